@@ -1,0 +1,1 @@
+"""Pictures, recipes and fonts that come with fluidwarp, read as package data."""

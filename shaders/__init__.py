@@ -1,0 +1,1 @@
+"""The GLSL sources, read as package data by `solver.program`."""

@@ -1,0 +1,149 @@
+"""The GPU as the solver sees it: one GL 3.3 context, its limits, its compiled passes and its float textures."""
+
+from __future__ import annotations
+
+import ctypes.util
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import moderngl
+import numpy as np
+
+from solver.field import DoubleField, Field
+from solver.timing import Timings
+
+if TYPE_CHECKING:
+    from solver.passes import Pass
+
+INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
+
+
+class ContextError(RuntimeError):
+    """No usable OpenGL 3.3; the message says why and what to install."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What this GL can do: names, version and the sizes that bound us."""
+
+    vendor: str
+    renderer: str
+    version: str
+    max_texture_size: int
+    max_draw_buffers: int
+    max_texture_units: int
+
+    @property
+    def is_software(self) -> bool:
+        """True on a software rasteriser, where instructions cost more than passes."""
+        return any(name in self.renderer.lower() for name in ("llvmpipe", "softpipe", "swiftshader"))
+
+
+class Device:
+    """One GL context and everything made in it.
+
+    Args:
+        ctx: a moderngl context, GL 3.3 core or later; use `Device.headless()` where there is no window.
+    """
+
+    def __init__(self, ctx: moderngl.Context, owns_context: bool = False) -> None:
+        self.ctx = ctx
+        self._owns_context = owns_context
+        info = ctx.info
+        self.limits = Limits(
+            vendor=str(info["GL_VENDOR"]),
+            renderer=str(info["GL_RENDERER"]),
+            version=str(info["GL_VERSION"]),
+            max_texture_size=int(info["GL_MAX_TEXTURE_SIZE"]),
+            max_draw_buffers=int(info["GL_MAX_DRAW_BUFFERS"]),
+            max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
+        )
+        self.timings = Timings(ctx)
+        self._passes: dict[tuple[str, tuple[tuple[str, object], ...]], Pass] = {}
+        self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
+        ctx.gc_mode = "auto"
+        ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+
+    @classmethod
+    def headless(cls) -> Device:
+        """A device of its own through EGL, with no window.
+
+        Raises:
+            ContextError: if EGL or an OpenGL 3.3 driver is missing; the message says what to install.
+        """
+        attempts: list[dict[str, str]] = [{}]
+        if ctypes.util.find_library("EGL"):
+            # Without the -dev packages only the versioned names exist.
+            attempts.append({"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
+        reason = ""
+        for libraries in attempts:
+            try:
+                ctx = moderngl.create_context(standalone=True, backend="egl", require=330, **libraries)
+            except Exception as error:  # glcontext raises plain Exception
+                reason = str(error)
+            else:
+                return cls(ctx, owns_context=True)
+        raise ContextError(f"no OpenGL 3.3 without a window ({reason}); {INSTALL_HINT}")
+
+    # -- what is made in it -----------------------------------------------------------------------------------------
+
+    def field(self, size: tuple[int, int], components: int = 1, label: str = "field", dtype: str = "f4") -> Field:
+        """A zeroed texture that can be drawn into; see `solver.field.Field`."""
+        return Field(self, size, components, label, dtype)
+
+    def double_field(self, size: tuple[int, int], components: int = 1, label: str = "field") -> DoubleField:
+        """A ping-pong pair of fields; see `solver.field.DoubleField`."""
+        return DoubleField(self, size, components, label)
+
+    def upload(self, array: np.ndarray, label: str = "upload", dtype: str | None = None) -> Field:
+        """A field holding `array`, `(h, w)` or `(h, w, c)`; dtype from the array: uint8 -> f1, else f4."""
+        array = np.asarray(array)
+        kind = dtype or ("f1" if array.dtype == np.uint8 else "f4")
+        components = 1 if array.ndim == 2 else array.shape[2]
+        field = Field(self, (array.shape[1], array.shape[0]), components, label, kind)
+        field.set(array)
+        return field
+
+    def pass_(self, shader: str, **defines: object) -> Pass:
+        """The pass of fragment shader `shader` (a path below `shaders/`), compiled once for each set of defines."""
+        from solver.passes import Pass
+
+        key = (shader, tuple(sorted(defines.items())))
+        if key not in self._passes:
+            self._passes[key] = Pass(self, shader, defines)
+        return self._passes[key]
+
+    def framebuffer(self, *fields: Field) -> moderngl.Framebuffer:
+        """The framebuffer that draws into `fields` at once, kept until one of them is released."""
+        if len(fields) == 1:
+            return fields[0].framebuffer
+        key = tuple(field.texture.glo for field in fields)
+        if key not in self._targets:
+            self._targets[key] = self.ctx.framebuffer([field.texture for field in fields])
+        return self._targets[key]
+
+    def forget_targets(self, field: Field) -> None:
+        """Drop the framebuffers that hold `field`, because it is being released."""
+        for key in [key for key in self._targets if field.texture.glo in key]:
+            self._targets.pop(key).release()
+
+    # -- its life ---------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Count and, when `timings.enabled`, time everything drawn inside under the stage's name."""
+        with self.timings.stage(name):
+            yield
+
+    def release(self) -> None:
+        """Give the context back, if it is ours; nothing made in it can be used afterwards."""
+        if self._owns_context:
+            self.ctx.release()
+
+    def __enter__(self) -> Device:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()

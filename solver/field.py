@@ -1,0 +1,121 @@
+"""Float textures that passes read from and draw into."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import moderngl
+import numpy as np
+
+if TYPE_CHECKING:
+    from solver.context import Device
+
+
+class FieldError(ValueError):
+    """A field of an impossible size, or data that does not fit it."""
+
+
+class Field:
+    """One texture with its framebuffer: nearest filtering, clamped to the edge.
+
+    Args:
+        device: the device it lives in.
+        size: (width, height) in texels, each from 1 to the GL's limit.
+        components: 1-4.
+        label: its name in errors and in a frame debugger.
+        dtype: "f4" (float32), "f1" (8-bit, read as 0-1) or "f2".
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
+        width, height = size
+        limit = device.limits.max_texture_size
+        # A texture that is too large, or empty, is returned without an error and fails much later.
+        if not (1 <= width <= limit and 1 <= height <= limit):
+            raise FieldError(f"{label}: {width} x {height} is outside 1 x 1 to {limit} x {limit} of this GL")
+        self.device = device
+        self.size = (width, height)
+        self.components = components
+        self.label = label
+        self.dtype = dtype
+        self.texture: moderngl.Texture = device.ctx.texture(self.size, components, dtype=dtype, alignment=1)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.texture.label = label
+        self.framebuffer: moderngl.Framebuffer = device.ctx.framebuffer([self.texture])
+        self.framebuffer.label = label
+        self.clear()
+
+    @property
+    def width(self) -> int:
+        return self.size[0]
+
+    @property
+    def height(self) -> int:
+        return self.size[1]
+
+    @property
+    def texel(self) -> tuple[float, float]:
+        """(1 / width, 1 / height)."""
+        return 1.0 / self.size[0], 1.0 / self.size[1]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return self.size[0] * self.size[1] * self.components * {"f1": 1, "f2": 2, "f4": 4}[self.dtype]
+
+    def clear(self, *values: float) -> None:
+        """Fill with `values`, by default zero."""
+        self.framebuffer.clear(*(values or (0.0,) * 4))
+
+    def set(self, array: np.ndarray) -> None:
+        """Write an array of shape (height, width) or (height, width, components), row 0 on top.
+
+        Raises:
+            FieldError: on another shape, or on a value that is not finite.
+        """
+        array = np.asarray(array)
+        shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
+        if array.shape != shape and array.shape != (*shape, 1):
+            raise FieldError(f"{self.label}: an array of shape {array.shape} was given, {shape} is wanted")
+        if self.dtype == "f1":
+            data = array.astype(np.uint8, copy=False)
+        else:
+            data = array.astype(np.float32 if self.dtype == "f4" else np.float16, copy=False)
+            if not np.isfinite(data).all():
+                raise FieldError(f"{self.label}: the array holds a value that is not finite")
+        self.texture.write(np.ascontiguousarray(data).tobytes())
+
+    def get(self) -> np.ndarray:
+        """Read back as an array of shape (height, width) or (height, width, components), row 0 on top."""
+        kind = {"f1": np.uint8, "f2": np.float16, "f4": np.float32}[self.dtype]
+        data = np.frombuffer(self.framebuffer.read(components=self.components, dtype=self.dtype, alignment=1), kind)
+        shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
+        return data.reshape(shape).copy()
+
+    def copy_from(self, other: Field) -> None:
+        """Take over the texels of `other`, which has the same size and components."""
+        self.device.ctx.copy_framebuffer(self.framebuffer, other.framebuffer)
+
+    def release(self) -> None:
+        """Free the texture; the field can no longer be used."""
+        self.device.forget_targets(self)
+        self.framebuffer.release()
+        self.texture.release()
+
+    def __repr__(self) -> str:
+        return f"Field({self.label}, {self.width} x {self.height} x {self.components} {self.dtype})"
+
+
+class DoubleField:
+    """A ping-pong pair: a pass reads `read`, draws into `write`, then `swap()` makes the result the one to read."""
+
+    def __init__(self, device: Device, size: tuple[int, int], components: int, label: str) -> None:
+        self.read = Field(device, size, components, f"{label} a")
+        self.write = Field(device, size, components, f"{label} b")
+
+    def swap(self) -> None:
+        self.read, self.write = self.write, self.read
+
+    def release(self) -> None:
+        self.read.release()
+        self.write.release()

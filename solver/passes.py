@@ -1,0 +1,73 @@
+"""A pass: one fragment shader drawn over the whole of its target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import moderngl
+
+from solver.field import Field
+from solver.program import ShaderError, assemble, compile_program, declared_reads
+
+if TYPE_CHECKING:
+    from solver.context import Device
+
+Target = Field | Sequence[Field]
+
+
+class Pass:
+    """One full-screen draw of a fragment shader, with its inputs given by name.
+
+    `pass_(target, velocity=field, dt=0.1)` sets `uniform sampler2D u_velocity` and `uniform float u_dt`, and draws into
+    `target`, a field or several (the outputs in the order of their locations). Texture units are given out once.
+
+    Raises:
+        ShaderError: if the shader does not compile, or an input is none of its uniforms.
+    """
+
+    def __init__(self, device: Device, shader: str, defines: dict[str, object]) -> None:
+        self.device = device
+        self.shader = shader
+        self.reads = declared_reads(shader)
+        self._source, _ = assemble(shader, defines)
+        self.program = compile_program(device.ctx, shader, defines)
+        self.program.label = shader
+        self._vertices = device.ctx.vertex_array(self.program, [])
+        self._uniforms: dict[str, moderngl.Uniform] = {}
+        self._units: dict[str, int] = {}
+        for name in self.program:
+            member = self.program[name]
+            if isinstance(member, moderngl.Uniform):
+                self._uniforms[name] = member
+                if member.gl_type == 0x8B5E:  # GL_SAMPLER_2D
+                    self._units[name] = member.value = len(self._units)
+
+    def __call__(self, target: Target, **inputs: object) -> None:
+        fields = (target,) if isinstance(target, Field) else tuple(target)
+        for name, value in inputs.items():
+            self._bind(f"u_{name}", value)
+        self.device.framebuffer(*fields).use()
+        self._vertices.render(moderngl.TRIANGLES, vertices=3)
+        self.device.timings.count(fields[0].width * fields[0].height, self.reads)
+
+    def draw_into(self, framebuffer: moderngl.Framebuffer, **inputs: object) -> None:
+        """Draw over the viewport of a framebuffer that is not a field's, such as the window's."""
+        for name, value in inputs.items():
+            self._bind(f"u_{name}", value)
+        framebuffer.use()
+        self._vertices.render(moderngl.TRIANGLES, vertices=3)
+
+    def _bind(self, name: str, value: object) -> None:
+        uniform = self._uniforms.get(name)
+        if uniform is None:
+            # The compiler drops uniforms it has no use for; only a name the source does not know is a mistake.
+            if name not in self._source:
+                raise ShaderError(f"shaders/{self.shader} has no uniform {name}")
+            return
+        if isinstance(value, Field):
+            value.texture.use(self._units[name])
+        elif isinstance(value, moderngl.Texture):
+            value.use(self._units[name])
+        else:
+            uniform.value = value  # pyright: ignore[reportAttributeAccessIssue]

@@ -1,0 +1,78 @@
+"""Compiling GLSL from `shaders/`: includes, defines, and errors that name the file and the line."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from importlib import resources
+from pathlib import PurePosixPath
+
+import moderngl
+
+_INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
+_READS = re.compile(r"^//\s*reads:\s*(\d+)", re.MULTILINE)
+# Mesa: "0:12(5): error: ..."; NVIDIA: "0(12) : error ...".
+_LOG_LINE = re.compile(r"\b0(?::(\d+)\(\d+\)|\((\d+)\))")
+
+FULL_SCREEN_VERTEX = "lib/full_screen.vert"
+
+
+class ShaderError(RuntimeError):
+    """A shader that is missing, does not compile, or is given a uniform it does not declare."""
+
+
+@cache
+def read_shader(path: str) -> str:
+    """The text of `shaders/<path>`."""
+    try:
+        return resources.files("shaders").joinpath(*PurePosixPath(path).parts).read_text("utf-8")
+    except (FileNotFoundError, IsADirectoryError) as error:
+        raise ShaderError(f"shaders/{path} does not exist") from error
+
+
+def _flatten(path: str, seen: set[str]) -> list[tuple[str, str, int]]:
+    """The lines of a shader with its includes laid in once each, as (text, file, line number)."""
+    lines: list[tuple[str, str, int]] = []
+    for number, text in enumerate(read_shader(path).splitlines(), 1):
+        if match := _INCLUDE.match(text):
+            included = match.group(1)
+            if included not in seen:
+                seen.add(included)
+                lines += _flatten(included, seen)
+        else:
+            lines.append((text, path, number))
+    return lines
+
+
+def assemble(path: str, defines: dict[str, object]) -> tuple[str, list[tuple[str, int]]]:
+    """The GLSL handed to the driver, and for each of its lines the file and line it comes from."""
+    head = [("#version 330 core", path, 0)]
+    head += [(f"#define {name} {value}", path, 0) for name, value in sorted(defines.items())]
+    lines = head + _flatten(path, {path})
+    return "\n".join(text for text, _, _ in lines) + "\n", [(file, number) for _, file, number in lines]
+
+
+def declared_reads(path: str) -> int:
+    """Texel reads a fragment, as the header of the shader states them in a line `// reads: N`."""
+    match = _READS.search(read_shader(path))
+    return int(match.group(1)) if match else 0
+
+
+def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, object]) -> moderngl.Program:
+    """The full-screen program of a fragment shader.
+
+    Raises:
+        ShaderError: if it does not compile; names the file and the line, includes resolved.
+    """
+    vertex_source, _ = assemble(FULL_SCREEN_VERTEX, {})
+    source, table = assemble(fragment, defines)
+
+    def place(match: re.Match[str]) -> str:
+        line = int(match.group(1) or match.group(2))
+        file, number = table[min(line, len(table)) - 1]
+        return f"shaders/{file}:{number}"
+
+    try:
+        return ctx.program(vertex_shader=vertex_source, fragment_shader=source)
+    except moderngl.Error as error:
+        raise ShaderError(f"shaders/{fragment} does not compile:\n{_LOG_LINE.sub(place, str(error))}") from error

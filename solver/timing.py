@@ -1,0 +1,58 @@
+"""How often and how long each stage of a step ran."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import moderngl
+
+
+class Timings:
+    """Passes, texel reads and, when `enabled`, milliseconds by stage, since the last `take()`.
+
+    Timing waits for the GPU at both ends of every stage, which slows a step down: it is off unless asked for.
+    It measures, and never steers: nothing that is simulated depends on it.
+    """
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._stage = "other"
+        self.enabled = False
+        self.milliseconds: dict[str, float] = defaultdict(float)
+        self.passes: dict[str, int] = defaultdict(int)
+        self.texel_reads: dict[str, int] = defaultdict(int)
+        self.texel_writes: dict[str, int] = defaultdict(int)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Book everything drawn inside under `name`; stages do not nest, the inner name is ignored."""
+        if self._stage != "other":
+            yield
+            return
+        self._stage = name
+        if self.enabled:
+            self._ctx.finish()
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            if self.enabled:
+                self._ctx.finish()
+                self.milliseconds[name] += (time.perf_counter() - start) * 1e3
+            self._stage = "other"
+
+    def count(self, pixels: int, reads: int) -> None:
+        """Book one pass over `pixels` texels with `reads` texel reads each."""
+        self.passes[self._stage] += 1
+        self.texel_reads[self._stage] += pixels * reads
+        self.texel_writes[self._stage] += pixels
+
+    def take(self) -> dict[str, float]:
+        """Milliseconds by stage since the last call; starts anew."""
+        taken = dict(self.milliseconds)
+        for book in (self.milliseconds, self.passes, self.texel_reads, self.texel_writes):
+            book.clear()
+        return taken
