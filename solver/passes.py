@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from solver.context import Device
 
 Target = Field | Sequence[Field]
+Region = tuple[int, int, int, int]
 
 
 class Pass:
@@ -43,13 +44,37 @@ class Pass:
                 if member.gl_type == 0x8B5E:  # GL_SAMPLER_2D
                     self._units[name] = member.value = len(self._units)
 
-    def __call__(self, target: Target, **inputs: object) -> None:
+    def __call__(self, target: Target, *, add: bool = False, region: Region | None = None, **inputs: object) -> None:
+        """Draw into `target`.
+
+        Args:
+            target: a field, or several fields of one size.
+            add: add to what the target holds (float blending) instead of replacing it.
+            region: (x, y, width, height) in texels, to draw only there; clipped to the target.
+            inputs: the shader's uniforms without their `u_`.
+        """
         fields = (target,) if isinstance(target, Field) else tuple(target)
         for name, value in inputs.items():
             self._bind(f"u_{name}", value)
-        self.device.framebuffer(*fields).use()
+        framebuffer = self.device.framebuffer(*fields)
+        width, height = fields[0].size
+        if region is not None:
+            x, y = max(region[0], 0), max(region[1], 0)
+            width, height = min(region[0] + region[2], width) - x, min(region[1] + region[3], height) - y
+            if width <= 0 or height <= 0:
+                return
+            framebuffer.scissor = (x, y, width, height)
+        ctx = self.device.ctx
+        if add:
+            ctx.enable_only(moderngl.BLEND)
+            ctx.blend_func = moderngl.ONE, moderngl.ONE
+        framebuffer.use()
         self._vertices.render(moderngl.TRIANGLES, vertices=3)
-        self.device.timings.count(fields[0].width * fields[0].height, self.reads)
+        if add:
+            ctx.enable_only(moderngl.NOTHING)
+        if region is not None:
+            framebuffer.scissor = None
+        self.device.timings.count(width * height, self.reads)
 
     def draw_into(self, framebuffer: moderngl.Framebuffer, **inputs: object) -> None:
         """Draw over the viewport of a framebuffer that is not a field's, such as the window's."""
