@@ -1,0 +1,37 @@
+// Velocity on the MAC grid: u on left faces in R, v on upper faces in G (see CONTRIBUTING.md).
+#include "lib/walls.glsl"
+
+// Velocity at position p (in cells, (0,0) the top left corner of the grid), each component bilinear between its faces.
+// 8 reads, by texture() with nearest filtering: exact at texel centres, and cheaper than texelFetch in software.
+vec2 mac_velocity(sampler2D velocity, vec2 p) {
+    vec2 size = vec2(textureSize(velocity, 0)), texel = 1.0 / size;
+    // u lives at (i, j + .5), v at (i + .5, j).
+    vec2 qu = p - vec2(0.0, 0.5), qv = p - vec2(0.5, 0.0);
+    vec2 cu = floor(qu), cv = floor(qv), fu = qu - cu, fv = qv - cv;
+    float add_u, add_v;
+    vec2 ux = wall_normal(vec2(1.0 - fu.x, fu.x), vec2(cu.x, cu.x + 1.0), size.x);
+    vec2 uy = wall_tangential(vec2(1.0 - fu.y, fu.y), vec2(cu.y, cu.y + 1.0), size.y, u_wall_speed.zw, add_u);
+    vec2 vx = wall_tangential(vec2(1.0 - fv.x, fv.x), vec2(cv.x, cv.x + 1.0), size.x, u_wall_speed.xy, add_v);
+    vec2 vy = wall_normal(vec2(1.0 - fv.y, fv.y), vec2(cv.y, cv.y + 1.0), size.y);
+    vec4 tu = vec4(cu + 0.5, cu + 1.5) * texel.xyxy, tv = vec4(cv + 0.5, cv + 1.5) * texel.xyxy;
+    vec4 u = vec4(texture(velocity, tu.xy).r, texture(velocity, tu.zy).r,
+                  texture(velocity, tu.xw).r, texture(velocity, tu.zw).r);
+    vec4 v = vec4(texture(velocity, tv.xy).g, texture(velocity, tv.zy).g,
+                  texture(velocity, tv.xw).g, texture(velocity, tv.zw).g);
+    return vec2(dot(u, vec4(ux * uy.x, ux * uy.y)) + add_u, dot(v, vec4(vx * vy.x, vx * vy.y)) + add_v);
+}
+
+// Velocity at the centre of the cell at p (in cells): the mean of opposite faces. 3 reads.
+vec2 mac_centre(sampler2D velocity, vec2 p) {
+    vec2 size = vec2(textureSize(velocity, 0)), texel = 1.0 / size, uv = p * texel;
+    vec2 beyond = vec2(texture(velocity, uv + vec2(texel.x, 0.0)).r, texture(velocity, uv + vec2(0.0, texel.y)).g);
+    return 0.5 * (texture(velocity, uv).rg + beyond * vec2(lessThan(p + 1.0, size)));
+}
+
+// Where the fluid at position p (in cells) was `dt_over_h` ago: second-order (midpoint) backtrace, kept in the grid.
+// `here` is the velocity at p.
+vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, float dt_over_h) {
+    vec2 edge = vec2(textureSize(velocity, 0));
+    vec2 middle = clamp(p - 0.5 * dt_over_h * here, vec2(0.0), edge);
+    return clamp(p - dt_over_h * mac_velocity(velocity, middle), vec2(0.0), edge);
+}

@@ -1,0 +1,39 @@
+// Advect: w2(x) = decay w1(x - dt w1(x)), semi-Lagrangian (paper section 3.2, second stage), each component at its own
+// faces, interpolated by a four-point cubic in both directions.
+// u_velocity: MAC faces, lengths / s; u_trace: backtrace of the cell centres, cells; u_decay: exp(-drag dt).
+// reads: 19
+//
+// A face's departure is the mean of those of the two cells it parts. The 4 x 4 faces around the departure of u and of v
+// are the same texels unless the flow strains by more than half a cell a step, so both are read at once, around the mean
+// departure, and each weighs them for its own place.
+#include "lib/cubic.glsl"
+#include "lib/walls.glsl"
+uniform sampler2D u_velocity;
+uniform sampler2D u_trace;
+uniform float u_decay;
+in vec2 v_uv;
+layout(location = 0) out vec2 out_velocity;
+
+void main() {
+    vec2 size = vec2(textureSize(u_velocity, 0)), texel = 1.0 / size, cell = floor(gl_FragCoord.xy);
+    vec2 here = texture(u_trace, v_uv).rg;
+    vec2 to_u = 0.5 * (here + texture(u_trace, v_uv - vec2(texel.x, 0.0)).rg);
+    vec2 to_v = 0.5 * (here + texture(u_trace, v_uv - vec2(0.0, texel.y)).rg);
+    vec2 corner = floor(cell + 0.5 * (to_u + to_v));
+    vec2 fu = clamp(cell + to_u - corner, -0.5, 1.5), fv = clamp(cell + to_v - corner, -0.5, 1.5);
+    vec4 column = corner.x + vec4(-1.0, 0.0, 1.0, 2.0), row = corner.y + vec4(-1.0, 0.0, 1.0, 2.0);
+    float add_u, add_v;
+    vec4 ux = wall_normal(cubic_lagrange(fu.x), column, size.x);
+    vec4 uy = wall_tangential(cubic_lagrange(fu.y), row, size.y, u_wall_speed.zw, add_u);
+    vec4 vx = wall_tangential(cubic_lagrange(fv.x), column, size.x, u_wall_speed.xy, add_v);
+    vec4 vy = wall_normal(cubic_lagrange(fv.y), row, size.y);
+    vec4 x = (column + 0.5) * texel.x, y = (row + 0.5) * texel.y;
+    vec2 sum = vec2(add_u, add_v);
+    for (int j = 0; j < 4; ++j) {
+        vec2 a = texture(u_velocity, vec2(x.x, y[j])).rg, b = texture(u_velocity, vec2(x.y, y[j])).rg;
+        vec2 c = texture(u_velocity, vec2(x.z, y[j])).rg, d = texture(u_velocity, vec2(x.w, y[j])).rg;
+        sum += vec2(uy[j] * dot(ux, vec4(a.r, b.r, c.r, d.r)), vy[j] * dot(vx, vec4(a.g, b.g, c.g, d.g)));
+    }
+    // The near walls' faces stay at zero.
+    out_velocity = u_decay * sum * vec2(greaterThan(cell, vec2(0.5)));
+}
