@@ -63,6 +63,7 @@ class Device:
         self.timings = Timings(ctx)
         self._passes: dict[tuple[str, tuple[tuple[str, object], ...]], Pass] = {}
         self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
+        self._rest = ctx.simple_framebuffer((1, 1))
         ctx.gc_mode = "auto"
         ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
 
@@ -126,6 +127,8 @@ class Device:
 
     def forget_targets(self, field: Field) -> None:
         """Drop the framebuffers that hold `field`, because it is being released."""
+        # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
+        self._rest.use()
         for key in [key for key in self._targets if field.texture.glo in key]:
             self._targets.pop(key).release()
 
