@@ -36,6 +36,33 @@ def frozen(data: Any) -> Any:
     return data
 
 
+def plain(model: BaseModel) -> dict[str, Any]:
+    """The model as tables, lists and values, in the order TOML is written in, without what is as by default.
+
+    What tells the members of a union apart is always there. `frozen(plain(model))` validates to an equal model.
+    """
+    tags = _literals(type(model))
+    told = {
+        name: _plain_value(getattr(model, name))
+        for name, field in type(model).model_fields.items()
+        if getattr(model, name) in tags or getattr(model, name) != field.default
+    }
+    # A single value after a table would belong to the table.
+    return dict(sorted(told.items(), key=lambda item: _rank(item[1])))
+
+
+def _plain_value(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        return plain(value)
+    return [_plain_value(item) for item in value] if isinstance(value, (tuple, list)) else value
+
+
+def _rank(value: Any) -> int:
+    if isinstance(value, dict):
+        return 1
+    return 2 if isinstance(value, list) and any(isinstance(item, dict) for item in value) else 0
+
+
 def complaint(error: ValidationError, model: type[BaseModel], data: Any, text: str, source: str) -> UserError:
     """The first fault that pydantic found in `data`, as one sentence for the person who wrote it.
 
@@ -53,7 +80,7 @@ def complaint(error: ValidationError, model: type[BaseModel], data: Any, text: s
     line = line_of(text, path)
     where = f"{source}, line {line}: " if line else f"{source}: "
     others = f" ({len(faults) - 1} more after this one)" if len(faults) > 1 else ""
-    return UserError(f"{where}{_sentence(fault, path, model)}{others}")
+    return UserError(f"{where}{_sentence(fault, path, data, model)}{others}")
 
 
 def _path_in(data: Any, loc: tuple[int | str, ...]) -> list[int | str]:
@@ -68,29 +95,39 @@ def _path_in(data: Any, loc: tuple[int | str, ...]) -> list[int | str]:
     return path
 
 
-def dotted(path: list[int | str]) -> str:
-    """`force[2].radius`, counted from 1, as a person counts the tables of a file."""
-    name = ""
+def named(path: list[int | str], data: Any) -> tuple[str, str]:
+    """The table and the key of `path` as a person calls them: ('force 2 "wind": ', "radius"), counted from 1."""
+    table, key = "", ""
     for item in path:
-        name += f"[{item + 1}]" if isinstance(item, int) else f".{item}" if name else item
-    return name or "the file"
+        data = data[item] if isinstance(data, dict) and item in data else _item(data, item)
+        if isinstance(item, int) and isinstance(data, dict):
+            title = data.get("name")
+            table, key = f"{table}{key} {item + 1}" + (f' "{title}"' if title else "") + ": ", ""
+        else:
+            key += f"[{item + 1}]" if isinstance(item, int) else f".{item}" if key else item
+    return table, key
 
 
-def _sentence(fault: Any, path: list[int | str], model: type[BaseModel]) -> str:
-    name, kind, context, given = dotted(path), fault["type"], fault.get("ctx", {}), fault["input"]
+def _item(data: Any, item: int | str) -> Any:
+    return data[item] if isinstance(data, (list, tuple)) and isinstance(item, int) and item < len(data) else None
+
+
+def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseModel]) -> str:
+    kind, context, given = fault["type"], fault.get("ctx", {}), fault["input"]
+    table, key = named(path, data)
     if kind == "extra_forbidden":
         known = sorted(_known_keys(model, fault["loc"][:-1]))
         near = difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
-        return f"unknown key {name!r}; {hint}"
+        return f"{table}unknown key {key!r}; {hint}"
     if kind == "missing":
-        return f"{name!r} is missing"
+        return f"{table}{key!r} is missing"
     if kind in ("union_tag_not_found", "union_tag_invalid"):
-        key = str(context["discriminator"]).strip("'")
-        choices = context.get("expected_tags") or ", ".join(repr(tag) for tag in _tags(model, fault["loc"]))
-        return f"'{name}.{key}' must be one of {choices}" + (f", not {context['tag']!r}" if "tag" in context else "")
+        tag = str(context["discriminator"]).strip("'")
+        choices = ", ".join(repr(tag) for tag in _tags(model, fault["loc"]))
+        return f"{table}{tag!r} must be one of {choices}" + (f", not {context['tag']!r}" if "tag" in context else "")
     if kind == "value_error":
-        return f"{name}: {context['error']}" if path else str(context["error"])
+        return f"{table}{key}{': ' if key else ''}{context['error']}"
     wanted = {
         "float_type": "a number",
         "int_type": "a whole number",
@@ -113,9 +150,10 @@ def _sentence(fault: Any, path: list[int | str], model: type[BaseModel]) -> str:
         "string_too_short": "a text that is not empty",
     }.get(kind)
     if wanted is None:
-        return f"{name}: {fault['msg']}"
-    given = f", not {_shown(given)}" if kind != "too_short" or given else ", and is empty"
-    return f"{name!r} must be {wanted.format(**context)}{given}"
+        return f"{table}{key}: {fault['msg']}"
+    bounds = {name: f"{bound:g}" if isinstance(bound, float) else bound for name, bound in context.items()}
+    but = f", not {_shown(given)}" if kind != "too_short" or given else ", and is empty"
+    return f"{table}{key!r} must be {wanted.format(**bounds)}{but}"
 
 
 def _shown(value: Any) -> str:
