@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -178,7 +178,7 @@ class Recipe(Model):
         if self.duration / self.fluid.dt > MOST_TICKS:
             raise ValueError(f"'duration' / 'fluid.dt' is more than {MOST_TICKS} ticks; make dt larger")
         ticks = [change.tick for change in self.change]
-        if any(later < earlier for earlier, later in zip(ticks, ticks[1:], strict=False)):
+        if any(later < earlier for earlier, later in pairwise(ticks)):
             raise ValueError("the ticks of [[change]] must not go backwards")
         return self
 

@@ -191,7 +191,9 @@ def _tags(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
     models = [model]
     for item in loc:
         if not isinstance(item, int):
-            models = [part for model in models if item in model.model_fields for part in _models_in(_field(model, item))]
+            models = [
+                part for model in models if item in model.model_fields for part in _models_in(_field(model, item))
+            ]
     return [tag for model in models for tag in _literals(model)[:1]]
 
 

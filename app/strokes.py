@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
 from app.schema import Fraction01, Model, Place, Radius
 
-Tool = Literal[
-    "push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"
-]
+Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
 Tick = Annotated[int, Field(ge=0, le=10_000_000)]
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
@@ -31,7 +30,7 @@ class Stroke(Model):
 
     Between two samples the pointer moved at a constant speed, so that a stroke does not depend on how often the pointer
     was sampled: during tick n (the step from n to n + 1) the brush passes the path from time n - 1 to time n. A tool
-    that acts while it stands still (twirl, bloat, thicken ...) acts in every tick from the first sample's to the last's.
+    that acts while it stands still (twirl, bloat, thicken ...) acts in every tick from the first sample to the last.
     A curve acts all at once, in the tick of its last sample, along the whole path.
 
     Attributes:
@@ -51,7 +50,7 @@ class Stroke(Model):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         ticks = [sample[0] for sample in self.samples]
-        if any(later < earlier for earlier, later in zip(ticks, ticks[1:], strict=False)):
+        if any(later < earlier for earlier, later in pairwise(ticks)):
             raise ValueError("the ticks of the samples must not go backwards")
         if self.tool == "curve" and len(self.samples) < 2:
             raise ValueError("a curve needs at least two samples")
@@ -95,9 +94,7 @@ class Stroke(Model):
         if len(points) == 1:
             _, x, y, pressure = points[0]
             return (Dab(x, y, x, y, pressure),)
-        return tuple(
-            Dab(a[1], a[2], b[1], b[2], (a[3] + b[3]) / 2) for a, b in zip(points, points[1:], strict=False)
-        )
+        return tuple(Dab(a[1], a[2], b[1], b[2], (a[3] + b[3]) / 2) for a, b in pairwise(points))
 
     def agrees_until(self, other: Stroke) -> int:
         """The tick before which both strokes do the same; at least the earlier one's first."""
