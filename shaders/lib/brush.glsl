@@ -1,0 +1,20 @@
+// The shape of a brush drawn from a to b: everything in lengths.
+uniform vec4 u_segment;   // a.xy, b.xy
+uniform float u_radius;
+uniform float u_hardness; // 0 soft, 1 hard
+
+// The point of the segment nearest to x.
+vec2 brush_nearest(vec2 x) {
+    vec2 a = u_segment.xy, along = u_segment.zw - a;
+    float length2 = dot(along, along);
+    return a + along * (length2 > 0.0 ? clamp(dot(x - a, along) / length2, 0.0, 1.0) : 0.0);
+}
+
+// 1 inside the hard core, falling smoothly (twice differentiable) to 0 at the radius.
+float brush_falloff(float distance_to_path) {
+    float core = 0.9 * u_hardness * u_radius;
+    float q = clamp((distance_to_path - core) / (u_radius - core), 0.0, 1.0), w = 1.0 - q * q;
+    return w * w * w;
+}
+
+float brush_weight(vec2 x) { return brush_falloff(distance(x, brush_nearest(x))); }

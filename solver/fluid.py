@@ -1,0 +1,199 @@
+"""The fluid: Stable Fluids with spatially varying viscosity, in the paper's order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.context import Device
+from solver.field import DoubleField, Field
+from solver.grid import Grid
+from solver.multigrid import Pressure
+from solver.params import FluidParams
+from solver.viscosity import Viscosity
+
+# A force field on the grid's faces, and its time law integrated over the tick (seconds).
+Force = tuple[Field, float]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How fast the fluid moves: what stop conditions and statistics look at."""
+
+    kinetic_energy: float
+    largest_speed: float
+
+
+class Fluid:
+    """An incompressible fluid of spatially varying viscosity on a MAC grid.
+
+    Everything is in the units of CONTRIBUTING.md: the longer side of the picture is 1, y points down, velocities are
+    lengths per second. Paper: section 3, equation (4).
+
+    Args:
+        device: where it lives.
+        grid: its cells; see `Grid.for_picture`.
+        params: walls, drag, cycles; may be replaced between steps.
+    """
+
+    def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
+        self.device = device
+        self.grid = grid
+        self.params = params or FluidParams()
+        self.velocity = device.double_field(grid.size, 2, "velocity")
+        self.viscosity = device.field(grid.size, 1, "viscosity")
+        self.solid = device.field(grid.size, 1, "solid", "f1")
+        self.source = device.field(grid.size, 1, "divergence source")
+        self._trace = device.field(grid.size, 2, "trace")
+        self._has_source = False
+        self._solids_changed = True
+        self._coefficients_of: object = None
+        self._viscosity_solver = Viscosity(device, grid.size)
+        self._pressure_solver = Pressure(device, grid.size)
+
+    # -- the paper's step -------------------------------------------------------------------------------------------
+
+    def step(self, dt: float, forces: Iterable[Force] = ()) -> None:
+        """Advance by `dt` seconds: w0 -> add force -> w1 -> advect -> w2 -> diffuse -> w3 -> project -> w4."""
+        self.add_force(forces)
+        self.advect(dt)
+        self.diffuse(dt)
+        self.project()
+
+    def add_force(self, forces: Iterable[Force]) -> None:
+        """w1 = w0 + dt f, f the sum of the forces; brushes have drawn theirs into w0 already."""
+        with self.device.stage("add force"):
+            add = self.device.pass_("stages/add_force.frag")
+            for force, impulse in forces:
+                if impulse != 0.0:
+                    add(self.velocity.read, add=True, force=force, impulse=impulse)
+
+    def advect(self, dt: float) -> None:
+        """w2(x) = w1(x - dt w1(x)): second-order backtrace, cubic interpolation; drag acts on the way."""
+        with self.device.stage("advect"):
+            walls = self._wall_inputs()
+            trace = self.device.pass_("stages/trace.frag", **self._wall_defines())
+            trace(self._trace, velocity=self.velocity.read, dt_over_h=dt / self.grid.h, **walls)
+            advect = self.device.pass_("stages/advect.frag", **self._wall_defines())
+            decay = math.exp(-self.params.drag * dt)
+            advect(self.velocity.write, velocity=self.velocity.read, trace=self._trace, decay=decay, **walls)
+            self.velocity.swap()
+
+    def diffuse(self, dt: float) -> None:
+        """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled."""
+        with self.device.stage("diffuse"):
+            key = (dt, self.params.walls)
+            if key != self._coefficients_of:
+                self._viscosity_solver.set_coefficients(self.viscosity, self.solid, dt, self.params.walls)
+                self._coefficients_of = key
+            self._viscosity_solver.diffuse(self.velocity)
+
+    def project(self) -> None:
+        """w4 = w3 - grad q with lap q = div w3 - source: divergence-free but for the brushes' sources."""
+        with self.device.stage("project"):
+            if self._solids_changed:
+                self._pressure_solver.set_solids(self.solid)
+                self._solids_changed = False
+            source = self.source if self._has_source else None
+            self._pressure_solver.project(self.velocity, self.params.pressure_cycles, source)
+            if self._has_source:
+                self.source.clear()
+                self._has_source = False
+
+    # -- what is put in ---------------------------------------------------------------------------------------------
+
+    def set_velocity(self, array: np.ndarray) -> None:
+        """Set u on left faces and v on upper faces from (ny, nx, 2); the walls' own faces become zero."""
+        faces = np.array(array, np.float32)
+        faces[:, 0, 0] = 0.0
+        faces[0, :, 1] = 0.0
+        self.velocity.read.set(faces)
+
+    def set_viscosity(self, viscosity: np.ndarray | float) -> None:
+        """Set the viscosity of the cells, lengths^2 / s, from (ny, nx) or one number.
+
+        Raises:
+            ValueError: if a value is negative or not finite.
+        """
+        array = np.broadcast_to(np.asarray(viscosity, np.float32), (self.grid.ny, self.grid.nx))
+        if not (np.isfinite(array).all() and (array >= 0).all()):
+            raise ValueError("viscosity must be finite and not negative everywhere")
+        self.viscosity.set(array)
+        self.masks_changed()
+
+    def set_solid(self, solid: np.ndarray) -> None:
+        """Freeze the cells where the (ny, nx) array is true or non-zero: their faces do not move."""
+        self.solid.set(np.where(np.asarray(solid), 255, 0).astype(np.uint8))
+        self.masks_changed()
+
+    def masks_changed(self) -> None:
+        """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
+        self._coefficients_of = None
+        self._solids_changed = True
+
+    def add_source(self, source: Field, amount: float = 1.0) -> None:
+        """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
+        self.device.pass_("stages/add_source.frag")(self.source, add=True, source=source, amount=amount)
+        self.source_drawn()
+
+    def source_drawn(self) -> None:
+        """Say that something was drawn into `source`; the next projection uses it up."""
+        self._has_source = True
+
+    # -- what is read out -------------------------------------------------------------------------------------------
+
+    def faces(self) -> Field:
+        """The velocity on MAC faces, as the warp map, the overlays and the density take it."""
+        return self.velocity.read
+
+    def velocity_at_centres(self) -> np.ndarray:
+        """Velocity at cell centres, (ny, nx, 2) float32."""
+        faces = np.pad(self.faces().get(), ((0, 1), (0, 1), (0, 0)))
+        return 0.5 * np.stack([faces[:-1, :-1, 0] + faces[:-1, 1:, 0], faces[:-1, :-1, 1] + faces[1:, :-1, 1]], axis=-1)
+
+    def divergence(self) -> np.ndarray:
+        """Divergence of the velocity, (ny, nx) float32, 1 / s."""
+        faces = np.pad(self.velocity.read.get(), ((0, 1), (0, 1), (0, 0)))
+        return (faces[:-1, 1:, 0] - faces[:-1, :-1, 0] + faces[1:, :-1, 1] - faces[:-1, :-1, 1]) / np.float32(self.grid.h)
+
+    def pressure(self) -> np.ndarray:
+        """The last projection's q, (ny, nx) float32, lengths^2 / s: pressure times dt."""
+        return self._pressure_solver.pressure
+
+    def motion(self) -> Motion:
+        """Kinetic energy (integral of |v|^2 / 2) and largest speed; reads the velocity back."""
+        speed = np.linalg.norm(self.velocity_at_centres().astype(np.float64), axis=-1)
+        return Motion(float(0.5 * (speed**2).sum() * self.grid.h**2), float(speed.max()))
+
+    # -- checkpoints ------------------------------------------------------------------------------------------------
+
+    def state(self) -> Sequence[Field]:
+        """The fields that a later step depends on, for checkpoints: copies of them bring this moment back exactly."""
+        return (self.velocity.read, self.viscosity, self.solid, *self._pressure_solver.state())
+
+    def load(self, state: Sequence[Field]) -> None:
+        """Go back to copies of `state()` taken earlier."""
+        for field, saved in zip(self.state(), state, strict=True):
+            field.copy_from(saved)
+        self.masks_changed()
+
+    def clear_velocity(self) -> None:
+        """Stop all motion, and forget the pressure that went with it."""
+        self.velocity.read.clear()
+        self._pressure_solver.clear()
+
+    def release(self) -> None:
+        """Free the textures."""
+        for item in (self.velocity, self.viscosity, self.solid, self.source, self._trace):
+            item.release()
+        self._viscosity_solver.release()
+        self._pressure_solver.release()
+
+    def _wall_defines(self) -> dict[str, object]:
+        return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
+
+    def _wall_inputs(self) -> dict[str, object]:
+        return {"wall_speed": self.params.walls.speed} if self.params.walls.slip == "none" else {}

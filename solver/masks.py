@@ -1,0 +1,90 @@
+"""Painted masks: how thick the fluid is and where it is frozen, over what the recipe sets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solver.brush import Tip
+from solver.context import Device
+from solver.field import DoubleField, Field
+from solver.fluid import Fluid
+from solver.grid import Grid
+
+# Decades that painting may thin or thicken the fluid by, and the viscosity it starts from where there is none.
+THINNEST, THICKEST = -3.0, 5.0
+LEAST_VISCOSITY = 1e-6
+
+
+class Masks:
+    """Thickness (decades of viscosity) and frozenness painted by hand, and the base they are painted over.
+
+    Args:
+        device: where they live.
+        grid: of the fluid they are for.
+    """
+
+    def __init__(self, device: Device, grid: Grid) -> None:
+        self.device = device
+        self.grid = grid
+        self.base_viscosity = device.field(grid.size, 1, "base viscosity")
+        self.base_frozen = device.field(grid.size, 1, "base frozen")
+        self.thickness = device.double_field(grid.size, 1, "painted thickness")
+        self.frozen = device.double_field(grid.size, 1, "painted frozen")
+
+    def set_base(self, viscosity: np.ndarray | float, frozen: np.ndarray | None = None) -> None:
+        """Set what is painted over: viscosity in lengths^2 / s, and frozen cells, each (ny, nx)."""
+        shape = (self.grid.ny, self.grid.nx)
+        self.base_viscosity.set(np.broadcast_to(np.asarray(viscosity, np.float32), shape))
+        self.base_frozen.set(np.zeros(shape, np.float32) if frozen is None else np.asarray(frozen, np.float32))
+
+    def thicken(self, tip: Tip, decades: float) -> None:
+        """Thicken by `decades` at the tip's centre; negative thins."""
+        self._paint(self.thickness, tip, add=decades, limits=(THINNEST, THICKEST))
+
+    def freeze(self, tip: Tip, amount: float) -> None:
+        """Freeze by `amount` (0-1); negative thaws."""
+        self._paint(self.frozen, tip, mix=min(abs(amount), 1.0), towards=1.0 if amount > 0 else -1.0)
+
+    def smooth(self, tip: Tip, strength: float) -> None:
+        """Smooth both masks under the tip."""
+        for mask in (self.thickness, self.frozen):
+            inputs = tip.inputs(self.grid)
+            self.device.pass_("brush/smooth.frag")(mask.write, mask=mask.read, strength=strength, **inputs)
+            mask.swap()
+
+    def clear(self) -> None:
+        """Take all paint off."""
+        self.thickness.read.clear()
+        self.frozen.read.clear()
+
+    def apply(self, fluid: Fluid) -> None:
+        """Give the fluid its viscosity and solid cells; the next step takes them up."""
+        self.device.pass_("stages/compose_masks.frag")(
+            (fluid.viscosity, fluid.solid),
+            base_viscosity=self.base_viscosity,
+            base_frozen=self.base_frozen,
+            thickness=self.thickness.read,
+            frozen=self.frozen.read,
+            least=LEAST_VISCOSITY,
+        )
+        fluid.masks_changed()
+
+    def state(self) -> Sequence[Field]:
+        """The painted fields, for checkpoints."""
+        return self.thickness.read, self.frozen.read
+
+    def load(self, state: Sequence[Field]) -> None:
+        """Go back to copies of `state()` taken earlier; call `apply` after it."""
+        for field, saved in zip(self.state(), state, strict=True):
+            field.copy_from(saved)
+
+    def release(self) -> None:
+        for item in (self.base_viscosity, self.base_frozen, self.thickness, self.frozen):
+            item.release()
+
+    def _paint(self, mask: DoubleField, tip: Tip, **inputs: object) -> None:
+        inputs = {"add": 0.0, "mix": 0.0, "towards": 0.0, "limits": (-1.0, 1.0), **inputs, **tip.inputs(self.grid)}
+        self.device.pass_("brush/paint.frag")(mask.write, mask=mask.read, **inputs)
+        mask.swap()
