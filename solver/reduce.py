@@ -1,0 +1,49 @@
+"""Largest values and sums of a field, found on the GPU and read back as a few numbers."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from solver.context import Device
+from solver.field import Field
+
+_SMALL = 16  # this many texels across are cheaper to read back than to shrink again
+
+
+class Reduction:
+    """The largest value or the sum of every component of fields of one size.
+
+    Args:
+        device: the device.
+        size: (width, height) of the fields.
+        components: of the fields, 1-4.
+        kind: "max" or "sum". The smallest value is the negative of the largest negative.
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], components: int, kind: Literal["max", "sum"]) -> None:
+        self._kind = kind
+        self._shrink = device.pass_("reduce/shrink.frag", **({"SUM": 1} if kind == "sum" else {}))
+        self._levels: list[Field] = []
+        while max(size) > _SMALL:
+            size = -(-size[0] // 4), -(-size[1] // 4)
+            self._levels.append(device.field(size, components, f"{kind} {size[0]} x {size[1]}"))
+
+    def __call__(self, field: Field) -> np.ndarray:
+        """One number a component, float64; waits for the GPU."""
+        for level in self._levels:
+            self._shrink(level, field=field)
+            field = level
+        values = field.get().reshape(-1, field.components)
+        return values.max(axis=0).astype(np.float64) if self._kind == "max" else values.sum(axis=0, dtype=np.float64)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return sum(level.nbytes for level in self._levels)
+
+    def release(self) -> None:
+        """Free the textures."""
+        for level in self._levels:
+            level.release()

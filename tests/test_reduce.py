@@ -1,0 +1,18 @@
+"""Reductions agree with NumPy at any size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.context import Device
+from solver.reduce import Reduction
+
+
+@pytest.mark.parametrize("size", [(1, 1), (16, 16), (17, 5), (64, 64), (333, 217), (5, 700)])
+def test_reduction_agrees_with_numpy(device: Device, size: tuple[int, int]) -> None:
+    array = np.random.default_rng(1).integers(-500, 500, (size[1], size[0], 3)).astype(np.float32)
+    field = device.upload(array)
+    flat = array.reshape(-1, 3).astype(np.float64)
+    np.testing.assert_array_equal(Reduction(device, size, 3, "max")(field), flat.max(axis=0))
+    np.testing.assert_array_equal(Reduction(device, size, 3, "sum")(field), flat.sum(axis=0))
