@@ -1,0 +1,87 @@
+"""Writing a file whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.errors import UserError
+
+MENDS = {
+    errno.ENOSPC: "the disk is full; free some space or choose another folder",
+    errno.EDQUOT: "your disk quota is used up; free some space or choose another folder",
+    errno.EACCES: "no permission; choose another folder or change its permissions",
+    errno.EPERM: "no permission; choose another folder or change its permissions",
+    errno.EROFS: "the disk is read-only; choose another folder",
+    errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
+    errno.EFBIG: "the file grows larger than this disk allows; choose another folder or a smaller size",
+}
+
+
+def temporary_beside(path: Path) -> Path:
+    """A hidden name nobody uses in the folder of `path`, with the same ending."""
+    return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(4)}{path.suffix}")
+
+
+def writable(path: str | os.PathLike[str]) -> Path:
+    """The real path behind `path`, known to be a file or free, in a folder that is there.
+
+    Call it before a long job, so that a slip in the name costs no time. Raises `UserError`.
+    """
+    target = Path(os.path.realpath(path))  # through a link: the link stays, the file behind it is replaced
+    if target.is_dir():
+        raise UserError(f"Cannot write {path}: it is a folder; give the name of a file in it.")
+    if target.exists() and not target.is_file():
+        raise UserError(f"Cannot write {path}: it is no ordinary file; give another name.")
+    if not target.parent.is_dir():
+        raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise UserError(f"Cannot write {path}: {MENDS[errno.EACCES]}.")
+    return target
+
+
+def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:
+    """What `error` means for the user who wanted `path` written."""
+    reason = MENDS.get(error.errno or 0, error.strerror or str(error) or "the system gave no reason")
+    return UserError(f"Cannot write {path}: {reason}.")
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary name beside `path`, which takes the place of `path` once the block has ended well.
+
+    When the block raises, the temporary file goes and `path` is as it was. `OSError` becomes `UserError`.
+    """
+    target = writable(path)
+    temporary = temporary_beside(target)
+    try:
+        yield temporary
+        os.replace(temporary, target)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_many(folder: str | os.PathLike[str], label: str) -> Iterator[Path]:
+    """Yield a temporary folder in `folder`, whose files move up into `folder` once the block has ended well.
+
+    When the block raises, they all go and `folder` is as it was. `label` names the output in errors.
+    """
+    target = writable(Path(folder) / label).parent
+    temporary = temporary_beside(target / "sequence")
+    try:
+        temporary.mkdir()
+        yield temporary
+        for file in sorted(temporary.iterdir()):
+            os.replace(file, target / file.name)
+    except OSError as error:
+        raise cannot_write(Path(folder) / label, error) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

@@ -1,0 +1,628 @@
+"""Reading and writing pictures, each in its own depth."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.files import replacing
+
+MAX_PIXELS = 400_000_000
+PNG_LEVEL = 4  # on photographs as small as zlib's 6 within 1 %, in half the time
+
+ORIENTATION, DESCRIPTION, EXIF_IFD, GPS_IFD = 0x0112, 0x010E, 0x8769, 0x8825
+# description, make, model, software, date, artist, copyright: what of a TIFF's first directory is not about its layout
+TIFF_TEXTS = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Pixels, top row first, with what belongs to them.
+
+    `pixels` is (h, w, c), c = 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA, alpha straight; uint8 and uint16 hold the whole
+    range in the transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
+    """
+
+    pixels: np.ndarray
+    icc: bytes | None = None
+    exif: bytes | None = None
+    xmp: bytes | None = None
+    dpi: tuple[float, float] | None = None
+    chromaticities: tuple[float, ...] | None = None
+    texts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def width(self) -> int:
+        return self.pixels.shape[1]
+
+    @property
+    def height(self) -> int:
+        return self.pixels.shape[0]
+
+    @property
+    def bits(self) -> int:
+        """Bits a channel: 8, 16 or 32."""
+        return self.pixels.dtype.itemsize * 8
+
+    @property
+    def linear(self) -> bool:
+        """Whether the values are linear light."""
+        return self.pixels.dtype == np.float32
+
+    @property
+    def has_alpha(self) -> bool:
+        return self.pixels.shape[2] in (2, 4)
+
+    def with_pixels(self, pixels: np.ndarray) -> Picture:
+        """The same picture with other pixels, of any size."""
+        return replace(self, pixels=pixels)
+
+    def stripped(self) -> Picture:
+        """The same pixels without the metadata; what the colours mean is kept."""
+        return Picture(self.pixels, icc=self.icc, chromaticities=self.chromaticities)
+
+
+@dataclass(frozen=True)
+class Format:
+    """What a file format can hold: bits a channel, deepest last; alpha, grey; the longest side in pixels."""
+
+    name: str
+    bits: tuple[int, ...]
+    alpha: bool = True
+    grey: bool = True
+    longest: int = 2**31 - 1
+
+
+PNG = Format("PNG", (8, 16))
+JPEG = Format("JPEG", (8,), alpha=False, longest=65500)
+WEBP = Format("WebP", (8,), grey=False, longest=16383)
+AVIF = Format("AVIF", (8,), grey=False, longest=65536)
+TIFF = Format("TIFF", (8, 16, 32))
+EXR = Format("OpenEXR", (32,))
+
+FORMATS = {
+    ".png": PNG, ".jpg": JPEG, ".jpeg": JPEG, ".webp": WEBP, ".avif": AVIF, ".tif": TIFF, ".tiff": TIFF, ".exr": EXR,
+}  # fmt: skip
+SIGNATURES = {
+    "PNG": rb"\x89PNG\r\n\x1a\n", "JPEG": rb"\xff\xd8\xff", "WebP": rb"RIFF....WEBP", "AVIF": rb"....ftypavi[fs]",
+    "TIFF": rb"II[*+]\0|MM\0[*+]", "OpenEXR": rb"v/1\x01", "GIF": rb"GIF8[79]a", "BMP": rb"BM",
+}  # fmt: skip
+
+
+def picture_format(path: str | os.PathLike[str]) -> Format:
+    """The format the ending of `path` asks for; raises `UserError` when it is none we write."""
+    known = FORMATS.get(Path(path).suffix.lower())
+    if known is None:
+        raise UserError(f"Cannot write {path}: a picture's name must end in one of {' '.join(FORMATS)}.")
+    return known
+
+
+# Depth and alpha ----------------------------------------------------------------------------------------------------
+
+
+def srgb_to_linear(values: np.ndarray) -> np.ndarray:
+    """Linear light of sRGB values 0-1 (IEC 61966-2-1)."""
+    return np.where(values <= 0.04045, values / 12.92, ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def linear_to_srgb(values: np.ndarray) -> np.ndarray:
+    """sRGB values 0-1 of linear light (IEC 61966-2-1)."""
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def to_bits(pixels: np.ndarray, bits: int, *, dither: bool = True) -> np.ndarray:
+    """Pixels (h, w, c) in another depth: 8 and 16 are sRGB, 32 is linear light; alpha is never curved.
+
+    Going to 8 bits adds noise of one step before cutting, always the same, which leaves exact values exact. Works in
+    strips, so that the extra memory does not depend on the size.
+    """
+    if pixels.dtype.itemsize * 8 == bits:
+        return pixels
+    out = np.empty(pixels.shape, {8: np.uint8, 16: np.uint16, 32: np.float32}[bits])
+    noise = np.random.default_rng(0) if dither and bits == 8 else None
+    rows = max(1, 500_000 // max(1, pixels[0].size))
+    for top in range(0, len(pixels), rows):
+        out[top : top + rows] = _strip_to_bits(pixels[top : top + rows], bits, noise)
+    return out
+
+
+def _strip_to_bits(pixels: np.ndarray, bits: int, noise: np.random.Generator | None) -> np.ndarray:
+    if pixels.dtype == np.uint8 and bits == 16:
+        return pixels * np.uint16(257)
+    colours = pixels.shape[2] - (pixels.shape[2] in (2, 4))
+    if bits == 32:
+        values = pixels.astype(np.float32) / np.iinfo(pixels.dtype).max
+        values[..., :colours] = srgb_to_linear(values[..., :colours])
+        return values
+    top = 2**bits - 1
+    if pixels.dtype == np.uint16:
+        values = pixels / np.float32(257)
+    else:
+        values = np.clip(np.nan_to_num(pixels), 0, 1)
+        values[..., :colours] = linear_to_srgb(values[..., :colours])
+        values *= top
+    # a little less than a whole step, so that rounding errors do not move values that are exact
+    offset = 0.5 if noise is None else 0.001 + 0.998 * noise.random(values.shape, np.float32)
+    return np.minimum(values + offset, top).astype(np.uint8 if bits == 8 else np.uint16)
+
+
+def unpremultiplied(pixels: np.ndarray) -> np.ndarray:
+    """Straight alpha from premultiplied; colour without alpha is left as it is."""
+    alpha = pixels[..., -1:].astype(np.float32)
+    whole = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
+    scale = np.divide(whole, alpha, out=np.ones_like(alpha), where=alpha > 0)
+    colours = pixels[..., :-1] * scale
+    if pixels.dtype != np.float32:
+        colours = np.clip(colours + 0.5, 0, whole)
+    return np.concatenate([colours.astype(pixels.dtype), pixels[..., -1:]], axis=2)
+
+
+def over(pixels: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:
+    """8-bit pixels with alpha laid over an opaque 8-bit RGB colour, as programs do it: in the values, not the light."""
+    alpha = pixels[..., -1:].astype(np.float32) / 255
+    ground = np.asarray(background if pixels.shape[2] == 4 else [np.mean(background)], np.float32)
+    return (pixels[..., :-1] * alpha + ground * (1 - alpha) + 0.5).astype(np.uint8)
+
+
+# Reading ------------------------------------------------------------------------------------------------------------
+
+
+def read_picture(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Picture:
+    """Read a picture in its own depth, upright, its first page or frame; palette and CMYK become RGB.
+
+    The content decides the format, not the ending. Raises `UserError` for what is no picture, damaged or larger than
+    `max_pixels`.
+    """
+    file = Path(path)
+    try:
+        if file.is_dir():
+            raise UserError(f"Cannot read {path}: it is a folder; give the name of a picture.")
+        if file.stat().st_size == 0:
+            raise UserError(f"Cannot read {path}: the file is empty; save or download it again.")
+        with file.open("rb") as stream:
+            head = stream.read(16)
+    except FileNotFoundError:
+        raise UserError(f"Cannot read {path}: there is no such file; check the name.") from None
+    except OSError as error:
+        raise UserError(f"Cannot read {path}: {error.strerror}.") from error
+    name = next((name for name, start in SIGNATURES.items() if re.match(start, head, re.DOTALL)), None)
+    if name is None:
+        raise UserError(f"Cannot read {path}: it is no picture of a known kind ({', '.join(SIGNATURES)}).")
+
+    def check_size(width: int, height: int) -> None:
+        if width * height > max_pixels:
+            raise UserError(
+                f"Cannot read {path}: {width} x {height} pixels are more than the limit of {max_pixels}; "
+                f"if you trust the file, raise it with --max-pixels {width * height}."
+            )
+
+    reader = {"TIFF": _read_tiff, "OpenEXR": _read_exr}.get(name, _read_pillow)
+    try:
+        return reader(file, name, check_size)
+    except (UserError, KeyboardInterrupt):
+        raise
+    except MemoryError:
+        raise UserError(f"Cannot read {path}: it does not fit into the memory.") from None
+    except Exception as error:  # decoders of damaged files raise anything: IndexError, struct.error, zlib.error ...
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        message = f"Cannot read {path}: the {name} file is truncated or damaged ({reason}); get it again."
+        raise UserError(message) from error
+
+
+def _read_pillow(file: Path, name: str, check_size: Callable[[int, int], None]) -> Picture:
+    from PIL import Image
+
+    Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; check_size has ours
+    with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
+        check_size(*image.size)
+        icc = image.info.get("icc_profile")
+        if name == "PNG" and _png_bits(file) == 16:
+            import imagecodecs
+
+            with _quiet():
+                pixels = imagecodecs.png_decode(file.read_bytes())  # Pillow gives 8 bits of 16 without a word
+        elif image.mode == "CMYK":
+            pixels, icc = cmyk_to_rgb(np.asarray(image), icc)
+        else:
+            pixels = np.asarray(image if image.mode == (mode := _plain_mode(image)) else image.convert(mode))
+        exif = image.getexif()
+        orientation = exif.get(ORIENTATION, 1)
+        texts = {key: str(text) for key, text in getattr(image, "text", {}).items() if key != "XML:com.adobe.xmp"}
+        if comment := image.info.get("comment"):
+            texts["Comment"] = comment.decode("utf-8", "replace") if isinstance(comment, bytes) else str(comment)
+        xmp = image.info.get("xmp")
+        return Picture(
+            upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
+            icc=icc,
+            exif=_upright_exif(exif),
+            xmp=_upright_xmp(xmp.encode() if isinstance(xmp, str) else xmp),
+            dpi=_positive(image.info.get("dpi")),
+            texts=texts,
+        )
+
+
+def _png_bits(file: Path) -> int:
+    with file.open("rb") as stream:
+        return stream.read(25)[24]
+
+
+def _plain_mode(image: Any) -> str:
+    """The mode of 8-bit grey or RGB, with or without alpha, that loses nothing of Pillow's `image`."""
+    grey = image.mode in ("1", "L", "LA", "La")
+    alpha = image.mode in ("LA", "La", "RGBA", "RGBa", "PA") or "transparency" in image.info
+    return ("L" if grey else "RGB") + ("A" if alpha else "")
+
+
+def _positive(dpi: Any) -> tuple[float, float] | None:
+    return (float(dpi[0]), float(dpi[1])) if dpi and float(dpi[0]) > 0 and float(dpi[1]) > 0 else None
+
+
+def upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
+    """Pixels turned and mirrored as EXIF's orientation 1-8 says (CIPA DC-008, 4.6.4)."""
+    if orientation in (5, 6, 7, 8):
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    return np.ascontiguousarray(pixels)
+
+
+def _upright_exif(exif: Any) -> bytes | None:
+    """Pillow's `exif` as bytes, its orientation undone; the thumbnail, stale after a warp, falls away."""
+    if not exif:
+        return None
+    if ORIENTATION in exif:
+        exif[ORIENTATION] = 1
+    try:
+        return exif.tobytes()
+    except Exception:  # a camera's damaged EXIF must not cost the picture
+        return None
+
+
+def _upright_xmp(xmp: bytes | None) -> bytes | None:
+    if xmp is None:
+        return None
+    return re.sub(rb"(tiff:Orientation(?:=\"|>))[0-9]", rb"\g<1>1", xmp)
+
+
+def cmyk_to_rgb(pixels: np.ndarray, icc: bytes | None) -> tuple[np.ndarray, bytes | None]:
+    """RGB of CMYK (h, w, 4; 0 = no ink) through its profile, or by the plain formula; the profile the RGB is in."""
+    if icc is not None:
+        import imagecodecs
+
+        srgb = imagecodecs.cms_profile("srgb")
+        try:
+            rgb = imagecodecs.cms_transform(
+                np.ascontiguousarray(pixels),
+                icc,
+                srgb,
+                colorspace="cmyk",
+                outcolorspace="rgb",
+                intent=imagecodecs.CMS.INTENT.RELATIVE_COLORIMETRIC,
+            )
+            return rgb, srgb
+        except (imagecodecs.CmsError, ValueError):
+            pass  # a broken profile: colours by the formula are better than no picture
+    white = np.iinfo(pixels.dtype).max
+    light = white - pixels.astype(np.uint32)
+    return ((light[..., :3] * light[..., 3:] + white // 2) // white).astype(pixels.dtype), None
+
+
+def _read_tiff(file: Path, name: str, check_size: Callable[[int, int], None]) -> Picture:
+    import tifffile
+    from PIL import Image
+
+    with tifffile.TiffFile(file) as tiff:
+        page = tiff.pages.first
+        check_size(page.imagewidth, page.imagelength)
+        tags = {tag.code: tag.value for tag in page.tags}
+        samples = [axis for axis in page.axes if axis in "YXS"]
+        if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
+            raise UserError(f"Cannot read {file}: a TIFF with the axes {page.axes} is no picture; save one page of it.")
+        pixels = page.asarray()
+        photometric = tifffile.PHOTOMETRIC(page.photometric).name
+    pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
+    pixels = _plain_depth(file, pixels)
+    icc = tags.get(34675)
+    if photometric == "PALETTE":
+        pixels = np.moveaxis(np.asarray(tags[320], np.uint16), 0, -1)[pixels[..., 0]]
+    elif photometric == "SEPARATED":
+        pixels, icc = cmyk_to_rgb(pixels[..., :4], icc)
+    elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
+        pixels = np.iinfo(pixels.dtype).max - pixels
+    elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
+        raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
+    if pixels.shape[2] > 4:  # further samples are masks and spot colours
+        pixels = pixels[..., : 4 if page.extrasamples else 3]
+    if page.extrasamples and page.extrasamples[0] == tifffile.EXTRASAMPLE.ASSOCALPHA and pixels.shape[2] in (2, 4):
+        pixels = unpremultiplied(pixels)
+
+    exif = Image.Exif()
+    with file.open("rb") as stream:
+        try:
+            exif.load_from_fp(stream)
+            for code in set(exif) - {*TIFF_TEXTS, ORIENTATION, EXIF_IFD, GPS_IFD}:
+                del exif[code]
+            encoded = _upright_exif(exif)
+        except Exception:  # damaged metadata must not cost the picture
+            encoded = None
+    unit = {2: 1.0, 3: 2.54}.get(int(tags.get(296, 2)))
+    resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]
+    return Picture(
+        upright(pixels, int(tags.get(ORIENTATION, 1))),
+        icc=bytes(icc) if icc is not None else None,
+        exif=encoded,
+        xmp=_upright_xmp(bytes(tags[700])) if 700 in tags else None,
+        dpi=_positive([value * unit for value in resolution]) if unit and len(resolution) == 2 else None,
+    )
+
+
+def _plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
+    """TIFF samples of any kind as uint8, uint16 or float32."""
+    kind = pixels.dtype.kind
+    if kind == "b":
+        return pixels.astype(np.uint8) * np.uint8(255)
+    if kind == "f":
+        return pixels.astype(np.float32)
+    if kind == "u" and pixels.dtype.itemsize == 4:
+        return (pixels >> 16).astype(np.uint16)
+    if kind == "u" and pixels.dtype.itemsize <= 2:
+        return pixels.astype(pixels.dtype.newbyteorder("="))
+    raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not understood; convert it to 16 bits.")
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Hold back what OpenEXR and libpng print about a damaged file by themselves, where we raise an error of ours."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [(number, os.dup(number)) for number in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for number, _ in kept:
+            os.dup2(nowhere, number)
+        yield
+    finally:
+        sys.stdout.flush()
+        for number, copy in kept:
+            os.dup2(copy, number)
+            os.close(copy)
+        os.close(nowhere)
+
+
+def read_exr(
+    file: Path, check_size: Callable[[int, int], None] = lambda width, height: None
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The channels (h, w) float32 by name, filling the data window, and the header of an EXR's first part."""
+    import OpenEXR
+
+    with _quiet():
+        header = OpenEXR.File(str(file), header_only=True).header()
+        for window in ("dataWindow", "displayWindow"):
+            (left, top), (right, bottom) = header[window]
+            check_size(int(right) - int(left) + 1, int(bottom) - int(top) + 1)
+        exr = OpenEXR.File(str(file), separate_channels=True)
+        # a file that ends early is announced on stdout, not raised: it just has no part
+        channels = exr.channels() if exr.parts else {}
+    if not channels:
+        raise ValueError("pixel data is missing")
+    return {key: np.asarray(channel.pixels, np.float32) for key, channel in channels.items()}, header
+
+
+def _read_exr(file: Path, name: str, check_size: Callable[[int, int], None]) -> Picture:
+    channels, header = read_exr(file, check_size)
+    for wanted in (("R", "G", "B", "A"), ("R", "G", "B"), ("Y", "A"), ("Y",)):
+        if set(wanted) <= set(channels) and "RY" not in channels:
+            break
+    else:
+        names = " ".join(channels)
+        raise UserError(f"Cannot read {file}: of its channels {names} none are R G B or Y; save a plain RGB layer.")
+    (left, top), _ = header["dataWindow"]
+    (first_x, first_y), (last_x, last_y) = header["displayWindow"]
+    data = np.stack([channels[key] for key in wanted], axis=-1)
+    pixels = np.zeros((last_y - first_y + 1, last_x - first_x + 1, len(wanted)), np.float32)
+    place_window(data, (left - first_x, top - first_y), pixels)
+    chromaticities = header.get("chromaticities")
+    return Picture(
+        unpremultiplied(pixels) if wanted[-1] == "A" else pixels,
+        chromaticities=tuple(float(value) for value in chromaticities) if chromaticities is not None else None,
+        texts={key: value for key, value in header.items() if isinstance(value, str) and key not in ("name", "view")},
+    )
+
+
+def place_window(data: np.ndarray, at: tuple[int, int], into: np.ndarray) -> None:
+    """Copy what of `data`, its corner laid at pixel `at` (x, y), falls on `into`."""
+    spans = []
+    for start, length, room in zip(at[::-1], data.shape, into.shape, strict=False):
+        first, last = max(0, int(start)), min(room, int(start) + length)
+        spans.append((slice(first, max(first, last)), slice(first - int(start), max(first, last) - int(start))))
+    into[spans[0][0], spans[1][0]] = data[spans[0][1], spans[1][1]]
+
+
+# Writing ------------------------------------------------------------------------------------------------------------
+
+
+def write_picture(
+    path: str | os.PathLike[str],
+    picture: Picture,
+    *,
+    bits: int | None = None,
+    quality: int = 95,
+    strip: bool = False,
+    background: tuple[int, int, int] = (0, 0, 0),
+) -> None:
+    """Write a picture in the format of the ending of `path`, whole or not at all.
+
+    bits: 8, 16 or 32 a channel; None keeps the picture's own, or the deepest below it that the format has.
+    quality: 1-100 for JPEG, WebP and AVIF; WebP is lossless at 100.
+    strip: leave out EXIF, XMP, resolution and texts; the colour profile stays.
+    background: what shows through where the format has no alpha.
+    Raises `UserError`.
+    """
+    chosen = picture_format(path)
+    if max(picture.width, picture.height) > chosen.longest:
+        raise UserError(
+            f"Cannot write {path}: {chosen.name} holds no side longer than {chosen.longest} pixels; use PNG or TIFF."
+        )
+    if bits is not None and bits not in chosen.bits:
+        raise UserError(
+            f"Cannot write {path}: {chosen.name} holds {' or '.join(map(str, chosen.bits))} bits a channel, not {bits}."
+        )
+    if strip:
+        picture = picture.stripped()
+    depth = bits or max((held for held in chosen.bits if held <= picture.bits), default=chosen.bits[0])
+    picture = picture.with_pixels(to_bits(picture.pixels, depth))
+    if picture.has_alpha and not chosen.alpha:
+        picture = picture.with_pixels(over(picture.pixels, background))
+    if picture.icc and picture.icc[16:20] != (b"GRAY" if picture.pixels.shape[2] < 3 and chosen.grey else b"RGB "):
+        picture = replace(picture, icc=None)  # a profile of the other kind is not allowed, and readers complain
+    with replacing(path) as temporary:
+        if chosen is TIFF:
+            _write_tiff(temporary, picture)
+        elif chosen is EXR:
+            _write_exr(temporary, picture)
+        else:
+            # encoded in memory: on a full disk Pillow's own writing loses the reason
+            encoded = _encode_png(picture) if chosen is PNG else _encode_pillow(picture, chosen, quality)
+            temporary.write_bytes(encoded)
+
+
+def _encode_png(picture: Picture) -> bytes:
+    import zlib
+
+    import imagecodecs
+    from PIL.PngImagePlugin import PngInfo, putchunk
+
+    pixels = np.ascontiguousarray(picture.pixels)
+    encoded = imagecodecs.png_encode(pixels if pixels.shape[2] > 1 else pixels[..., 0], level=PNG_LEVEL)
+    extra = PngInfo()
+    if picture.icc:
+        extra.add(b"iCCP", b"ICC Profile\0\0" + zlib.compress(picture.icc))
+    if picture.dpi:
+        metre = [round(value / 0.0254).to_bytes(4, "big") for value in picture.dpi]
+        extra.add(b"pHYs", b"".join(metre) + b"\1")
+    if picture.exif:
+        extra.add(b"eXIf", _sized_exif(picture).removeprefix(b"Exif\0\0"))
+    if picture.xmp:
+        extra.add_itxt("XML:com.adobe.xmp", picture.xmp.decode("utf-8", "replace"))
+    for key, text in picture.texts.items():
+        extra.add_itxt(key.encode("latin-1", "replace")[:79], text)
+    chunks = io.BytesIO()
+    for kind, data, _ in extra.chunks:
+        putchunk(chunks, kind, data)
+    header = 8 + 25  # the signature and IHDR, after which all of these may stand
+    return b"".join([encoded[:header], chunks.getvalue(), encoded[header:]])
+
+
+def _encode_pillow(picture: Picture, chosen: Format, quality: int) -> bytes:
+    from PIL import Image, features
+
+    if chosen is AVIF and not features.check("avif"):
+        raise UserError("This Pillow was built without AVIF; use another format or install Pillow from PyPI.")
+    options: dict[str, Any] = {"quality": quality, "icc_profile": picture.icc, "exif": _sized_exif(picture)}
+    if picture.xmp:
+        options["xmp"] = picture.xmp
+    if chosen is JPEG:
+        options |= {"subsampling": 0, "optimize": True, "comment": picture.texts.get("Comment", "")}
+        if picture.dpi:
+            options["dpi"] = tuple(round(value) for value in picture.dpi)
+    elif chosen is WEBP:
+        options |= {"lossless": quality == 100, "exact": True}
+    else:
+        options |= {"subsampling": "4:4:4"}
+    pixels = picture.pixels[..., 0] if picture.pixels.shape[2] == 1 else picture.pixels
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, format=chosen.name.upper(), **options)
+    return buffer.getvalue()
+
+
+def _exif_of(picture: Picture) -> Any:
+    from PIL import Image
+
+    exif = Image.Exif()
+    if picture.exif:
+        exif.load(picture.exif)
+        inner = exif.get_ifd(EXIF_IFD)
+        for code, size in ((0xA002, picture.width), (0xA003, picture.height)):
+            if code in inner:
+                inner[code] = size
+    return exif
+
+
+def _sized_exif(picture: Picture) -> bytes:
+    """The picture's EXIF, telling its present size."""
+    return _exif_of(picture).tobytes() if picture.exif else b""
+
+
+def _write_tiff(temporary: Path, picture: Picture) -> None:
+    import tifffile
+
+    exif = _exif_of(picture)
+    extra: list[tuple[int, int | str, int, Any, bool]] = []
+    for code in TIFF_TEXTS:
+        if isinstance(text := exif.get(code), str):
+            extra.append((code, "s", 0, text.encode(), True))
+    if picture.xmp:
+        extra.append((700, "B", len(picture.xmp), picture.xmp, True))
+    channels = picture.pixels.shape[2]
+    with tifffile.TiffWriter(temporary) as tiff:
+        tiff.write(
+            picture.pixels if channels > 1 else picture.pixels[..., 0],
+            photometric="rgb" if channels >= 3 else "minisblack",
+            planarconfig="contig" if channels > 1 else None,
+            extrasamples=["unassalpha"] if picture.has_alpha else None,
+            compression="zlib",
+            compressionargs={"level": PNG_LEVEL},
+            predictor=True,
+            iccprofile=picture.icc,
+            resolution=picture.dpi,
+            resolutionunit="inch" if picture.dpi else None,
+            software=False,
+            metadata=None,
+            extratags=extra,
+        )
+
+
+def _write_exr(temporary: Path, picture: Picture) -> None:
+    names = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}[picture.pixels.shape[2]]
+    pixels = picture.pixels
+    if picture.has_alpha:  # OpenEXR's convention is premultiplied
+        pixels = np.concatenate([pixels[..., :-1] * pixels[..., -1:], pixels[..., -1:]], axis=2)
+    attributes: dict[str, Any] = dict(picture.texts)
+    if picture.chromaticities:
+        attributes["chromaticities"] = picture.chromaticities
+    write_exr(temporary, {name: pixels[..., index] for index, name in enumerate(names)}, attributes)
+
+
+def write_exr(
+    temporary: Path, channels: Mapping[str, np.ndarray], attributes: Mapping[str, Any], overscan: int = 0
+) -> None:
+    """Write float32 channels (h, w) by name; `overscan` pixels on each side lie outside the display window."""
+    import OpenEXR
+
+    height, width = next(iter(channels.values())).shape
+
+    def window(left: int, top: int, right: int, bottom: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([left, top], np.int32), np.array([right, bottom], np.int32)
+
+    header = {
+        **attributes,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "displayWindow": window(0, 0, width - 2 * overscan - 1, height - 2 * overscan - 1),
+        "dataWindow": window(-overscan, -overscan, width - overscan - 1, height - overscan - 1),
+    }
+    planes = {name: np.ascontiguousarray(plane, np.float32) for name, plane in channels.items()}
+    with temporary.open("wb") as stream:  # given a name OpenEXR writes to a full disk without a word
+        OpenEXR.File(header, planes).write(stream)

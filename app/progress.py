@@ -1,0 +1,95 @@
+"""How far a long job is, and the wish to stop it: one thing for the command line and for the window."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from app.errors import Cancelled
+
+
+def never() -> bool:
+    """The wish to stop that nobody has."""
+    return False
+
+
+class Progress:
+    """Counts the steps of a job; `report(done, total)` hears of each, `cancel()` answers whether to stop.
+
+    The window passes its own two callbacks; the command line uses `on_terminal`.
+    """
+
+    def __init__(
+        self,
+        total: int | None = None,
+        report: Callable[[int, int | None], None] = lambda done, total: None,
+        cancel: Callable[[], bool] = never,
+    ) -> None:
+        self.total = total
+        self.done = 0
+        self.cancel = cancel
+        self._report = report
+        self._started = time.monotonic()
+
+    def check(self) -> None:
+        """Raise `Cancelled` if the user wants to stop."""
+        if self.cancel():
+            raise Cancelled
+
+    def advance(self, steps: int = 1) -> None:
+        """Count `steps` as done; raises `Cancelled` if the user wants to stop."""
+        self.check()
+        self.done += steps
+        self._report(self.done, self.total)
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Seconds the rest takes at the speed so far; None before the first step or without a total."""
+        if not self.done or self.total is None:
+            return None
+        return (time.monotonic() - self._started) / self.done * max(0, self.total - self.done)
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl+C and SIGTERM into a wish to stop while the block runs; yields the callable that answers it.
+
+    A second Ctrl+C interrupts at once. Outside the main thread, where signals do not arrive, it does nothing.
+    """
+    wish = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield wish.is_set
+        return
+
+    def ask(number: int, frame: object) -> None:
+        if wish.is_set():
+            raise KeyboardInterrupt
+        wish.set()
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield wish.is_set
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def on_terminal(description: str, total: int | None) -> Iterator[Progress]:
+    """A `Progress` drawn as a bar with the time left on stderr, silent when that is no terminal; Ctrl+C cancels."""
+    with interruptible() as cancel:
+        if not sys.stderr.isatty():
+            yield Progress(total, cancel=cancel)
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bars
+
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+            task = bars.add_task(description, total=total)
+            yield Progress(total, lambda done, total: bars.update(task, completed=done, total=total), cancel)
