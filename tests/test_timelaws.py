@@ -1,0 +1,184 @@
+"""The time laws of a force: exact integrals, whatever the ticks, and formulas that cannot do harm."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from app.schema import frozen
+from app.timelaws import FUNCTIONS, Formula, FormulaError, Timed
+
+
+def timed(**keys: Any) -> Timed:
+    return Timed.model_validate(frozen(keys))
+
+
+def total(law: Any, dt: float, ticks: int) -> float:
+    return sum(law.impulse(n * dt, (n + 1) * dt) for n in range(ticks))
+
+
+def test_a_force_acts_at_the_beginning_unless_told_otherwise() -> None:
+    law = timed().law
+    assert [law.impulse(n / 60, (n + 1) / 60) for n in range(3)] == [1, 0, 0]
+
+
+@pytest.mark.parametrize("dt", [0.1, 1 / 60, 1 / 24, 0.07, 1 / 3])
+def test_an_instant_falls_in_exactly_one_tick(dt: float) -> None:
+    for k in range(40):
+        law = timed(at=k * 0.1).law
+        hits = [n for n in range(60) if law.impulse(n * dt, (n + 1) * dt)]
+        assert len(hits) <= 1
+        assert hits or k * 0.1 >= 60 * dt - 1e-6
+    assert timed(at=0.3).law.impulse(0.3, 0.4) == 1, "3 * 0.1 > 0.3 must not bring it a tick forward"
+    assert total(timed(at=[0, 0.25, 1.0]).law, dt, math.ceil(1.1 / dt) + 1) == 3
+
+
+@pytest.mark.parametrize("dt", [0.1, 1 / 60, 0.33])
+def test_an_interval_gives_its_length(dt: float) -> None:
+    assert total(timed(during=[0.2, 0.95]).law, dt, round(2 / dt)) == pytest.approx(0.75, abs=1e-12)
+    assert timed(during=[0, 1]).law.impulse(2, 3) == 0
+
+
+@pytest.mark.parametrize("dt", [0.1, 1 / 60, 0.25])
+@pytest.mark.parametrize(("interpolation", "expected"), [("linear", 1.5), ("smooth", 1.5), ("hold", 1.0)])
+def test_keyframes_are_integrated_exactly(interpolation: str, expected: float, dt: float) -> None:
+    law = timed(keys=[[0, 0], [0.5, 2], [1.0, 0]], interpolation=interpolation).law
+    assert total(law, dt, round(1 / dt)) == pytest.approx(1.0, abs=1e-12)
+    law = timed(keys=[[0, 0], [1, 1]], interpolation=interpolation).law
+    assert total(law, dt, round(2 / dt)) == pytest.approx(expected, abs=1e-12), "the last value holds"
+
+
+def test_smooth_keys_start_and_end_at_rest() -> None:
+    law = timed(keys=[[0, 0], [1, 1]], interpolation="smooth").law
+    assert law.impulse(0, 1e-3) < 1e-8
+    assert law.impulse(0.499, 0.501) == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_the_first_key_holds_before_it() -> None:
+    assert timed(keys=[[1, 3], [2, 0]]).law.impulse(0, 1) == pytest.approx(3)
+
+
+@pytest.mark.parametrize(
+    ("text", "integral"),
+    [
+        ("1", 1),
+        ("t", 0.5),
+        ("sin(2*pi*t)", 0),
+        ("sin(pi*t)**2", 0.5),
+        ("exp(-t)", 1 - math.exp(-1)),
+        ("1 if t < 0.5 else 0", 0.5),
+        ("step(t - 0.5) * 2", 1),
+        ("pulse(t, 0.2, 0.7)", 0.5),
+        ("max(0, min(1, 2*t, 5))", 0.75),
+        ("smoothstep(0, 1, t)", 0.5),
+        ("abs(-t) % 1 - +0", 0.5),
+        ("(0.2 <= t < 0.7) and not t > 2", 0.5),
+        ("-2**2", -4),
+    ],
+)
+def test_formulas(text: str, integral: float) -> None:
+    assert total(timed(formula=text).law, 1 / 60, 60) == pytest.approx(integral, abs=2e-3)
+
+
+def test_a_smooth_formula_is_integrated_exactly() -> None:
+    assert Formula("sin(pi*t)").impulse(0, 1) == pytest.approx(2 / math.pi, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("foo(t)", 'calls "foo"'),
+        ("x + 1", 'names "x"'),
+        ("__import__('os')", 'calls "__import__"'),
+        ("t.real", "not allowed"),
+        ("(1).__class__", "not allowed"),
+        ("[1, 2]", "not allowed"),
+        ("lambda: 1", "not allowed"),
+        ("sin(t", "cannot be read"),
+        ("", "cannot be read"),
+        ("'a' * 3", "not allowed"),
+        ("True", "not allowed"),
+        ("sin(1, 2)", "2 numbers"),
+        ("min(1)", "1 numbers"),
+        ("sin(x=1)", "not allowed"),
+        ("1; 2", "cannot be read"),
+        ("1" + "0" * 400, "too large"),
+        ("1+" * 300 + "1", "longer"),
+        ("-" * 200 + "1", "nested"),
+        ("t\x00", "cannot be read"),
+    ],
+)
+def test_what_a_formula_may_not_hold_is_said_on_reading(text: str, part: str) -> None:
+    with pytest.raises(ValidationError, match=part.replace("(", r"\(")):
+        timed(formula=text)
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("1/t", "divides by zero at t = 0"),
+        ("t % 0", "divides by zero"),
+        ("log(t - 1)", "no finite value"),
+        ("9**9**9", "no finite value"),
+        ("sqrt(-1)", "no finite value"),
+        ("(-1)**0.5", "no finite value"),
+        ("1e308 * 10", "no finite value"),
+    ],
+)
+def test_a_formula_without_a_value_is_found_before_it_runs(text: str, part: str) -> None:
+    law = timed(formula=text).law
+    with pytest.raises(FormulaError, match=part.replace("(", r"\(")):
+        law.check(1.0)
+
+
+def test_every_function_has_a_value_somewhere() -> None:
+    for name, (_, arguments) in FUNCTIONS.items():
+        given = ", ".join(["0.2", "0.7", "0.4"][: arguments or 2])
+        assert math.isfinite(Formula(f"{name}({given})")(0.0))
+
+
+def test_feedback_sees_the_state() -> None:
+    seen = []
+    law = timed(feedback=lambda state: seen.append(state) or 2.0).law
+    assert law.impulse(0, 0.5, "state") == 1.0
+    assert seen == ["state"]
+    with pytest.raises(Exception, match="feedback function returned nan"):
+        timed(feedback=lambda state: math.nan).law.impulse(0, 1)
+
+
+@pytest.mark.parametrize(
+    ("keys", "part"),
+    [
+        ({"at": 0, "during": [0, 1]}, "at and during"),
+        ({"during": [1, 0.5]}, "ends before it starts"),
+        ({"during": [1, 1]}, "ends before it starts"),
+        ({"during": [0]}, "during"),
+        ({"keys": [[0, 0], [1, 1], [1, 2]]}, "keys overlap"),
+        ({"keys": [[1, 0], [0, 1]]}, "keys overlap"),
+        ({"keys": []}, "at least 1"),
+        ({"keys": [[0, math.nan]]}, "finite"),
+        ({"at": []}, "at least 1"),
+        ({"at": [0, 0]}, "same instant twice"),
+        ({"at": -1}, "greater than or equal to 0"),
+        ({"at": math.inf}, "at"),
+        ({"at": "now"}, "at"),
+        ({"at": True}, "at"),
+        ({"formula": 3}, "formula"),
+        ({"interpolation": "hold"}, "there are none"),
+        ({"keys": [[0, 1]], "interpolation": "wavy"}, "interpolation"),
+        ({"feedback": "f"}, "feedback"),
+        ({"when": 1}, "when"),
+    ],
+)
+def test_bad_laws_are_refused(keys: dict[str, Any], part: str) -> None:
+    with pytest.raises(ValidationError, match=part):
+        timed(**keys)
+
+
+@pytest.mark.parametrize(("keys", "part"), [({"at": 2}, "act at 2 s"), ({"during": [3, 4]}, "start at 3 s")])
+def test_a_law_that_never_acts_is_told(keys: dict[str, Any], part: str) -> None:
+    with pytest.raises(ValueError, match=part):
+        timed(**keys).law.check(1.0)
