@@ -85,7 +85,7 @@ class Brush:
         self.device.pass_("brush/probe.frag")(self._motion, velocity=fluid.faces(), at=at, reach=reach, h=h)
 
     def _draw(self, fluid: Fluid, shader: str, tip: Tip, **inputs: object) -> None:
-        with self.device.stage("add force"):
-            region = tip.region(fluid.grid)
-            inputs |= tip.inputs(fluid.grid)
-            self.device.pass_(shader)(fluid.velocity.read, add=True, region=region, motion=self._motion, **inputs)
+        region = tip.region(fluid.grid)
+        inputs |= tip.inputs(fluid.grid)
+        paint = self.device.pass_(shader)
+        fluid.add_impulse(lambda faces: paint(faces, add=True, region=region, motion=self._motion, **inputs))

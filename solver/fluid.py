@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,6 +70,11 @@ class Fluid:
             for force, impulse in forces:
                 if impulse != 0.0:
                     add(self.velocity.read, add=True, force=force, impulse=impulse)
+
+    def add_impulse(self, draw: Callable[[Field], None]) -> None:
+        """Let `draw` add a change of velocity, lengths / s, to the field of MAC faces it is handed."""
+        with self.device.stage("add force"):
+            draw(self.velocity.read)
 
     def advect(self, dt: float) -> None:
         """w2(x) = w1(x - dt w1(x)): second-order backtrace, cubic interpolation; drag acts on the way."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -36,6 +36,11 @@ class PaperFluid(Fluid):
             for force, impulse in forces:
                 if impulse != 0.0:
                     add(self.velocity.read, add=True, force=force, impulse=impulse)
+
+    def add_impulse(self, draw: Callable[[Field], None]) -> None:
+        self._faces.clear()
+        draw(self._faces)
+        self.add_force([(self._faces, 1.0)])
 
     def advect(self, dt: float) -> None:
         with self.device.stage("advect"):

@@ -1,0 +1,55 @@
+"""Every shader compiles, says what it reads, and names its file and line when it is wrong."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shaders
+from solver.context import Device
+from solver.program import ShaderError, assemble, compile_program, read_shader
+
+ROOT = Path(shaders.__file__).parent
+STAGES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.frag"))
+
+
+@pytest.mark.parametrize("defines", [{}, {"NO_SLIP": 1}], ids=["free-slip", "no-slip"])
+@pytest.mark.parametrize("stage", STAGES)
+def test_stage_compiles_with_either_wall(device: Device, stage: str, defines: dict[str, object]) -> None:
+    compile_program(device.ctx, stage, defines).release()
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_stage_states_its_texel_reads(stage: str) -> None:
+    assert re.search(r"^// reads: \d+", read_shader(stage), re.MULTILINE), f"{stage} lacks a line `// reads: N`"
+
+
+def test_error_names_file_and_line(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = '#include "lib/cubic.glsl"\nout vec4 c;\nvoid main() {\n    c = nonsense;\n}\n'
+    real = read_shader
+    monkeypatch.setattr("solver.program.read_shader", lambda path: source if path == "broken.frag" else real(path))
+    with pytest.raises(ShaderError, match=r"shaders/broken\.frag:4"):
+        compile_program(device.ctx, "broken.frag", {})
+
+
+def test_missing_include_is_named() -> None:
+    with pytest.raises(ShaderError, match=r"shaders/lib/nowhere\.glsl does not exist"):
+        assemble("lib/nowhere.glsl", {})
+
+
+def test_unknown_uniform_is_a_mistake(device: Device) -> None:
+    field = device.field((4, 4), 1)
+    with pytest.raises(ShaderError, match="no uniform u_sauce"):
+        device.pass_("stages/add_source.frag")(field, sauce=field, amount=1.0)
+
+
+def test_pass_adds_within_its_region(device: Device) -> None:
+    target, source = device.field((6, 5), 1), device.upload(np.ones((5, 6), np.float32))
+    target.clear(1.0)
+    device.pass_("stages/add_source.frag")(target, add=True, region=(-2, 1, 4, 99), source=source, amount=2.0)
+    expected = np.ones((5, 6), np.float32)
+    expected[1:, :2] = 3.0
+    np.testing.assert_array_equal(target.get(), expected)
