@@ -7,6 +7,7 @@ import re
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 
 from app.errors import UserError
 
@@ -41,11 +42,10 @@ def plain(model: BaseModel) -> dict[str, Any]:
 
     What tells the members of a union apart is always there. `frozen(plain(model))` validates to an equal model.
     """
-    tags = _literals(type(model))
     told = {
         name: _plain_value(getattr(model, name))
         for name, field in type(model).model_fields.items()
-        if getattr(model, name) in tags or getattr(model, name) != field.default
+        if len(_choices(field)) == 1 or getattr(model, name) != field.default
     }
     # A single value after a table would belong to the table.
     return dict(sorted(told.items(), key=lambda item: _rank(item[1])))
@@ -203,12 +203,12 @@ def _field(model: type[BaseModel], name: str) -> Any:
 
 def _literals(model: type[BaseModel]) -> list[str]:
     """The values of the fields that can only have one, which is how the members of a union are told apart."""
-    found = []
-    for field in model.model_fields.values():
-        choices = get_args(field.annotation)
-        if get_origin(field.annotation) is Literal and len(choices) == 1:
-            found.append(choices[0])
-    return found
+    choices = (_choices(field) for field in model.model_fields.values())
+    return [values[0] for values in choices if len(values) == 1]
+
+
+def _choices(field: FieldInfo) -> tuple[Any, ...]:
+    return get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
 
 
 # -- where it stands in the file --------------------------------------------------------------------------------------

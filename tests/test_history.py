@@ -1,0 +1,96 @@
+"""Undo and redo: exact, shared, bounded."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from app.history import History
+from app.recipe import Recipe
+from app.strokes import Stroke
+
+
+def stroke(seed: int, samples: int = 3) -> Stroke:
+    return Stroke(tool="push", radius=0.1, samples=tuple((i, seed / 1000, i / samples, 1.0) for i in range(samples)))
+
+
+def test_undo_and_redo_give_the_same_recipes():
+    history = History(Recipe())
+    states = [history.recipe]
+    for seed in range(5):
+        history.commit(f"Push {seed}", history.recipe.edited(stroke=(*history.recipe.stroke, stroke(seed))))
+        states.append(history.recipe)
+    assert (history.undo_name, history.redo_name) == ("Push 4", None)
+    for state in states[-2::-1]:
+        assert history.undo() is state
+    assert not history.can_undo
+    assert history.undo() is states[0]
+    for state in states[1:]:
+        assert history.redo() is state
+    assert not history.can_redo
+
+
+def test_an_edit_after_undo_ends_the_future():
+    history = History(Recipe())
+    history.commit("A", Recipe(name="a"))
+    history.undo()
+    history.commit("B", Recipe(name="b"))
+    assert [entry.name for entry in history.entries] == ["Open", "B"]
+    assert history.redo() is history.recipe
+
+
+def test_an_edit_of_nothing_is_none():
+    history = History(Recipe())
+    history.commit("Nothing", Recipe())
+    assert not history.can_undo
+
+
+def test_recipes_share_what_did_not_change():
+    long = Recipe(stroke=tuple(stroke(seed, 1000) for seed in range(50)))
+    history = History(long)
+    before = history.nbytes
+    for seed in range(100):
+        history.commit("Push", history.recipe.edited(stroke=(*history.recipe.stroke, stroke(seed))))
+    assert history.entries[-1].recipe.stroke[0] is long.stroke[0]
+    assert history.nbytes - before < before / 10
+
+
+def test_the_budget_drops_the_oldest():
+    history = History(Recipe(), budget=200_000)
+    for seed in range(100):
+        history.commit(f"Push {seed}", Recipe(stroke=(stroke(seed, 100),)))
+    assert history.nbytes <= 200_000
+    assert history.entries[-1].name == "Push 99"
+    assert 1 < len(history.entries) < 20
+
+
+def test_random_actions_against_a_plain_list():
+    for seed in range(20):
+        rng = random.Random(seed)
+        history = History(Recipe())
+        model, present = [history.recipe], 0
+        for step in range(200):
+            action = rng.choice(["commit", "commit", "undo", "redo", "jump"])
+            if action == "commit":
+                recipe = Recipe(name=f"{seed} {step}")
+                history.commit("Edit", recipe)
+                del model[present + 1 :]
+                model.append(recipe)
+                present += 1
+            elif action == "undo":
+                history.undo()
+                present = max(present - 1, 0)
+            elif action == "redo":
+                history.redo()
+                present = min(present + 1, len(model) - 1)
+            else:
+                present = rng.randrange(len(model))
+                history.go_to(present)
+            assert history.recipe is model[present]
+            assert (history.can_undo, history.can_redo) == (present > 0, present < len(model) - 1)
+
+
+def test_no_such_entry():
+    with pytest.raises(IndexError, match="1 entries"):
+        History(Recipe()).go_to(1)

@@ -1,0 +1,173 @@
+"""The recipe: written and read without loss, and every fault told in one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.errors import UserError
+from app.recipe import Recipe
+from app.strokes import Change, Dab, Stroke
+
+FULL = """
+version = 1
+name = "Everything"
+picture = "cat.jpg"
+duration = 2.5
+edges = "mirror"
+mode = "density"
+
+[fluid]
+solver = "paper"
+grid = 96
+dt = 0.025
+viscosity = 0.01
+drag = 0.5
+walls = "no-slip"
+
+[density]
+kappa = 0.001
+source = [0.1, 0, 0]
+
+[stop]
+det_below = 0.1
+[[stop.watch]]
+point = [0.5, 0.25]
+distance = 0.1
+
+[time]
+speed = 0.5
+ping_pong = true
+
+[output]
+size = 640
+fps = 25
+
+[[change]]
+tick = 10
+viscosity = 0.1
+reset_warp = true
+
+[[stroke]]
+tool = "push"
+radius = 0.1
+samples = [[0, 0.1, 0.30000000000000004, 1], [4, 0.2, 0.3, 0.5]]
+"""
+
+
+def test_round_trip_loses_nothing():
+    recipe = Recipe.parse(FULL)
+    assert Recipe.parse(recipe.text()) == recipe
+    assert recipe.stroke[0].samples[0][2] == 0.30000000000000004
+
+
+def test_defaults_are_not_written():
+    assert Recipe().text() == "version = 1\n"
+    assert Recipe.parse("") == Recipe()
+
+
+def test_save_and_load(tmp_path: Path):
+    recipe = Recipe.parse(FULL)
+    recipe.save(tmp_path / "a.toml")
+    assert Recipe.load(tmp_path / "a.toml") == recipe
+    assert [path.name for path in tmp_path.iterdir()] == ["a.toml"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("durration = 1", "line 1: unknown key 'durration'; did you mean 'duration'?"),
+        ("\n[fluid]\ngird = 3", "line 3: unknown key 'fluid.gird'; did you mean 'grid'?"),
+        ("duration = 0", "line 1: 'duration' must be greater than 0, not 0"),
+        ("duration = nan", "'duration' must be a finite number, not nan"),
+        ("[fluid]\nviscosity = inf", "line 2: 'fluid.viscosity' must be a finite number, not inf"),
+        ("duration = '1'", "'duration' must be a number, not '1'"),
+        ("[fluid]\ngrid = 1.5", "'fluid.grid' must be a whole number, not 1.5"),
+        ("[fluid]\nwalls = true", "'fluid.walls' must be one of 'free-slip' or 'no-slip', not true"),
+        ("fluid = 3", "'fluid' must be a table, not 3"),
+        ("stroke = 3", "'stroke' must be a list, not 3"),
+        ("version = 2", "of version 2, and this fluidwarp reads recipes up to version 1"),
+        ("duration = 1\nduration = 2", "the same key is given twice"),
+        ("duration = ", "not valid TOML"),
+        ("duration = 1e6", "make dt larger"),
+        ("[time]\nstart = 2\nend = 1", "'end' (1) is before 'start' (2)"),
+        ("[[stop.watch]]\npoint = [0.1, 0.1]", "stop.watch 1: give either 'distance' or 'place'"),
+        ("[[stroke]]\ntool = 'push'\nsamples = []", "line 3: stroke 1: 'samples' must be a list of at least 1"),
+        ("[[stroke]]\ntool = 'pish'\nsamples = [[0, 0, 0, 1]]", "'tool' must be one of 'push'"),
+        ("[[stroke]]\ntool = 'push'\nradius = 0\nsamples = [[0, 0, 0, 1]]", "'radius' must be greater than 0, not 0"),
+        ("[[stroke]]\ntool = 'push'\nsamples = [[1, 0, 0, 1], [0, 0, 0, 1]]", "must not go backwards"),
+        ("[[stroke]]\ntool = 'push'\nsamples = [[0, 0, nan, 1]]", "'samples[1][3]' must be a finite number"),
+        ("[density]\nsource = [1]", "'source' must be three numbers"),
+    ],
+)
+def test_faults_are_told_in_a_sentence(text: str, words: str):
+    with pytest.raises(UserError) as caught:
+        Recipe.parse(text, "a.toml")
+    message = str(caught.value)
+    assert message.startswith("a.toml")
+    assert words in message
+    assert len(message.splitlines()) == 1
+    assert "pydantic" not in message
+    assert "input" not in message.lower()
+
+
+def test_files_that_are_none(tmp_path: Path):
+    (tmp_path / "noise.toml").write_bytes(bytes(range(256)))
+    for name, words in (("none.toml", "does not exist"), ("noise.toml", "not text"), ("", "is a folder")):
+        with pytest.raises(UserError, match=words):
+            Recipe.load(tmp_path / name)
+
+
+# -- strokes ----------------------------------------------------------------------------------------------------------
+
+
+def push(*samples: tuple[int, float, float, float], **options: object) -> Stroke:
+    return Stroke.model_validate({"tool": "push", "samples": samples, **options})
+
+
+def test_a_stroke_is_passed_piece_by_piece():
+    stroke = push((2, 0.0, 0.0, 1.0), (2, 0.1, 0.0, 1.0), (4, 0.3, 0.2, 0.0))
+    assert stroke.at(1) == ()
+    assert stroke.at(2) == (Dab(0.0, 0.0, 0.1, 0.0, 1.0),)
+    assert stroke.at(3) == (Dab(0.1, 0.0, 0.2, 0.1, 0.75),)
+    assert stroke.at(4)[0][:4] == pytest.approx((0.2, 0.1, 0.3, 0.2))
+    assert stroke.at(5) == ()
+
+
+def test_sampling_more_often_is_the_same_path():
+    coarse = push((0, 0.0, 0.0, 1.0), (4, 0.4, 0.8, 1.0))
+    fine = push(*((i, 0.1 * i, 0.2 * i, 1.0) for i in range(5)))
+    for tick in range(6):
+        for a, b in zip(coarse.at(tick), fine.at(tick), strict=True):
+            assert a == pytest.approx(b)
+
+
+def test_a_curve_acts_at_once_when_it_is_released():
+    curve = push((0, 0.0, 0.0, 1.0), (3, 0.5, 0.0, 1.0), (6, 1.0, 0.0, 1.0), tool="curve")
+    assert [len(curve.at(tick)) for tick in range(8)] == [0, 0, 0, 0, 0, 0, 2, 0]
+
+
+def test_recipes_agree_until_they_differ():
+    first, second = push((0, 0, 0, 1), (5, 1, 0, 1)), push((10, 0, 0, 1), (20, 1, 0, 1), (20, 1, 1, 1), (30, 1, 0, 1))
+    recipe = Recipe(stroke=(first, second))
+    cut = second.model_copy(update={"samples": second.samples[:2]})
+    shorter = second.model_copy(update={"samples": second.samples[:3]})
+    assert recipe.agrees_until(Recipe(stroke=(first, second))) == float("inf")
+    assert recipe.agrees_until(Recipe(stroke=(first,))) == 10
+    assert recipe.agrees_until(Recipe(stroke=(first, cut))) == 20
+    assert recipe.agrees_until(Recipe(stroke=(first, shorter))) == 21
+    assert recipe.agrees_until(Recipe(stroke=(first, push((10, 0.5, 0, 1))))) == 10
+    assert recipe.agrees_until(Recipe(stroke=(second,))) == 0
+    assert recipe.agrees_until(recipe.edited(change=(Change(tick=7, drag=1.0),))) == 7
+    assert recipe.agrees_until(recipe.edited(duration=9.0, name="other")) == float("inf")
+    assert recipe.agrees_until(Recipe.parse("[fluid]\ngrid = 64").edited(stroke=recipe.stroke)) == 0
+
+
+def test_past_before_the_parting_is_the_same():
+    """What `agrees_until` promises: before that tick, every stroke passes the same pieces."""
+    whole = push((0, 0, 0, 1), (3, 1, 0, 1), (3, 1, 1, 1), (8, 0, 0, 0))
+    for length in range(1, 5):
+        part = whole.model_copy(update={"samples": whole.samples[:length]})
+        until = int(min(Recipe(stroke=(whole,)).agrees_until(Recipe(stroke=(part,))), 20))
+        assert all(whole.at(tick) == part.at(tick) for tick in range(until))

@@ -1,0 +1,86 @@
+"""Which ticks an animation's frames show, and what ends a simulation."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from app.errors import UserError
+from app.recipe import Playback, Recipe, Stop, Watch
+from app.timeline import Observation, Sentinel, Timeline, frame_positions
+
+TEN = Timeline(10, 0.1)
+
+
+def test_duration_is_a_whole_number_of_ticks():
+    recipe = Recipe.parse("duration = 1.0\n[fluid]\ndt = 0.3")
+    assert Timeline.of(recipe).ticks == 3
+    assert Recipe.parse("duration = 1e-6").ticks == 1
+
+
+def test_frames_run_from_the_first_warp_to_the_last():
+    assert frame_positions(TEN, Playback(), fps=10) == list(range(11))
+
+
+def test_frame_rate_is_independent_of_the_tick():
+    positions = frame_positions(TEN, Playback(), fps=24)
+    assert len(positions) == 25
+    assert positions[0] == 0
+    assert positions[-1] == 10
+    assert {b - a for a, b in zip(positions, positions[1:], strict=False)} == {Fraction(10, 24)}
+
+
+def test_slow_motion_has_more_frames():
+    assert len(frame_positions(TEN, Playback(speed=0.5), fps=10)) == 21
+
+
+def test_reverse_hold_and_ping_pong():
+    playback = Playback(reverse=True, hold_first=0.2, hold_last=0.3, ping_pong=True, start=0.8)
+    shown = [10, 10, 10, 9, 8, 8, 8, 8, 9, 10]
+    assert frame_positions(TEN, playback, fps=10) == shown
+
+
+def test_part_of_the_simulation():
+    assert frame_positions(TEN, Playback(start=0.2, end=0.4), fps=10) == [2, 3, 4]
+    assert frame_positions(TEN, Playback(start=0.2, end=0.2), fps=10) == [2]
+    assert frame_positions(TEN, Playback(start=50), fps=10) == [10]
+
+
+def test_too_many_frames_are_refused():
+    with pytest.raises(UserError, match=r"time.speed"):
+        frame_positions(Timeline(10, 10.0), Playback(speed=1e-4), fps=1000)
+
+
+def test_rest_counts_only_after_motion():
+    sentinel = Sentinel(Stop(speed_below=0.1, energy_below=0.5), dt=0.1)
+    assert sentinel.needs_motion
+    assert sentinel.verdict(1, Observation(energy=0.0, speed=0.0)) is None
+    assert sentinel.verdict(2, Observation(energy=0.0, speed=1.0)) is None
+    message = sentinel.verdict(3, Observation(energy=0.0, speed=0.05))
+    assert message == "stopped at t = 0.3 s (tick 3): largest speed 0.05 is below 0.1"
+
+
+@pytest.mark.parametrize(
+    ("stop", "seen", "words"),
+    [
+        (Stop(displacement_above=0.1), Observation(displacement=0.2), "largest displacement 0.2 is above 0.1"),
+        (Stop(det_below=0.2), Observation(det=0.1), "smallest det J 0.1 is below 0.2"),
+        (
+            Stop(watch=(Watch(point=(0.5, 0.5), distance=0.1),)),
+            Observation(points=((0.5, 0.4),), extent=(1.0, 0.5)),
+            "watched point 1 has moved 0.15",
+        ),
+        (
+            Stop(watch=(Watch(point=(0.5, 0.5), place=(0.5, 1.0)),)),
+            Observation(points=((0.5, 0.495),), extent=(1.0, 0.5)),
+            "watched point 1 has reached its place",
+        ),
+    ],
+)
+def test_conditions(stop: Stop, seen: Observation, words: str):
+    assert words in (Sentinel(stop, 0.1).verdict(5, seen) or "")
+
+
+def test_nothing_to_watch():
+    assert Sentinel(Stop(), 0.1).is_idle
