@@ -1,0 +1,350 @@
+"""Writing animations frame by frame: videos, animated pictures and numbered sequences."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from app import ffmpeg
+from app.errors import Cancelled, UserError
+from app.files import cannot_write, replacing, replacing_many, temporary_beside
+from app.pictures import Picture, picture_format, to_bits, write_picture
+from app.progress import never
+
+FrameWriter = Callable[[np.ndarray], None]
+"""Takes a frame (h, w, c): uint8 or uint16 sRGB, or float32 linear light, all of one kind in one animation."""
+
+NUMBER = re.compile(r"%(0\d+)?d")
+
+# What players take a video for. The filters set the tags: the frames' own overrule those given to the encoder.
+BT709 = (
+    "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+lanczos,"
+    "setparams=colorspace=bt709:color_primaries=bt709:color_trc=bt709:range=tv"
+)
+SRGB = "setparams=color_primaries=bt709:color_trc=iec61966-2-1"
+ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
+
+
+class Encoding(Protocol):
+    """ffmpeg's output options for frames with or without alpha, of 8 or 16 bits a channel."""
+
+    def __call__(self, alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]: ...
+
+
+def _mp4(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    quality = ["-c:v", "libx264", "-preset", "medium", "-crf", str(18 if crf is None else crf)]
+    return [
+        *["-vf", (ON_BLACK if alpha else "") + BT709, "-pix_fmt", "yuv420p", *quality],
+        *["-movflags", "+faststart"],
+    ]
+
+
+def _webm(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    quality = ["-c:v", "libvpx-vp9", "-b:v", "0", "-crf", str(24 if crf is None else crf), "-row-mt", "1"]
+    speed = ["-deadline", "good", "-cpu-used", "4"]
+    return ["-vf", BT709, "-pix_fmt", "yuva420p" if alpha else "yuv420p", *quality, *speed]
+
+
+def _ffv1(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    kind = {(False, 8): "bgr0", (True, 8): "bgra", (False, 16): "gbrp16le", (True, 16): "gbrap16le"}[alpha, bits]
+    return ["-vf", SRGB, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
+
+
+def _prores(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if alpha else "yuv444p10le", "-vendor", "apl0"]
+    return ["-vf", BT709, "-c:v", "prores_ks", *kind]
+
+
+def _apng(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    return ["-c:v", "apng", "-pix_fmt", "rgba" if alpha else "rgb24", "-plays", str(loops), "-f", "apng"]
+
+
+def _webp(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    kind = ["-pix_fmt", "yuva420p" if alpha else "yuv420p", "-quality", "90", "-compression_level", "3"]
+    return ["-c:v", "libwebp_anim", *kind, "-loop", str(loops), "-f", "webp"]
+
+
+@dataclass(frozen=True)
+class Container:
+    """A kind of animation file: its options, whether sides must be even, and the sound it carries.
+
+    `sound` names the codecs taken over as they are; any other is turned into the first one, by `encoder`.
+    """
+
+    name: str
+    encoding: Encoding
+    even: bool = False
+    sound: tuple[str, ...] = ()
+    encoder: tuple[str, ...] = ()
+
+
+ANIMATIONS = {
+    ".mp4": Container("MP4", _mp4, even=True, sound=("aac", "mp3", "ac3"), encoder=("aac", "-b:a", "192k")),
+    ".webm": Container("WebM", _webm, even=True, sound=("opus", "vorbis"), encoder=("libopus", "-b:a", "128k")),
+    ".mkv": Container("FFV1", _ffv1, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("flac",)),
+    ".mov": Container("ProRes", _prores, even=True, sound=("pcm_s16le", "pcm_s24le", "aac"), encoder=("pcm_s16le",)),
+    ".gif": Container("GIF", _ffv1),  # by way of a lossless file, see _GifWriter
+    ".apng": Container("APNG", _apng),
+    ".webp": Container("animated WebP", _webp),
+}
+
+
+def is_sequence(path: str | os.PathLike[str]) -> bool:
+    """Whether `path` numbers its files, as `name.%04d.png` does."""
+    return NUMBER.search(Path(path).name) is not None
+
+
+def is_animation(path: str | os.PathLike[str]) -> bool:
+    """Whether the name alone asks for more than one frame; `.webp` does not, it may be a still."""
+    suffix = Path(path).suffix.lower()
+    return is_sequence(path) or (suffix in ANIMATIONS and suffix != ".webp")
+
+
+def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1) -> None:
+    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate."""
+    if not 0 < fps <= 1000:
+        raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
+    if is_sequence(path):
+        if "%" in NUMBER.sub("", Path(path).name, count=1):
+            raise UserError(f"Cannot write {path}: a sequence's name holds one number, as in name.%04d.png.")
+        picture_format(path)
+        return
+    suffix = Path(path).suffix.lower()
+    if suffix not in ANIMATIONS:
+        endings = " ".join(ANIMATIONS)
+        raise UserError(f"Cannot write {path}: an animation ends in one of {endings}, or is name.%04d.png.")
+    if suffix == ".gif" and fps > 50:
+        raise UserError(f"Cannot write {path}: GIF shows at most 50 frames a second; lower the rate or use .apng.")
+
+
+@contextmanager
+def animation_writer(
+    path: str | os.PathLike[str],
+    fps: float | Fraction = 30,
+    *,
+    crf: int | None = None,
+    loops: int = 0,
+    sound: str | os.PathLike[str] | None = None,
+    frames: int | None = None,
+    first: int = 0,
+    like: Picture | None = None,
+    cancel: Callable[[], bool] = never,
+) -> Iterator[FrameWriter]:
+    """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
+
+    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on.
+    crf: H.264's (18) or VP9's (24) constant rate factor. loops: GIF, APNG, WebP; 0 is for ever.
+    sound: a file whose sound is carried over, cut to the length of `frames`.
+    like: the picture whose profile and metadata the pictures of a sequence get.
+    cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
+    Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
+    """
+    check_animation(path, fps)
+    if is_sequence(path):
+        with _sequence_writer(Path(path), first, like, cancel) as write:
+            yield write
+        return
+    container = ANIMATIONS[Path(path).suffix.lower()]
+    rate = Fraction(fps).limit_denominator(100_000)
+    with replacing(path) as temporary:
+        if container.encoding is _ffv1 and temporary.suffix.lower() == ".gif":
+            with _gif_writer(temporary, str(path), rate, loops, cancel) as write:
+                yield write
+            return
+        sound_in, sound_out = _sound(container, sound, rate, frames)
+        with _Video(temporary, str(path), container, rate, crf, loops, sound_in, sound_out, cancel) as video:
+            yield video.write
+            video.finish()
+
+
+class _Video:
+    """Frames into one run of ffmpeg, started when the first frame shows what they are like."""
+
+    def __init__(
+        self,
+        temporary: Path,
+        label: str,
+        container: Container,
+        rate: Fraction,
+        crf: int | None = None,
+        loops: int = 0,
+        sound_in: list[str] | None = None,
+        sound_out: list[str] | None = None,
+        cancel: Callable[[], bool] = never,
+    ) -> None:
+        self._temporary, self._label, self._container, self._rate = temporary, label, container, rate
+        self._crf, self._loops, self._cancel = crf, loops, cancel
+        self._sound_in, self._sound_out = sound_in or [], sound_out or []
+        self._process: ffmpeg.Ffmpeg | None = None
+        self._kind: tuple[tuple[int, ...], np.dtype] | None = None
+
+    def __enter__(self) -> _Video:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._process is not None:
+            self._process.__exit__(*exception)
+
+    def write(self, frame: np.ndarray) -> None:
+        if self._cancel():
+            raise Cancelled
+        if self._process is None:
+            self._kind = frame.shape, frame.dtype
+            self._process = self._start(frame)
+        elif (frame.shape, frame.dtype) != self._kind:
+            raise ValueError(f"a frame {frame.shape} {frame.dtype} among frames {self._kind}")
+        if frame.dtype == np.float32:
+            frame = to_bits(frame, 16)
+        if self._container.even and (frame.shape[0] % 2 or frame.shape[1] % 2):
+            # the edge is repeated: a black line would show, a resize would blur
+            frame = np.pad(frame, ((0, frame.shape[0] % 2), (0, frame.shape[1] % 2), (0, 0)), mode="edge")
+        self._process.feed(np.ascontiguousarray(frame).data.cast("B"))
+
+    def _start(self, frame: np.ndarray) -> ffmpeg.Ffmpeg:
+        height, width, channels = frame.shape
+        if self._container.even:
+            height, width = height + height % 2, width + width % 2
+        bits = 8 if frame.dtype == np.uint8 else 16
+        names = ("gray", "ya8", "rgb24", "rgba") if bits == 8 else ("gray16le", "ya16le", "rgb48le", "rgba64le")
+        return ffmpeg.Ffmpeg(
+            [
+                *["-f", "rawvideo", "-pix_fmt", names[channels - 1], "-s", f"{width}x{height}", "-r", str(self._rate)],
+                *["-i", "-", *self._sound_in, "-map", "0:v:0"],
+                *self._container.encoding(channels in (2, 4), bits, self._crf, self._loops),
+                *self._sound_out,
+                f"file:{self._temporary}",
+            ],
+            self._label,
+            cancel=self._cancel,
+        )
+
+    def finish(self) -> None:
+        """Wait for the encoder to have written everything."""
+        if self._process is None:
+            raise UserError(f"Cannot write {self._label}: the animation has no frame.")
+        self._process.finish()
+
+
+def _sound(
+    container: Container, sound: str | os.PathLike[str] | None, rate: Fraction, frames: int | None
+) -> tuple[list[str], list[str]]:
+    """ffmpeg's input and output options that carry the sound of a file over."""
+    if sound is None or not container.sound:
+        return [], []
+    from app.video import read_clip
+
+    codec = read_clip(sound).sound
+    if codec is None:
+        return [], []
+    length = [] if frames is None else ["-t", f"{float(frames / rate):.6f}"]
+    chosen = ("copy",) if codec in container.sound else container.encoder
+    return [*length, "-i", f"file:{sound}"], ["-map", "1:a:0", "-c:a", *chosen]
+
+
+@contextmanager
+def _gif_writer(
+    temporary: Path, label: str, rate: Fraction, loops: int, cancel: Callable[[], bool]
+) -> Iterator[FrameWriter]:
+    """Frames into a lossless file first: a palette of all colours needs all frames, which may not fit in memory."""
+    spool = temporary_beside(temporary.with_suffix(".mkv"))
+    palette = spool.with_suffix(".png")
+    alpha = False
+    try:
+        with _Video(spool, label, ANIMATIONS[".mkv"], rate, cancel=cancel) as video:
+
+            def write(frame: np.ndarray) -> None:
+                nonlocal alpha
+                alpha = frame.shape[2] in (2, 4)
+                video.write(to_bits(frame, 8))
+
+            yield write
+            video.finish()
+        source = ["-i", f"file:{spool}"]
+        generate = f"palettegen=stats_mode=full:reserve_transparent={int(alpha)}"
+        ffmpeg.run([*source, "-vf", generate, "-update", "1", f"file:{palette}"], label, cancel=cancel)
+        use = ["-lavfi", "paletteuse=dither=sierra2_4a:diff_mode=rectangle"]
+        # ffmpeg counts repetitions, and -1 means none
+        repeat = ["-loop", str(loops - 1 if loops > 1 else -1 if loops == 1 else 0)]
+        ffmpeg.run([*source, "-i", f"file:{palette}", *use, *repeat, f"file:{temporary}"], label, cancel=cancel)
+    finally:
+        spool.unlink(missing_ok=True)
+        palette.unlink(missing_ok=True)
+
+
+@contextmanager
+def _sequence_writer(path: Path, first: int, like: Picture | None, cancel: Callable[[], bool]) -> Iterator[FrameWriter]:
+    number = first
+    with replacing_many(path.parent, path.name) as folder:
+
+        def write(frame: np.ndarray) -> None:
+            nonlocal number
+            if cancel():
+                raise Cancelled
+            picture = like.with_pixels(frame) if like is not None else Picture(frame)
+            write_picture(folder / (path.name % number), picture)
+            number += 1
+
+        yield write
+        if number == first:
+            raise UserError(f"Cannot write {path}: the animation has no frame.")
+
+
+# Order of frames ----------------------------------------------------------------------------------------------------
+
+
+def frame_order(
+    count: int, *, ping_pong: bool = False, rounds: int = 1, hold_first: int = 0, hold_last: int = 0
+) -> Iterator[int]:
+    """The indices of `count` frames in the order they are shown.
+
+    ping_pong: there and back, without showing the two ends twice, so that rounds follow each other smoothly.
+    hold_first, hold_last: how many times more the first and the last frame are shown.
+    """
+    there = [0] * (hold_first + 1) + list(range(1, count)) + [count - 1] * hold_last if count else []
+    once = there + list(range(count - 2, 0, -1)) if ping_pong else there
+    for _ in range(rounds):
+        yield from once
+
+
+def order_length(
+    count: int, *, ping_pong: bool = False, rounds: int = 1, hold_first: int = 0, hold_last: int = 0
+) -> int:
+    """How many indices `frame_order` gives."""
+    back = max(0, count - 2) if ping_pong else 0
+    return rounds * (count + back + hold_first + hold_last) if count else 0
+
+
+def reordered(
+    frames: Iterable[np.ndarray], order: Iterable[int], folder: str | os.PathLike[str]
+) -> Iterator[np.ndarray]:
+    """Frames that come once, one after the other, shown in any `order`; kept in a file in `folder`, not in memory.
+
+    The file has no name and is gone with the process. Raises `UserError` when the disk is full.
+    """
+    source = iter(frames)
+    count = 0
+    latest = np.empty(0)
+    try:
+        with tempfile.TemporaryFile(dir=folder) as spool:
+            for index in order:
+                while count <= index:
+                    latest = np.ascontiguousarray(next(source))
+                    spool.seek(count * latest.nbytes)
+                    spool.write(latest.data)
+                    count += 1
+                if index == count - 1:
+                    yield latest
+                else:
+                    spool.seek(index * latest.nbytes)
+                    yield np.frombuffer(spool.read(latest.nbytes), latest.dtype).reshape(latest.shape)
+    except OSError as error:
+        raise cannot_write(folder, error) from error

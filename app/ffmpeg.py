@@ -1,0 +1,134 @@
+"""Running the ffmpeg that imageio-ffmpeg brings along: fed or read without blocking, stopped at will."""
+
+from __future__ import annotations
+
+import errno
+import functools
+import os
+import re
+import select
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+
+from app.errors import Cancelled, UserError
+from app.files import cannot_write
+from app.progress import never
+
+PATIENCE = 0.1  # seconds between two looks at the wish to stop
+
+
+@functools.cache
+def executable() -> str:
+    """Path of ffmpeg; raises `UserError` when there is none for this machine."""
+    import imageio_ffmpeg
+
+    try:
+        return imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise UserError("No ffmpeg was found: install one, or set IMAGEIO_FFMPEG_EXE to its path.") from error
+
+
+class Ffmpeg:
+    """One run of ffmpeg; as a context manager it never outlives its block.
+
+    arguments: what follows `ffmpeg -y`.
+    label: the file a failure is told about, with `doing` ("write", "read") as the verb.
+    cancel: asked about ten times a second while ffmpeg keeps us waiting; when true, `Cancelled` is raised.
+    """
+
+    def __init__(
+        self, arguments: Sequence[str], label: str, *, doing: str = "write", cancel: Callable[[], bool] = never
+    ) -> None:
+        self._label, self._doing, self._cancel = label, doing, cancel
+        self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__; a pipe could fill and block
+        self._process = subprocess.Popen(
+            [executable(), "-hide_banner", "-nostats", "-loglevel", "error", "-y", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._complaints,
+            bufsize=0,
+            start_new_session=True,  # Ctrl+C is ours to handle
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._stdin, self._stdout = self._process.stdin, self._process.stdout
+        os.set_blocking(self._stdin.fileno(), False)
+        os.set_blocking(self._stdout.fileno(), False)
+
+    def __enter__(self) -> Ffmpeg:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._stdin.close()
+        self._stdout.close()
+        self._complaints.close()
+
+    def feed(self, data: memoryview) -> None:
+        """Write all of `data`, bytes, to its standard input."""
+        pipe = self._stdin.fileno()
+        while data:
+            self._check()
+            if select.select([], [pipe], [], PATIENCE)[1]:
+                try:
+                    data = data[os.write(pipe, data) :]
+                except BlockingIOError:
+                    continue
+                except BrokenPipeError:
+                    self._process.wait()
+                    raise self.failure() from None
+
+    def blocks(self, size: int) -> Iterator[bytearray]:
+        """Its standard output in blocks of `size` bytes; raises `UserError` when it fails."""
+        pipe = self._stdout.fileno()
+        while True:
+            block = bytearray(size)
+            view = memoryview(block)
+            while view:
+                self._check()
+                if not select.select([pipe], [], [], PATIENCE)[0]:
+                    continue
+                count = os.readv(pipe, [view])
+                if not count:
+                    break
+                view = view[count:]
+            if view:  # the end, where a partial block can only come from a failure
+                self.finish()
+                return
+            yield block
+
+    def finish(self) -> None:
+        """Close its input and wait for its end; raises `UserError` when it failed."""
+        self._stdin.close()
+        while True:
+            self._check()
+            try:
+                status = self._process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                continue
+            if status:
+                raise self.failure()
+            return
+
+    def _check(self) -> None:
+        if self._cancel():
+            raise Cancelled
+
+    def failure(self) -> UserError:
+        """What its last words mean for the user."""
+        self._complaints.seek(0)
+        said = self._complaints.read().decode("utf-8", "replace")
+        if os.strerror(errno.ENOSPC) in said:
+            return cannot_write(self._label, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in said.splitlines()]
+        lines = [line for line in lines if line and line != "Conversion failed!"]
+        last = lines[-1].rstrip(".") if lines else f"it ended with status {self._process.returncode}"
+        return UserError(f"Cannot {self._doing} {self._label}: ffmpeg says: {last}.")
+
+
+def run(arguments: Sequence[str], label: str, *, doing: str = "write", cancel: Callable[[], bool] = never) -> None:
+    """Run ffmpeg to its end; raises `UserError` or `Cancelled`."""
+    with Ffmpeg(arguments, label, doing=doing, cancel=cancel) as process:
+        process.finish()

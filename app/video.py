@@ -1,0 +1,120 @@
+"""Reading a clip: what it is, and its frames one after the other."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from app import ffmpeg
+from app.errors import UserError
+from app.pictures import MAX_PIXELS
+from app.progress import never
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A video file as it is shown: upright, with square pixels, at a constant rate.
+
+    rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
+    sound: name of its first sound track's codec, None if silent. bits: 8, or 16 for what has more than 8.
+    """
+
+    path: Path
+    width: int
+    height: int
+    fps: Fraction
+    frames: int | None
+    rotation: int
+    sound: str | None
+    bits: int
+    alpha: bool
+    decoder: tuple[str, ...]
+    filters: str
+
+    def read_frames(self, cancel: Callable[[], bool] = never) -> Iterator[np.ndarray]:
+        """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time."""
+        channels = 4 if self.alpha else 3
+        kind = {(False, 8): "rgb24", (True, 8): "rgba", (False, 16): "rgb48le", (True, 16): "rgba64le"}
+        arguments = [
+            *[*self.decoder, "-i", f"file:{self.path}", "-map", "0:v:0", "-vf", self.filters, "-r", str(self.fps)],
+            *["-f", "rawvideo", "-pix_fmt", kind[self.alpha, self.bits], "-"],
+        ]
+        dtype = np.dtype(np.uint8 if self.bits == 8 else np.uint16)
+        shape = self.height, self.width, channels
+        with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel) as process:
+            for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
+                yield np.frombuffer(block, dtype).reshape(shape)
+
+
+def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
+    """Look into a video file; raises `UserError` when it is none."""
+    file = Path(path)
+    if file.is_dir():
+        raise UserError(f"Cannot read {path}: it is a folder; give the name of a video.")
+    if not file.exists():
+        raise UserError(f"Cannot read {path}: there is no such file; check the name.")
+    told = _banner(file)
+    video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
+    if video is None:
+        reason = "it is empty" if file.stat().st_size == 0 else "it is no video, or damaged"
+        raise UserError(f"Cannot read {path}: {reason}; give the name of a video.")
+    kind = re.search(r"Video: [^,]*, ?(?:none, )?(\w+)", video)
+    pixel_format = kind.group(1) if kind else ""
+    hidden = "Video: vp9" in video and "alpha_mode" in told  # a second stream, which only libvpx decodes
+    alpha = hidden or bool(re.match(r"(yuva|gbrap|rgba|bgra|argb|abgr|ya\d|pal8)", pixel_format))
+    matrix = "" if re.search(r"bt709|bt2020|smpte170m|bt470bg|gbr", video) else _untagged(video)
+    aspect = re.search(r"SAR (\d+):(\d+)", video)
+    square = aspect is None or aspect.group(1) == aspect.group(2)
+    filters = f"scale={'iw' if square else 'iw*sar'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
+    width, height, fps = _shown(file, filters)
+    if width * height > max_pixels:
+        raise UserError(f"Cannot read {path}: {width} x {height} pixels are more than the limit of {max_pixels}.")
+    length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
+    seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
+    rotation = re.search(r"rotation of (-?[\d.]+) degrees", told)
+    sound = re.search(r"Stream #0.*: Audio: (\w+)", told)
+    return Clip(
+        path=file,
+        width=width,
+        height=height,
+        fps=fps,
+        frames=max(1, round(seconds * fps)) if seconds is not None else None,
+        rotation=round(-float(rotation.group(1))) % 360 if rotation else 0,
+        sound=sound.group(1) if sound else None,
+        bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
+        alpha=alpha,
+        decoder=("-c:v", "libvpx-vp9") if hidden else (),
+        filters=filters,
+    )
+
+
+def _banner(file: Path) -> str:
+    """What ffmpeg says of a file it opens; imageio-ffmpeg brings no ffprobe."""
+    command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}"]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    return done.stderr.decode("utf-8", "replace")
+
+
+def _untagged(video: str) -> str:
+    """The matrix players take for a video that does not tell: BT.709 from 720 lines on."""
+    size = re.search(r", (\d{2,5})x(\d{2,5})", video)
+    return ":in_color_matrix=bt709" if size and "yuv" in video and int(size.group(2)) >= 720 else ""
+
+
+def _shown(file: Path, filters: str) -> tuple[int, int, Fraction]:
+    """Width, height and exact frame rate of the first frame as decoded, from the header of `framemd5`."""
+    arguments = ["-i", f"file:{file}", "-map", "0:v:0", "-vf", filters, "-frames:v", "1", "-f", "framemd5", "-"]
+    with ffmpeg.Ffmpeg(arguments, str(file), doing="read") as process:
+        told = b"".join(bytes(block) for block in process.blocks(1)).decode()
+    size = re.search(r"#dimensions 0: (\d+)x(\d+)", told)
+    step = re.search(r"#tb 0: (\d+)/(\d+)", told)
+    if size is None or step is None:
+        raise UserError(f"Cannot read {file}: it has no frame that can be decoded; get it again.")
+    return int(size.group(1)), int(size.group(2)), Fraction(int(step.group(2)), int(step.group(1)))
