@@ -18,7 +18,8 @@ vec2 mac_velocity(sampler2D velocity, vec2 p) {
                   texture(velocity, tu.xw).r, texture(velocity, tu.zw).r);
     vec4 v = vec4(texture(velocity, tv.xy).g, texture(velocity, tv.zy).g,
                   texture(velocity, tv.xw).g, texture(velocity, tv.zw).g);
-    return vec2(dot(u, vec4(ux * uy.x, ux * uy.y)) + add_u, dot(v, vec4(vx * vy.x, vx * vy.y)) + add_v);
+    vec2 moved = vec2(add_u * (ux.x + ux.y), add_v * (vy.x + vy.y));
+    return vec2(dot(u, vec4(ux * uy.x, ux * uy.y)), dot(v, vec4(vx * vy.x, vx * vy.y))) + moved;
 }
 
 // Velocity at the centre of the cell at p (in cells): the mean of opposite faces. 3 reads.

@@ -4,8 +4,8 @@
 // reads: 19
 //
 // A face's departure is the mean of those of the two cells it parts. The 4 x 4 faces around the departure of u and of v
-// are the same texels unless the flow strains by more than half a cell a step, so both are read at once, around the mean
-// departure, and each weighs them for its own place.
+// are nearly always the same texels, so both are read at once, around the mean departure, and each weighs them for its
+// own place; the cubic holds as long as that lies among the four, that is for a strain of up to two cells a step.
 #include "lib/cubic.glsl"
 #include "lib/walls.glsl"
 uniform sampler2D u_velocity;
@@ -20,7 +20,7 @@ void main() {
     vec2 to_u = 0.5 * (here + texture(u_trace, v_uv - vec2(texel.x, 0.0)).rg);
     vec2 to_v = 0.5 * (here + texture(u_trace, v_uv - vec2(0.0, texel.y)).rg);
     vec2 corner = floor(cell + 0.5 * (to_u + to_v));
-    vec2 fu = clamp(cell + to_u - corner, -0.5, 1.5), fv = clamp(cell + to_v - corner, -0.5, 1.5);
+    vec2 fu = clamp(cell + to_u - corner, -1.0, 2.0), fv = clamp(cell + to_v - corner, -1.0, 2.0);
     vec4 column = corner.x + vec4(-1.0, 0.0, 1.0, 2.0), row = corner.y + vec4(-1.0, 0.0, 1.0, 2.0);
     float add_u, add_v;
     vec4 ux = wall_normal(cubic_lagrange(fu.x), column, size.x);
@@ -28,7 +28,7 @@ void main() {
     vec4 vx = wall_tangential(cubic_lagrange(fv.x), column, size.x, u_wall_speed.xy, add_v);
     vec4 vy = wall_normal(cubic_lagrange(fv.y), row, size.y);
     vec4 x = (column + 0.5) * texel.x, y = (row + 0.5) * texel.y;
-    vec2 sum = vec2(add_u, add_v);
+    vec2 sum = vec2(add_u * dot(ux, vec4(1.0)), add_v * dot(vy, vec4(1.0)));
     for (int j = 0; j < 4; ++j) {
         vec2 a = texture(u_velocity, vec2(x.x, y[j])).rg, b = texture(u_velocity, vec2(x.y, y[j])).rg;
         vec2 c = texture(u_velocity, vec2(x.z, y[j])).rg, d = texture(u_velocity, vec2(x.w, y[j])).rg;

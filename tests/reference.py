@@ -1,0 +1,217 @@
+"""What the shaders compute, again: NumPy, float64, straight from the formulas and with arrays padded by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+Faces = np.ndarray
+
+# ---------------------------------------------------------------------------------------------------------------------
+# The stages of a step
+# ---------------------------------------------------------------------------------------------------------------------
+
+PAD = 4
+
+
+def padded_faces(faces: Faces, no_slip: bool = False, speed: tuple[float, ...] = (0, 0, 0, 0)) -> tuple[np.ndarray, ...]:
+    """u and v with PAD ghost faces on every side, from (ny, nx, 2): zero on and beyond walls for the normal component;
+    for the tangential one the nearest inside, or 2 U minus it."""
+    u, v = (np.asarray(faces[..., axis], np.float64) for axis in (0, 1))
+    u = np.pad(u, ((PAD, PAD), (0, 0)), mode="edge")[:, 1:]
+    v = np.pad(v, ((0, 0), (PAD, PAD)), mode="edge")[1:]
+    if no_slip:
+        u[:PAD] = 2 * speed[2] - u[:PAD]
+        u[-PAD:] = 2 * speed[3] - u[-PAD:]
+        v[:, :PAD] = 2 * speed[0] - v[:, :PAD]
+        v[:, -PAD:] = 2 * speed[1] - v[:, -PAD:]
+    return np.pad(u, ((0, 0), (PAD + 1, PAD))), np.pad(v, ((PAD + 1, PAD), (0, 0)))
+
+
+def interpolate(
+    values: np.ndarray, x: np.ndarray, y: np.ndarray, order: str, corner: tuple[np.ndarray, ...] | None = None
+) -> np.ndarray:
+    """Values at fractional indices (x, y) of an array padded by PAD, linear or four-point Lagrange in each direction.
+
+    The four points lie around `corner`, by default the whole part of (x, y)."""
+    i, j = (np.floor(a).astype(int) for a in corner or (x, y))
+    fx, fy = x - i, y - j
+    if order == "linear":
+        offsets, wx, wy = (0, 1), (1 - fx, fx), (1 - fy, fy)
+    else:
+        offsets = (-1, 0, 1, 2)
+        wx, wy = ([_lagrange(offsets, k, f) for k in offsets] for f in (fx, fy))
+    rows, columns = values.shape
+    total = np.zeros_like(x, np.float64)
+    for dy, b in zip(offsets, wy, strict=True):
+        for dx, a in zip(offsets, wx, strict=True):
+            row = np.clip(j + dy + PAD, 0, rows - 1)
+            column = np.clip(i + dx + PAD, 0, columns - 1)
+            total += a * b * values[row, column]
+    return total
+
+
+def _lagrange(nodes: tuple[int, ...], k: int, f: np.ndarray) -> np.ndarray:
+    weight = np.ones_like(f)
+    for other in nodes:
+        if other != k:
+            weight = weight * (f - other) / (k - other)
+    return weight
+
+
+def velocity_at(padded: tuple[np.ndarray, ...], x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity at (x, y) in cells, each component bilinear between its faces."""
+    u, v = padded
+    return interpolate(u, x, y - 0.5, "linear"), interpolate(v, x - 0.5, y, "linear")
+
+
+def trace(faces: Faces, dt_over_h: float, **walls: object) -> np.ndarray:
+    """Midpoint backtrace of the cell centres, (ny, nx, 2) in cells."""
+    ny, nx = faces.shape[:2]
+    padded = padded_faces(faces, **walls)  # type: ignore[arg-type]
+    x, y = np.meshgrid(np.arange(nx) + 0.5, np.arange(ny) + 0.5)
+    u, v = velocity_at(padded, x, y)
+    middle = np.clip(x - dt_over_h / 2 * u, 0, nx), np.clip(y - dt_over_h / 2 * v, 0, ny)
+    u, v = velocity_at(padded, *middle)
+    return np.stack([np.clip(x - dt_over_h * u, 0, nx) - x, np.clip(y - dt_over_h * v, 0, ny) - y], axis=-1)
+
+
+def advect(faces: Faces, dt_over_h: float, **walls: object) -> np.ndarray:
+    """Semi-Lagrangian advection of a MAC velocity by itself, cubic; departures of faces are means of the cells'."""
+    back = trace(faces, dt_over_h, **walls)
+    u, v = padded_faces(faces, **walls)  # type: ignore[arg-type]
+    ny, nx = faces.shape[:2]
+    column, row = np.meshgrid(np.arange(nx), np.arange(ny))
+    left = np.concatenate([back[:, :1], back[:, :-1]], axis=1)
+    above = np.concatenate([back[:1], back[:-1]], axis=0)
+    to_u, to_v = 0.5 * (back + left), 0.5 * (back + above)
+    # Both components are read around one place, as the shader does.
+    corner = column + 0.5 * (to_u + to_v)[..., 0], row + 0.5 * (to_u + to_v)[..., 1]
+    result = np.stack(
+        [
+            interpolate(u, column + to_u[..., 0], row + to_u[..., 1], "cubic", corner),
+            interpolate(v, column + to_v[..., 0], row + to_v[..., 1], "cubic", corner),
+        ],
+        axis=-1,
+    )
+    result[:, 0, 0] = 0
+    result[0, :, 1] = 0
+    return result
+
+
+def divergence(faces: Faces, h: float) -> np.ndarray:
+    """Divergence of the cells, (ny, nx), far walls closed."""
+    u = np.pad(np.asarray(faces[..., 0], np.float64), ((0, 0), (0, 1)))
+    v = np.pad(np.asarray(faces[..., 1], np.float64), ((0, 1), (0, 0)))
+    return (np.diff(u, axis=1) + np.diff(v, axis=0)) / h
+
+
+def smooth_velocity(nx: int, ny: int, seed: int, cells: float = 6.0) -> np.ndarray:
+    """A random smooth velocity on MAC faces, largest component 1, zero on the near walls."""
+    rng = np.random.default_rng(seed)
+    faces = np.stack([ndimage.gaussian_filter(rng.standard_normal((ny, nx)), cells) for _ in range(2)], axis=-1)
+    faces /= np.abs(faces).max()
+    faces[:, 0, 0] = 0
+    faces[0, :, 1] = 0
+    return faces
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# The paper's stages
+# ---------------------------------------------------------------------------------------------------------------------
+
+
+def paper_padded(values: np.ndarray, odd: bool = False, axis: int | None = None) -> np.ndarray:
+    """One ghost cell around a collocated array; odd across the edges that `axis` is normal to."""
+    padded = np.pad(values, 1, mode="edge")
+    if odd and axis == 0:
+        padded[:, 0], padded[:, -1] = -padded[:, 0], -padded[:, -1]
+    if odd and axis == 1:
+        padded[0], padded[-1] = -padded[0], -padded[-1]
+    return padded
+
+
+def paper_diffuse_sweep(velocity: np.ndarray, before: np.ndarray, viscosity: np.ndarray, dt_over_h2: float) -> np.ndarray:
+    """One Jacobi sweep of Appendix A, mended."""
+    u, v = paper_padded(velocity[..., 0], True, 0), paper_padded(velocity[..., 1], True, 1)
+    mu = paper_padded(viscosity)
+
+    def around(a: np.ndarray) -> tuple[np.ndarray, ...]:
+        return a[1:-1, :-2], a[1:-1, 2:], a[:-2, 1:-1], a[2:, 1:-1]
+
+    ul, ur, ua, ub = around(u)
+    vl, vr, va, vb = around(v)
+    ml, mr, ma, mb = around(mu)
+    k = dt_over_h2 * viscosity
+    kx, ky = 0.5 * dt_over_h2 * (mr - ml), 0.5 * dt_over_h2 * (mb - ma)
+    shear = ub - ua + vr - vl
+    new_u = before[..., 0] + k * (ul + ur + ua + ub) + kx * (ur - ul) + 0.5 * ky * shear
+    new_v = before[..., 1] + k * (vl + vr + va + vb) + ky * (vb - va) + 0.5 * kx * shear
+    return np.stack([new_u, new_v], axis=-1) / (1 + 4 * k)[..., None]
+
+# -- the warp map ---------------------------------------------------------------------------------------------------
+
+
+def lagrange(field: np.ndarray, x: np.ndarray, y: np.ndarray, points: int) -> np.ndarray:
+    """`field` (ny, nx, c) at positions x, y by Lagrange polynomials through `points` x `points` texels.
+
+    At the edges the outermost texels are taken.
+    """
+
+    def weights(position: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        first = np.clip(np.floor(position - 0.5).astype(int) - (points // 2 - 1), 0, count - points)
+        nodes = np.arange(points)
+        f = (position - 0.5 - first)[..., None]
+        value = np.ones((*position.shape, points))
+        for i in nodes:
+            for j in nodes[nodes != i]:
+                value[..., i] *= (f[..., 0] - j) / (i - j)
+        return first[..., None] + nodes, value
+
+    columns, wx = weights(np.asarray(x, float), field.shape[1])
+    rows, wy = weights(np.asarray(y, float), field.shape[0])
+    values = field.astype(float)[rows[..., :, None], columns[..., None, :]]
+    return np.einsum("...j,...i,...jic->...c", wy, wx, values)
+
+
+def texel_centres(size: tuple[int, int], texels: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the centres of a `size` lattice in the texels of another one over the same domain."""
+    x = (np.arange(size[0]) + 0.5) * texels[0] / size[0]
+    y = (np.arange(size[1]) + 0.5) * texels[1] / size[1]
+    return tuple(np.meshgrid(x, y))  # pyright: ignore[reportReturnType]
+
+
+def advance_map(near: np.ndarray, trace: np.ndarray, h: float) -> np.ndarray:
+    """near'(x) = (x_d - x) + near(x_d), with x_d - x = `trace` in cells."""
+    x, y = texel_centres(near.shape[1::-1], near.shape[1::-1])
+    return trace * h + lagrange(near, x + trace[..., 0], y + trace[..., 1], 4)
+
+
+def compose_map(near: np.ndarray, base: np.ndarray, extent: tuple[float, float], size: tuple[int, int]) -> np.ndarray:
+    """near(x) + base(x + near(x)) at the centres of a `size` lattice."""
+    moved = lagrange(near, *texel_centres(size, near.shape[1::-1]), 4)
+    width, height = base.shape[1::-1]
+    x, y = texel_centres(size, (width, height))
+    x = np.clip(x + moved[..., 0] / extent[0] * width, 0, width)
+    y = np.clip(y + moved[..., 1] / extent[1] * height, 0, height)
+    return moved + lagrange(base, x, y, 6)
+
+
+def follow(
+    velocity: Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]],
+    x: np.ndarray,
+    y: np.ndarray,
+    start: float,
+    end: float,
+    steps: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where particles at (x, y) at time `start` are at `end`: classical Runge-Kutta."""
+    dt = (end - start) / steps
+    for step in range(steps):
+        t = start + step * dt
+        u1, v1 = velocity(x, y, t)
+        u2, v2 = velocity(x + dt / 2 * u1, y + dt / 2 * v1, t + dt / 2)
+        u3, v3 = velocity(x + dt / 2 * u2, y + dt / 2 * v2, t + dt / 2)
+        u4, v4 = velocity(x + dt * u3, y + dt * v3, t + dt)
+        x, y = x + dt / 6 * (u1 + 2 * u2 + 2 * u3 + u4), y + dt / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+    return x, y

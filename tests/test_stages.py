@@ -1,0 +1,84 @@
+"""Every stage of a step against the same formula in NumPy, float64."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import reference
+from solver.context import Device
+from solver.grid import Grid
+
+SIZES = [(8, 8), (33, 17), (64, 48), (31, 64)]
+WALLS = [(False, (0.0, 0.0, 0.0, 0.0)), (True, (0.3, -0.2, 1.0, 0.5))]
+
+
+def relative(got: np.ndarray, wanted: np.ndarray) -> float:
+    return float(np.abs(got - wanted).max() / np.abs(wanted).max())
+
+
+def wall_inputs(no_slip: bool, speed: tuple[float, ...]) -> tuple[dict[str, object], dict[str, object]]:
+    return ({"NO_SLIP": 1}, {"wall_speed": speed}) if no_slip else ({}, {})
+
+
+@pytest.mark.parametrize(("no_slip", "speed"), WALLS, ids=["free-slip", "moving no-slip"])
+@pytest.mark.parametrize(("nx", "ny"), SIZES)
+@pytest.mark.parametrize("courant", [0.4, 3.0])
+def test_trace_and_advect(
+    device: Device, nx: int, ny: int, no_slip: bool, speed: tuple[float, ...], courant: float
+) -> None:
+    faces = reference.smooth_velocity(nx, ny, seed=nx, cells=5)
+    velocity, back, after = device.upload(faces), device.field((nx, ny), 2), device.field((nx, ny), 2)
+    defines, inputs = wall_inputs(no_slip, speed)
+    device.pass_("stages/trace.frag", **defines)(back, velocity=velocity, dt_over_h=courant, **inputs)
+    wanted = reference.trace(faces, courant, no_slip=no_slip, speed=speed)
+    assert relative(back.get(), wanted) < 1e-4
+    device.pass_("stages/advect.frag", **defines)(after, velocity=velocity, trace=back, decay=0.5, **inputs)
+    wanted = 0.5 * reference.advect(faces, courant, no_slip=no_slip, speed=speed)
+    assert relative(after.get(), wanted) < 1e-4
+    assert (after.get()[:, 0, 0] == 0).all()
+    assert (after.get()[0, :, 1] == 0).all()
+
+
+def test_add_force_and_source(device: Device) -> None:
+    faces = reference.smooth_velocity(20, 14, seed=3).astype(np.float32)
+    velocity, force = device.upload(faces), device.upload(faces[::-1].copy())
+    device.pass_("stages/add_force.frag")(velocity, add=True, force=force, impulse=0.25)
+    np.testing.assert_allclose(velocity.get(), faces + np.float32(0.25) * faces[::-1], rtol=1e-6)
+
+
+def test_masks_compose(device: Device) -> None:
+    from solver.fluid import Fluid
+    from solver.masks import LEAST_VISCOSITY, Masks
+
+    grid = Grid(12, 9)
+    rng = np.random.default_rng(5)
+    base, frozen = rng.uniform(0, 1, (9, 12)), (rng.uniform(0, 1, (9, 12)) > 0.8).astype(float)
+    base[0] = 0
+    masks, fluid = Masks(device, grid), Fluid(device, grid)
+    masks.set_base(base, frozen)
+    thickness = rng.uniform(-2, 4, (9, 12)) * (rng.uniform(0, 1, (9, 12)) > 0.5)
+    painted = rng.uniform(-1, 1, (9, 12))
+    masks.thickness.read.set(thickness)
+    masks.frozen.read.set(painted)
+    masks.apply(fluid)
+    wanted = np.where(thickness == 0, base, np.maximum(base, LEAST_VISCOSITY) * 10**thickness)
+    np.testing.assert_allclose(fluid.viscosity.get(), wanted, rtol=1e-5)
+    np.testing.assert_array_equal(fluid.solid.get() > 127, frozen + painted >= 0.5)
+
+
+@pytest.mark.parametrize(("nx", "ny"), SIZES)
+def test_paper_diffusion_sweep_is_appendix_a(device: Device, nx: int, ny: int) -> None:
+    rng = np.random.default_rng(nx)
+    velocity, before = rng.standard_normal((2, ny, nx, 2))
+    viscosity = rng.uniform(0, 1, (ny, nx))
+    out = device.field((nx, ny), 2)
+    device.pass_("paper/diffuse.frag")(
+        out,
+        velocity=device.upload(velocity),
+        before=device.upload(before),
+        viscosity=device.upload(viscosity),
+        solid=device.field((nx, ny), 1, dtype="f1"),
+        dt_over_h2=0.7,
+    )
+    assert relative(out.get(), reference.paper_diffuse_sweep(velocity, before, viscosity, 0.7)) < 1e-4
