@@ -1,0 +1,32 @@
+// Reading a displacement between its texels, at position p (in texels, (0,0) the top left corner), by Lagrange
+// polynomials. At the edges the outermost texels are taken, so that the map goes on beyond them as the same polynomial.
+// texture() with nearest filtering: exact at texel centres, and cheaper than texelFetch in software.
+#include "lib/cubic.glsl"
+#include "lib/quintic.glsl"
+
+// Four-point cubic both ways. 16 reads.
+vec2 cubic_displacement(sampler2D displacement, vec2 p) {
+    vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
+    vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
+    vec4 wx = cubic_lagrange(f.x), wy = cubic_lagrange(f.y);
+    vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
+    vec2 sum = vec2(0.0);
+    for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 4; ++i)
+            sum += wx[i] * wy[j] * texture(displacement, vec2(x[i], y[j])).rg;
+    return sum;
+}
+
+// Six-point quintic both ways: on a base map of twice the grid as good as the cubic on one of four times. 36 reads.
+vec2 quintic_displacement(sampler2D displacement, vec2 p) {
+    vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
+    vec2 cell = clamp(floor(p - 0.5), vec2(2.0), size - 4.0), f = p - 0.5 - cell;
+    float wx[6], wy[6];
+    quintic_lagrange(f.x, wx);
+    quintic_lagrange(f.y, wy);
+    vec2 sum = vec2(0.0), corner = (cell - 1.5) * texel;
+    for (int j = 0; j < 6; ++j)
+        for (int i = 0; i < 6; ++i)
+            sum += wx[i] * wy[j] * texture(displacement, corner + vec2(i, j) * texel).rg;
+    return sum;
+}

@@ -1,0 +1,302 @@
+"""The warp map: where every point of the result is looked up in the original."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.context import Device
+from solver.field import Field, FieldError
+from solver.grid import Grid
+from solver.reduce import Reduction
+
+Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+
+CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last fold
+_ROW = 256  # points in a row of the texture that lists them
+STEEPEST = 1.0  # largest |grad D| that the cubic carries well
+
+
+@dataclass(frozen=True)
+class MapStatistics:
+    """How a map distorts, by central differences at the simulation's cell centres.
+
+    Attributes:
+        det_min, det_max: of the Jacobian of x + D(x): how many times larger an area it is looked up in.
+        folds: cells where it is zero or negative.
+        det_error: mean of |det - 1|.
+        displacement_max, displacement_mean: |D|, longer sides.
+    """
+
+    det_min: float
+    det_max: float
+    folds: int
+    det_error: float
+    displacement_max: float
+    displacement_mean: float
+
+
+@dataclass(frozen=True)
+class MapState:
+    """A copy of a map on the GPU, for `WarpMap.load`."""
+
+    fields: tuple[Field, Field]
+    steps: int
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return sum(field.nbytes for field in self.fields)
+
+    def release(self) -> None:
+        """Free the textures."""
+        for field in self.fields:
+            field.release()
+
+
+class WarpMap:
+    """The map x -> x + D(x) from the result to the original, carried along by a fluid without blurring.
+
+    Two levels (the characteristic mapping method): what has moved lately, `near`, on the simulation's grid, and `base`,
+    on a finer one, which `near` is folded into before it is bent so far that interpolating it every step would show.
+    The map is near first, then base: D(x) = near(x) + base(x + near(x)); longer sides, RG32F at cell centres.
+
+    Args:
+        device: the device.
+        grid: the simulation's grid.
+        base_scale: texels of the base map along a cell.
+        fold_every: most steps between two folds.
+    """
+
+    def __init__(self, device: Device, grid: Grid, base_scale: int = 2, fold_every: int = 32) -> None:
+        self.device = device
+        self.grid = grid
+        self.base_scale = base_scale
+        self.fold_every = fold_every
+        fine = grid.nx * base_scale, grid.ny * base_scale
+        self._near = device.double_field(grid.size, 2, "warp map, near")
+        self._base = device.double_field(fine, 2, "warp map, base")
+        self._trace = device.field(grid.size, 2, "warp map, trace")
+        self._largest = device.field(grid.size, 4, "warp map, largest distortion")
+        self._total = device.field(grid.size, 4, "warp map, total distortion")
+        self._find_largest = Reduction(device, grid.size, 4, "max")
+        self._find_total = Reduction(device, grid.size, 4, "sum")
+        self._composed: dict[int, Field] = {}
+        self._fresh: set[int] = set()  # the scales at which `_composed` holds the present map
+        self._steps = 0  # since the last fold
+
+    # -- moving it --------------------------------------------------------------------------------------------------
+
+    def advance(self, velocity: Field, dt: float) -> None:
+        """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
+        self.device.pass_("stages/trace.frag")(self._trace, velocity=velocity, dt_over_h=dt / self.grid.h)
+        self.advance_traced(self._trace)
+
+    def advance_traced(self, trace: Field) -> None:
+        """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
+        advance = self.device.pass_("warp/advance.frag")
+        advance(self._near.write, displacement=self._near.read, trace=trace, h=self.grid.h)
+        self._near.swap()
+        self._steps += 1
+        self._changed()
+        # The look waits for the GPU, so not at every step; at fixed steps, so that a replay folds at the same ones.
+        look = self._steps % CHECK_EVERY == 0
+        if self._steps >= self.fold_every or (look and self._distortion(self._near.read)[3] > STEEPEST):
+            self.fold()
+
+    def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
+        """Carry the map from `time` to `time + dt` by a velocity that is given.
+
+        Args:
+            velocity: a function (x, y, t) -> (u, v) on float64 arrays, lengths per second, followed back by a
+                fourth-order Runge-Kutta step of its own exact values; or an array (ny, nx, 2) on the MAC grid.
+            dt: the step.
+            time: where it begins, for the function.
+        """
+        if isinstance(velocity, np.ndarray):
+            field = self.device.upload(velocity, "prescribed velocity")
+            self.advance(field, dt)
+            field.release()
+            return
+        x, y = self.grid.centres()
+        back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
+        self._trace.set(np.stack([back_x - x, back_y - y], axis=-1) / self.grid.h)
+        self.advance_traced(self._trace)
+
+    def fold(self) -> None:
+        """Fold what has moved lately into the base map; the whole map stays what it was."""
+        if self._steps:
+            self._compose(self._base.write)
+            self._base.swap()
+            self._near.read.clear()
+            self._steps = 0
+
+    def restore(self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0) -> None:
+        """Let the map go back to the identity under a round brush.
+
+        Args:
+            center, radius: longer sides.
+            hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
+            amount: 0-1, the part of the displacement that is taken away at the centre.
+        """
+        for pair in (self._near, self._base):
+            self.device.pass_("warp/restore.frag")(
+                pair.write,
+                displacement=pair.read,
+                extent=self.grid.extent,
+                center=center,
+                radius=radius,
+                hardness=min(hardness, 0.99),
+                amount=amount,
+            )
+            pair.swap()
+        self._changed()
+
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Back to the identity."""
+        self._near.read.clear()
+        self._base.read.clear()
+        self._steps = 0
+        self._changed()
+
+    def set(self, displacement: np.ndarray) -> None:
+        """Take over a displacement (h, w, 2) in longer sides, of any size from 6 x 6, laid over the whole domain.
+
+        Raises:
+            FieldError: on another shape, or a value that is not finite.
+        """
+        if displacement.ndim != 3 or displacement.shape[2] != 2 or min(displacement.shape[:2]) < 6:
+            raise FieldError(f"a map of shape {displacement.shape} was given, (h, w, 2) from 6 x 6 is wanted")
+        given = self.device.upload(displacement.astype(np.float32), "given map")
+        self.reset()
+        self._resample(given, self._base.read, (0.0, 0.0), self._base.read.texel)
+        given.release()
+
+    def save(self) -> MapState:
+        """A copy of the state on the GPU, which the caller releases."""
+        copies = []
+        for field in (self._near.read, self._base.read):
+            copy = self.device.field(field.size, 2, f"{field.label}, saved")
+            copy.copy_from(field)
+            copies.append(copy)
+        return MapState((copies[0], copies[1]), self._steps)
+
+    def load(self, state: MapState) -> None:
+        """Go back to a saved state, exactly."""
+        self._near.read.copy_from(state.fields[0])
+        self._base.read.copy_from(state.fields[1])
+        self._steps = state.steps
+        self._changed()
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory, as long as nothing is read at other sizes."""
+        own = [self._near.read, self._near.write, self._base.read, self._base.write]
+        own += [self._trace, self._largest, self._total, *self._composed.values()]
+        return sum(field.nbytes for field in own) + self._find_largest.nbytes + self._find_total.nbytes
+
+    def release(self) -> None:
+        """Free the textures."""
+        for thing in (self._near, self._base, self._trace, self._largest, self._total, *self._composed.values()):
+            thing.release()
+        self._find_largest.release()
+        self._find_total.release()
+
+    # -- reading it -------------------------------------------------------------------------------------------------
+
+    def composed(self, scale: int | None = None) -> Field:
+        """The whole map's displacement on `scale` texels a cell, by default the base map's; valid until it changes."""
+        scale = scale or self.base_scale
+        if scale == self.base_scale and self._steps == 0:
+            return self._base.read
+        if scale not in self._composed:
+            size = self.grid.nx * scale, self.grid.ny * scale
+            self._composed[scale] = self.device.field(size, 2, f"warp map at {scale}")
+        if scale not in self._fresh:
+            self._compose(self._composed[scale])
+            self._fresh.add(scale)
+        return self._composed[scale]
+
+    def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
+        """The displacement at the pixel centres of a picture of `size` (width, height), by default the grid's.
+
+        Returns:
+            float32 (height, width, 2), longer sides.
+        """
+        field = self.device.field(size or self.grid.size, 2, "warp map, to read")
+        self._compose(field)
+        displacement = field.get()
+        field.release()
+        return displacement
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
+        return at_points(self.device, points, self.grid.extent, "warp/compose.frag", **self._parts())
+
+    def statistics(self) -> MapStatistics:
+        """How the whole map distorts; waits for the GPU."""
+        largest = self._distortion(self.composed(1))
+        total = self._find_total(self._total).tolist()
+        cells = self.grid.nx * self.grid.ny
+        return MapStatistics(
+            det_min=-largest[0],
+            det_max=largest[1],
+            folds=int(total[0]),
+            det_error=total[2] / cells,
+            displacement_max=largest[2],
+            displacement_mean=total[1] / cells,
+        )
+
+    # -- its parts --------------------------------------------------------------------------------------------------
+
+    def _compose(self, target: Field) -> None:
+        self.device.pass_("warp/compose.frag")(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
+
+    def _parts(self) -> dict[str, Any]:
+        """What `compose.frag` puts together."""
+        return {"near": self._near.read, "base": self._base.read, "extent": self.grid.extent}
+
+    def _distortion(self, displacement: Field) -> list[float]:
+        """The largest of what `distortion.frag` finds; the totals are left in `_total`."""
+        targets = self._largest, self._total
+        self.device.pass_("warp/distortion.frag")(targets, displacement=displacement, h=self.grid.h)
+        return self._find_largest(self._largest).tolist()
+
+    def _resample(self, source: Field, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
+        self.device.pass_("warp/resample.frag")(target, displacement=source, origin=origin, step=step)
+
+    def _changed(self) -> None:
+        self._fresh.clear()
+
+
+def at_points(
+    device: Device, points: np.ndarray, domain: tuple[float, float], shader: str, **inputs: Any
+) -> np.ndarray:
+    """What a shader that includes `lib/place.glsl` draws at points (n, 2), in longer sides: float32 (n, 2)."""
+    points = np.asarray(points, np.float64).reshape(-1, 2)
+    rows = max(1, -(-len(points) // _ROW))
+    listed = np.zeros((rows * _ROW, 2))
+    listed[: len(points)] = points / domain
+    places = device.upload(listed.reshape(rows, _ROW, 2).astype(np.float32), "points")
+    found = device.field(places.size, 2, "found at points")
+    device.pass_(shader, POINTS=1)(found, points=places, **inputs)
+    values = found.get().reshape(-1, 2)[: len(points)]
+    places.release()
+    found.release()
+    return values
+
+
+def _runge_kutta(
+    velocity: Velocity, x: np.ndarray, y: np.ndarray, time: float, dt: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where points are carried in `dt` by a velocity: the classical fourth-order step."""
+    u1, v1 = velocity(x, y, time)
+    u2, v2 = velocity(x + dt / 2 * u1, y + dt / 2 * v1, time + dt / 2)
+    u3, v3 = velocity(x + dt / 2 * u2, y + dt / 2 * v2, time + dt / 2)
+    u4, v4 = velocity(x + dt * u3, y + dt * v3, time + dt)
+    return x + dt / 6 * (u1 + 2 * u2 + 2 * u3 + u4), y + dt / 6 * (v1 + 2 * v2 + 2 * v3 + v4)

@@ -1,0 +1,188 @@
+"""The warp map: against float64, against traced particles, and what every map must keep."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import reference
+from flows import VORTEX_TIME, vortex, vortex_faces
+
+from solver.context import Device
+from solver.field import FieldError
+from solver.grid import Grid
+from solver.warp import WarpMap
+
+
+def smooth(rng: np.random.Generator, size: tuple[int, int], amplitude: float) -> np.ndarray:
+    """A few random waves, (h, w, 2)."""
+    x, y = np.meshgrid((np.arange(size[0]) + 0.5) / size[0], (np.arange(size[1]) + 0.5) / size[1])
+    field = np.zeros((size[1], size[0], 2))
+    for _ in range(4):
+        kx, ky, phase = *rng.integers(-3, 4, 2), rng.uniform(0, 2 * np.pi)
+        field += rng.normal(size=2) * np.sin(2 * np.pi * (kx * x + ky * y) / 2 + phase)[..., None]
+    return (amplitude * field / np.abs(field).max()).astype(np.float32)
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(a - b).max() / np.abs(b).max())
+
+
+@pytest.mark.parametrize("size", [(37, 23), (8, 8), (16, 51)])
+def test_one_step_agrees_with_float64(device: Device, size: tuple[int, int]) -> None:
+    rng = np.random.default_rng(3)
+    grid = Grid(*size)
+    near, trace = smooth(rng, size, 0.1), smooth(rng, size, 3.0)
+    warp = WarpMap(device, grid)
+    warp._near.read.set(near)
+    warp.advance_traced(device.upload(trace))
+    assert difference(warp._near.read.get(), reference.advance_map(near, trace, grid.h)) < 1e-5
+
+
+@pytest.mark.parametrize("size", [(37, 23), (8, 8), (16, 51)])
+def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) -> None:
+    rng = np.random.default_rng(4)
+    grid = Grid(*size)
+    near, base = smooth(rng, size, 0.1), smooth(rng, (2 * size[0], 2 * size[1]), 0.3)
+    warp = WarpMap(device, grid)
+    warp.set(base)
+    warp._near.read.set(near)
+    warp._steps = 1
+    for wanted in (grid.size, (50, 31)):
+        assert difference(warp.read(wanted), reference.compose_map(near, base, grid.extent, wanted)) < 1e-5
+    before = warp.read()
+    warp.fold()
+    assert difference(warp.read((2 * size[0], 2 * size[1])), warp._base.read.get()) < 1e-5
+    assert difference(warp.read(), before) < 0.1
+
+
+def test_vortex_comes_back(device: Device) -> None:
+    """The single vortex in a box, T = 8, 128 x 128, CFL 1."""
+    grid = Grid(128, 128)
+    warp = WarpMap(device, grid)
+    x, y = grid.centres()
+    dt = grid.h
+    steps = round(VORTEX_TIME / dt)
+
+    def error(true_x: np.ndarray, true_y: np.ndarray) -> float:
+        displacement = warp.read()
+        return float(np.hypot(x + displacement[..., 0] - true_x, y + displacement[..., 1] - true_y).mean() / grid.h)
+
+    for step in range(steps):
+        warp.advance_prescribed(vortex, dt, step * dt)
+        if step + 1 == steps // 2:
+            assert error(*reference.follow(vortex, x, y, VORTEX_TIME / 2, 0.0, 200)) < 0.002
+    assert error(x, y) < 0.003
+    assert warp.statistics().det_error < 2e-4
+    # The disc that was stretched into a spiral is round again: E_shape = max | distance - radius |.
+    angle = np.linspace(0, 2 * np.pi, 500)
+    rim = np.stack([0.5 + 0.15 * np.cos(angle), 0.75 + 0.15 * np.sin(angle)], axis=-1)
+    found = rim + warp.at(rim)
+    assert np.abs(np.hypot(found[:, 0] - 0.5, found[:, 1] - 0.75) - 0.15).max() < 5e-5
+
+
+def test_small_steps_do_not_blur(device: Device) -> None:
+    """A quarter of the vortex's way in steps of CFL 0.1, where interpolating every step would blur most."""
+    grid = Grid(48, 48)
+    warp = WarpMap(device, grid)
+    x, y = grid.centres()
+    dt = 0.1 * grid.h
+    steps = round(2.0 / dt)
+    for step in range(steps):
+        warp.advance_prescribed(vortex, dt, step * dt)
+    true_x, true_y = reference.follow(vortex, x, y, steps * dt, 0.0, 200)
+    displacement = warp.read()
+    assert np.hypot(x + displacement[..., 0] - true_x, y + displacement[..., 1] - true_y).mean() < 0.01 * grid.h
+
+
+def test_fluid_velocity_on_faces(device: Device) -> None:
+    """The same vortex known only by its means over the faces: second order in the cell."""
+    errors = []
+    for n in (32, 64):
+        grid = Grid(n, n)
+        warp = WarpMap(device, grid)
+        x, y = grid.centres()
+        dt = 0.5 * grid.h
+        steps = round(1.0 / dt)
+        for step in range(steps):
+            warp.advance_prescribed(vortex_faces(grid, (step + 0.5) * dt), dt)
+        true_x, true_y = reference.follow(vortex, x, y, 1.0, 0.0, 100)
+        displacement = warp.read()
+        errors.append(np.hypot(x + displacement[..., 0] - true_x, y + displacement[..., 1] - true_y).mean())
+    assert errors[1] < 1e-3
+    assert errors[0] / errors[1] > 3.0
+
+
+def test_rest_is_the_identity_exactly(device: Device) -> None:
+    warp = WarpMap(device, Grid(20, 12))
+    still = device.field((20, 12), 2)
+    for _ in range(40):
+        warp.advance(still, 0.1)
+    assert not warp.read((50, 30)).any()
+    assert warp.statistics().det_min == warp.statistics().det_max == 1.0
+
+
+def test_saved_state_goes_on_bit_for_bit(device: Device) -> None:
+    grid = Grid(24, 24)
+    velocity = device.upload(vortex_faces(grid, 0.0))
+
+    def go(warp: WarpMap, steps: int) -> None:
+        for _ in range(steps):
+            warp.advance(velocity, 0.05)
+
+    warp = WarpMap(device, grid)
+    go(warp, 21)
+    state = warp.save()
+    go(warp, 30)
+    straight = warp.read()
+    warp.load(state)
+    go(warp, 30)
+    np.testing.assert_array_equal(warp.read(), straight)
+    assert state.nbytes == 24 * 24 * 8 * 5
+    state.release()
+
+
+def test_statistics_of_linear_maps(device: Device) -> None:
+    grid = Grid(32, 16)
+    x, y = grid.centres()
+    warp = WarpMap(device, grid)
+    warp.set(np.stack([0.2 * x, -0.5 * y], axis=-1))
+    found = warp.statistics()
+    assert found.det_min == pytest.approx(0.6, abs=1e-4)
+    assert found.det_max == pytest.approx(0.6, abs=1e-4)
+    assert found.folds == 0
+    displacement = np.hypot(0.2 * x, 0.5 * y)
+    assert found.displacement_max == pytest.approx(displacement.max(), rel=1e-4)
+    assert found.displacement_mean == pytest.approx(displacement.mean(), rel=1e-4)
+    warp.set(np.stack([-2.0 * x, 0 * y], axis=-1))
+    assert warp.statistics().folds == 32 * 16
+    assert warp.statistics().det_error == pytest.approx(2.0, abs=1e-3)
+
+
+def test_a_map_of_any_size_is_taken_over(device: Device) -> None:
+    warp = WarpMap(device, Grid(40, 24))
+    for size in ((40, 24), (80, 48), (123, 77)):
+        given = smooth(np.random.default_rng(5), size, 0.2)
+        warp.set(given)
+        assert np.abs(warp.read(size) - given).max() < 2e-4
+    with pytest.raises(FieldError, match="shape"):
+        warp.set(np.zeros((20, 20)))
+    with pytest.raises(FieldError, match="finite"):
+        warp.set(np.full((20, 20, 2), np.nan))
+
+
+def test_restoring_makes_the_identity_under_the_brush_without_folds(device: Device) -> None:
+    grid = Grid(64, 48)
+    warp = WarpMap(device, grid)
+    warp.set(smooth(np.random.default_rng(6), grid.size, 0.03))
+    warp.advance_prescribed(vortex, 0.02)
+    before = warp.read()
+    for _ in range(60):
+        warp.restore((0.5, 0.4), 0.3, hardness=0.4, amount=0.15)
+        assert warp.statistics().folds == 0
+    x, y = grid.centres()
+    far = np.hypot(x - 0.5, y - 0.4)
+    after = np.abs(warp.read())
+    assert after[far < 0.1].max() < 1e-4
+    np.testing.assert_allclose(warp.read()[far > 0.32], before[far > 0.32], atol=2e-3)
+    warp.reset()
+    assert not warp.read().any()
