@@ -253,6 +253,16 @@ class Recipe(Model):
         """The whole number of steps nearest to the duration, at least 1."""
         return max(1, round(self.duration / self.fluid.dt))
 
+    def fluid_at(self, tick: int) -> FluidSettings:
+        """The fluid's settings in force during `tick`, with all changes up to it."""
+        changed: dict[str, Any] = {}
+        for change in self.change:
+            if change.tick <= tick:
+                for key in ("viscosity", "drag", "walls"):
+                    if (value := getattr(change, key)) is not None:
+                        changed[key] = value
+        return self.fluid.model_copy(update=changed) if changed else self.fluid
+
     def edited(self, **parts: Any) -> Self:
         """The recipe with some of its parts replaced by parts that are valid in themselves; shares all the others."""
         return self.model_copy(update=parts)
@@ -274,7 +284,7 @@ class Recipe(Model):
 
         Checkpoints up to and including that tick are common to both.
         """
-        if self._set_up() != other._set_up():
+        if not self.is_set_up_as(other):
             return 0
         agreed: float = float("inf")
         for mine, theirs in zip_longest(self.stroke, other.stroke):
@@ -286,6 +296,10 @@ class Recipe(Model):
             if mine != theirs:
                 agreed = min([agreed, *(change.tick for change in (mine, theirs) if change is not None)])
         return agreed
+
+    def is_set_up_as(self, other: Recipe) -> bool:
+        """True if both are the same simulation but for strokes and changes."""
+        return self._set_up() == other._set_up()
 
     def _set_up(self) -> tuple[object, ...]:
         """What is in force from the first tick on."""

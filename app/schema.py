@@ -96,13 +96,13 @@ def _path_in(data: Any, loc: tuple[int | str, ...]) -> list[int | str]:
 
 
 def named(path: list[int | str], data: Any) -> tuple[str, str]:
-    """The table and the key of `path` as a person calls them: ('force 2 "wind": ', "radius"), counted from 1."""
+    """The table and the key of `path` as a person calls them: ('force[2] "wind": ', "radius"), counted from 1."""
     table, key = "", ""
     for item in path:
         data = data[item] if isinstance(data, dict) and item in data else _item(data, item)
         if isinstance(item, int) and isinstance(data, dict):
             title = data.get("name")
-            table, key = f"{table}{key} {item + 1}" + (f' "{title}"' if title else "") + ": ", ""
+            table, key = f"{table}{key}[{item + 1}]" + (f' "{title}"' if title else "") + ": ", ""
         else:
             key += f"[{item + 1}]" if isinstance(item, int) else f".{item}" if key else item
     return table, key

@@ -1,4 +1,4 @@
-"""Time: integer ticks of a constant dt, which ticks an animation's frames show, and what ends a simulation early."""
+"""Time: integer ticks of a constant dt, where an animation's frames lie, and what ends a simulation early."""
 
 from __future__ import annotations
 
@@ -33,11 +33,12 @@ class Timeline:
 
 
 def frame_positions(timeline: Timeline, playback: Playback, fps: float) -> list[Fraction]:
-    """The position in ticks of every frame of an animation, in the order in which they are shown.
+    """The position in ticks of every distinct frame of an animation, forwards in time.
 
     A position may lie between two ticks; it is then reached by a shorter last step of the warp map (`Replay.seek`).
     Frames are evenly spaced from the part's start to its end, both included, and as many as make the spacing nearest
-    to speed / fps: the animation begins and ends exactly where it should, whatever fps and dt.
+    to speed / fps: the animation begins and ends exactly where it should, whatever fps and dt. In which order they are
+    shown is `app.animation.frame_order`'s.
 
     Raises:
         UserError: if the animation would have more than a million frames.
@@ -45,20 +46,14 @@ def frame_positions(timeline: Timeline, playback: Playback, fps: float) -> list[
     start = timeline.tick_at(playback.start)
     end = timeline.ticks if playback.end is None else max(timeline.tick_at(playback.end), start)
     wanted = timeline.time_of(end - start) / playback.speed * fps
-    still = (playback.hold_first + playback.hold_last) * fps
-    if wanted + still > MOST_FRAMES:
-        frames = f"{wanted + still:.0f} frames"
-        raise UserError(f"the animation would have {frames}; raise 'time.speed' or lower 'output.fps'")
-    count = max(1, round(wanted)) if end > start else 1
-    there = [start + Fraction((end - start) * frame, count) for frame in range(count + 1)]
+    if wanted + (playback.hold_first + playback.hold_last) * fps > MOST_FRAMES:
+        raise UserError(
+            f"the animation would have more than {MOST_FRAMES} frames; raise 'time.speed' or lower 'output.fps'"
+        )
     if end == start:
-        del there[1:]
-    if playback.reverse:
-        there.reverse()
-    back = there[-2::-1] if playback.ping_pong else []
-    hold_first, hold_last = round(playback.hold_first * fps), round(playback.hold_last * fps)
-    # Held frames are repeated where they stand; in a ping-pong the last one is where it turns.
-    return [there[0]] * hold_first + there + [there[-1]] * hold_last + back
+        return [Fraction(start)]
+    count = max(1, round(wanted))
+    return [start + Fraction((end - start) * frame, count) for frame in range(count + 1)]
 
 
 @dataclass(frozen=True)

@@ -35,12 +35,6 @@ def test_slow_motion_has_more_frames():
     assert len(frame_positions(TEN, Playback(speed=0.5), fps=10)) == 21
 
 
-def test_reverse_hold_and_ping_pong():
-    playback = Playback(reverse=True, hold_first=0.2, hold_last=0.3, ping_pong=True, start=0.8)
-    shown = [10, 10, 10, 9, 8, 8, 8, 8, 9, 10]
-    assert frame_positions(TEN, playback, fps=10) == shown
-
-
 def test_part_of_the_simulation():
     assert frame_positions(TEN, Playback(start=0.2, end=0.4), fps=10) == [2, 3, 4]
     assert frame_positions(TEN, Playback(start=0.2, end=0.2), fps=10) == [2]

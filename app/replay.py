@@ -1,0 +1,323 @@
+"""Driving the solver by a recipe: the one way to a warp, for the window and for the command line."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+from math import hypot
+
+import numpy as np
+
+from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, State, copies
+from app.forces import build
+from app.masks import solid, viscosity
+from app.recipe import FluidSettings, Recipe
+from app.sampling import Pictures, channels
+from app.strokes import Change, Dab, Stroke
+from solver.brush import Brush, Tip
+from solver.context import Device
+from solver.density import Density
+from solver.field import Field
+from solver.fluid import Fluid
+from solver.grid import Grid
+from solver.masks import Masks
+from solver.paper import PaperFluid, PaperWarpMap
+from solver.params import FluidParams, Walls
+from solver.warp import WarpMap
+
+CHECKPOINT_EVERY = 16  # ticks
+
+# What a tool of strength 1 does under a brush at full pressure.
+TWIRL = 4.0  # radians per second
+GROWTH = 2.0  # of area, per second
+BLOW = 0.5  # longer sides per second along a curve
+THICKENING = 4.0  # decades of viscosity per second
+RESTORING = 6.0  # per second, the part of the displacement that is taken away
+
+
+SOLVERS = {"mac": (Fluid, WarpMap), "paper": (PaperFluid, PaperWarpMap)}
+
+
+class Replay:
+    """A recipe's simulation at a tick, which can go to any other tick.
+
+    The state at a tick depends on nothing but the recipe: going there from the start, from a checkpoint or by way of
+    later ticks gives the same bytes.
+
+    Args:
+        device: where it is simulated.
+        recipe: what is simulated.
+        pictures: the source and the auxiliary pictures by name.
+        budget: bytes of texture memory for checkpoints.
+
+    Attributes:
+        tick: the steps made so far; strokes and changes at this tick come next.
+        fluid, warp, masks, density: the simulation at this moment; `density` only in density mode.
+    """
+
+    def __init__(self, device: Device, recipe: Recipe, pictures: Pictures, budget: int = DEFAULT_BUDGET) -> None:
+        self.device = device
+        self.recipe = recipe
+        self.pictures = pictures
+        self.tick = 0
+        self.checkpoints = Checkpoints(budget)
+        self._brush = Brush(device)
+        self._passing: State | None = None
+        self._build()
+
+    # -- going through time -----------------------------------------------------------------------------------------
+
+    def advance(self) -> None:
+        """Make one step: everything that the recipe has at this tick."""
+        self._leave_passing()
+        if self.tick % CHECKPOINT_EVERY == 0 or self._begins_here():
+            self.checkpoint()
+        self._step(1.0)
+        self.tick += 1
+
+    def seek(self, position: int | Fraction) -> None:
+        """Go to a tick, or between two: there the step from the earlier one is made, with the map carried on only by
+        the part of it that has passed. The next `advance` or `seek` goes on from the whole tick.
+        """
+        self._leave_passing()
+        whole, part = int(position // 1), float(position % 1)
+        nearest = self.checkpoints.nearest(self.recipe, whole)
+        if whole < self.tick or (nearest is not None and nearest.tick > self.tick):
+            self._load(nearest)
+        while self.tick < whole:
+            self.advance()
+        if part:
+            self._passing = self._state()
+            self._step(part)
+
+    def use(self, recipe: Recipe) -> None:
+        """Go on with another recipe at the same tick, making again what differs in its past."""
+        self._leave_passing()
+        before, self.recipe = self.recipe, recipe
+        if not recipe.is_set_up_as(before):
+            self._release_simulation()
+            self.checkpoints.clear()
+            tick, self.tick = self.tick, 0
+            self._build()
+            self.seek(tick)
+        elif recipe.agrees_until(before) < self.tick:
+            # What is left behind may be wanted again: by redo.
+            self._keep(before)
+            tick = self.tick
+            self._load(self.checkpoints.nearest(recipe, tick))
+            self.seek(tick)
+
+    def checkpoint(self) -> None:
+        """Keep this moment, so that going back to it costs nothing."""
+        self._leave_passing()
+        self._keep(self.recipe)
+
+    def release(self) -> None:
+        """Free the textures."""
+        self._leave_passing()
+        self.checkpoints.clear()
+        self._release_simulation()
+        self._brush.release()
+
+    # -- what it looks at -------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds so far."""
+        return self.tick * self.recipe.fluid.dt
+
+    @property
+    def settings(self) -> FluidSettings:
+        """The fluid's settings as they are in force at this tick."""
+        return self.recipe.fluid_at(self.tick)
+
+    # -- one step ---------------------------------------------------------------------------------------------------
+
+    def _step(self, part: float) -> None:
+        """Everything at this tick; the warp is carried on by `part` of the step."""
+        dt = self.recipe.fluid.dt
+        for change in self.recipe.change:
+            if change.tick == self.tick:
+                self._change(change)
+        self._set_parameters()
+        painted = False
+        for stroke in self.recipe.stroke:
+            if dabs := stroke.at(self.tick):
+                painted |= self._draw(stroke, dabs, dt, part)
+        if painted:
+            self.masks.apply(self.fluid)
+        self.fluid.step(dt, self._forces(dt))
+        with self.device.stage("warp map"):
+            self.warp.advance(self.fluid.faces(), dt * part)
+        if self.density is not None:
+            self.density.advance(self.fluid.faces(), self.grid, dt * part)
+
+    def _change(self, change: Change) -> None:
+        if change.clear_velocity:
+            self.fluid.clear_velocity()
+        if change.reset_warp:
+            self.warp.reset()
+            if self.density is not None:
+                self.density.set(self._density_values())
+        if change.clear_masks:
+            self.masks.clear()
+            self._viscosity_in_force = None
+
+    def _set_parameters(self) -> None:
+        settings = self.settings
+        slip = "free" if settings.walls == "free-slip" else "none"
+        params = FluidParams(walls=Walls(slip=slip), drag=settings.drag, sweeps=settings.sweeps)
+        if params != self.fluid.params:
+            self.fluid.params = params
+        if settings.viscosity != self._viscosity_in_force:
+            self.masks.set_base(self._viscosity(settings.viscosity), self._frozen)
+            self.masks.apply(self.fluid)
+            self._viscosity_in_force = settings.viscosity
+
+    def _forces(self, dt: float) -> list[tuple[Field, float]]:
+        """The force fields and their impulses in this tick; sources go into the fluid's own."""
+        start, pushes = self.tick * dt, []
+        for law, faces, divergence in self._forces_built:
+            impulse = law.impulse(start, start + dt, self)
+            if impulse and faces is not None:
+                pushes.append((faces, impulse))
+            if impulse and divergence is not None:
+                # The velocity that holds during this tick has to make all the room that the tick shall make.
+                self.fluid.add_source(divergence, impulse / dt)
+        return pushes
+
+    def _draw(self, stroke: Stroke, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
+        """Let a stroke act; True if it painted on the masks."""
+        strength = -stroke.strength if stroke.reverse else stroke.strength
+        tips = [(self._tip(stroke, dab), strength * dab.pressure) for dab in dabs]
+        # Several samples in one tick: the fluid is carried by the whole way, a mask is painted piece by piece.
+        whole = Tip(tips[0][0].start, tips[-1][0].end, stroke.radius, stroke.hardness)
+        pressed = sum(amount for _, amount in tips) / len(tips)
+        match stroke.tool:
+            case "push":
+                self._brush.push(self.fluid, whole, dt, pressed)
+            case "curve":
+                for tip, amount in tips:
+                    length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
+                    if length:
+                        self._brush.push(self.fluid, tip, length / BLOW, amount)
+            case "twirl":
+                self._brush.twirl(self.fluid, whole, TWIRL * pressed)
+            case "bloat":
+                self._brush.expand(self.fluid, whole, GROWTH * pressed)
+            case "pinch":
+                self._brush.expand(self.fluid, whole, -GROWTH * pressed)
+            case "restore":
+                for tip, amount in tips:
+                    share = 1 - np.exp(-RESTORING * abs(amount) * dt * part / len(tips))
+                    self.warp.restore(tip.end, tip.radius, tip.hardness, float(share))
+            case _:
+                for tip, amount in tips:
+                    self._paint(stroke, tip, amount, dt / len(tips))
+                return True
+        return False
+
+    def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
+        match stroke.tool:
+            case "thicken":
+                self.masks.thicken(tip, THICKENING * amount * dt)
+            case "thin":
+                self.masks.thicken(tip, -THICKENING * amount * dt)
+            case "freeze":
+                self.masks.freeze(tip, amount)
+            case "thaw":
+                self.masks.freeze(tip, -amount)
+            case "smooth":
+                self.masks.smooth(tip, abs(amount))
+
+    def _tip(self, stroke: Stroke, dab: Dab) -> Tip:
+        width, height = self.grid.extent
+        return Tip((dab.x0 * width, dab.y0 * height), (dab.x1 * width, dab.y1 * height), stroke.radius, stroke.hardness)
+
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        """Everything as it is at tick 0."""
+        recipe, source = self.recipe, self.pictures.source
+        self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
+        fluid, warp = SOLVERS[recipe.fluid.solver]
+        self.fluid = fluid(self.device, self.grid)
+        self.warp = warp(self.device, self.grid)
+        self.masks = Masks(self.device, self.grid)
+        self.density = self._new_density() if recipe.mode == "density" else None
+        self._viscosity_in_force: float | None = None
+        self._frozen = solid(recipe.freeze, self.grid, self.pictures)
+        self._forces_built = [
+            (force.law, self._uploaded(force.faces, force.label), self._uploaded(force.divergence, force.label))
+            for force in build(recipe.force, self.grid, self.pictures, recipe.duration)
+        ]
+        self._viscosity = cache(self._viscosity_over)
+        self._set_parameters()
+
+    def _new_density(self) -> Density:
+        values, settings = self._density_values(), self.recipe.density
+        colour = np.asarray((*settings.source, 0.0)[: values.shape[2]], np.float32)
+        source = np.broadcast_to(colour, values.shape) if colour.any() else None
+        return Density(self.device, values, settings.kappa, source)
+
+    def _density_values(self) -> np.ndarray:
+        """The picture's colours and alpha as the eye sees them, (h, w, 4) float32 in [0, 1]."""
+        colours, alpha = channels(self.pictures.source)
+        return np.concatenate([colours, alpha[..., None]], axis=2)
+
+    def _viscosity_over(self, base: float) -> np.ndarray:
+        return viscosity(self.recipe.viscosity, base, self.grid, self.pictures)
+
+    def _uploaded(self, array: np.ndarray | None, label: str) -> Field | None:
+        return None if array is None else self.device.upload(array, label)
+
+    def _release_simulation(self) -> None:
+        fields = [field for _, *fields in self._forces_built for field in fields]
+        for thing in (self.fluid, self.warp, self.masks, self.density, *fields):
+            if thing is not None:
+                thing.release()
+
+    def _fields(self) -> list[Field]:
+        density = self.density.state() if self.density is not None else ()
+        return [*self.fluid.state(), *self.masks.state(), *density]
+
+    def _state(self) -> State:
+        return State(copies(self.device, self._fields()), self.warp.save())
+
+    def _restore(self, state: State) -> None:
+        fields = list(state.fields)
+        for part in (self.fluid, self.masks, self.density):
+            if part is not None:
+                count = len(part.state())
+                part.load(fields[:count])
+                del fields[:count]
+        self.warp.load(state.warp)
+        # Which base the masks were painted over then is worked out anew.
+        self._viscosity_in_force = None
+
+    def _load(self, checkpoint: Checkpoint | None) -> None:
+        if checkpoint is None:
+            self._release_simulation()
+            self._build()
+            self.tick = 0
+        else:
+            self._restore(checkpoint.state)
+            self.tick = checkpoint.tick
+
+    def _keep(self, recipe: Recipe) -> None:
+        if not self.checkpoints.has(recipe, self.tick):
+            self.checkpoints.add(Checkpoint(recipe, self.tick, self._state()))
+
+    def _leave_passing(self) -> None:
+        """Come back to the whole tick from between two."""
+        if self._passing is not None:
+            self._restore(self._passing)
+            self._passing.release()
+            self._passing = None
+
+    def _begins_here(self) -> bool:
+        events = (
+            *(stroke.first_tick for stroke in self.recipe.stroke),
+            *(change.tick for change in self.recipe.change),
+        )
+        return self.tick in events
