@@ -12,7 +12,7 @@ from solver.field import Field
 from solver.fluid import Fluid, Force
 from solver.grid import Grid
 from solver.params import FluidParams
-from solver.warp import WarpMap
+from solver.warp import Velocity, WarpMap
 
 
 class PaperFluid(Fluid):
@@ -113,3 +113,34 @@ class PaperFluid(Fluid):
         super().release()
         for item in (self._pressure, self._divergence, self._before, self._faces):
             item.release()
+
+
+class PaperWarpMap(WarpMap):
+    """The paper's warp map: coordinates advected like a density, first-order backtrace and bilinear, never folded.
+
+    It blurs a little at every step, which is what the default map is measured against. Velocities are at cell centres.
+    """
+
+    def __init__(self, device: Device, grid: Grid) -> None:
+        super().__init__(device, grid, base_scale=1)
+
+    def advance(self, velocity: Field, dt: float) -> None:
+        """Carry the map one step by a velocity at cell centres, such as `PaperFluid.velocity.read`."""
+        advance = self.device.pass_("paper/advance_coordinates.frag")
+        advance(
+            self._near.write,
+            displacement=self._near.read,
+            velocity=velocity,
+            dt_over_h=dt / self.grid.h,
+            h=self.grid.h,
+        )
+        self._near.swap()
+        self._changed()
+
+    def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
+        """Carry the map from `time` to `time + dt` by a function (x, y, t) or an array (ny, nx, 2), at cell centres."""
+        if not isinstance(velocity, np.ndarray):
+            velocity = np.stack(velocity(*self.grid.centres(), time + 0.5 * dt), axis=-1)
+        field = self.device.upload(velocity.astype(np.float32), "prescribed velocity")
+        self.advance(field, dt)
+        field.release()

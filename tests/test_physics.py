@@ -1,0 +1,170 @@
+"""The fluid as a whole against exact and published solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import reference
+from solver.brush import Brush, Tip
+from solver.context import Device
+from solver.fluid import Fluid
+from solver.grid import Grid
+from solver.paper import PaperFluid
+from solver.params import FluidParams, Walls
+
+PI = np.pi
+
+
+def taylor_green(grid: Grid) -> np.ndarray:
+    """(sin pi x cos pi y, -cos pi x sin pi y) on the faces of the unit square."""
+    (ux, uy), (vx, vy) = grid.u_faces(), grid.v_faces()
+    return np.stack([np.sin(PI * ux) * np.cos(PI * uy), -np.cos(PI * vx) * np.sin(PI * vy)], axis=-1)
+
+
+def test_taylor_green_decays_at_its_rate(device: Device) -> None:
+    grid, viscosity, dt, steps = Grid(128, 128), 0.01, 1 / 256, 128
+    fluid = Fluid(device, grid)
+    fluid.set_viscosity(viscosity)
+    fluid.set_velocity(taylor_green(grid))
+    before = fluid.motion().kinetic_energy
+    for _ in range(steps):
+        fluid.step(dt)
+    rate = -np.log(fluid.motion().kinetic_energy / before) / (steps * dt)
+    assert rate == pytest.approx(4 * viscosity * PI**2, rel=5e-3)
+    fluid.release()
+
+
+def test_taylor_green_hardly_fades_without_viscosity(device: Device) -> None:
+    grid, dt, steps = Grid(128, 128), 1 / 128, 128
+    energies = {}
+    for name, kind in {"mac": Fluid, "paper": PaperFluid}.items():
+        fluid = kind(device, grid)
+        faces = taylor_green(grid)
+        if name == "paper":
+            x, y = grid.centres()
+            faces = np.stack([np.sin(PI * x) * np.cos(PI * y), -np.cos(PI * x) * np.sin(PI * y)], axis=-1)
+        fluid.set_velocity(faces)
+        before = fluid.motion().kinetic_energy
+        for _ in range(steps):
+            fluid.step(dt)
+        energies[name] = fluid.motion().kinetic_energy / before
+        fluid.release()
+    assert energies["mac"] > 0.99
+    assert energies["mac"] > energies["paper"]
+
+
+@pytest.mark.parametrize(
+    ("reynolds", "u_min", "v_max", "v_min"),
+    [(100, -0.21404, 0.1795728, -0.2538030), (1000, -0.3885698, 0.3769447, -0.5270771)],
+)
+def test_lid_driven_cavity(device: Device, reynolds: int, u_min: float, v_max: float, v_min: float) -> None:
+    """Extrema of the velocity on the centre lines: Botella and Peyret, Computers & Fluids 27 (1998)."""
+    faces = None
+    # A coarse cavity first: its steady state is what the fine one starts from.
+    for cells, seconds in [(32, 40.0), (64, 20.0), (128, 12.0)] if reynolds == 1000 else [(32, 10.0), (64, 6.0), (128, 3.0)]:
+        grid = Grid(cells, cells)
+        fluid = Fluid(device, grid, FluidParams(walls=Walls("none", (0.0, 0.0, 1.0, 0.0)), pressure_cycles=1))
+        fluid.set_viscosity(1 / reynolds)
+        if faces is not None:
+            fluid.set_velocity(faces.repeat(2, axis=0).repeat(2, axis=1))
+        dt = 1.0 / cells
+        for _ in range(round(seconds / dt)):
+            fluid.step(dt)
+        faces = fluid.velocity.read.get()
+        fluid.release()
+    middle = faces.shape[0] // 2
+    # The lid is on top and y points down: a vertical velocity changes its sign against the publication.
+    u, v = faces[:, middle, 0], -faces[middle, :, 1]
+    got = np.array([u.min(), v.max(), v.min()])
+    np.testing.assert_allclose(got, [u_min, v_max, v_min], rtol=1e-2)
+
+
+@pytest.mark.parametrize("size", [(8, 8), (9, 31), (64, 40)])
+def test_push_is_divergence_free_and_moves_at_the_pointers_speed(device: Device, size: tuple[int, int]) -> None:
+    grid = Grid(*size)
+    fluid, brush = Fluid(device, grid), Brush(device)
+    width, height = grid.extent
+    at = (width / 2, height / 2)
+    dt = 1 / 60
+    tip = Tip((at[0] - 0.004, at[1]), (at[0] + 0.002, at[1] + 0.001), radius=0.3 * min(width, height))
+    brush.push(fluid, tip, dt)
+    faces = fluid.velocity.read.get()
+    speed = np.abs(faces).max()
+    assert np.abs(reference.divergence(faces, grid.h)).max() < 1e-5 * speed / grid.h
+    x, y = at[0] / grid.h, at[1] / grid.h
+    u, v = reference.velocity_at(reference.padded_faces(faces), np.array(tip.end[0] / grid.h), np.array(tip.end[1] / grid.h))
+    if min(size) >= 40:
+        assert (float(u), float(v)) == pytest.approx((0.006 / dt, 0.001 / dt), rel=0.03)
+    assert x and y
+    fluid.release()
+    brush.release()
+
+
+def test_twirl_turns_clockwise_at_its_rate_and_no_faster(device: Device) -> None:
+    grid = Grid(64, 64)
+    fluid, brush = Fluid(device, grid), Brush(device)
+    tip = Tip((0.5, 0.5), (0.5, 0.5), radius=0.3, hardness=0.8)
+    for _ in range(5):
+        brush.twirl(fluid, tip, rate=3.0)
+    velocity = fluid.velocity_at_centres()
+    # To the right of the centre, clockwise on the screen (y down) is downwards.
+    assert velocity[32, 32 + 9, 1] == pytest.approx(3.0 * 9.5 / 64, rel=0.05)
+    assert velocity[32 - 9, 32, 0] == pytest.approx(3.0 * 8.5 / 64, rel=0.05)
+    fluid.release()
+    brush.release()
+
+
+def test_expand_grows_by_its_integral(device: Device) -> None:
+    grid = Grid(96, 64)
+    fluid, brush = Fluid(device, grid), Brush(device)
+    brush.expand(fluid, Tip((0.5, 0.3), (0.5, 0.3), radius=0.15), rate=2.0)
+    source = fluid.source.get().astype(np.float64)
+    fluid.project()
+    div = fluid.divergence().astype(np.float64)
+    wanted = source - source.mean()
+    assert np.linalg.norm(div - wanted) < 2e-3 * np.linalg.norm(wanted)
+    fluid.project()
+    assert np.abs(fluid.divergence()).max() < 1e-2 * np.abs(div).max()
+    fluid.release()
+    brush.release()
+
+
+def test_frozen_cells_stand_still_while_the_rest_flows(device: Device) -> None:
+    grid = Grid(64, 48)
+    fluid = Fluid(device, grid)
+    x, y = grid.centres()
+    solid = np.hypot(x - 0.5, y - 0.375) < 0.15
+    fluid.set_solid(solid)
+    fluid.set_viscosity(1e-3)
+    fluid.set_velocity(reference.smooth_velocity(64, 48, seed=2))
+    for _ in range(10):
+        fluid.step(1 / 30)
+    faces = fluid.velocity.read.get()
+    assert (faces[..., 0][solid] == 0).all()
+    assert (faces[..., 1][solid] == 0).all()
+    assert (faces[:, 1:, 0][solid[:, :-1]] == 0).all()
+    assert (faces[1:, :, 1][solid[:-1]] == 0).all()
+    assert np.abs(faces).max() > 0.01
+    fluid.release()
+
+
+@pytest.mark.parametrize("kind", [Fluid, PaperFluid])
+def test_state_brings_a_moment_back_exactly(device: Device, kind: type[Fluid]) -> None:
+    fluid = kind(device, Grid(40, 32))
+    fluid.set_viscosity(0.01)
+    fluid.set_velocity(reference.smooth_velocity(40, 32, seed=8))
+    fluid.step(1 / 60)
+    copies = []
+    for field in fluid.state():
+        copy = device.field(field.size, field.components, "copy", field.dtype)
+        copy.copy_from(field)
+        copies.append(copy)
+    for _ in range(3):
+        fluid.step(1 / 60)
+    wanted = fluid.velocity.read.get()
+    fluid.load(copies)
+    for _ in range(3):
+        fluid.step(1 / 60)
+    np.testing.assert_array_equal(fluid.velocity.read.get(), wanted)
+    fluid.release()
