@@ -148,7 +148,7 @@ class Replay:
             self.masks.apply(self.fluid)
         self.fluid.step(dt, self._forces(dt))
         with self.device.stage("warp map"):
-            self.warp.advance(self.fluid.faces(), dt * part)
+            self.warp.advance(self.fluid.velocity.read, dt * part)
         if self.density is not None:
             self.density.advance(self.fluid.faces(), self.grid, dt * part)
 
