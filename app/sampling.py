@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from PIL import Image
 from pydantic import Field, model_validator
 
 from app.pictures import Picture, linear_to_srgb, read_picture
@@ -93,12 +92,27 @@ def intensity(picture: Picture) -> np.ndarray:
 
 def to_grid(values: np.ndarray, grid: Grid) -> np.ndarray:
     """Values of pixels (h, w) as averages over the cells (ny, nx), float32; the picture is fitted to the whole grid."""
-    image = Image.fromarray(np.ascontiguousarray(values, np.float32))
-    for size in ((grid.nx, image.height), (grid.nx, grid.ny)):
-        # A box is the exact mean over a cell, but would draw the pixels of a small picture as squares.
-        shrinking = size[0] <= image.width and size[1] <= image.height
-        image = image.resize(size, Image.Resampling.BOX if shrinking else Image.Resampling.BILINEAR)
-    return np.asarray(image, np.float32)
+    return _resized(_resized(values, grid.nx, 1), grid.ny, 0).astype(np.float32)
+
+
+def _resized(values: np.ndarray, n: int, axis: int) -> np.ndarray:
+    """Values resampled to `n` along an axis: exact means over the new cells, or interpolated if there are more."""
+    values = np.moveaxis(values, axis, 0)
+    m = len(values)
+    if n >= m:
+        at = np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1)
+        k = np.minimum(at.astype(int), max(m - 2, 0))
+        part = (at - k).reshape(-1, *(1,) * (values.ndim - 1))
+        resized = values[k] * (1 - part) + values[np.minimum(k + 1, m - 1)] * part
+    else:
+        # The integral up to each of the new edges, which may lie within a pixel.
+        integral = np.cumsum(values, axis=0, dtype=np.float64)
+        integral = np.concatenate([np.zeros_like(integral[:1]), integral])
+        edges = np.arange(n + 1) * (m / n)
+        k = np.minimum(edges.astype(int), m - 1)
+        part = (edges - k).reshape(-1, *(1,) * (values.ndim - 1))
+        resized = np.diff(integral[k] * (1 - part) + integral[k + 1] * part, axis=0) * (n / m)
+    return np.moveaxis(resized, 0, axis)
 
 
 def blurred(values: np.ndarray, radius: float, grid: Grid) -> np.ndarray:
