@@ -267,8 +267,8 @@ class Recipe(Model):
         """The recipe with some of its parts replaced by parts that are valid in themselves; shares all the others."""
         return self.model_copy(update=parts)
 
-    def checked(self) -> Self:
-        """The recipe, validated as a whole again: for parts that came from outside.
+    def checked(self, source: str = "the recipe") -> Self:
+        """The recipe, validated as a whole again: for parts that came from outside, that is from `source`.
 
         Raises:
             UserError: naming the key and what was expected.
@@ -277,7 +277,7 @@ class Recipe(Model):
         try:
             return type(self).model_validate(frozen(data))
         except ValidationError as error:
-            raise complaint(error, type(self), data, "", "the recipe") from None
+            raise complaint(error, type(self), data, "", source) from None
 
     def agrees_until(self, other: Recipe) -> float:
         """The tick before which both recipes simulate the same; infinite where they do so for ever.

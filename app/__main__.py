@@ -1,0 +1,5 @@
+"""`python -m app` is `fluidwarp`."""
+
+from app.cli import main
+
+main()

@@ -1,0 +1,58 @@
+"""Finding what a name on the command line, or a dropped file, stands for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from app.errors import UserError
+from app.pictures import Picture, read_picture
+from app.recipe import Recipe
+
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr", ".avif", ".gif", ".bmp")
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A recipe that was found, and the folder that the names in it start from."""
+
+    recipe: Recipe
+    folder: Path
+    label: str
+
+    def picture(self, other: Path | None = None) -> Picture:
+        """The picture `other`, or else the recipe's own.
+
+        Raises:
+            UserError: if there is none, or it cannot be read.
+        """
+        if other is not None:
+            return read_picture(other)
+        if self.recipe.picture is None:
+            raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
+        return read_picture(self.folder / self.recipe.picture)
+
+
+def shipped_recipes() -> dict[str, Path]:
+    """The recipes that come with fluidwarp, by name."""
+    folder = Path(str(resources.files("assets"))) / "recipes"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def open_recipe(name: str) -> Opened:
+    """The recipe in a file, or the one of this name that comes with fluidwarp.
+
+    Raises:
+        UserError: if there is none, naming those that there are.
+    """
+    path = Path(name)
+    if path.suffix.lower() in PICTURE_ENDINGS:
+        example = next(iter(shipped_recipes()), "RECIPE")
+        raise UserError(f"{name} is a picture and not a recipe; try: fluidwarp render {example} {name} -o out.png")
+    if not path.exists() and path.suffix == "":
+        known = shipped_recipes()
+        if name not in known:
+            raise UserError(f"{name} does not exist; recipes that come with fluidwarp: {', '.join(known) or 'none'}")
+        path = known[name]
+    return Opened(Recipe.load(path), path.parent, str(path))
