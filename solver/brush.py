@@ -47,8 +47,8 @@ class Tip:
 class Brush:
     """Draws tips into a fluid.
 
-    Push and twirl are closed loops: they add what the fluid lacks of the wanted motion at the brush, so that the picture
-    follows the pointer at its own speed however thick the fluid is, and a resting brush holds it still.
+    Push and twirl are closed loops: they add what the fluid lacks of the wanted motion at the brush, so that the
+    picture follows the pointer at its own speed however thick the fluid is, and a resting brush holds it still.
     """
 
     def __init__(self, device: Device) -> None:

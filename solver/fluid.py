@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.context import Device
-from solver.field import DoubleField, Field
+from solver.field import Field
 from solver.grid import Grid
 from solver.multigrid import Pressure
 from solver.params import FluidParams
@@ -162,7 +162,8 @@ class Fluid:
     def divergence(self) -> np.ndarray:
         """Divergence of the velocity, (ny, nx) float32, 1 / s."""
         faces = np.pad(self.velocity.read.get(), ((0, 1), (0, 1), (0, 0)))
-        return (faces[:-1, 1:, 0] - faces[:-1, :-1, 0] + faces[1:, :-1, 1] - faces[:-1, :-1, 1]) / np.float32(self.grid.h)
+        across, down = np.diff(faces[:-1, :, 0], axis=1), np.diff(faces[:, :-1, 1], axis=0)
+        return (across + down) / np.float32(self.grid.h)
 
     def pressure(self) -> np.ndarray:
         """The last projection's q, (ny, nx) float32, lengths^2 / s: pressure times dt."""
@@ -177,7 +178,7 @@ class Fluid:
 
     def state(self) -> Sequence[Field]:
         """The fields that a later step depends on, for checkpoints: copies of them bring this moment back exactly."""
-        return (self.velocity.read, self.viscosity, self.solid, *self._pressure_solver.state())
+        return self.velocity.read, self.viscosity, self.solid
 
     def load(self, state: Sequence[Field]) -> None:
         """Go back to copies of `state()` taken earlier."""
@@ -186,9 +187,8 @@ class Fluid:
         self.masks_changed()
 
     def clear_velocity(self) -> None:
-        """Stop all motion, and forget the pressure that went with it."""
+        """Stop all motion."""
         self.velocity.read.clear()
-        self._pressure_solver.clear()
 
     def release(self) -> None:
         """Free the textures."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -102,12 +102,6 @@ class PaperFluid(Fluid):
 
     def pressure(self) -> np.ndarray:
         return self._pressure.read.get()
-
-    def state(self) -> Sequence[Field]:
-        return self.velocity.read, self.viscosity, self.solid
-
-    def clear_velocity(self) -> None:
-        self.velocity.read.clear()
 
     def release(self) -> None:
         super().release()

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, sparse
+from scipy.sparse import linalg as sparse_linalg
 
 Faces = np.ndarray
 
@@ -16,7 +17,9 @@ Faces = np.ndarray
 PAD = 4
 
 
-def padded_faces(faces: Faces, no_slip: bool = False, speed: tuple[float, ...] = (0, 0, 0, 0)) -> tuple[np.ndarray, ...]:
+def padded_faces(
+    faces: Faces, no_slip: bool = False, speed: tuple[float, ...] = (0, 0, 0, 0)
+) -> tuple[np.ndarray, ...]:
     """u and v with PAD ghost faces on every side, from (ny, nx, 2): zero on and beyond walls for the normal component;
     for the tangential one the nearest inside, or 2 U minus it."""
     u, v = (np.asarray(faces[..., axis], np.float64) for axis in (0, 1))
@@ -133,7 +136,9 @@ def paper_padded(values: np.ndarray, odd: bool = False, axis: int | None = None)
     return padded
 
 
-def paper_diffuse_sweep(velocity: np.ndarray, before: np.ndarray, viscosity: np.ndarray, dt_over_h2: float) -> np.ndarray:
+def paper_diffuse_sweep(
+    velocity: np.ndarray, before: np.ndarray, viscosity: np.ndarray, dt_over_h2: float
+) -> np.ndarray:
     """One Jacobi sweep of Appendix A, mended."""
     u, v = paper_padded(velocity[..., 0], True, 0), paper_padded(velocity[..., 1], True, 1)
     mu = paper_padded(viscosity)
@@ -150,6 +155,7 @@ def paper_diffuse_sweep(velocity: np.ndarray, before: np.ndarray, viscosity: np.
     new_u = before[..., 0] + k * (ul + ur + ua + ub) + kx * (ur - ul) + 0.5 * ky * shear
     new_v = before[..., 1] + k * (vl + vr + va + vb) + ky * (vb - va) + 0.5 * kx * shear
     return np.stack([new_u, new_v], axis=-1) / (1 + 4 * k)[..., None]
+
 
 # -- the warp map ---------------------------------------------------------------------------------------------------
 
@@ -217,3 +223,68 @@ def follow(
         u4, v4 = velocity(x + dt * u3, y + dt * v3, t + dt)
         x, y = x + dt / 6 * (u1 + 2 * u2 + 2 * u3 + u4), y + dt / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
     return x, y
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# The viscous step
+# ---------------------------------------------------------------------------------------------------------------------
+
+
+def viscous_system(
+    viscosity: np.ndarray,
+    dt: float,
+    h: float,
+    solid: np.ndarray | None = None,
+    no_slip: bool = False,
+    speed: tuple[float, ...] = (0, 0, 0, 0),
+) -> tuple[sparse.csc_matrix, np.ndarray, np.ndarray]:
+    """(I - dt div mu (grad + grad^T)) on MAC faces as a sparse matrix over (u, v) of (ny, nx) each; what moving walls
+    (left, right, top, bottom) add to the right-hand side; and which faces are free, the others being zero."""
+    ny, nx = viscosity.shape
+    fluid = np.pad(~(np.zeros((ny, nx), bool) if solid is None else np.asarray(solid, bool)), 1)
+    mu = np.pad(np.asarray(viscosity, np.float64), 1)
+    count = nx * ny
+    # Numbers of the faces with a frame around them; pinned ones have none.
+    u, v = np.full((2, ny + 2, nx + 2), -1)
+    u[1:-1, 1:-1] = np.where(fluid[1:-1, 1:-1] & fluid[1:-1, :-2], np.arange(count).reshape(ny, nx), -1)
+    v[1:-1, 1:-1] = np.where(fluid[1:-1, 1:-1] & fluid[:-2, 1:-1], np.arange(count).reshape(ny, nx) + count, -1)
+    stiffness, strains, wall_strain = [], [], []
+    for j in range(1, ny + 1):
+        for i in range(1, nx + 1):
+            if fluid[j, i]:
+                stiffness += [2 * mu[j, i]] * 2
+                strains += [{u[j, i + 1]: 1, u[j, i]: -1}, {v[j + 1, i]: 1, v[j, i]: -1}]
+                wall_strain += [0, 0]
+    for j in range(1, ny + 2):
+        for i in range(1, nx + 2):
+            around = [(j - 1, i - 1), (j - 1, i), (j, i - 1), (j, i)]
+            wet = [cell for cell in around if fluid[cell]]
+            if not wet or (len(wet) < 4 and not no_slip):
+                continue
+            node = len(wet) / sum(1 / mu[cell] for cell in wet)
+            strain, moving = {u[j, i]: 1, u[j - 1, i]: -1, v[j, i]: 1, v[j, i - 1]: -1}, 0.0
+            if len(wet) == 2:
+                # A flat wall: the velocity beyond it is 2 U minus the one inside, so the strain is twice what it is
+                # with a resting face there, and half the energy belongs to the fluid's side.
+                node *= 2
+                moving += speed[2] * (j == 1) * -1 + speed[3] * (j == ny + 1)
+                moving += speed[0] * (i == 1) * -1 + speed[1] * (i == nx + 1)
+            stiffness.append(node)
+            strains.append(strain)
+            wall_strain.append(moving)
+    rows = [row for row, strain in enumerate(strains) for face in strain if face >= 0]
+    columns = [face for strain in strains for face in strain if face >= 0]
+    signs = [sign for strain in strains for face, sign in strain.items() if face >= 0]
+    strain_of = sparse.csr_matrix((signs, (rows, columns)), (len(strains), 2 * count))
+    weighted = strain_of.T @ sparse.diags(np.asarray(stiffness) * dt / h**2)
+    matrix = sparse.identity(2 * count) + weighted @ strain_of
+    free = np.isin(np.arange(2 * count), np.concatenate([u, v]))
+    return sparse.csc_matrix(matrix), -(weighted @ np.asarray(wall_strain)), free
+
+
+def viscous_step(faces: Faces, viscosity: np.ndarray, dt: float, h: float, **walls: object) -> Faces:
+    """The exact implicit viscous step of (ny, nx, 2) velocities on MAC faces."""
+    matrix, added, free = viscous_system(viscosity, dt, h, **walls)  # pyright: ignore[reportArgumentType]
+    right = np.where(free, np.moveaxis(np.asarray(faces, np.float64), -1, 0).ravel() + added, 0.0)
+    solution = sparse_linalg.splu(matrix).solve(right)
+    return np.moveaxis(solution.reshape(2, *viscosity.shape), 0, -1)
