@@ -30,11 +30,16 @@ class Reduction:
             size = -(-size[0] // 4), -(-size[1] // 4)
             self._levels.append(device.field(size, components, f"{kind} {size[0]} x {size[1]}"))
 
-    def __call__(self, field: Field) -> np.ndarray:
-        """One number a component, float64; waits for the GPU."""
+    def shrink(self, field: Field) -> Field:
+        """A field of at most 16 x 16 texels with the same result, for stages that go on without reading it back."""
         for level in self._levels:
             self._shrink(level, field=field)
             field = level
+        return field
+
+    def __call__(self, field: Field) -> np.ndarray:
+        """One number a component, float64; waits for the GPU."""
+        field = self.shrink(field)
         values = field.get().reshape(-1, field.components)
         return values.max(axis=0).astype(np.float64) if self._kind == "max" else values.sum(axis=0, dtype=np.float64)
 

@@ -1,0 +1,58 @@
+// Faces and viscosities packed 2 x 2 cells a texel, (x, y, z, w) = upper left, upper right, lower left, lower right;
+// u in one texture, v in another. Around the texels in use runs a ring of zeros, so that no stage asks for the edge:
+// what lies beyond a wall is at rest.
+// Matrix: A v = v - B^T K B v with the strains B: u_x and v_y in cells (K = 2 dt mu / h^2), u_y + v_x at nodes
+// (K = dt mu_node / h^2). Pinned faces (walls, solid cells) hold exactly zero and are no unknowns.
+uniform sampler2D u_cells_x;    // K of u_x in the cells; negative where the cell's left face is pinned
+uniform sampler2D u_cells_y;    // K of v_y in the cells (the same as cells_x on the finest grid)
+uniform sampler2D u_nodes;      // K of the cells' upper left nodes; negative where the cell's upper face is pinned
+uniform sampler2D u_cell_halo;  // xy: cells_x left of the texel, zw: cells_y above it
+uniform sampler2D u_node_halo;  // xy: nodes right of the texel, zw: nodes below it
+
+struct Faces { vec4 u, v; };
+struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below; Faces open; };
+
+Stiffness read_stiffness(vec2 at) {
+    vec4 x = texture(u_cells_x, at), n = texture(u_nodes, at);
+    vec4 cells = texture(u_cell_halo, at), nodes = texture(u_node_halo, at);
+    Stiffness k;
+    k.open = Faces(step(0.0, x), step(0.0, n));
+    x = abs(x);
+    n = abs(n);
+#ifdef FINEST
+    vec4 y = x;
+#else
+    vec4 y = texture(u_cells_y, at);
+#endif
+    k.here_x = x;
+    k.here_y = y;
+    k.left = vec4(cells.x, x.x, cells.y, x.z);
+    k.above = vec4(cells.zw, y.xy);
+    k.node = n;
+    k.node_right = vec4(n.y, nodes.x, n.w, nodes.y);
+    k.node_below = vec4(n.zw, nodes.zw);
+    return k;
+}
+
+// The diagonal of A.
+Faces diagonal(Stiffness k) {
+    return Faces(1.0 + k.left + k.here_x + k.node + k.node_below, 1.0 + k.above + k.here_y + k.node + k.node_right);
+}
+
+// A f for the texel at `at` of the faces in textures fu, fv; `here` becomes their own values. 12 reads.
+Faces apply_matrix(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {
+    vec2 x = vec2(1.0 / float(textureSize(fu, 0).x), 0.0), y = vec2(0.0, 1.0 / float(textureSize(fu, 0).y));
+    vec4 u = texture(fu, at), v = texture(fv, at);
+    vec4 u_left = texture(fu, at - x), u_right = texture(fu, at + x), u_up = texture(fu, at - y), u_down = texture(fu, at + y);
+    vec4 v_left = texture(fv, at - x), v_right = texture(fv, at + x), v_up = texture(fv, at - y), v_down = texture(fv, at + y);
+    float u_corner = texture(fu, at + x - y).z, v_corner = texture(fv, at - x + y).y;
+    here = Faces(u, v);
+    // Tensions in the cells either side of a face, and shear at the nodes.
+    vec4 along_u = k.here_x * (vec4(u.y, u_right.x, u.w, u_right.z) - u) - k.left * (u - vec4(u_left.y, u.x, u_left.w, u.z));
+    vec4 along_v = k.here_y * (vec4(v.zw, v_down.xy) - v) - k.above * (v - vec4(v_up.zw, v.xy));
+    vec4 shear = k.node * (u - vec4(u_up.zw, u.xy) + v - vec4(v_left.y, v.x, v_left.w, v.z));
+    vec2 shear_below = k.node_below.zw * (u_down.xy - u.zw + v_down.xy - vec2(v_corner, v_down.x));
+    vec2 shear_right = k.node_right.yw * (u_right.xz - vec2(u_corner, u_right.x) + v_right.xz - v.yw);
+    return Faces(u - along_u - vec4(shear.zw, shear_below) + shear,
+                 v - along_v - vec4(shear.y, shear_right.x, shear.w, shear_right.y) + shear);
+}

@@ -1,0 +1,45 @@
+// Restrict: the residual on the next coarser grid, a quarter of the transpose of prolong.frag.
+// u_u, u_v: the fine residual, zero on pinned faces; u_open: which coarse faces are open (1 for u, plus 2 for v).
+// Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
+// that it would share with a pinned neighbour.
+// reads: 29
+uniform sampler2D u_u;
+uniform sampler2D u_v;
+uniform sampler2D u_open;
+in vec2 v_uv;
+layout(location = 0) out vec4 out_u;
+layout(location = 1) out vec4 out_v;
+
+// Faces of the fine texel at p, v turned so that both components are gathered alike.
+vec4 fine(sampler2D f, vec2 p, bool is_v) { return is_v ? texture(f, p).xzyw : texture(f, p); }
+
+// The two coarse columns' sums along the normal, on the upper (xy) and the lower (zw) row of fine texels from `p`.
+vec4 along(sampler2D f, vec2 p, vec2 step_along, bool is_v) {
+    vec4 a = fine(f, p - step_along, is_v), b = fine(f, p, is_v), c = fine(f, p + step_along, is_v);
+    return 0.5 * (vec4(a.y, b.y, a.w, b.w) + vec4(b.y, c.y, b.w, c.w)) + vec4(b.x, c.x, b.z, c.z);
+}
+
+// before, here, after: openness (0 or 1) of the coarse faces of this texel and of those across from it.
+vec4 gather(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, vec4 before, vec4 here, vec4 after) {
+    vec4 a = along(f, p - step_across, step_along, is_v), b = along(f, p, step_along, is_v);
+    vec4 c = along(f, p + step_across, step_along, is_v), d = along(f, p + 2.0 * step_across, step_along, is_v);
+#ifdef NO_SLIP
+    const vec4 alone_before = vec4(0.0), alone_after = vec4(0.0);
+#else
+    vec4 alone_before = 1.0 - vec4(before.zw, here.xy), alone_after = 1.0 - vec4(here.zw, after.xy);
+#endif
+    vec4 sum = (0.25 + 0.75 * alone_before) * vec4(a.zw, b.zw) + (0.75 + 0.25 * alone_before) * vec4(b.xy, c.xy)
+             + (0.75 + 0.25 * alone_after) * vec4(b.zw, c.zw) + (0.25 + 0.75 * alone_after) * vec4(c.xy, d.xy);
+    return 0.25 * here * sum;
+}
+
+void main() {
+    vec2 fine_texel = 1.0 / vec2(textureSize(u_u, 0)), texel = 1.0 / vec2(textureSize(u_open, 0));
+    // The first of this texel's fine texels, past the ring.
+    vec2 p = (2.0 * (floor(gl_FragCoord.xy) - 1.0) + 1.5) * fine_texel;
+    vec2 fx = vec2(fine_texel.x, 0.0), fy = vec2(0.0, fine_texel.y), x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
+    vec4 here = texture(u_open, v_uv), up = texture(u_open, v_uv - y), down = texture(u_open, v_uv + y);
+    vec4 left = texture(u_open, v_uv - x), right = texture(u_open, v_uv + x);
+    out_u = gather(u_u, p, fx, fy, false, mod(up, 2.0), mod(here, 2.0), mod(down, 2.0));
+    out_v = gather(u_v, p, fy, fx, true, step(1.5, left.xzyw), step(1.5, here.xzyw), step(1.5, right.xzyw)).xzyw;
+}

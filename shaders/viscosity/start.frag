@@ -1,0 +1,16 @@
+// Start: the first damped Jacobi sweep, from rest: f = weight D^-1 b.
+// u_right_u, u_right_v: the right-hand side b; u_weight: of the sweep.
+// reads: 7
+#include "viscosity/block.glsl"
+uniform sampler2D u_right_u;
+uniform sampler2D u_right_v;
+uniform float u_weight;
+in vec2 v_uv;
+layout(location = 0) out vec4 out_u;
+layout(location = 1) out vec4 out_v;
+
+void main() {
+    Faces d = diagonal(read_stiffness(v_uv));
+    out_u = u_weight * texture(u_right_u, v_uv) / d.u;
+    out_v = u_weight * texture(u_right_v, v_uv) / d.v;
+}
