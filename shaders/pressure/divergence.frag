@@ -1,0 +1,32 @@
+// Right-hand side of the pressure equation: what flows out of each cell, per face length; h times the divergence.
+//   r = u_right - u_left + v_down - v_up  [- (s - mean)]          sum over open faces of (p' - p) = r
+// in:  u_velocity   MAC velocity, lengths / s
+//      u_left, u_up, u_far   faces
+// With WITH_SOURCE: u_source, h s at blocks, lengths / s; u_sums, whose quotient is its mean over the fluid.
+// out: r at blocks, lengths / s
+// reads: 11
+#include "lib/block_faces.glsl"
+#include "lib/quotient.glsl"
+
+uniform sampler2D u_velocity;
+#ifdef WITH_SOURCE
+uniform sampler2D u_source;
+uniform sampler2D u_sums;
+#endif
+
+out vec4 out_residual;
+
+void main() {
+    vec2 texel = 1.0 / vec2(textureSize(u_velocity, 0)), a = (2.0 * floor(gl_FragCoord.xy) + 0.5) * texel;
+    vec2 b = a + texel, c = b + texel;
+    vec2 v00 = texture(u_velocity, a).rg, v10 = texture(u_velocity, vec2(b.x, a.y)).rg;
+    vec2 v01 = texture(u_velocity, vec2(a.x, b.y)).rg, v11 = texture(u_velocity, b).rg;
+    vec2 right = vec2(texture(u_velocity, vec2(c.x, a.y)).r, texture(u_velocity, vec2(c.x, b.y)).r);
+    vec2 down = vec2(texture(u_velocity, vec2(a.x, c.y)).g, texture(u_velocity, vec2(b.x, c.y)).g);
+    Faces f = faces();
+    out_residual = f.right * vec4(v10.x, right.x, v11.x, right.y) - f.left * vec4(v00.x, v10.x, v01.x, v11.x)
+                 + f.down * vec4(v01.y, v11.y, down) - f.up * vec4(v00.y, v10.y, v01.y, v11.y);
+#ifdef WITH_SOURCE
+    out_residual -= texture(u_source, v_uv) - quotient(u_sums) * live(f);
+#endif
+}

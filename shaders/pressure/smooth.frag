@@ -1,0 +1,19 @@
+// One sweep of weighted Jacobi:  p += weight (A p - r) / (sum of the openness of the cell's faces).
+// in:  u_pressure   pressure / h at blocks, lengths / s;  u_residual   right-hand side r, lengths / s
+//      u_left, u_up, u_far   faces;  u_weight   of this sweep, from the roots of a Chebyshev polynomial
+// out: pressure / h
+// reads: 9
+#include "lib/block_faces.glsl"
+
+uniform sampler2D u_pressure;
+uniform sampler2D u_residual;
+uniform float u_weight;
+
+out vec4 out_pressure;
+
+void main() {
+    Faces f = faces();
+    vec4 p = texture(u_pressure, v_uv), sum = openness(f);
+    vec4 weight = u_weight * vec4(greaterThan(sum, vec4(0.0))) / max(sum, 1e-3);
+    out_pressure = p + weight * (laplacian(u_pressure, p, f) - texture(u_residual, v_uv));
+}

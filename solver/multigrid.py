@@ -1,0 +1,238 @@
+"""The pressure: makes a velocity on the MAC grid free of divergence, by multigrid over blocks of 2 x 2 cells."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import cos, pi, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.field import DoubleField, Field
+
+if TYPE_CHECKING:
+    from solver.context import Device
+
+# A level of no more blocks of 2 x 2 cells than this is solved directly, by a dense matrix.
+DIRECT_BLOCKS = 64
+
+
+def chebyshev_weights(sweeps: int, smallest: float) -> tuple[float, ...]:
+    """Jacobi weights that together damp all modes with eigenvalues from `smallest` to 2 as evenly as can be.
+
+    Largest weight first: what rounding and a leading overshoot leave, the small ones then smooth.
+    """
+    middle, half = (2.0 + smallest) / 2, (2.0 - smallest) / 2
+    return tuple(sorted((1 / (middle + half * cos(pi * (k + 0.5) / sweeps)) for k in range(sweeps)), reverse=True))
+
+
+# Sweeps after each interpolation, from the finest level down; the last entry serves all coarser ones. There are none
+# before a restriction: from a zero guess the residual is the right-hand side itself, and the way down costs little.
+SWEEPS = (chebyshev_weights(3, 0.5), chebyshev_weights(4, 0.4), chebyshev_weights(5, 0.3))
+
+
+class Level:
+    """The textures of one grid: faces, right-hand side, solution; `size` in blocks of 2 x 2 cells."""
+
+    def __init__(self, device: Device, cells: tuple[int, int], number: int) -> None:
+        self.size = ((cells[0] + 1) // 2, (cells[1] + 1) // 2)
+        label = f"pressure level {number}"
+        self.left, self.up, self.far, self.links = (
+            device.field(self.size, 4, f"{label} {name}", "f1") for name in ("left", "up", "far", "links")
+        )
+        self.faces = {"left": self.left, "up": self.up, "far": self.far}
+        self.residual = device.double_field(self.size, 4, f"{label} residual")
+        self.pressure = device.double_field(self.size, 4, f"{label} pressure")
+
+    def release(self) -> None:
+        for field in (self.left, self.up, self.far, self.links, self.residual, self.pressure):
+            field.release()
+
+
+class Pressure:
+    """The projection u <- u - grad p with lap p = div u - s, and no flow through the edges and the solid cells.
+
+    What is kept on the GPU is p / h, in lengths / s, so that only the source needs the size of a cell. Each cycle
+    solves for a correction to what the cycles before it left, so that float32 sets no floor to the divergence; where
+    there are solids it is scaled to leave the least, so that no mask can make the divergence grow.
+
+    Args:
+        device: the device.
+        size: (nx, ny) cells, of any size.
+        h: side of a cell, lengths; 1 / max(nx, ny) if not given.
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], h: float | None = None) -> None:
+        self.device = device
+        self.size = size
+        self.h = h or 1.0 / max(size)
+        self._levels = [Level(device, size, 0)]
+        while self._levels[-1].size[0] * self._levels[-1].size[1] > DIRECT_BLOCKS:
+            self._levels.append(Level(device, self._levels[-1].size, len(self._levels)))
+        blocks, coarsest = self._levels[0].size, self._levels[-1].size
+        count = coarsest[0] * coarsest[1]
+        self._inverse = device.field((4 * count, count), 4, "pressure inverse")
+        self._base = device.double_field(blocks, 4, "pressure base")
+        self._change = device.double_field(blocks, 4, "pressure change")
+        self._whole = device.field(blocks, 4, "pressure whole")
+        self._applied = device.field(blocks, 4, "pressure applied")
+        self._u, self._v = (device.field(blocks, 4, f"velocity {name} in blocks") for name in "uv")
+        self._sums: list[Field] = []
+        while blocks != (1, 1) or not self._sums:
+            blocks = ((blocks[0] + 7) // 8, (blocks[1] + 7) // 8)
+            self._sums.append(device.field(blocks, 2, "pressure sums"))
+        self.set_solids(None)
+
+    def release(self) -> None:
+        """Free the textures."""
+        for item in (*self._levels, *self._sums, self._inverse, self._base, self._change, self._whole, self._applied):
+            item.release()
+        self._u.release()
+        self._v.release()
+
+    # -- what goes in and comes out ---------------------------------------------------------------------------------
+
+    def set_solids(self, solid: Field | None) -> None:
+        """Close every face of the solid cells (R8 at cells, 1 = solid), and of no others; None for no solids at all."""
+        shader, levels = self.device.pass_, self._levels
+        self._has_solids = solid is not None
+        finest = levels[0]
+        everywhere = solid or self.device.field(self.size, 1, "no solids", "f1")
+        shader("pressure/open_faces.frag")((finest.left, finest.up, finest.far), solid=everywhere)
+        if solid is None:
+            everywhere.release()
+        for fine, coarse in pairwise(levels):
+            shader("pressure/coarsen_faces.frag")((coarse.left, coarse.up, coarse.far), **fine.faces)
+            shader("pressure/links.frag")(
+                fine.links, **fine.faces, coarse_left=coarse.left, coarse_up=coarse.up, coarse_far=coarse.far
+            )
+        self._inverse.set(_inverse(levels[-1]))
+
+    def project(self, velocity: DoubleField, cycles: int = 3, source: Field | None = None, warm: bool = False) -> None:
+        """Make `velocity` free of divergence, or its divergence equal to the source's; writes and swaps.
+
+        Args:
+            velocity: MAC velocity, lengths / s; its faces at edges and solids become exactly zero.
+            cycles: multigrid cycles; each leaves a tenth to a thirtieth of the divergence.
+            source: wanted divergence at cells, 1 / s; its mean over the fluid is taken off: nothing leaves the grid.
+            warm: start from the last pressure, scaled to leave the least: never worse than to start from none.
+        """
+        device, finest = self.device, self._levels[0]
+        self._take_divergence(velocity.read, source)
+        self._base.read.clear()
+        self._change.read.clear()
+        if warm:
+            self._accept(self._whole, self._base, scaled=True)
+        for cycle in range(cycles):
+            self._solve_roughly()
+            first, last = cycle == 0 and not warm, cycle == cycles - 1
+            self._accept(finest.pressure.read, self._base if first else self._change, self._has_solids, last)
+        device.pass_("pressure/subtract_gradient.frag")(
+            (self._u, self._v, self._whole),
+            velocity=velocity.read, base=self._base.read, change=self._change.read, **finest.faces,
+        )  # fmt: skip
+        device.pass_("pressure/scatter_velocity.frag")(velocity.write, u=self._u, v=self._v)
+        velocity.swap()
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """The last pressure, (ny, nx) float32, lengths^2 / s: it includes the time step."""
+        return _cells(self._whole.get(), self.size) * np.float32(self.h)
+
+    def divergence_norm(self, velocity: Field) -> float:
+        """Root mean square divergence of a MAC velocity over all cells, 1 / s; waits for the GPU."""
+        self._take_divergence(velocity, None)
+        residual = self._levels[0].residual.read
+        squares = float(self._dot(residual, residual).get()[0, 0, 1])
+        return sqrt(squares / (self.size[0] * self.size[1])) / self.h
+
+    # -- the solve --------------------------------------------------------------------------------------------------
+
+    def _take_divergence(self, velocity: Field, source: Field | None) -> None:
+        """The right-hand side of the finest level."""
+        finest, shader = self._levels[0], self.device.pass_
+        if source is None:
+            shader("pressure/divergence.frag")(finest.residual.read, velocity=velocity, **finest.faces)
+            return
+        # The blocks of the velocity are free until the end of a projection.
+        wanted, live = self._u, self._v
+        shader("pressure/gather_source.frag")((wanted, live), source=source, scale=self.h, **finest.faces)
+        shader("pressure/divergence.frag", WITH_SOURCE=1)(
+            finest.residual.read, velocity=velocity, source=wanted, sums=self._dot(wanted, live), **finest.faces
+        )
+
+    def _solve_roughly(self) -> None:
+        """One cycle: a correction in the finest level's `pressure` to its `residual`, from a zero guess."""
+        shader, levels = self.device.pass_, self._levels
+        for fine, coarse in pairwise(levels):
+            shader("pressure/restrict.frag")(coarse.residual.read, residual=fine.residual.read, links=fine.links)
+        coarsest = levels[-1]
+        shader("pressure/solve_directly.frag")(
+            coarsest.pressure.read, residual=coarsest.residual.read, inverse=self._inverse
+        )
+        for number in range(len(levels) - 2, -1, -1):
+            fine, coarse = levels[number], levels[number + 1]
+            pressure = fine.pressure
+            shader("pressure/prolong.frag")(pressure.read, coarse=coarse.pressure.read, links=fine.links)
+            for weight in SWEEPS[min(number, len(SWEEPS) - 1)]:
+                shader("pressure/smooth.frag")(
+                    pressure.write, pressure=pressure.read, residual=fine.residual.read, weight=weight, **fine.faces
+                )
+                pressure.swap()
+
+    def _accept(self, correction: Field, part: DoubleField, scaled: bool, last: bool = False) -> None:
+        """Add a correction to a part of the pressure, and take from the residual what it accounts for.
+
+        Scaled, it is multiplied by the factor that leaves least: r . A p / A p . A p.
+        """
+        shader, finest = self.device.pass_, self._levels[0]
+        residual = finest.residual
+        if scaled:
+            applied = self._applied
+            shader("pressure/residual.frag", ONLY_LAPLACIAN=1)(applied, pressure=correction, **finest.faces)
+            sums = self._dot(residual.read, applied)
+            step = shader("pressure/add_scaled.frag")
+            step(residual.write, a=residual.read, b=applied, sums=sums, sign=-1.0)
+            step(part.write, a=part.read, b=correction, sums=sums, sign=1.0)
+            residual.swap()
+            part.swap()
+            return
+        shader("pressure/add.frag")(part.write, a=part.read, b=correction)
+        part.swap()
+        if not last:
+            shader("pressure/residual.frag")(
+                residual.write, pressure=correction, residual=residual.read, **finest.faces
+            )
+            residual.swap()
+
+    def _dot(self, a: Field, b: Field) -> Field:
+        """The scalar products (a . b, b . b) in one texel, as `lib/quotient.glsl` takes them."""
+        self.device.pass_("pressure/dot_products.frag")(self._sums[0], a=a, b=b)
+        for larger, smaller in pairwise(self._sums):
+            self.device.pass_("pressure/add_up.frag")(smaller, sums=larger)
+        return self._sums[-1]
+
+
+def _cells(blocks: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """The cells of an array of blocks, (h, w, 4) -> (ny, nx)."""
+    height, width, _ = blocks.shape
+    cells = blocks.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)
+    return cells[: size[1], : size[0]]
+
+
+def _inverse(level: Level) -> np.ndarray:
+    """The pseudo-inverse of a level's Laplacian, laid out for `solve_directly.frag`: (blocks, 4 blocks, 4).
+
+    Pseudo, because each region of the fluid leaves the pressure's constant open.
+    """
+    width, height = level.size
+    size = (2 * width, 2 * height)
+    left, up = (_cells(field.get() / 255.0, size) for field in (level.left, level.up))
+    # Numbered block after block, as the texels' cells lie.
+    number = _cells(np.arange(4 * width * height).reshape(height, width, 4), size)
+    matrix = np.zeros((number.size, number.size))
+    for open_, here, there in ((left[:, 1:], number[:, 1:], number[:, :-1]), (up[1:], number[1:], number[:-1])):
+        matrix[here, there] = matrix[there, here] = open_
+    matrix -= np.diag(matrix.sum(axis=1))
+    inverse = np.linalg.pinv(matrix, rcond=1e-6, hermitian=True)
+    return inverse.reshape(width * height, 4, -1).transpose(0, 2, 1)

@@ -1,0 +1,216 @@
+"""The projection against a sparse direct solve in float64, and how fast it gets there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
+
+from solver.context import Device
+from solver.multigrid import Pressure
+
+SIZES = [(8, 8), (9, 13), (64, 64), (61, 40), (100, 23)]
+
+
+def open_faces(solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which left and upper faces lie between two fluid cells, each (ny, nx)."""
+    fluid = ~solid
+    left, up = np.zeros(solid.shape, bool), np.zeros(solid.shape, bool)
+    left[:, 1:] = fluid[:, 1:] & fluid[:, :-1]
+    up[1:] = fluid[1:] & fluid[:-1]
+    return left, up
+
+
+def divergence(velocity: np.ndarray) -> np.ndarray:
+    """Divergence times h of a MAC velocity, float64, (ny, nx)."""
+    u, v = velocity[..., 0].astype(float), velocity[..., 1].astype(float)
+    return np.pad(u, ((0, 0), (0, 1)))[:, 1:] - u + np.pad(v, ((0, 1), (0, 0)))[1:] - v
+
+
+def gradient_matrix(solid: np.ndarray) -> sparse.csr_matrix:
+    """From the cells to the open faces (left ones first): the difference of the pressure across."""
+    number = np.arange(solid.size).reshape(solid.shape)
+    left, up = open_faces(solid)
+    here = np.concatenate([number[left], number[up]])
+    there = np.concatenate([np.roll(number, 1, 1)[left], np.roll(number, 1, 0)[up]])
+    face = np.arange(here.size)
+    ones = np.ones(here.size)
+    return sparse.csr_matrix(
+        (np.r_[ones, -ones], (np.r_[face, face], np.r_[here, there])), shape=(here.size, solid.size)
+    )
+
+
+def exact_projection(velocity: np.ndarray, solid: np.ndarray, wanted: np.ndarray | None = None) -> np.ndarray:
+    """The velocity without divergence (times h; or with the wanted one) nearest to the given one, by a direct solve."""
+    left, up = open_faces(solid)
+    faces = np.concatenate([velocity[..., 0][left], velocity[..., 1][up]]).astype(float)
+    gradient = gradient_matrix(solid)
+    laplacian = (gradient.T @ gradient).tolil()
+    _, region = connected_components(laplacian)
+    # One cell of each region holds its constant; the right-hand side sums to zero there, so nothing else changes.
+    for cell in np.unique(region, return_index=True)[1]:
+        laplacian[cell, cell] += 1.0
+    right = gradient.T @ faces + (0 if wanted is None else wanted.ravel())
+    faces = faces - gradient @ spsolve(laplacian.tocsc(), right)
+    result = np.zeros((*solid.shape, 2))
+    result[..., 0][left], result[..., 1][up] = faces[: left.sum()], faces[left.sum() :]
+    return result
+
+
+def brush(size: tuple[int, int], sigma: float = 20.0) -> np.ndarray:
+    """An impulse under a Gaussian, off the middle."""
+    x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
+    bell = np.exp(-((x - 0.4 * size[0]) ** 2 + (y - 0.45 * size[1]) ** 2) / (2 * sigma**2))
+    return np.stack([bell, 0.6 * bell], -1).astype(np.float32)
+
+
+def walled(size: tuple[int, int]) -> np.ndarray:
+    """Two thin walls, one of them one cell thick, and a disc."""
+    nx, ny = size
+    x, y = np.meshgrid(np.arange(nx), np.arange(ny))
+    solid = (x - 0.7 * nx) ** 2 + (y - 0.3 * ny) ** 2 < (0.12 * min(size)) ** 2
+    solid[int(0.1 * ny) : int(0.8 * ny), int(0.55 * nx)] = True
+    solid[: int(0.6 * ny), int(0.23 * nx) : int(0.23 * nx) + 2] = True
+    return solid
+
+
+def closed(velocity: np.ndarray, solid: np.ndarray) -> np.ndarray:
+    """The velocity with zeros at edges and solids."""
+    return velocity * np.stack(open_faces(solid), -1)
+
+
+def project(
+    device: Device, velocity: np.ndarray, solid: np.ndarray, cycles: int, source: np.ndarray | None = None
+) -> np.ndarray:
+    """The velocity after a projection on the GPU from a cold start."""
+    size = solid.shape[1], solid.shape[0]
+    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    frozen = device.upload(solid.astype(np.uint8) * 255) if solid.any() else None
+    wanted = None if source is None else device.upload(source)
+    pressure.set_solids(frozen)
+    field.read.set(velocity)
+    pressure.project(field, cycles, wanted)
+    result = field.read.get()
+    for item in (pressure, field, frozen, wanted):
+        if item is not None:
+            item.release()
+    return result
+
+
+def left_over(device: Device, velocity: np.ndarray, solid: np.ndarray, cycles: int) -> float:
+    """What a projection leaves of the divergence, relative."""
+    before = np.linalg.norm(divergence(closed(velocity, solid)))
+    return float(np.linalg.norm(divergence(project(device, velocity, solid, cycles))) / before)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("density", [0.0, 0.1])
+def test_it_agrees_with_a_direct_solve(device: Device, size: tuple[int, int], density: float) -> None:
+    rng = np.random.default_rng(3)
+    solid = rng.random((size[1], size[0])) < density
+    velocity = rng.standard_normal((size[1], size[0], 2)).astype(np.float32)
+    exact = exact_projection(velocity, solid)
+    result = project(device, velocity, solid, 20)
+    assert np.linalg.norm(result - exact) <= 1e-4 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("size", [(512, 512), (333, 217), (512, 100), (257, 255), (1024, 1024)])
+def test_three_cycles_do_for_a_brush(device: Device, size: tuple[int, int]) -> None:
+    solid = np.zeros((size[1], size[0]), bool)
+    assert left_over(device, brush(size), solid, 3) <= 1e-3
+
+
+def test_three_cycles_do_for_noise(device: Device) -> None:
+    noise = np.random.default_rng(1).standard_normal((217, 333, 2)).astype(np.float32)
+    assert left_over(device, noise, np.zeros((217, 333), bool), 3) <= 1e-3
+
+
+@pytest.mark.parametrize("size", [(512, 512), (1024, 1024)])
+def test_four_cycles_do_with_thin_walls(device: Device, size: tuple[int, int]) -> None:
+    assert left_over(device, brush(size), walled(size), 4) <= 1e-3
+
+
+def masks(size: tuple[int, int]) -> dict[str, np.ndarray]:
+    nx, ny = size
+    x, y = np.meshgrid(np.arange(nx), np.arange(ny))
+    rng = np.random.default_rng(5)
+    return {
+        "all solid": np.ones((ny, nx), bool),
+        "one fluid cell": (x != 5) | (y != 4),
+        "checkerboard": (x + y) % 2 == 0,
+        "dots": (x % 2 == 0) & (y % 2 == 0),
+        "a third": rng.random((ny, nx)) < 0.33,
+        "half": rng.random((ny, nx)) < 0.5,
+        "channels": x % 9 == 4,
+        "pockets": np.abs(np.hypot(x % 30 - 15, y % 30 - 15) - 10) < 1.0,
+    }
+
+
+@pytest.mark.parametrize("name", sorted(masks((8, 8))))
+def test_no_mask_makes_the_divergence_grow(device: Device, name: str) -> None:
+    size = (120, 83)
+    solid = masks(size)[name]
+    velocity = np.random.default_rng(2).standard_normal((83, 120, 2)).astype(np.float32)
+    before = np.linalg.norm(divergence(closed(velocity, solid)))
+    for cycles in (1, 3, 8):
+        result = project(device, velocity, solid, cycles)
+        assert np.isfinite(result).all()
+        assert np.linalg.norm(divergence(result)) <= 1.0001 * before
+        assert not result[~np.stack(open_faces(solid), -1)].any()
+
+
+def test_edges_are_exactly_zero(device: Device) -> None:
+    velocity = np.ones((40, 61, 2), np.float32)
+    result = project(device, velocity, np.zeros((40, 61), bool), 2)
+    assert not result[:, 0, 0].any()
+    assert not result[0, :, 1].any()
+
+
+def test_a_source_makes_its_divergence_less_the_mean(device: Device) -> None:
+    size, solid = (90, 61), walled((90, 61))
+    x, y = np.meshgrid(np.arange(90), np.arange(61))
+    source = (np.exp(-((x - 45.0) ** 2 + (y - 40.0) ** 2) / 50) * 0.7).astype(np.float32)
+    wanted = np.where(solid, 0.0, source - source[~solid].mean()) / max(size)
+    result = project(device, np.zeros((61, 90, 2), np.float32), solid, 10, source)
+    assert np.linalg.norm(divergence(result) - wanted) <= 1e-4 * np.linalg.norm(wanted)
+    exact = exact_projection(np.zeros((61, 90, 2)), solid, wanted)
+    assert np.linalg.norm(result - exact) <= 1e-3 * np.linalg.norm(exact)
+
+
+def test_the_pressure_is_what_was_subtracted(device: Device) -> None:
+    size = (61, 40)
+    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    velocity = np.random.default_rng(4).standard_normal((40, 61, 2)).astype(np.float32)
+    field.read.set(velocity)
+    pressure.project(field, 4)
+    gradient_x = np.diff(pressure.pressure.astype(float), axis=1) * max(size)
+    np.testing.assert_allclose(field.read.get()[:, 1:, 0], velocity[:, 1:, 0] - gradient_x, atol=1e-5)
+
+
+def test_a_warm_start_is_never_worse(device: Device) -> None:
+    size = (128, 96)
+    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    norms = {}
+    for name, change in (("the same", 1.0), ("the opposite", -1.0)):
+        field.read.set(brush(size, 8.0))
+        pressure.project(field, 3)
+        field.read.set(change * brush(size, 8.0))
+        before = pressure.divergence_norm(field.read)
+        pressure.project(field, 1, warm=True)
+        norms[name] = pressure.divergence_norm(field.read) / before
+    field.read.set(brush(size, 8.0))
+    pressure.project(field, 1)
+    cold = pressure.divergence_norm(field.read) / before
+    assert norms["the same"] < 0.01 * cold
+    assert norms["the opposite"] < 1.1 * cold
+
+
+def test_the_norm_is_the_root_mean_square(device: Device) -> None:
+    size = (61, 40)
+    pressure, field = Pressure(device, size), device.field(size, 2)
+    velocity = closed(brush(size, 5.0), np.zeros((40, 61), bool))
+    field.set(velocity)
+    expected = np.sqrt((divergence(velocity) ** 2).mean()) * max(size)
+    assert pressure.divergence_norm(field) == pytest.approx(expected, rel=1e-5)
