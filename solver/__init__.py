@@ -7,15 +7,19 @@
 ...     warp.advance(fluid.faces(), 1 / 60)
 """
 
-from solver.brush import Brush, Tip
-from solver.context import ContextError, Device
-from solver.density import Density
-from solver.fluid import Fluid
-from solver.grid import Grid
-from solver.masks import Masks
-from solver.paper import PaperFluid, PaperWarpMap
-from solver.params import FluidParams, Walls
-from solver.warp import WarpMap
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from solver.brush import Brush, Tip
+    from solver.context import ContextError, Device
+    from solver.density import Density
+    from solver.fluid import Fluid
+    from solver.grid import Grid
+    from solver.masks import Masks
+    from solver.paper import PaperFluid, PaperWarpMap
+    from solver.params import FluidParams, Walls
+    from solver.warp import WarpMap
 
 __all__ = [
     "Brush",
@@ -32,3 +36,23 @@ __all__ = [
     "Walls",
     "WarpMap",
 ]
+
+# Loaded when first asked for: a recipe needs `solver.grid` and must not bring all of GL along.
+_MODULES = {
+    "brush": ("Brush", "Tip"),
+    "context": ("ContextError", "Device"),
+    "density": ("Density",),
+    "fluid": ("Fluid",),
+    "grid": ("Grid",),
+    "masks": ("Masks",),
+    "paper": ("PaperFluid", "PaperWarpMap"),
+    "params": ("FluidParams", "Walls"),
+    "warp": ("WarpMap",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _MODULES.items():
+        if name in names:
+            return getattr(import_module(f"solver.{module}"), name)
+    raise AttributeError(f"module 'solver' has no attribute {name!r}")
