@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from app.errors import Cancelled, UserError
 from app.files import cannot_write, replacing, replacing_many, temporary_beside
 from app.pictures import Picture, picture_format, to_bits, write_picture
 from app.progress import never
+
+T = TypeVar("T")
 
 FrameWriter = Callable[[np.ndarray], None]
 """Takes a frame (h, w, c): uint8 or uint16 sRGB, or float32 linear light, all of one kind in one animation."""
@@ -150,7 +152,12 @@ def animation_writer(
     """
     check_animation(path, fps)
     if is_sequence(path):
-        with _sequence_writer(Path(path), first, like, cancel) as write:
+        template = like or Picture(np.empty((0, 0, 1), np.uint8))
+
+        def write_one(file: Path, frame: np.ndarray) -> None:
+            write_picture(file, template.with_pixels(frame))
+
+        with sequence_writer(path, write_one, first, cancel) as write:
             yield write
         return
     container = ANIMATIONS[Path(path).suffix.lower()]
@@ -281,16 +288,25 @@ def _gif_writer(
 
 
 @contextmanager
-def _sequence_writer(path: Path, first: int, like: Picture | None, cancel: Callable[[], bool]) -> Iterator[FrameWriter]:
-    number = first
-    with replacing_many(path.parent, path.name) as folder:
+def sequence_writer(
+    path: str | os.PathLike[str],
+    write_one: Callable[[Path, T], None],
+    first: int = 0,
+    cancel: Callable[[], bool] = never,
+) -> Iterator[Callable[[T], None]]:
+    """Yield a function that writes one numbered file by `write_one`; all appear when the block ends well, or none.
 
-        def write(frame: np.ndarray) -> None:
+    path: such as `name.%04d.png`; first: the first number. Raises `UserError`.
+    """
+    pattern = Path(path)
+    number = first
+    with replacing_many(pattern.parent, pattern.name) as folder:
+
+        def write(item: T) -> None:
             nonlocal number
             if cancel():
                 raise Cancelled
-            picture = like.with_pixels(frame) if like is not None else Picture(frame)
-            write_picture(folder / (path.name % number), picture)
+            write_one(folder / (pattern.name % number), item)
             number += 1
 
         yield write

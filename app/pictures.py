@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import re
+import struct
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -184,47 +187,61 @@ def read_picture(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> 
     `max_pixels`.
     """
     file = Path(path)
-    try:
-        if file.is_dir():
-            raise UserError(f"Cannot read {path}: it is a folder; give the name of a picture.")
-        if file.stat().st_size == 0:
-            raise UserError(f"Cannot read {path}: the file is empty; save or download it again.")
-        with file.open("rb") as stream:
-            head = stream.read(16)
-    except FileNotFoundError:
-        raise UserError(f"Cannot read {path}: there is no such file; check the name.") from None
-    except OSError as error:
-        raise UserError(f"Cannot read {path}: {error.strerror}.") from error
+    head = _head(file)
     name = next((name for name, start in SIGNATURES.items() if re.match(start, head, re.DOTALL)), None)
     if name is None:
-        raise UserError(f"Cannot read {path}: it is no picture of a known kind ({', '.join(SIGNATURES)}).")
-
-    def check_size(width: int, height: int) -> None:
-        if width * height > max_pixels:
-            raise UserError(
-                f"Cannot read {path}: {width} x {height} pixels are more than the limit of {max_pixels}; "
-                f"if you trust the file, raise it with --max-pixels {width * height}."
-            )
-
+        raise UserError(f"Cannot read {file}: it is no picture of a known kind ({', '.join(SIGNATURES)}).")
     reader = {"TIFF": _read_tiff, "OpenEXR": _read_exr}.get(name, _read_pillow)
+    with _decoding(file, name):
+        return reader(file, name, max_pixels)
+
+
+def _head(file: Path) -> bytes:
+    """The first bytes of a file that is there and not empty."""
     try:
-        return reader(file, name, check_size)
-    except (UserError, KeyboardInterrupt):
+        if file.is_dir():
+            raise UserError(f"Cannot read {file}: it is a folder; give the name of a picture.")
+        if file.stat().st_size == 0:
+            raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
+        with file.open("rb") as stream:
+            return stream.read(16)
+    except FileNotFoundError:
+        raise UserError(f"Cannot read {file}: there is no such file; check the name.") from None
+    except OSError as error:
+        raise UserError(f"Cannot read {file}: {error.strerror}.") from error
+
+
+@contextmanager
+def _decoding(file: Path, name: str) -> Iterator[None]:
+    """Turn whatever a decoder raises into `UserError`, and keep it from warning."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except UserError:
         raise
     except MemoryError:
-        raise UserError(f"Cannot read {path}: it does not fit into the memory.") from None
+        raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
     except Exception as error:  # decoders of damaged files raise anything: IndexError, struct.error, zlib.error ...
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        message = f"Cannot read {path}: the {name} file is truncated or damaged ({reason}); get it again."
+        message = f"Cannot read {file}: the {name} file is truncated or damaged ({reason}); get it again."
         raise UserError(message) from error
 
 
-def _read_pillow(file: Path, name: str, check_size: Callable[[int, int], None]) -> Picture:
+def _check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
+    if width * height > max_pixels:
+        raise UserError(
+            f"Cannot read {file}: {width} x {height} pixels are more than the limit of {max_pixels}; "
+            f"if you trust the file, raise it with --max-pixels {width * height}."
+        )
+
+
+def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
     from PIL import Image
 
-    Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; check_size has ours
+    Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; ours is in _check_size
     with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
-        check_size(*image.size)
+        _check_size(file, *image.size, max_pixels)
         icc = image.info.get("icc_profile")
         if name == "PNG" and _png_bits(file) == 16:
             import imagecodecs
@@ -319,13 +336,14 @@ def cmyk_to_rgb(pixels: np.ndarray, icc: bytes | None) -> tuple[np.ndarray, byte
     return ((light[..., :3] * light[..., 3:] + white // 2) // white).astype(pixels.dtype), None
 
 
-def _read_tiff(file: Path, name: str, check_size: Callable[[int, int], None]) -> Picture:
+def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
     import tifffile
     from PIL import Image
 
+    tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
     with tifffile.TiffFile(file) as tiff:
         page = tiff.pages.first
-        check_size(page.imagewidth, page.imagelength)
+        _check_size(file, page.imagewidth, page.imagelength, max_pixels)
         tags = {tag.code: tag.value for tag in page.tags}
         samples = [axis for axis in page.axes if axis in "YXS"]
         if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
@@ -385,43 +403,41 @@ def _plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Hold back what OpenEXR and libpng print about a damaged file by themselves, where we raise an error of ours."""
-    sys.stdout.flush()
     sys.stderr.flush()
-    kept = [(number, os.dup(number)) for number in (1, 2)]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
     try:
-        for number, _ in kept:
-            os.dup2(nowhere, number)
-        yield
+        with redirect_stdout(io.StringIO()):
+            yield
     finally:
-        sys.stdout.flush()
-        for number, copy in kept:
-            os.dup2(copy, number)
-            os.close(copy)
+        os.dup2(kept, 2)
+        os.close(kept)
         os.close(nowhere)
 
 
-def read_exr(
-    file: Path, check_size: Callable[[int, int], None] = lambda width, height: None
-) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """The channels (h, w) float32 by name, filling the data window, and the header of an EXR's first part."""
+def read_exr(file: Path, max_pixels: int = MAX_PIXELS) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The channels (h, w) float32 by name, filling the data window, and the header of an EXR's first part.
+
+    Raises `UserError`.
+    """
     import OpenEXR
 
-    with _quiet():
+    _head(file)
+    with _decoding(file, "OpenEXR"), _quiet():
         header = OpenEXR.File(str(file), header_only=True).header()
         for window in ("dataWindow", "displayWindow"):
             (left, top), (right, bottom) = header[window]
-            check_size(int(right) - int(left) + 1, int(bottom) - int(top) + 1)
+            _check_size(file, int(right) - int(left) + 1, int(bottom) - int(top) + 1, max_pixels)
         exr = OpenEXR.File(str(file), separate_channels=True)
         # a file that ends early is announced on stdout, not raised: it just has no part
         channels = exr.channels() if exr.parts else {}
-    if not channels:
-        raise ValueError("pixel data is missing")
-    return {key: np.asarray(channel.pixels, np.float32) for key, channel in channels.items()}, header
+        if not channels:
+            raise ValueError("pixel data is missing")
+        return {key: np.asarray(channel.pixels, np.float32) for key, channel in channels.items()}, header
 
 
-def _read_exr(file: Path, name: str, check_size: Callable[[int, int], None]) -> Picture:
-    channels, header = read_exr(file, check_size)
+def _read_exr(file: Path, name: str, max_pixels: int) -> Picture:
+    channels, header = read_exr(file, max_pixels)
     for wanted in (("R", "G", "B", "A"), ("R", "G", "B"), ("Y", "A"), ("Y",)):
         if set(wanted) <= set(channels) and "RY" not in channels:
             break
@@ -575,28 +591,62 @@ def _write_tiff(temporary: Path, picture: Picture) -> None:
             extra.append((code, "s", 0, text.encode(), True))
     if picture.xmp:
         extra.append((700, "B", len(picture.xmp), picture.xmp, True))
+    directories = {code: exif.get_ifd(code) for code in (EXIF_IFD, GPS_IFD) if exif.get_ifd(code)}
     channels = picture.pixels.shape[2]
-    with tifffile.TiffWriter(temporary) as tiff:
-        tiff.write(
-            picture.pixels if channels > 1 else picture.pixels[..., 0],
-            photometric="rgb" if channels >= 3 else "minisblack",
-            planarconfig="contig" if channels > 1 else None,
-            extrasamples=["unassalpha"] if picture.has_alpha else None,
-            compression="zlib",
-            compressionargs={"level": PNG_LEVEL},
-            predictor=True,
-            iccprofile=picture.icc,
-            resolution=picture.dpi,
-            resolutionunit="inch" if picture.dpi else None,
-            software=False,
-            metadata=None,
-            extratags=extra,
-        )
+    tifffile.imwrite(
+        temporary,
+        picture.pixels if channels > 1 else picture.pixels[..., 0],
+        photometric="rgb" if channels >= 3 else "minisblack",
+        planarconfig="contig" if channels > 1 else None,
+        extrasamples=["unassalpha"] if picture.has_alpha else None,
+        compression="zlib",
+        compressionargs={"level": PNG_LEVEL},
+        predictor=True,
+        iccprofile=picture.icc,
+        resolution=picture.dpi,
+        resolutionunit="inch" if picture.dpi else None,
+        byteorder="<",
+        software=False,
+        metadata=None,
+        extratags=extra,
+    )
+    if directories:
+        _append_directories(temporary, directories)
+
+
+def _append_directories(temporary: Path, directories: Mapping[int, Mapping[int, Any]]) -> None:
+    """Put EXIF's own directories at the end of a TIFF, and a first directory that knows them (TIFF 6.0, section 2).
+
+    tifffile writes no directories but those of images.
+    """
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    with temporary.open("r+b") as stream:
+        mark, start = struct.unpack("<4sI", stream.read(8))
+        if mark != b"II*\0":  # a BigTIFF of 4 GB goes without
+            return
+        stream.seek(start)
+        (count,) = struct.unpack("<H", stream.read(2))
+        entries = [stream.read(12) for _ in range(count)]
+        for code, values in directories.items():
+            directory = ImageFileDirectory_v2(group=code)
+            for tag, value in values.items():
+                directory[tag] = value
+            end = stream.seek(0, os.SEEK_END)
+            stream.write(directory.tobytes(end))
+            entries.append(struct.pack("<HHII", code, 4, 1, end))
+        end = stream.seek(0, os.SEEK_END)
+        entries.sort(key=lambda entry: struct.unpack("<H", entry[:2]))
+        stream.write(struct.pack("<H", len(entries)) + b"".join(entries) + struct.pack("<I", 0))
+        stream.seek(4)
+        stream.write(struct.pack("<I", end))
 
 
 def _write_exr(temporary: Path, picture: Picture) -> None:
-    names = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}[picture.pixels.shape[2]]
     pixels = picture.pixels
+    if pixels.shape[2] == 2:  # luminance with alpha is allowed, and misread by ffmpeg
+        pixels = pixels[..., [0, 0, 0, 1]]
+    names = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
     if picture.has_alpha:  # OpenEXR's convention is premultiplied
         pixels = np.concatenate([pixels[..., :-1] * pixels[..., -1:], pixels[..., -1:]], axis=2)
     attributes: dict[str, Any] = dict(picture.texts)

@@ -1,0 +1,326 @@
+"""Warp maps out and in: ST maps, pixel offsets, Middlebury .flo and NumPy .npy."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from app.animation import sequence_writer
+from app.errors import UserError
+from app.files import replacing
+from app.pictures import MAX_PIXELS, read_exr, read_picture, write_exr
+from app.progress import never
+
+Kind = Literal["st", "offsets"]
+"""What an EXR or TIFF holds: absolute places in 0-1 from the bottom left, or pixels from here to there, y up."""
+
+Grid = Literal["centres", "corners", "pixels"]
+"""The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
+
+FLO_MAGIC = np.float32(202021.25)
+MAP_ENDINGS = (".exr", ".tif", ".tiff", ".flo", ".npy")
+
+CONVENTIONS = {
+    "st": "ST map: R = u, G = v of the place looked up, 0-1, origin bottom left, pixel centres at (x + .5) / width",
+    "offsets": "R = x, G = y offset in pixels to the place looked up, x to the right, y up",
+}
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """Where each pixel is looked up: at its own centre plus `values`.
+
+    values: (height + 2 overscan, width + 2 overscan, 2), x right and y down, in longer sides of width x height;
+    float32, or float64 when read from a file, so that conversions lose nothing.
+    overscan: pixels beyond each side of the picture.
+    forward: the other way, from places of the original to places of the result.
+    """
+
+    values: np.ndarray
+    overscan: int = 0
+    forward: bool = False
+
+    @property
+    def width(self) -> int:
+        return self.values.shape[1] - 2 * self.overscan
+
+    @property
+    def height(self) -> int:
+        return self.values.shape[0] - 2 * self.overscan
+
+    @property
+    def longest(self) -> int:
+        return max(self.width, self.height)
+
+    def fitted(self, width: int, height: int) -> Displacement:
+        """The map for a picture of width x height, its values in the longer sides of that.
+
+        Sizes may differ, proportions by no more than their rounding: raises `UserError` otherwise.
+        """
+        off = abs(height * self.width / width - self.height), abs(width * self.height / height - self.width)
+        if min(off) >= 1:
+            raise UserError(
+                f"The map is {self.width} x {self.height} and the picture {width} x {height}: "
+                "they must have the same proportions; crop the picture or make the map anew."
+            )
+        longest = max(width, height)
+        scale = self.longest / self.width * width / longest, self.longest / self.height * height / longest
+        if scale == (1, 1):
+            return self
+        values = (self.values * np.array(scale)).astype(self.values.dtype)
+        return Displacement(values, self.overscan, self.forward)
+
+
+def check_map(path: str | os.PathLike[str]) -> None:
+    """Raise `UserError` if `path` has no ending of a map."""
+    if Path(path).suffix.lower() not in MAP_ENDINGS:
+        raise UserError(f"{path}: a map's name must end in one of {' '.join(MAP_ENDINGS)}.")
+
+
+# Conversions --------------------------------------------------------------------------------------------------------
+
+
+def _centres(count: int, overscan: int) -> np.ndarray:
+    return np.arange(-overscan, count + overscan) + 0.5
+
+
+def to_st(displacement: Displacement) -> np.ndarray:
+    """Absolute places (h, w, 2) float32, 0-1 over the picture, y up, pixel centres at (x + .5) / width."""
+    map_, out = displacement, np.empty(displacement.values.shape, np.float32)
+    x, y = _centres(map_.width, map_.overscan), _centres(map_.height, map_.overscan)
+    for rows in _strips(out):
+        # float64 and rounded far below float32, so that a place of exactly 0 comes out of a round trip as 0
+        u = (x + map_.longest * map_.values[rows, :, 0].astype(np.float64)) / map_.width
+        v = 1 - (y[rows, None] + map_.longest * map_.values[rows, :, 1].astype(np.float64)) / map_.height
+        out[rows, :, 0], out[rows, :, 1] = np.round(u, 13), np.round(v, 13)
+    return out
+
+
+def from_st(st: np.ndarray, grid: Grid = "centres", overscan: int = 0) -> Displacement:
+    """The displacement (float64) of absolute places (h, w, 2), y up, on any of the three grids."""
+    width, height = st.shape[1] - 2 * overscan, st.shape[0] - 2 * overscan
+    values = np.empty(st.shape, np.float64)
+    # one step of the stored value in pixels, and the place of its zero
+    step_x, step_y = (max(1, width - 1), max(1, height - 1)) if grid == "corners" else (width, height)
+    zero = 0.0 if grid == "centres" else 0.5
+    x, y = _centres(width, overscan), _centres(height, overscan)
+    longest = max(width, height)
+    for rows in _strips(values):
+        values[rows, :, 0] = (st[rows, :, 0] * np.float64(step_x) + zero - x) / longest
+        values[rows, :, 1] = (height - zero - st[rows, :, 1] * np.float64(step_y) - y[rows, None]) / longest
+    return Displacement(values, overscan)
+
+
+def to_offsets(displacement: Displacement, *, up: bool) -> np.ndarray:
+    """Offsets in pixels of the map's own size, (h, w, 2) float32; y up or down."""
+    pixels = np.array([displacement.longest, -displacement.longest if up else displacement.longest], np.float64)
+    return (displacement.values * pixels).astype(np.float32)
+
+
+def from_offsets(offsets: np.ndarray, *, up: bool, overscan: int = 0) -> Displacement:
+    """The displacement (float64) of offsets in pixels, (h, w, 2); y up or down."""
+    longest = max(offsets.shape[0], offsets.shape[1]) - 2 * overscan
+    return Displacement(offsets / np.array([longest, -longest if up else longest], np.float64), overscan)
+
+
+def _strips(array: np.ndarray) -> Iterator[slice]:
+    rows = max(1, 500_000 // max(1, array[0].size))
+    for top in range(0, len(array), rows):
+        yield slice(top, top + rows)
+
+
+# Files --------------------------------------------------------------------------------------------------------------
+
+
+def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Kind = "st") -> None:
+    """Write a map, whole or not at all: .exr and .tif hold `kind` in 32 bits, with the convention in the metadata.
+
+    .flo holds offsets in pixels, y down; .npy the displacement itself, (h, w, 2) float32. Neither tells its overscan,
+    so they are cut to the picture. Raises `UserError`.
+    """
+    check_map(path)
+    suffix = Path(path).suffix.lower()
+    with replacing(path) as temporary:
+        if suffix in (".flo", ".npy"):
+            displacement = cropped(displacement)
+            with temporary.open("wb") as stream:
+                if suffix == ".npy":
+                    np.save(stream, displacement.values.astype(np.float32))
+                else:
+                    stream.write(FLO_MAGIC.tobytes())
+                    stream.write(np.array([displacement.width, displacement.height], np.int32).tobytes())
+                    stream.write(to_offsets(displacement, up=False).data)
+            return
+        values = to_st(displacement) if kind == "st" else to_offsets(displacement, up=True)
+        told = {
+            "map": kind,
+            "grid": "centres",
+            "direction": "forward" if displacement.forward else "inverse",
+            "overscan": str(displacement.overscan),
+        }
+        if suffix == ".exr":
+            attributes = {f"fluidwarp/{key}": value for key, value in told.items()}
+            attributes["comments"] = CONVENTIONS[kind]
+            channels = {"R": values[..., 0], "G": values[..., 1], "B": _third(values)}
+            write_exr(temporary, channels, attributes, displacement.overscan)
+        else:
+            _write_tiff(temporary, values, {"fluidwarp": told, "convention": CONVENTIONS[kind]})
+
+
+def cropped(displacement: Displacement) -> Displacement:
+    """The map without its overscan."""
+    edge = displacement.overscan
+    values = displacement.values[edge:-edge, edge:-edge] if edge else displacement.values
+    return Displacement(values, 0, displacement.forward)
+
+
+def _third(values: np.ndarray) -> np.ndarray:
+    """Ones: Blender's Map UV takes the third channel for the alpha of the result, others ignore it."""
+    return np.ones(values.shape[:2], np.float32)
+
+
+def _write_tiff(temporary: Path, values: np.ndarray, told: dict[str, Any]) -> None:
+    import tifffile
+
+    tifffile.imwrite(
+        temporary,
+        np.dstack([values, _third(values)]),
+        photometric="rgb",
+        compression="zlib",
+        predictor=True,
+        description=json.dumps(told),
+        metadata=None,
+        software=False,
+    )
+
+
+def map_writer(
+    path: str | os.PathLike[str], kind: Kind = "st", *, first: int = 0, cancel: Callable[[], bool] = never
+) -> AbstractContextManager[Callable[[Displacement], None]]:
+    """A context that yields a function appending a map to the sequence `name.%04d.exr`; see `animation_writer`."""
+    check_map(path)
+    return sequence_writer(path, lambda file, displacement: write_map(file, displacement, kind), first, cancel)
+
+
+def read_map(
+    path: str | os.PathLike[str],
+    *,
+    kind: Kind | None = None,
+    grid: Grid | None = None,
+    overscan: int | None = None,
+    max_pixels: int = MAX_PIXELS,
+) -> Displacement:
+    """Read a map, also one made elsewhere.
+
+    kind, grid, overscan: what an EXR or TIFF holds; None believes its metadata, and takes it for an ST map on pixel
+    centres when there is none. Raises `UserError` for what is no map, damaged, or holds NaN.
+    """
+    check_map(path)
+    suffix = Path(path).suffix.lower()
+    if suffix in (".flo", ".npy"):
+        offsets = _read_flo(Path(path)) if suffix == ".flo" else _read_npy(Path(path))
+        _check_finite(path, offsets)
+        if suffix == ".npy":
+            return Displacement(offsets)
+        return from_offsets(offsets, up=False)
+    values, told, edge = _read_exr(Path(path), max_pixels) if suffix == ".exr" else _read_tiff(Path(path), max_pixels)
+    _check_finite(path, values)
+    edge = edge if overscan is None else overscan
+    if edge < 0 or 2 * edge >= min(values.shape[:2]):
+        raise UserError(f"Cannot read {path}: an overscan of {edge} leaves nothing of {values.shape[1::-1]} pixels.")
+    if (kind or told.get("map", "st")) == "offsets":
+        read = from_offsets(values, up=True, overscan=edge)
+    else:
+        named = grid or told.get("grid", "centres")
+        read = from_st(values, named if named in ("corners", "pixels") else "centres", edge)
+    return Displacement(read.values, edge, forward=told.get("direction") == "forward")
+
+
+def _check_finite(path: str | os.PathLike[str], values: np.ndarray) -> None:
+    bad = ~np.isfinite(values).all(axis=2)
+    if bad.any():
+        row, column = np.argwhere(bad)[0]
+        raise UserError(
+            f"Cannot use {path}: {int(bad.sum())} of its pixels are NaN or infinite, "
+            f"the first at x {column}, y {row}; fill them where the map was made."
+        )
+
+
+def _read_flo(file: Path) -> np.ndarray:
+    data = _bytes(file)
+    size = np.frombuffer(data[4:12], "<i4") if len(data) >= 12 else np.zeros(2, np.int32)
+    if len(data) < 12 or np.frombuffer(data[:4], "<f4")[0] != FLO_MAGIC or size.min() < 1:
+        raise UserError(f"Cannot read {file}: it is no Middlebury .flo file.")
+    width, height = int(size[0]), int(size[1])
+    if len(data) != 12 + width * height * 8:
+        raise UserError(f"Cannot read {file}: {width} x {height} offsets need another length of file; get it again.")
+    return np.frombuffer(data, "<f4", offset=12).reshape(height, width, 2)
+
+
+def _read_npy(file: Path) -> np.ndarray:
+    import io
+
+    try:
+        values = np.load(io.BytesIO(_bytes(file)), allow_pickle=False)
+    except (ValueError, EOFError, OSError) as error:
+        raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({error}).") from error
+    if not isinstance(values, np.ndarray) or values.ndim != 3 or values.shape[2] != 2 or values.dtype.kind != "f":
+        shape = getattr(values, "shape", ())
+        raise UserError(f"Cannot read {file}: a map is a float array (height, width, 2), this one is {shape}.")
+    if 0 in values.shape:
+        raise UserError(f"Cannot read {file}: the array {values.shape} is empty.")
+    return values
+
+
+def _bytes(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except FileNotFoundError:
+        raise UserError(f"Cannot read {file}: there is no such file; check the name.") from None
+    except OSError as error:
+        raise UserError(f"Cannot read {file}: {error.strerror}.") from error
+
+
+def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
+    channels, header = read_exr(file, max_pixels)
+    for x, y in (("R", "G"), ("U", "V"), ("u", "v"), ("X", "Y")):
+        found = {key.rpartition(".")[2]: plane for key, plane in reversed(channels.items())}
+        if x in found and y in found:
+            values = np.stack([found[x], found[y]], axis=-1)
+            break
+    else:
+        raise UserError(f"Cannot read {file}: its channels {' '.join(channels)} are no map; it needs R and G.")
+    told = {key.removeprefix("fluidwarp/"): value for key, value in header.items() if key.startswith("fluidwarp/")}
+    (left, top), (right, bottom) = header["dataWindow"]
+    (first_x, first_y), (last_x, last_y) = header["displayWindow"]
+    edges = [int(edge) for edge in (first_x - left, first_y - top, right - last_x, bottom - last_y)]
+    edge = min(edges)
+    if edge < 0:
+        raise UserError(f"Cannot read {file}: its data window does not cover the picture; write all of it.")
+    # as much overscan as all four sides have
+    rows = slice(edges[1] - edge, values.shape[0] - (edges[3] - edge))
+    return values[rows, edges[0] - edge : values.shape[1] - (edges[2] - edge)], told, edge
+
+
+def _read_tiff(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
+    import tifffile
+
+    pixels = read_picture(file, max_pixels).pixels
+    if pixels.shape[2] < 2 or pixels.dtype == np.uint8:
+        raise UserError(f"Cannot read {file}: a map needs two channels of 16 or 32 bits; write it as 32-bit float.")
+    values = pixels[..., :2] if pixels.dtype == np.float32 else pixels[..., :2] / np.float64(65535)
+    told: dict[str, str] = {}
+    with tifffile.TiffFile(file) as tiff:
+        try:
+            told = json.loads(tiff.pages.first.description)["fluidwarp"]
+            edge = int(told["overscan"])
+        except (ValueError, TypeError, KeyError):  # made elsewhere
+            edge = 0
+    return values, told, edge

@@ -1,0 +1,501 @@
+"""Pictures: every format in every depth and mode, read back by another program; and everything that can go wrong."""
+
+from __future__ import annotations
+
+import os
+import struct
+import subprocess
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image, ImageCms, PngImagePlugin
+
+from app import files
+from app.errors import UserError
+from app.ffmpeg import executable
+from app.pictures import Picture, linear_to_srgb, read_exr, read_picture, srgb_to_linear, to_bits, write_picture
+
+MODES = {1: "grey", 2: "grey+alpha", 3: "RGB", 4: "RGBA"}
+SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+XMP = b'<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf tiff:Orientation="6"/></x:xmpmeta>'
+
+
+def noise(channels: int, dtype: type, size: tuple[int, int] = (12, 10)) -> np.ndarray:
+    values = np.random.default_rng(channels).random((*size, channels), dtype=np.float32)
+    return values if dtype is np.float32 else (values * np.iinfo(dtype).max).astype(dtype)
+
+
+def smooth(channels: int) -> np.ndarray:
+    """8-bit pixels that lossy formats keep."""
+    y, x = np.mgrid[0:48, 0:64]
+    planes = np.stack([x * 3 + 20, y * 4 + 30, 240 - x * 2 - y, 255 - y * 3], axis=-1).astype(np.uint8)
+    return planes[..., [[0], [0, 3], [0, 1, 2], [0, 1, 2, 3]][channels - 1]]
+
+
+def with_opencv(path: Path) -> np.ndarray:
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert image is not None
+    return image[..., None] if image.ndim == 2 else image[..., [2, 1, 0, 3][: image.shape[2]]]
+
+
+def with_ffmpeg(path: Path, shape: tuple[int, ...]) -> np.ndarray:
+    """The float planes ffmpeg makes of an EXR, which it orders G, B, R, A."""
+    channels = shape[2]
+    kind = {1: "grayf32le", 3: "gbrpf32le", 4: "gbrapf32le"}[channels]
+    command = [executable(), "-v", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", kind, "-"]
+    raw = subprocess.run(command, capture_output=True, check=True).stdout
+    planes = np.frombuffer(raw, np.float32).reshape(channels, *shape[:2])
+    return np.moveaxis(planes if channels == 1 else planes[[2, 0, 1, 3][:channels]], 0, -1)
+
+
+# Formats, depths and modes ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("channels", MODES, ids=MODES.get)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_png_is_exact(tmp_path: Path, dtype: type, channels: int):
+    pixels, path = noise(channels, dtype), tmp_path / "a.png"
+    write_picture(path, Picture(pixels))
+    read = read_picture(path).pixels
+    assert read.dtype == dtype
+    np.testing.assert_array_equal(read, pixels)
+    # OpenCV makes RGBA of grey with alpha
+    seen = with_opencv(path)
+    np.testing.assert_array_equal(seen, pixels[..., [0, 0, 0, 1]] if channels == 2 else pixels)
+
+
+@pytest.mark.parametrize("channels", MODES, ids=MODES.get)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_tiff_is_exact(tmp_path: Path, dtype: type, channels: int):
+    pixels, path = noise(channels, dtype), tmp_path / "a.tif"
+    write_picture(path, Picture(pixels))
+    read = read_picture(path).pixels
+    assert read.dtype == dtype
+    np.testing.assert_array_equal(read, pixels)
+    if channels in (1, 3):
+        np.testing.assert_array_equal(with_opencv(path), pixels)
+    else:  # OpenCV has no grey with alpha, and premultiplies RGBA
+        np.testing.assert_array_equal(tifffile.imread(path), pixels)
+        with tifffile.TiffFile(path) as tiff:
+            assert tiff.pages.first.extrasamples == (tifffile.EXTRASAMPLE.UNASSALPHA,)
+
+
+@pytest.mark.parametrize("channels", MODES, ids=MODES.get)
+def test_exr_is_exact(tmp_path: Path, channels: int):
+    pixels, path = noise(channels, np.float32) * 4 - 1, tmp_path / "a.exr"
+    if channels in (2, 4):
+        pixels[..., -1] = noise(1, np.float32)[..., 0]
+    write_picture(path, Picture(pixels))
+    pixels = pixels[..., [0, 0, 0, 1]] if channels == 2 else pixels
+    stored = pixels
+    if channels in (2, 4):
+        stored = np.concatenate([pixels[..., :3] * pixels[..., 3:], pixels[..., 3:]], axis=2)
+    np.testing.assert_array_equal(with_ffmpeg(path, pixels.shape), stored)
+    read = read_picture(path)
+    assert read.pixels.dtype == np.float32
+    assert read.linear
+    np.testing.assert_allclose(read.pixels, pixels, rtol=3e-7)
+
+
+@pytest.mark.parametrize("channels", MODES, ids=MODES.get)
+@pytest.mark.parametrize("ending", [".jpg", ".webp", ".avif"])
+def test_lossy_formats_are_close(tmp_path: Path, ending: str, channels: int):
+    pixels, path = smooth(channels), tmp_path / f"a{ending}"
+    write_picture(path, Picture(pixels), background=(255, 255, 255))
+    expected = pixels.astype(float)
+    if ending == ".jpg" and channels in (2, 4):  # laid over the background
+        opacity = expected[..., -1:] / 255
+        expected = expected[..., :-1] * opacity + 255 * (1 - opacity)
+    elif ending != ".jpg" and channels < 3:
+        expected = expected[..., [0, 0, 0, 1][: channels + 2]]
+    seen = with_opencv(path).astype(float)
+    assert seen.shape == expected.shape
+    assert np.abs(seen - expected).mean() < 2
+    assert np.abs(read_picture(path).pixels - seen).mean() < 1
+
+
+def test_webp_at_full_quality_is_lossless(tmp_path: Path):
+    pixels = noise(4, np.uint8)
+    write_picture(tmp_path / "a.webp", Picture(pixels), quality=100)
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.webp")), pixels)
+
+
+@pytest.mark.parametrize(
+    ("ending", "depths"),
+    [
+        (".png", {8: np.uint8, 16: np.uint16, 32: np.uint16}),
+        (".jpg", {8: np.uint8, 16: np.uint8, 32: np.uint8}),
+        (".tif", {8: np.uint8, 16: np.uint16, 32: np.float32}),
+        (".exr", {8: np.float32, 16: np.float32, 32: np.float32}),
+    ],
+)
+def test_a_format_takes_the_nearest_depth_it_has(tmp_path: Path, ending: str, depths: dict[int, type]):
+    for bits, dtype in depths.items():
+        source = to_bits(smooth(3), bits, dither=False)
+        write_picture(tmp_path / f"a{ending}", Picture(source))
+        read = read_picture(tmp_path / f"a{ending}").pixels
+        assert read.dtype == dtype
+        assert np.abs(to_bits(read, 8).astype(int) - smooth(3)).mean() < 2
+    write_picture(tmp_path / "b.tif", Picture(smooth(3)), bits=32)
+    assert read_picture(tmp_path / "b.tif").bits == 32
+    with pytest.raises(UserError, match=r"b\.jpg: JPEG holds 8 bits a channel, not 16"):
+        write_picture(tmp_path / "b.jpg", Picture(smooth(3)), bits=16)
+
+
+def test_changing_the_depth_keeps_exact_values_and_the_mean():
+    every = np.arange(256, dtype=np.uint8).reshape(16, 16, 1)
+    for bits in (16, 32):
+        np.testing.assert_array_equal(to_bits(to_bits(every, bits), 8), every)
+    every16 = np.arange(65536, dtype=np.uint16).reshape(256, 256, 1)
+    np.testing.assert_array_equal(to_bits(to_bits(every16, 32), 16), every16)
+    np.testing.assert_allclose(linear_to_srgb(srgb_to_linear(every / 255)), every / 255, atol=1e-12)
+    # a flat grey between two steps comes out as their mixture, not as one of them
+    between = np.full((200, 200, 3), int(100.25 * 257), np.uint16)
+    assert to_bits(between, 8).mean() == pytest.approx(100.25, abs=0.01)
+    alpha = np.full((4, 4, 4), 0.5, np.float32)
+    assert to_bits(alpha, 16)[0, 0].tolist() == [48192, 48192, 48192, 32768]
+    wild = np.array([[[np.nan, np.inf, -5]]], np.float32)
+    assert to_bits(wild, 8).tolist() == [[[0, 255, 0]]]
+
+
+# What other programs write ------------------------------------------------------------------------------------------
+
+
+def test_palettes_and_keyed_transparency(tmp_path: Path):
+    rgb = smooth(3)
+    Image.fromarray(rgb).quantize(16).save(tmp_path / "p.png")
+    Image.fromarray(rgb).quantize(16).save(tmp_path / "p.gif")
+    Image.fromarray(rgb).quantize(16).save(tmp_path / "t.png", transparency=3)
+    Image.fromarray(rgb[..., 0]).save(tmp_path / "key.png", transparency=int(rgb[5, 5, 0]))
+    Image.fromarray(rgb[..., 0] > 99).save(tmp_path / "bits.png")
+    for name in ("p.png", "p.gif"):
+        np.testing.assert_array_equal(
+            read_picture(tmp_path / name).pixels, np.asarray(Image.open(tmp_path / name).convert("RGB"))
+        )
+    keyed = read_picture(tmp_path / "t.png").pixels
+    assert keyed.shape[2] == 4
+    assert set(np.unique(keyed[..., 3])) == {0, 255}
+    grey = read_picture(tmp_path / "key.png").pixels
+    assert grey.shape[2] == 2
+    assert grey[5, 5, 1] == 0
+    np.testing.assert_array_equal(read_picture(tmp_path / "bits.png").pixels[..., 0], (rgb[..., 0] > 99) * 255)
+
+
+def cmyk_profile() -> bytes:
+    """A small profile of CMYK to Lab, made of a table with two points a side, in which magenta ink looks green."""
+
+    def fixed(*values: float) -> bytes:
+        return b"".join(struct.pack(">i", round(value * 65536)) for value in values)
+
+    table = bytearray()
+    for c, m, y, k in np.ndindex(2, 2, 2, 2):
+        lightness = (1 - k) * (1 - 0.2 * (c + m + y))
+        table += bytes([round(255 * lightness), 128 - 60 * m, 128 + 40 * y - 40 * c])
+    identity = bytes(range(256))
+    lut = b"mft1" + bytes(4) + bytes([4, 3, 2, 0]) + fixed(1, 0, 0, 0, 1, 0, 0, 0, 1)
+    lut += identity * 4 + bytes(table) + identity * 3
+    lut += bytes(-len(lut) % 4)
+    white = b"XYZ " + bytes(4) + fixed(0.9642, 1, 0.8249)
+    text = b"text" + bytes(4) + b"test\0" + bytes(3)
+    entries, offset, body = b"", 128 + 4 + 12 * 4, b""
+    for name, data in ((b"A2B0", lut), (b"wtpt", white), (b"cprt", text), (b"desc", text)):
+        entries += name + struct.pack(">II", offset + len(body), len(data))
+        body += data
+    head = struct.pack(">I4sI4s4s4s", 0, b"lcms", 0x02400000, b"prtr", b"CMYK", b"Lab ")
+    head += bytes(12) + b"acsp" + bytes(28) + fixed(0.9642, 1, 0.8249) + bytes(48)
+    profile = head + struct.pack(">I", 4) + entries + body
+    return struct.pack(">I", len(profile)) + profile[4:]
+
+
+@pytest.mark.parametrize("ending", ["jpg", "tif"])
+def test_cmyk_becomes_rgb_through_its_profile(tmp_path: Path, ending: str):
+    ink = np.zeros((32, 32, 4), np.uint8)
+    ink[:, 16:, 1] = 255
+    image = Image.frombytes("CMYK", (32, 32), ink.tobytes())
+    image.save(tmp_path / f"plain.{ending}")
+    image.save(tmp_path / f"managed.{ending}", icc_profile=cmyk_profile())
+    plain, managed = read_picture(tmp_path / f"plain.{ending}"), read_picture(tmp_path / f"managed.{ending}")
+    assert np.abs(plain.pixels[8, [4, 28]].astype(int) - [[255, 255, 255], [255, 0, 255]]).max() < 4
+    assert plain.icc is None
+    paper, magenta = managed.pixels[8, 4].astype(int), managed.pixels[8, 28].astype(int)
+    assert paper.min() > 250
+    assert magenta[1] > magenta[0] + 50
+    assert managed.icc is not None
+    assert managed.icc[16:20] == b"RGB "
+
+
+@pytest.mark.parametrize("compression", ["none", "lzw", "zlib", "packbits", "zstd", "lzma"])
+def test_compressed_tiffs_of_16_bits(tmp_path: Path, compression: str):
+    pixels = noise(3, np.uint16, (33, 40))
+    predictor = compression in ("lzw", "zlib")
+    tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="rgb", compression=compression, predictor=predictor)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.tif").pixels, pixels)
+
+
+def test_odd_tiffs(tmp_path: Path):
+    path = tmp_path / "a.tif"
+    rgb = noise(3, np.uint8)
+    tifffile.imwrite(path, np.moveaxis(rgb, -1, 0), photometric="rgb", planarconfig="separate", byteorder=">")
+    np.testing.assert_array_equal(read_picture(path).pixels, rgb)
+    tifffile.imwrite(path, rgb[..., 0], photometric="miniswhite")
+    np.testing.assert_array_equal(read_picture(path).pixels, 255 - rgb[..., :1])
+    tifffile.imwrite(path, rgb[..., 0], photometric="palette", colormap=np.arange(768, dtype=np.uint16).reshape(3, 256))
+    np.testing.assert_array_equal(read_picture(path).pixels, rgb[..., :1] + np.array([0, 256, 512], np.uint16))
+    tifffile.imwrite(path, noise(3, np.float32).astype(np.float16), photometric="rgb")
+    assert read_picture(path).pixels.dtype == np.float32
+    tifffile.imwrite(path, np.stack([rgb, rgb // 2]), photometric="rgb")  # two pages
+    np.testing.assert_array_equal(read_picture(path).pixels, rgb)
+    premultiplied = np.full((4, 4, 4), 64, np.uint8)
+    premultiplied[..., 3] = 128
+    tifffile.imwrite(path, premultiplied, photometric="rgb", extrasamples=["assocalpha"])
+    assert read_picture(path).pixels[0, 0].tolist() == [128, 128, 128, 128]
+    for unsupported in (np.zeros((4, 4), np.complex64), np.zeros((4, 4), np.int16)):
+        tifffile.imwrite(path, unsupported)
+        with pytest.raises(UserError, match="convert it to 16 bits"):
+            read_picture(path)
+
+
+def test_exr_with_other_windows_and_channels(tmp_path: Path):
+    import OpenEXR
+
+    def save(channels: dict, **header: object) -> Path:
+        base = {"compression": OpenEXR.PIZ_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(base | header, channels).write(str(tmp_path / "a.exr"))
+        return tmp_path / "a.exr"
+
+    def window(*corners: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
+
+    plane = noise(1, np.float32, (5, 4))[..., 0]
+    half = save({name: plane.astype(np.float16) for name in "RGB"})
+    assert read_picture(half).pixels.dtype == np.float32
+    np.testing.assert_array_equal(read_picture(half).pixels[..., 1], plane.astype(np.float16))
+    # data that covers a part of the picture and sticks out of it
+    shifted = save({"Y": plane}, dataWindow=window(-1, 2, 2, 6), displayWindow=window(0, 0, 9, 5))
+    expected = np.zeros((6, 10), np.float32)
+    expected[2:6, :3] = plane[:4, 1:]
+    np.testing.assert_array_equal(read_picture(shifted).pixels[..., 0], expected)
+    elsewhere = save({"Y": plane}, dataWindow=window(50, 50, 53, 54), displayWindow=window(0, 0, 9, 5))
+    assert not read_picture(elsewhere).pixels.any()
+    with pytest.raises(UserError, match="of its channels depth none are R G B or Y"):
+        read_picture(save({"depth": plane}))
+
+
+# What belongs to a picture ------------------------------------------------------------------------------------------
+
+
+def exif_bytes(orientation: int = 1) -> bytes:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    exif[0x010F] = "A camera"
+    exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
+    exif.get_ifd(0x8769)[0xA002] = 9999
+    return exif.tobytes()
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("ending", ["png", "jpg", "webp", "tif", "png16", "tif16"])
+def test_pictures_are_read_upright(tmp_path: Path, ending: str, orientation: int):
+    pixels = smooth(3)
+    path = tmp_path / f"a.{ending.removesuffix('16')}"
+    if ending == "tif16":
+        tag = (274, "H", 1, orientation, True)
+        tifffile.imwrite(path, to_bits(pixels, 16), photometric="rgb", extratags=[tag])
+    elif ending == "png16":
+        write_picture(path, Picture(to_bits(pixels, 16), exif=exif_bytes(orientation)))
+    elif ending == "tif":
+        Image.fromarray(pixels).save(path, tiffinfo={274: orientation})
+    else:
+        Image.fromarray(pixels).save(path, exif=exif_bytes(orientation))
+    # what turns the picture upright, as Pillow has it
+    turns = [None, None, 0, 3, 1, 5, 4, 6, 2][orientation]
+    expected = Image.fromarray(pixels)
+    expected = np.asarray(expected if turns is None else expected.transpose(Image.Transpose(turns)))
+    read = read_picture(path)
+    assert np.abs(to_bits(read.pixels, 8).astype(int) - expected).mean() < 3
+    write_picture(tmp_path / "b.png", read)
+    assert Image.open(tmp_path / "b.png").getexif().get(0x0112, 1) == 1
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".webp", ".avif", ".tif"])
+def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
+    given = Picture(smooth(3), icc=SRGB, exif=exif_bytes(), xmp=XMP, dpi=(300, 300), texts={"Comment": "hübsch"})
+    path = tmp_path / f"a{ending}"
+    write_picture(path, given)
+    with Image.open(path) as image:  # another program's view
+        image.load()
+        assert image.info["icc_profile"] == SRGB
+        exif = image.getexif()
+        assert exif[0x010F] == "A camera"
+        assert exif.get_ifd(0x8769)[0x9003] == "2020:01:02 03:04:05"
+        assert exif.get_ifd(0x8769)[0xA002] == 64
+        assert b"adobe:ns:meta" in (image.info["xmp"] if "xmp" in image.info else bytes(exif[700]))
+    read = read_picture(path)
+    assert read.icc == SRGB
+    assert read.exif is not None
+    assert read.xmp is not None
+    assert b'Orientation="1"' in read.xmp
+    if ending in (".png", ".jpg", ".tif"):
+        assert read.dpi == pytest.approx((300, 300), abs=0.01)
+    if ending in (".png", ".jpg"):
+        assert read.texts["Comment"] == "hübsch"
+    write_picture(path, given, strip=True)
+    stripped = read_picture(path)
+    assert stripped.icc == SRGB
+    assert not stripped.exif
+    assert not stripped.xmp
+    assert not stripped.texts
+
+
+def test_16_bit_png_and_exr_keep_their_metadata(tmp_path: Path):
+    given = Picture(noise(4, np.uint16), icc=SRGB, exif=exif_bytes(), xmp=XMP, texts={"Title": "Ö"})
+    write_picture(tmp_path / "a.png", given)
+    np.testing.assert_array_equal(with_opencv(tmp_path / "a.png"), given.pixels)
+    read = read_picture(tmp_path / "a.png")
+    assert (read.icc, dict(read.texts)) == (SRGB, {"Title": "Ö"})
+    primaries = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)
+    given = Picture(noise(3, np.float32), chromaticities=primaries, texts={"owner": "me"})
+    write_picture(tmp_path / "a.exr", given)
+    _, header = read_exr(tmp_path / "a.exr")
+    assert header["owner"] == "me"
+    assert read_picture(tmp_path / "a.exr").chromaticities == pytest.approx(primaries)
+
+
+def test_a_profile_of_the_other_kind_is_not_written(tmp_path: Path):
+    write_picture(tmp_path / "a.png", Picture(noise(1, np.uint8), icc=SRGB))
+    assert read_picture(tmp_path / "a.png").icc is None
+
+
+# What can go wrong --------------------------------------------------------------------------------------------------
+
+
+ENDINGS = [".png", ".16.png", ".jpg", ".webp", ".avif", ".tif", ".exr"]
+
+
+def saved(folder: Path, ending: str) -> Path:
+    path = folder / f"picture{ending}"
+    write_picture(path, Picture(noise(3, np.uint16 if "16" in ending else np.uint8, (64, 64))))
+    return path
+
+
+@pytest.mark.parametrize("part", [0.03, 0.3, 0.6, 0.95])
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_truncated_files(tmp_path: Path, capfd: pytest.CaptureFixture, ending: str, part: float):
+    path = saved(tmp_path, ending)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(len(whole) * part)])
+    with pytest.raises(UserError, match="truncated or damaged") as raised:
+        read_picture(path)
+    assert str(path) in str(raised.value)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_corrupt_files_are_read_or_refused_in_a_sentence(tmp_path: Path, ending: str):
+    path = saved(tmp_path, ending)
+    whole = path.read_bytes()
+    random = np.random.default_rng(1)
+    for _ in range(40):
+        damaged = bytearray(whole)
+        for position in random.integers(4, len(whole) if random.random() < 0.5 else 200, 6):
+            damaged[position] = random.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_picture(path, max_pixels=10_000_000)
+        except UserError as error:
+            assert "\n" not in str(error)  # noqa: PT017 - most are read after all
+
+
+def test_no_picture_at_all(tmp_path: Path):
+    (tmp_path / "empty.png").touch()
+    (tmp_path / "junk.png").write_bytes(b"<!doctype html>" * 40)
+    with pytest.raises(UserError, match=r"missing\.png: there is no such file"):
+        read_picture(tmp_path / "missing.png")
+    with pytest.raises(UserError, match=r"empty\.png: the file is empty"):
+        read_picture(tmp_path / "empty.png")
+    with pytest.raises(UserError, match=r"junk\.png: it is no picture of a known kind"):
+        read_picture(tmp_path / "junk.png")
+    with pytest.raises(UserError, match="it is a folder"):
+        read_picture(tmp_path)
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".tif", ".exr"])
+def test_bombs_are_refused_until_the_limit_is_raised(tmp_path: Path, ending: str):
+    path = saved(tmp_path, ending)
+    with pytest.raises(UserError, match=r"64 x 64 pixels are more than the limit of 4000;.*--max-pixels 4096"):
+        read_picture(path, max_pixels=4000)
+    assert read_picture(path, max_pixels=4096).width == 64
+
+
+def test_an_enormous_claim_is_refused_before_decoding(tmp_path: Path):
+    path = tmp_path / "bomb.png"
+    header = b"IHDR" + struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
+    path.write_bytes(PngImagePlugin._MAGIC + struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header)))
+    with path.open("ab") as stream:
+        PngImagePlugin.putchunk(stream, b"IDAT", b"")
+    with pytest.raises(UserError, match=r"60000 x 60000 pixels are more than the limit"):
+        read_picture(path)
+
+
+def test_names_that_cannot_be_written(tmp_path: Path):
+    picture = Picture(smooth(3))
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "device.png").symlink_to("/dev/null")
+    for name, message in {
+        "a.bmp": "must end in one of .png .jpg",
+        "a": "must end in one of",
+        "folder.png": "it is a folder",
+        "nowhere/a.png": "there is no folder",
+        "device.png": "it is no ordinary file",
+    }.items():
+        with pytest.raises(UserError, match=message):
+            write_picture(tmp_path / name, picture)
+    with pytest.raises(UserError, match="WebP holds no side longer than 16383 pixels"):
+        write_picture(tmp_path / "a.webp", Picture(np.zeros((1, 17000, 3), np.uint8)))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "folder.png"]
+
+
+def test_a_folder_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
+    with pytest.raises(UserError, match="no permission; choose another folder"):
+        write_picture(tmp_path / "a.png", Picture(smooth(3)))
+
+
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make every temporary file a link to the device that is always full."""
+
+    def link(path: Path) -> Path:
+        temporary = path.with_name(f".full{path.suffix}")
+        temporary.symlink_to("/dev/full")
+        return temporary
+
+    monkeypatch.setattr(files, "temporary_beside", link)
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".webp", ".avif", ".tif", ".exr"])
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str):
+    path = tmp_path / f"a{ending}"
+    path.write_bytes(b"earlier")
+    full_disk(monkeypatch)
+    with pytest.raises(UserError, match=f"a{ending}: the disk is full; free some space"):
+        write_picture(path, Picture(smooth(3)))
+    assert path.read_bytes() == b"earlier"
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_writing_through_a_link_keeps_the_link(tmp_path: Path):
+    (tmp_path / "link.png").symlink_to(tmp_path / "real.png")
+    write_picture(tmp_path / "link.png", Picture(smooth(3)))
+    assert (tmp_path / "link.png").is_symlink()
+    assert read_picture(tmp_path / "real.png").width == 64
+    assert (tmp_path / "real.png").stat().st_mode & 0o777 == 0o666 & ~_umask()
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
