@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import cos, pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver.field import DoubleField, Field
+from solver.passes import Target
 
 if TYPE_CHECKING:
     from solver.context import Device
@@ -32,15 +33,16 @@ SWEEPS = (chebyshev_weights(3, 0.5), chebyshev_weights(4, 0.4), chebyshev_weight
 
 
 class Level:
-    """The textures of one grid: faces, right-hand side, solution; `size` in blocks of 2 x 2 cells."""
+    """The textures of one grid: faces, right-hand side, solution; its size in `cells` and, as `size`, in blocks."""
 
     def __init__(self, device: Device, cells: tuple[int, int], number: int) -> None:
+        self.cells = cells
         self.size = ((cells[0] + 1) // 2, (cells[1] + 1) // 2)
         label = f"pressure level {number}"
         self.left, self.up, self.far, self.links = (
             device.field(self.size, 4, f"{label} {name}", "f1") for name in ("left", "up", "far", "links")
         )
-        self.faces = {"left": self.left, "up": self.up, "far": self.far}
+        self.faces: dict[str, Any] = {"left": self.left, "up": self.up, "far": self.far}
         self.residual = device.double_field(self.size, 4, f"{label} residual")
         self.pressure = device.double_field(self.size, 4, f"{label} pressure")
 
@@ -72,7 +74,7 @@ class Pressure:
         blocks, coarsest = self._levels[0].size, self._levels[-1].size
         count = coarsest[0] * coarsest[1]
         self._inverse = device.field((4 * count, count), 4, "pressure inverse")
-        self._base = device.double_field(blocks, 4, "pressure base")
+        self._base = device.field(blocks, 4, "pressure base")
         self._change = device.double_field(blocks, 4, "pressure change")
         self._whole = device.field(blocks, 4, "pressure whole")
         self._applied = device.field(blocks, 4, "pressure applied")
@@ -96,6 +98,7 @@ class Pressure:
         """Close every face of the solid cells (R8 at cells, 1 = solid), and of no others; None for no solids at all."""
         shader, levels = self.device.pass_, self._levels
         self._has_solids = solid is not None
+        self._variant: dict[str, Any] = {} if self._has_solids else {"OPEN": 1}
         finest = levels[0]
         everywhere = solid or self.device.field(self.size, 1, "no solids", "f1")
         shader("pressure/open_faces.frag")((finest.left, finest.up, finest.far), solid=everywhere)
@@ -117,21 +120,25 @@ class Pressure:
             source: wanted divergence at cells, 1 / s; its mean over the fluid is taken off: nothing leaves the grid.
             warm: start from the last pressure, scaled to leave the least: never worse than to start from none.
         """
-        device, finest = self.device, self._levels[0]
+        finest = self._levels[0]
         self._take_divergence(velocity.read, source)
-        self._base.read.clear()
-        self._change.read.clear()
+        corrections = 0
         if warm:
-            self._accept(self._whole, self._base, scaled=True)
+            finest.pressure.read, self._whole = self._whole, finest.pressure.read
+            self._account_for_correction(scaled=True)
+            self._keep_correction(corrections)
+            corrections += 1
         for cycle in range(cycles):
-            self._solve_roughly()
-            first, last = cycle == 0 and not warm, cycle == cycles - 1
-            self._accept(finest.pressure.read, self._base if first else self._change, self._has_solids, last)
-        device.pass_("pressure/subtract_gradient.frag")(
-            (self._u, self._v, self._whole),
-            velocity=velocity.read, base=self._base.read, change=self._change.read, **finest.faces,
-        )  # fmt: skip
-        device.pass_("pressure/scatter_velocity.frag")(velocity.write, u=self._u, v=self._v)
+            self._find_correction()
+            if self._has_solids or cycle < cycles - 1:
+                self._account_for_correction(scaled=self._has_solids)
+            self._keep_correction(corrections)
+            corrections += 1
+        for part in (self._base, self._change.read)[corrections:]:
+            part.clear()
+        self._draw("subtract_gradient", (self._u, self._v, self._whole), finest,
+                   velocity=velocity.read, base=self._base, change=self._change.read)  # fmt: skip
+        self.device.pass_("pressure/scatter_velocity.frag")(velocity.write, u=self._u, v=self._v)
         velocity.swap()
 
     @property
@@ -148,62 +155,72 @@ class Pressure:
 
     # -- the solve --------------------------------------------------------------------------------------------------
 
+    def _draw(
+        self, shader: str, target: Target, level: Level, defines: dict[str, Any] | None = None, **inputs: Any
+    ) -> None:
+        """Draw a pass that needs the faces of its level."""
+        pass_ = self.device.pass_(f"pressure/{shader}.frag", **self._variant, **(defines or {}))
+        pass_(target, cells=level.cells, **level.faces, **inputs)
+
     def _take_divergence(self, velocity: Field, source: Field | None) -> None:
         """The right-hand side of the finest level."""
-        finest, shader = self._levels[0], self.device.pass_
+        finest = self._levels[0]
         if source is None:
-            shader("pressure/divergence.frag")(finest.residual.read, velocity=velocity, **finest.faces)
+            self._draw("divergence", finest.residual.read, finest, velocity=velocity)
             return
         # The blocks of the velocity are free until the end of a projection.
         wanted, live = self._u, self._v
-        shader("pressure/gather_source.frag")((wanted, live), source=source, scale=self.h, **finest.faces)
-        shader("pressure/divergence.frag", WITH_SOURCE=1)(
-            finest.residual.read, velocity=velocity, source=wanted, sums=self._dot(wanted, live), **finest.faces
-        )
+        self._draw("gather_source", (wanted, live), finest, source=source, scale=self.h)
+        self._draw("divergence", finest.residual.read, finest, {"WITH_SOURCE": 1},
+                   velocity=velocity, source=wanted, sums=self._dot(wanted, live))  # fmt: skip
 
-    def _solve_roughly(self) -> None:
-        """One cycle: a correction in the finest level's `pressure` to its `residual`, from a zero guess."""
-        shader, levels = self.device.pass_, self._levels
+    def _find_correction(self) -> None:
+        """One cycle: from a zero guess, the finest level's `pressure` that roughly accounts for its `residual`."""
+        pass_, levels = self.device.pass_, self._levels
         for fine, coarse in pairwise(levels):
-            shader("pressure/restrict.frag")(coarse.residual.read, residual=fine.residual.read, links=fine.links)
+            pass_("pressure/restrict.frag")(coarse.residual.read, residual=fine.residual.read, links=fine.links)
         coarsest = levels[-1]
-        shader("pressure/solve_directly.frag")(
+        pass_("pressure/solve_directly.frag")(
             coarsest.pressure.read, residual=coarsest.residual.read, inverse=self._inverse
         )
-        for number in range(len(levels) - 2, -1, -1):
-            fine, coarse = levels[number], levels[number + 1]
-            pressure = fine.pressure
-            shader("pressure/prolong.frag")(pressure.read, coarse=coarse.pressure.read, links=fine.links)
+        for number in reversed(range(len(levels) - 1)):
+            level, coarser = levels[number], levels[number + 1]
+            pressure = level.pressure
+            pass_("pressure/prolong.frag")(pressure.read, coarse=coarser.pressure.read, links=level.links)
             for weight in SWEEPS[min(number, len(SWEEPS) - 1)]:
-                shader("pressure/smooth.frag")(
-                    pressure.write, pressure=pressure.read, residual=fine.residual.read, weight=weight, **fine.faces
-                )
+                self._draw("smooth", pressure.write, level,
+                           pressure=pressure.read, residual=level.residual.read, weight=weight)  # fmt: skip
                 pressure.swap()
 
-    def _accept(self, correction: Field, part: DoubleField, scaled: bool, last: bool = False) -> None:
-        """Add a correction to a part of the pressure, and take from the residual what it accounts for.
+    def _account_for_correction(self, scaled: bool) -> None:
+        """Take from the finest residual r what the correction p accounts for.
 
-        Scaled, it is multiplied by the factor that leaves least: r . A p / A p . A p.
+        Scaled, the correction is first multiplied by the factor that leaves least of r: r . A p / A p . A p.
         """
-        shader, finest = self.device.pass_, self._levels[0]
-        residual = finest.residual
-        if scaled:
+        finest = self._levels[0]
+        pressure, residual = finest.pressure, finest.residual
+        if not scaled:
+            self._draw("residual", residual.write, finest, pressure=pressure.read, residual=residual.read)
+        else:
             applied = self._applied
-            shader("pressure/residual.frag", ONLY_LAPLACIAN=1)(applied, pressure=correction, **finest.faces)
+            self._draw("residual", applied, finest, {"ONLY_LAPLACIAN": 1}, pressure=pressure.read)
             sums = self._dot(residual.read, applied)
-            step = shader("pressure/add_scaled.frag")
-            step(residual.write, a=residual.read, b=applied, sums=sums, sign=-1.0)
-            step(part.write, a=part.read, b=correction, sums=sums, sign=1.0)
-            residual.swap()
-            part.swap()
-            return
-        shader("pressure/add.frag")(part.write, a=part.read, b=correction)
-        part.swap()
-        if not last:
-            shader("pressure/residual.frag")(
-                residual.write, pressure=correction, residual=residual.read, **finest.faces
-            )
-            residual.swap()
+            pass_ = self.device.pass_("pressure/add_scaled.frag")
+            pass_(residual.write, a=residual.read, b=applied, sums=sums, factors=(1.0, -1.0))
+            pass_(pressure.write, a=pressure.read, b=pressure.read, sums=sums, factors=(0.0, 1.0))
+            pressure.swap()
+        residual.swap()
+
+    def _keep_correction(self, before: int) -> None:
+        """Make the correction part of the pressure: the base, or the change, or added to it, after `before` others."""
+        pressure = self._levels[0].pressure
+        if before == 0:
+            self._base, pressure.read = pressure.read, self._base
+        elif before == 1:
+            self._change.read, pressure.read = pressure.read, self._change.read
+        else:
+            self.device.pass_("pressure/add.frag")(self._change.write, a=self._change.read, b=pressure.read)
+            self._change.swap()
 
     def _dot(self, a: Field, b: Field) -> Field:
         """The scalar products (a . b, b . b) in one texel, as `lib/quotient.glsl` takes them."""

@@ -2,9 +2,9 @@
 // The pressure comes as a sum that is taken only after the differences, which keeps the digits of the smaller part.
 // in:  u_velocity         MAC velocity, lengths / s
 //      u_base, u_change   the two parts of pressure / h at blocks, lengths / s
-//      u_left, u_up       faces
+//      u_left, u_up, u_far, u_cells   faces
 // out: u and v of the blocks' four cells, lengths / s; the whole pressure / h
-// reads: 12
+// reads: 13
 #include "lib/block_faces.glsl"
 
 uniform sampler2D u_velocity;
@@ -28,9 +28,8 @@ void main() {
     vec4 base, base_x, base_y, change, change_x, change_y;
     differences(u_base, base, base_x, base_y);
     differences(u_change, change, change_x, change_y);
-    vec4 open_x = vec4(greaterThan(texture(u_left, v_uv), vec4(0.0)));
-    vec4 open_y = vec4(greaterThan(texture(u_up, v_uv), vec4(0.0)));
-    out_u = open_x * (vec4(v00.x, v10.x, v01.x, v11.x) - base_x - change_x);
-    out_v = open_y * (vec4(v00.y, v10.y, v01.y, v11.y) - base_y - change_y);
+    Faces f = faces();
+    out_u = f.left * (vec4(v00.x, v10.x, v01.x, v11.x) - base_x - change_x);
+    out_v = f.up * (vec4(v00.y, v10.y, v01.y, v11.y) - base_y - change_y);
     out_pressure = base + change;
 }
