@@ -10,6 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from solver.context import Device
 
+_NUMPY = {"f1": np.uint8, "nu2": np.uint16, "f2": np.float16, "f4": np.float32}
+
 
 class FieldError(ValueError):
     """A field of an impossible size, or data that does not fit it."""
@@ -23,7 +25,7 @@ class Field:
         size: (width, height) in texels, each from 1 to the GL's limit.
         components: 1-4.
         label: its name in errors and in a frame debugger.
-        dtype: "f4" (float32), "f1" (8-bit, read as 0-1) or "f2".
+        dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1) or "f2".
     """
 
     def __init__(self, device: Device, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
@@ -61,7 +63,7 @@ class Field:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return self.size[0] * self.size[1] * self.components * {"f1": 1, "f2": 2, "f4": 4}[self.dtype]
+        return self.size[0] * self.size[1] * self.components * _NUMPY[self.dtype]().itemsize
 
     def clear(self, *values: float) -> None:
         """Fill with `values`, by default zero."""
@@ -77,20 +79,16 @@ class Field:
         shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
         if array.shape != shape and array.shape != (*shape, 1):
             raise FieldError(f"{self.label}: an array of shape {array.shape} was given, {shape} is wanted")
-        if self.dtype == "f1":
-            data = array.astype(np.uint8, copy=False)
-        else:
-            data = array.astype(np.float32 if self.dtype == "f4" else np.float16, copy=False)
-            if not np.isfinite(data).all():
-                raise FieldError(f"{self.label}: the array holds a value that is not finite")
+        data = array.astype(_NUMPY[self.dtype], copy=False)
+        if self.dtype in ("f2", "f4") and not np.isfinite(data).all():
+            raise FieldError(f"{self.label}: the array holds a value that is not finite")
         self.texture.write(np.ascontiguousarray(data).tobytes())
 
     def get(self) -> np.ndarray:
         """Read back as an array of shape (height, width) or (height, width, components), row 0 on top."""
-        kind = {"f1": np.uint8, "f2": np.float16, "f4": np.float32}[self.dtype]
-        data = np.frombuffer(self.framebuffer.read(components=self.components, dtype=self.dtype, alignment=1), kind)
+        raw = self.framebuffer.read(components=self.components, dtype=self.dtype, alignment=1)
         shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
-        return data.reshape(shape).copy()
+        return np.frombuffer(raw, _NUMPY[self.dtype]).reshape(shape).copy()
 
     def copy_from(self, other: Field) -> None:
         """Take over the texels of `other`, which has the same size and components."""

@@ -1,0 +1,397 @@
+"""A picture looked up through a map, at the quality of an export."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import moderngl
+import numpy as np
+
+from solver.context import Device
+from solver.field import Field
+from solver.warp import WarpMap
+
+Quality = Literal["catmull-rom", "bilinear", "nearest"]
+Edges = Literal["transparent", "black", "clamp", "mirror", "wrap"]
+
+MOST_SAMPLES = 8
+_TAPS = {"nearest": 1, "bilinear": 2, "catmull-rom": 4}
+_REACH = 2  # pixels that the taps reach beyond a place
+_KINDS = {np.dtype(np.uint8): ("f1", 255.0), np.dtype(np.uint16): ("nu2", 65535.0), np.dtype(np.float32): ("f4", 0.0)}
+_SWIZZLES = {1: "RRR1", 2: "RRRG", 3: "RGB1", 4: "RGBA"}
+_TARGET_COMPONENTS = {1: 1, 2: 2, 3: 4, 4: 4}  # targets of three components are not promised by GL
+_SMALLEST_TILE = 16
+
+
+class SamplingError(ValueError):
+    """A picture or a map that cannot be looked up."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a picture is looked up.
+
+    Attributes:
+        quality: interpolation between pixels.
+        edges: what lies beyond the picture. "transparent" is black where the picture has no alpha.
+        samples: places looked up along a side of each pixel of the result; "auto" follows the largest stretch of the map
+            there, sigma: clamp(ceil(2 sigma), 2, 8), and 1 where the map only shifts.
+        linear_light: mix in linear light; uint8 and uint16 are taken as sRGB, float32 as linear already.
+        dither: spread the rounding to 8 bits by a fixed pattern; by default where light is mixed.
+    """
+
+    quality: Quality = "catmull-rom"
+    edges: Edges = "transparent"
+    samples: int | Literal["auto"] = "auto"
+    linear_light: bool = True
+    dither: bool | None = None
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One picture, one map and one size, with what follows from them."""
+
+    displacement: Field
+    extent: tuple[float, float]
+    slack: float
+    picture: np.ndarray
+    size: tuple[int, int]
+    how: Sampling
+
+    @property
+    def source_size(self) -> tuple[int, int]:
+        return self.picture.shape[1], self.picture.shape[0]
+
+    @property
+    def channels(self) -> int:
+        return self.picture.shape[2]
+
+    @property
+    def has_alpha(self) -> bool:
+        return self.channels in (2, 4)
+
+    @property
+    def is_curved(self) -> bool:
+        """True if the values are sRGB and are to be mixed in linear light."""
+        return self.how.linear_light and self.picture.dtype != np.float32
+
+    @property
+    def is_prepared(self) -> bool:
+        return self.how.quality != "nearest" and (self.is_curved or self.has_alpha)
+
+    @property
+    def is_single(self) -> bool:
+        return self.how.quality == "nearest" or self.how.samples == 1
+
+    @property
+    def zoom(self) -> tuple[float, float]:
+        """Pixels of the picture to a pixel of the result."""
+        return self.source_size[0] / self.size[0], self.source_size[1] / self.size[1]
+
+    @property
+    def longer(self) -> tuple[float, float]:
+        """Pixels of the picture to a longer side; the map is laid over the whole of it."""
+        return self.source_size[0] / self.extent[0], self.source_size[1] / self.extent[1]
+
+    @property
+    def inside(self) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom bounds, in pixels, beyond which there is nothing."""
+        if self.how.edges not in ("transparent", "black"):
+            return (-1e30, -1e30, 1e30, 1e30)
+        # What is a part of a texel of the map outside is there because of the interpolation, not of the fluid.
+        width, height = self.source_size
+        return (-self.slack, -self.slack, width + self.slack, height + self.slack)
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """Of `look_up.frag`."""
+        kind, levels = _KINDS[self.picture.dtype]
+        samples = self.how.samples
+        dither = self.is_curved if self.how.dither is None else self.how.dither
+        flags = {
+            "SINGLE": self.is_single,
+            "PREPARED": self.is_prepared,
+            "LINEAR_LIGHT": self.is_curved and self.is_prepared,
+            "CLAMPED": levels > 0,
+            "DITHER": dither and kind == "f1" and self.how.quality != "nearest",
+            "GREY_ALPHA": self.channels == 2,
+        }
+        values: dict[str, object] = {name: 1 for name, wanted in flags.items() if wanted}
+        values |= {"TAPS": _TAPS[self.how.quality], "LEVELS": levels}
+        values |= {"LEAST_SAMPLES": 2 if samples == "auto" else samples}
+        values |= {"MOST_SAMPLES": MOST_SAMPLES if samples == "auto" else samples}
+        return values
+
+
+class Sampler:
+    """Looks pictures up through maps; keeps its textures from one picture to the next, as in a film.
+
+    Args:
+        device: the device.
+        whole: pixels up to which a picture is worked on in one piece; larger ones, and those above the GL's largest
+            texture, are done in tiles with the pieces of the original they need, to the same bits.
+        tile: (width, height) of such a tile.
+    """
+
+    def __init__(self, device: Device, whole: int = 10_000_000, tile: tuple[int, int] = (2048, 1024)) -> None:
+        self.device = device
+        self.whole = whole
+        self.tile = tile
+        self._fields: dict[str, Field] = {}
+        self._textures: dict[str, tuple[moderngl.Texture, tuple[object, ...]]] = {}
+
+    def apply(
+        self,
+        warp: WarpMap | np.ndarray,
+        picture: np.ndarray,
+        size: tuple[int, int] | None = None,
+        how: Sampling | None = None,
+    ) -> np.ndarray:
+        """The picture looked up at x + D(x).
+
+        Args:
+            warp: the map; or a displacement (h, w, 2) from 6 x 6, in its own longer sides, laid over the whole picture.
+            picture: (h, w) or (h, w, 1-4), uint8, uint16 or float32, straight alpha last.
+            size: (width, height) of the result, by default the picture's.
+            how: see `Sampling`.
+
+        Returns:
+            An array like `picture`, of the wanted size. Where the map is the identity, the very values of the picture.
+
+        Raises:
+            SamplingError: on a picture of another type or shape, or a map that tears a tile apart.
+        """
+        width, height = size or (picture.shape[1], picture.shape[0])
+        result = np.empty((height, width, *picture.shape[2:]), picture.dtype)
+        for _ in self.bands(warp, picture, size, how, result):
+            pass
+        return result
+
+    def bands(
+        self,
+        warp: WarpMap | np.ndarray,
+        picture: np.ndarray,
+        size: tuple[int, int] | None = None,
+        how: Sampling | None = None,
+        result: np.ndarray | None = None,
+    ) -> Iterator[np.ndarray]:
+        """The rows of `apply`'s result from the top, some at a time, so that a large one need never exist as a whole.
+
+        `result` takes them, if given; otherwise each band is an array of its own.
+        """
+        job = self._job(warp, picture, size, how or Sampling())
+        width, height = job.size
+        rows, columns = (height, width) if self._fits(job.size) else (self.tile[1], self.tile[0])
+        whole = self._fits(job.source_size) and job.how.edges not in ("mirror", "wrap")
+        if whole:
+            self._load(job, (0, 0, *job.source_size))
+        for top in range(0, height, rows):
+            bottom = min(top + rows, height)
+            shape = bottom - top, width, job.channels
+            if result is None:
+                band = np.empty(shape, job.picture.dtype)
+            else:
+                band = result[top:bottom].reshape(shape)
+            for left in range(0, width, columns):
+                right = min(left + columns, width)
+                self._draw(job, (left, top, right, bottom), whole)
+                self._take(job, band[:, left:right])
+            yield band.reshape(bottom - top, width, *picture.shape[2:])
+        if not isinstance(warp, WarpMap):
+            job.displacement.release()
+
+    def release(self) -> None:
+        """Free the textures."""
+        for field in self._fields.values():
+            field.release()
+        for texture, _ in self._textures.values():
+            texture.release()
+        self._fields.clear()
+        self._textures.clear()
+
+    # -- one tile ---------------------------------------------------------------------------------------------------
+
+    def _job(
+        self, warp: WarpMap | np.ndarray, picture: np.ndarray, size: tuple[int, int] | None, how: Sampling
+    ) -> _Job:
+        if picture.dtype not in _KINDS or picture.ndim not in (2, 3) or picture.size == 0:
+            raise SamplingError(f"a picture of shape {picture.shape} of {picture.dtype} cannot be looked up")
+        shaped = picture.reshape(*picture.shape[:2], -1)
+        if shaped.shape[2] > 4:
+            raise SamplingError(f"a picture of {shaped.shape[2]} channels cannot be looked up, 1 to 4 can")
+        size = size or (picture.shape[1], picture.shape[0])
+        if isinstance(warp, WarpMap):
+            field, extent = warp.composed(), warp.grid.extent
+            return _Job(field, extent, 0.5 * picture.shape[1] / field.width, shaped, size, how)
+        if warp.ndim != 3 or warp.shape[2] != 2 or min(warp.shape[:2]) < 6:
+            raise SamplingError(f"a map of shape {warp.shape} was given, (h, w, 2) from 6 x 6 is wanted")
+        height, width = warp.shape[:2]
+        extent = width / max(width, height), height / max(width, height)
+        return _Job(self.device.upload(warp.astype(np.float32), "given map"), extent, 0.01, shaped, size, how)
+
+    def _fits(self, size: tuple[int, int]) -> bool:
+        # The lattice of corners is one larger than the picture.
+        return size[0] * size[1] <= self.whole and max(size) < self.device.limits.max_texture_size
+
+    def _draw(self, job: _Job, tile: tuple[int, int, int, int], whole: bool) -> None:
+        """Draw one tile of the result into the field "result"."""
+        left, top, right, bottom = tile
+        lattice = self._spread(job, tile)
+        kind, _ = _KINDS[job.picture.dtype]
+        self._field("result", (right - left, bottom - top), _TARGET_COMPONENTS[job.channels], kind)
+        if whole:
+            self._look_up(job, lattice, (left, top), (0, 0, right - left, bottom - top), (0, 0, *job.source_size))
+        else:
+            places = lattice.get() * np.float32(job.longer)
+            more = 0 if job.is_single else 1
+            places[..., 0] += (np.arange(left, right + more) * job.zoom[0])[None, :]
+            places[..., 1] += (np.arange(top, bottom + more) * job.zoom[1])[:, None]
+            self._draw_pieces(job, lattice, places, (left, top), (0, 0, right - left, bottom - top))
+
+    def _draw_pieces(
+        self,
+        job: _Job,
+        lattice: Field,
+        places: np.ndarray,
+        origin: tuple[int, int],
+        region: tuple[int, int, int, int],
+    ) -> None:
+        """Draw a region of a tile from the piece of the picture it needs, or its halves, if that is too large."""
+        x, y, width, height = region
+        more = 0 if job.is_single else 1
+        within = places[y : y + height + more, x : x + width + more].reshape(-1, 2)
+        low = np.floor(within.min(axis=0)).astype(int) - _REACH
+        high = np.ceil(within.max(axis=0) + np.array(job.zoom)).astype(int) + _REACH
+        if job.how.edges not in ("mirror", "wrap"):
+            limits = np.array(job.source_size)
+            low, high = np.clip(low, 0, limits - 1), np.clip(high, 1, limits)
+        piece = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+        if not self._fits((piece[2] - piece[0], piece[3] - piece[1])):
+            if max(width, height) <= _SMALLEST_TILE:
+                raise SamplingError(
+                    f"the map tears a patch of {width} x {height} pixels over {piece[2] - piece[0]} x "
+                    f"{piece[3] - piece[1]} pixels of the picture"
+                )
+            if width >= height:
+                halves = (x, y, width // 2, height), (x + width // 2, y, width - width // 2, height)
+            else:
+                halves = (x, y, width, height // 2), (x, y + height // 2, width, height - height // 2)
+            for half in halves:
+                self._draw_pieces(job, lattice, places, origin, half)
+            return
+        self._load(job, piece)
+        self._look_up(job, lattice, origin, region, piece)
+
+    def _spread(self, job: _Job, tile: tuple[int, int, int, int]) -> Field:
+        """The displacement at the corners of a tile's pixels, or at their centres if one place is enough."""
+        left, top, right, bottom = tile
+        more, shift = (0, 0.5) if job.is_single else (1, 0.0)
+        width, height = right - left + more, bottom - top + more
+        source = job.displacement
+        rows = self._field("along x", (width, source.height), 2, "f4")
+        lattice = self._field("lattice", (width, height), 2, "f4")
+        scale_x, scale_y = source.width / job.size[0], source.height / job.size[1]
+        self.device.pass_("sampling/spread.frag", ALONG_X=1)(
+            rows, displacement=source, first=left + shift, scale=scale_x
+        )
+        self.device.pass_("sampling/spread.frag")(lattice, displacement=rows, first=top + shift, scale=scale_y)
+        return lattice
+
+    def _look_up(
+        self,
+        job: _Job,
+        lattice: Field,
+        origin: tuple[int, int],
+        region: tuple[int, int, int, int],
+        piece: tuple[int, int, int, int],
+    ) -> None:
+        raw, _ = self._textures["raw"]
+        opaque = job.how.edges == "black" or not job.has_alpha
+        self.device.pass_("sampling/look_up.frag", **job.defines)(
+            self._fields["result"],
+            region=region,
+            source=self._fields["prepared"] if job.is_prepared else raw,
+            raw=raw,
+            displacement=lattice,
+            corner=piece[:2],
+            extent=(piece[2] - piece[0], piece[3] - piece[1]),
+            pixel=origin,
+            zoom=job.zoom,
+            longer=job.longer,
+            inside=job.inside,
+            outside=(0.0, 0.0, 0.0, 1.0 if opaque else 0.0),
+        )
+
+    # -- textures ---------------------------------------------------------------------------------------------------
+
+    def _load(self, job: _Job, piece: tuple[int, int, int, int]) -> None:
+        """Upload a piece of the picture (left, top, right, bottom) and prepare it."""
+        left, top, right, bottom = piece
+        width, height = right - left, bottom - top
+        if job.how.edges in ("mirror", "wrap"):
+            columns = _edge_index(np.arange(left, right), job.source_size[0], job.how.edges)
+            rows = _edge_index(np.arange(top, bottom), job.source_size[1], job.how.edges)
+            pixels = job.picture[rows[:, None], columns]
+        else:
+            pixels = job.picture[top:bottom, left:right]
+        kind, _ = _KINDS[job.picture.dtype]
+        raw = self._texture("raw", (width, height), job.channels, kind)
+        raw.write(np.ascontiguousarray(pixels), viewport=(0, 0, width, height))
+        if job.is_prepared:
+            prepared = self._field("prepared", raw.size, 4, "f4")
+            defines: dict[str, object] = {"LINEAR_LIGHT": 1} if job.is_curved else {}
+            prepare = self.device.pass_("sampling/prepare.frag", **defines)
+            prepare(prepared, region=(0, 0, width, height), picture=raw)
+
+    def _take(self, job: _Job, target: np.ndarray) -> None:
+        """Read the field "result" into an array."""
+        field = self._fields["result"]
+        settings: dict[str, Any] = {"components": job.channels, "dtype": field.dtype, "alignment": 1}
+        if target.flags.c_contiguous:
+            field.framebuffer.read_into(target, **settings)
+        else:
+            data = field.framebuffer.read(**settings)
+            target[...] = np.frombuffer(data, target.dtype).reshape(target.shape)
+
+    def _field(self, role: str, size: tuple[int, int], components: int, dtype: str) -> Field:
+        """The field kept for `role`, made anew when it has to be another."""
+        kept = self._fields.get(role)
+        if kept is None or (kept.size, kept.components, kept.dtype) != (size, components, dtype):
+            if kept is not None:
+                kept.release()
+            self._fields[role] = self.device.field(size, components, f"sampling, {role}", dtype)
+        return self._fields[role]
+
+    def _texture(self, role: str, size: tuple[int, int], components: int, dtype: str) -> moderngl.Texture:
+        """The texture kept for `role`, at least of that size; not a field, as it need not be drawn into."""
+        kept, kind = self._textures.get(role, (None, ()))
+        if kept is None or kind != (components, dtype) or kept.width < size[0] or kept.height < size[1]:
+            if kept is not None:
+                kept.release()
+            texture = self.device.ctx.texture(size, components, dtype=dtype, alignment=1)
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            texture.repeat_x = texture.repeat_y = False
+            texture.swizzle = _SWIZZLES[components]
+            self._textures[role] = texture, (components, dtype)
+        return self._textures[role][0]
+
+
+def apply(
+    warp: WarpMap, picture: np.ndarray, size: tuple[int, int] | None = None, how: Sampling | None = None
+) -> np.ndarray:
+    """`Sampler.apply` for a single picture."""
+    sampler = Sampler(warp.device)
+    try:
+        return sampler.apply(warp, picture, size, how)
+    finally:
+        sampler.release()
+
+
+def _edge_index(index: np.ndarray, count: int, edges: str) -> np.ndarray:
+    """The pixel of a picture of `count` that stands for pixel `index` beyond it."""
+    if edges == "wrap":
+        return index % count
+    index = index % (2 * count)
+    return np.minimum(index, 2 * count - 1 - index)
