@@ -1,0 +1,298 @@
+"""Maps: what is written is what other programs read, every format back again, and maps that must be refused."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import tifffile
+
+from app import files
+from app.errors import UserError
+from app.maps import (
+    Displacement,
+    Grid,
+    Kind,
+    from_offsets,
+    from_st,
+    map_writer,
+    read_map,
+    to_offsets,
+    to_st,
+    write_map,
+)
+from app.pictures import Picture, read_exr, write_picture
+
+SIZES = [(48, 64), (64, 48), (33, 33), (1, 7)]
+
+
+def swirl(height: int, width: int, overscan: int = 0) -> Displacement:
+    """A smooth displacement, in longer sides, float32."""
+    longest = max(height, width)
+    y, x = (np.mgrid[-overscan : height + overscan, -overscan : width + overscan] + 0.5) / longest
+    values = np.stack([0.1 * np.sin(5 * y + 1), 0.07 * np.cos(4 * x) - 0.03], axis=-1)
+    return Displacement(values.astype(np.float32), overscan)
+
+
+def identity(height: int, width: int) -> Displacement:
+    return Displacement(np.zeros((height, width, 2), np.float32))
+
+
+# What the files hold ------------------------------------------------------------------------------------------------
+
+
+def test_the_identity_st_map_is_the_one_of_the_convention(tmp_path: Path):
+    write_map(tmp_path / "a.exr", identity(6, 10))
+    channels, header = read_exr(tmp_path / "a.exr")
+    np.testing.assert_array_equal(channels["R"][0], ((np.arange(10) + 0.5) / 10).astype(np.float32))
+    assert channels["G"][0, 0] == np.float32((6 - 0.5) / 6)  # the top row: the origin is at the bottom
+    assert channels["G"][-1, 0] == np.float32(0.5 / 6)
+    assert (channels["B"] == 1).all()
+    assert channels["R"].dtype == np.float32
+    assert (header["fluidwarp/map"], header["fluidwarp/grid"], header["fluidwarp/direction"]) == (
+        "st",
+        "centres",
+        "inverse",
+    )
+    assert "origin bottom left" in header["comments"]
+
+
+def test_a_shift_points_where_it_should(tmp_path: Path):
+    """Looking 2 pixels to the right and 1 down, in every format's own terms."""
+    shift = Displacement(np.full((4, 8, 2), (2 / 8, 1 / 8), np.float32))
+    st = to_st(shift)
+    np.testing.assert_allclose(st[0, 0], [2.5 / 8, 1 - 1.5 / 4], atol=1e-7)
+    assert to_offsets(shift, up=False)[0, 0].tolist() == [2, 1]
+    assert to_offsets(shift, up=True)[0, 0].tolist() == [2, -1]
+    write_map(tmp_path / "a.flo", shift)
+    data = (tmp_path / "a.flo").read_bytes()
+    assert struct.unpack("<fii", data[:12]) == (pytest.approx(202021.25), 8, 4)
+    assert struct.unpack("<ff", data[12:20]) == (2, 1)
+    write_map(tmp_path / "a.npy", shift)
+    np.testing.assert_array_equal(np.load(tmp_path / "a.npy"), shift.values)
+
+
+def test_opencv_reads_flo_and_tiff(tmp_path: Path):
+    map_ = swirl(20, 30)
+    write_map(tmp_path / "a.flo", map_)
+    np.testing.assert_array_equal(cv2.readOpticalFlow(str(tmp_path / "a.flo")), to_offsets(map_, up=False))
+    expectations: dict[Kind, np.ndarray] = {"st": to_st(map_), "offsets": to_offsets(map_, up=True)}
+    for kind, expected in expectations.items():
+        write_map(tmp_path / "a.tif", map_, kind)
+        image = cv2.imread(str(tmp_path / "a.tif"), cv2.IMREAD_UNCHANGED)
+        assert image is not None
+        np.testing.assert_array_equal(image[..., [2, 1]], expected)
+        with tifffile.TiffFile(tmp_path / "a.tif") as tiff:
+            told = json.loads(tiff.pages.first.description)
+        assert told["fluidwarp"]["map"] == kind
+
+
+def test_opencv_warps_by_the_st_map_as_the_displacement_says(tmp_path: Path):
+    map_ = swirl(48, 64)
+    y, x = np.mgrid[0:48, 0:64].astype(np.float32)
+    picture = 100 + x + 2 * y  # bilinear sampling of a plane is exact
+    write_map(tmp_path / "a.tif", map_)
+    st = tifffile.imread(tmp_path / "a.tif")
+    looked_up = cv2.remap(picture, st[..., 0] * 64 - 0.5, (1 - st[..., 1]) * 48 - 0.5, cv2.INTER_LINEAR)
+    expected = 100 + x + 64 * map_.values[..., 0] + 2 * (y + 64 * map_.values[..., 1])
+    np.testing.assert_allclose(looked_up[12:-12, 12:-12], expected[12:-12, 12:-12], atol=0.1)
+
+
+# There and back -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize(
+    ("ending", "kind"),
+    [(".exr", "st"), (".exr", "offsets"), (".tif", "st"), (".tif", "offsets"), (".flo", "st"), (".npy", "st")],
+)
+def test_maps_come_back(tmp_path: Path, ending: str, kind: Kind, size: tuple[int, int]):
+    map_ = swirl(*size)
+    first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
+    write_map(first, map_, kind)
+    read = read_map(first)
+    assert (read.width, read.height, read.forward) == (size[1], size[0], False)
+    # an absolute place in float32 knows a displacement to 2^-25, in fractions of the sides
+    np.testing.assert_allclose(read.values, map_.values, atol=6.1e-8)
+    write_map(second, read, kind)
+    assert second.read_bytes() == first.read_bytes()
+
+
+def test_st_values_are_exact_to_the_last_bit(tmp_path: Path):
+    """Any float32 place survives: file, displacement, another format, and back."""
+    random = np.random.default_rng(0)
+    st = random.uniform(-0.5, 1.5, (40, 56, 2)).astype(np.float32)
+    st[:5] = 0  # as programs leave what they do not know
+    st[5:8] = 1
+    np.testing.assert_array_equal(to_st(from_st(st)), st)
+    tifffile.imwrite(tmp_path / "a.tif", np.dstack([st, st[..., :1]]), photometric="rgb")
+    write_map(tmp_path / "b.exr", read_map(tmp_path / "a.tif"))
+    write_map(tmp_path / "c.tiff", read_map(tmp_path / "b.exr"))
+    channels, _ = read_exr(tmp_path / "b.exr")
+    np.testing.assert_array_equal(np.stack([channels["R"], channels["G"]], -1), st)
+    np.testing.assert_array_equal(tifffile.imread(tmp_path / "c.tiff")[..., :2], st)
+
+
+def test_converting_between_all_formats_keeps_the_map(tmp_path: Path):
+    map_ = swirl(30, 20)
+    path = tmp_path / "0.npy"
+    write_map(path, map_)
+    steps: list[tuple[str, Kind]] = [(".exr", "st"), (".flo", "st"), (".tif", "offsets"), (".exr", "offsets")]
+    for index, (ending, kind) in enumerate([*steps, (".tif", "st"), (".npy", "st")]):
+        following = tmp_path / f"{index + 1}{ending}"
+        write_map(following, read_map(path), kind)
+        path = following
+    np.testing.assert_allclose(read_map(path).values, map_.values, atol=3e-7)
+
+
+@pytest.mark.parametrize("grid", ["centres", "corners", "pixels"])
+def test_the_three_grids_all_mean_nothing_happens(tmp_path: Path, grid: Grid):
+    height, width = 6, 9
+    steps = {
+        "centres": lambda n: (np.arange(n) + 0.5) / n,
+        "corners": lambda n: np.arange(n) / (n - 1),
+        "pixels": lambda n: np.arange(n) / n,
+    }[grid]
+    u, v = np.meshgrid(steps(width), steps(height)[::-1])
+    tifffile.imwrite(tmp_path / "a.tif", np.dstack([u, v, u]).astype(np.float32), photometric="rgb")
+    np.testing.assert_allclose(read_map(tmp_path / "a.tif", grid=grid).values, 0, atol=2e-7)
+    shifted = np.dstack([u + (steps(width)[1] - steps(width)[0]), v]).astype(np.float32)
+    np.testing.assert_allclose(from_st(shifted, grid).values[..., 0], 1 / 9, atol=2e-7)
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif"])
+@pytest.mark.parametrize("kind", ["st", "offsets"])
+def test_overscan_and_direction_are_kept(tmp_path: Path, ending: str, kind: Kind):
+    map_ = Displacement(swirl(20, 30, overscan=4).values, 4, forward=True)
+    write_map(tmp_path / f"a{ending}", map_, kind)
+    read = read_map(tmp_path / f"a{ending}")
+    assert (read.width, read.height, read.overscan, read.forward) == (30, 20, 4, True)
+    np.testing.assert_allclose(read.values, map_.values, atol=1.3e-7)
+    if ending == ".exr":
+        _, header = read_exr(tmp_path / "a.exr")
+        assert [corner.tolist() for corner in header["displayWindow"]] == [[0, 0], [29, 19]]
+        assert [corner.tolist() for corner in header["dataWindow"]] == [[-4, -4], [33, 23]]
+    write_map(tmp_path / "a.flo", map_)
+    inner = read_map(tmp_path / "a.flo")
+    np.testing.assert_allclose(inner.values, map_.values[4:-4, 4:-4], atol=1e-7)
+
+
+def test_maps_made_elsewhere(tmp_path: Path):
+    import OpenEXR
+
+    map_ = swirl(20, 30)
+    st = to_st(map_)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    for x, y in (("U", "V"), ("uv.R", "uv.G"), ("forward.u", "forward.v")):
+        OpenEXR.File(header, {x: st[..., 0].copy(), y: st[..., 1].copy()}).write(str(tmp_path / "a.exr"))
+        np.testing.assert_allclose(read_map(tmp_path / "a.exr").values, map_.values, atol=6.1e-8)
+    write_picture(
+        tmp_path / "a.tif", Picture(np.round(np.dstack([st, st[..., :1]]).clip(0, 1) * 65535).astype(np.uint16))
+    )
+    inside = ((st > 0) & (st < 1)).all(axis=2)
+    np.testing.assert_allclose(read_map(tmp_path / "a.tif").values[inside], map_.values[inside], atol=1e-5)
+    offsets = to_offsets(map_, up=True)
+    tifffile.imwrite(tmp_path / "b.tif", np.dstack([offsets, offsets[..., :1]]), photometric="rgb")
+    np.testing.assert_allclose(read_map(tmp_path / "b.tif", kind="offsets").values, map_.values, atol=1e-7)
+
+
+def test_a_map_sequence(tmp_path: Path):
+    with map_writer(tmp_path / "m.%03d.exr", first=7) as write:
+        for amount in (0.0, 0.5, 1.0):
+            write(Displacement(swirl(8, 8).values * np.float32(amount)))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.007.exr", "m.008.exr", "m.009.exr"]
+    np.testing.assert_allclose(read_map(tmp_path / "m.009.exr").values, swirl(8, 8).values, atol=6.1e-8)
+
+
+def test_fitting_to_a_picture():
+    map_ = swirl(48, 64)
+    assert map_.fitted(4000, 3000).values is map_.values
+    # 1000 x 667 laid on 512 x 342: a rounding of the sides changes the longer side's measure by as little
+    fitted = swirl(342, 512).fitted(1000, 667)
+    np.testing.assert_allclose(fitted.values, swirl(342, 512).values, rtol=2e-3)
+    with pytest.raises(UserError, match=r"The map is 64 x 48 and the picture 800 x 800: .* same proportions"):
+        map_.fitted(800, 800)
+    with pytest.raises(UserError, match="same proportions"):
+        map_.fitted(48, 64)
+
+
+# What must be refused -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
+def test_nan_is_refused(tmp_path: Path, ending: str):
+    map_ = swirl(8, 9)
+    map_.values[3, 5] = np.nan
+    map_.values[4, 6, 0] = np.inf
+    write_map(tmp_path / f"a{ending}", map_)
+    with pytest.raises(UserError, match=r"2 of its pixels are NaN or infinite, the first at x 5, y 3"):
+        read_map(tmp_path / f"a{ending}")
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
+@pytest.mark.parametrize("damage", ["missing", "empty", "junk", "cut", "folder"])
+def test_damaged_maps(tmp_path: Path, ending: str, damage: str):
+    path = tmp_path / f"a{ending}"
+    write_map(path, swirl(30, 40))
+    whole = path.read_bytes()
+    path.unlink()
+    if damage == "folder":
+        path.mkdir()
+    elif damage != "missing":
+        path.write_bytes({"empty": b"", "junk": b"junk" * 50, "cut": whole[: len(whole) // 2]}[damage])
+    with pytest.raises(UserError, match=f"a{ending}") as raised:
+        read_map(path)
+    assert "\n" not in str(raised.value)
+
+
+def test_what_is_no_map(tmp_path: Path):
+    with pytest.raises(UserError, match="a map's name must end in one of"):
+        read_map(tmp_path / "a.jpg")
+    with pytest.raises(UserError, match="a map's name must end in one of"):
+        write_map(tmp_path / "a.png", identity(4, 4))
+    write_picture(tmp_path / "a.tif", Picture(np.zeros((4, 4, 3), np.uint8)))
+    with pytest.raises(UserError, match="two channels of 16 or 32 bits"):
+        read_map(tmp_path / "a.tif")
+    write_picture(tmp_path / "a.exr", Picture(np.zeros((4, 4, 1), np.float32)))
+    with pytest.raises(UserError, match="its channels Y are no map"):
+        read_map(tmp_path / "a.exr")
+    np.save(tmp_path / "a.npy", np.zeros((4, 4, 3), np.float32))
+    with pytest.raises(UserError, match=r"a map is a float array \(height, width, 2\), this one is \(4, 4, 3\)"):
+        read_map(tmp_path / "a.npy")
+    np.save(tmp_path / "a.npy", np.array([{}]), allow_pickle=True)
+    with pytest.raises(UserError, match="no NumPy array"):
+        read_map(tmp_path / "a.npy")
+    write_map(tmp_path / "b.tif", identity(8, 8))
+    with pytest.raises(UserError, match="an overscan of 4 leaves nothing"):
+        read_map(tmp_path / "b.tif", overscan=4)
+    with pytest.raises(UserError, match="more than the limit of 10"):
+        read_map(tmp_path / "b.tif", max_pixels=10)
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
+def test_a_full_disk_leaves_the_earlier_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str):
+    path = tmp_path / f"a{ending}"
+    write_map(path, swirl(8, 8))
+    before = path.read_bytes()
+
+    def link(path: Path) -> Path:
+        temporary = path.with_name(f".full{path.suffix}")
+        temporary.symlink_to("/dev/full")
+        return temporary
+
+    monkeypatch.setattr(files, "temporary_beside", link)
+    with pytest.raises(UserError, match="the disk is full"):
+        write_map(path, swirl(80, 80))
+    assert path.read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_offsets_there_and_back():
+    map_ = swirl(20, 30, overscan=3)
+    for up in (True, False):
+        back = from_offsets(to_offsets(map_, up=up), up=up, overscan=3)
+        np.testing.assert_allclose(back.values, map_.values, atol=1e-8)
