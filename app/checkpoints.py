@@ -82,9 +82,9 @@ class Checkpoints:
         return any(kept.tick == tick and kept.is_valid_for(recipe) for kept in self._kept)
 
     def add(self, checkpoint: Checkpoint) -> None:
-        """Keep a checkpoint; those that are missed least go where there is no room."""
+        """Keep a checkpoint; those that are missed least go where there is no room, and none stays with no budget."""
         self._kept.append(checkpoint)
-        while self.nbytes > self.budget and len(self._kept) > 2:
+        while self.nbytes > self.budget and self._kept:
             self._drop(self._least_missed(checkpoint))
 
     def clear(self) -> None:
@@ -103,7 +103,7 @@ class Checkpoints:
             for position, (before, kept, after) in enumerate(zip(line, line[1:], line[2:], strict=False))
             if kept is not newest
         ]
-        return min(gaps)[2] if gaps else line[-1] if line[-1] is not newest else line[0]
+        return min(gaps)[2] if gaps else line[0]
 
     def _drop(self, checkpoint: Checkpoint) -> None:
         self._kept.remove(checkpoint)

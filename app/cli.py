@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional
+from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
 from app.errors import Cancelled, UserError
 
 if TYPE_CHECKING:
+    from app.opening import Opened
     from app.recipe import Recipe
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
@@ -109,7 +110,6 @@ def render(
 
     With several pictures, write {name} where OUT shall have the name of each.
     """
-    from app.export import Job, check_output, run_job
     from app.opening import open_recipe
 
     loaded = open_recipe(recipe)
@@ -124,9 +124,20 @@ def render(
         raise UserError(f"{len(wanted)} pictures cannot all become {output}; write for example out/{{name}}.png")
     for picture in wanted:
         target = Path(str(output).replace("{name}", picture.stem)) if picture else output
-        check_output(target)
-        source = loaded.picture(picture)
-        run_job(Job(asked, source, loaded.folder, target, stats))
+        _render_one(asked, loaded, picture, target, stats)
+
+
+def _render_one(recipe: Recipe, loaded: Opened, picture: Path | None, target: Path, stats: Path | None) -> None:
+    from app.export import Job, run
+    from app.progress import on_terminal
+    from solver.context import Device
+
+    job = Job(recipe, loaded.picture(picture), loaded.folder, target, stats)
+    job.check()
+    with on_terminal(target.name, recipe.ticks) as progress, Device.headless() as device:
+        report = run(device, job, progress)
+    for notice in (*report.notices, *([report.verdict] if report.verdict else [])):
+        print(f"fluidwarp: {notice}", file=sys.stderr)
 
 
 def _with_options(recipe: Recipe, changed: dict[str, dict[str, Any]], duration: float | None) -> Recipe:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cache
-from math import hypot
+from math import exp, hypot
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from app.masks import solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
 from app.strokes import Change, Dab, Stroke
-from solver.brush import Brush, Tip
+from app.timeline import Observation, Sentinel
+from solver.brush import Brush, Push, Tip, Twirl
 from solver.context import Device
 from solver.density import Density
 from solver.field import Field
@@ -34,6 +35,7 @@ BLOW = 0.5  # longer sides per second along a curve
 THICKENING = 4.0  # decades of viscosity per second
 RESTORING = 6.0  # per second, the part of the displacement that is taken away
 
+MOST_HEADWAY = 20.0
 
 SOLVERS = {"mac": (Fluid, WarpMap), "paper": (PaperFluid, PaperWarpMap)}
 
@@ -63,6 +65,7 @@ class Replay:
         self.checkpoints = Checkpoints(budget)
         self._brush = Brush(device)
         self._passing: State | None = None
+        self._leading: list[Push | Twirl] = []
         self._build()
 
     # -- going through time -----------------------------------------------------------------------------------------
@@ -131,6 +134,33 @@ class Replay:
         """The fluid's settings as they are in force at this tick."""
         return self.recipe.fluid_at(self.tick)
 
+    def observe(self, sentinel: Sentinel) -> Observation:
+        """What the sentinel asks for, at this moment; reads back from the GPU."""
+        motion = self.fluid.motion() if sentinel.needs_motion else None
+        distortion = self.warp.statistics() if sentinel.needs_map else None
+        return Observation(
+            energy=motion and motion.kinetic_energy,
+            speed=motion and motion.largest_speed,
+            displacement=distortion and distortion.displacement_max,
+            det=distortion and distortion.det_min,
+            points=tuple(self.whereabouts(watch.point) for watch in sentinel.stop.watch),
+            extent=self.grid.extent,
+        )
+
+    def whereabouts(self, point: tuple[float, float]) -> tuple[float, float]:
+        """Where a point of the original (fractions of width and height) is now, in longer sides.
+
+        The cell that is looked up nearest to it, and from there one step of Newton's method: exact to second order.
+        """
+        h, (x, y) = self.grid.h, self.grid.centres()
+        looked_up = self.warp.read().astype(np.float64) + np.stack([x, y], axis=-1)
+        wanted = np.multiply(point, self.grid.extent)
+        j, i = np.unravel_index(((looked_up - wanted) ** 2).sum(axis=-1).argmin(), x.shape)
+        jacobian = np.stack([np.gradient(looked_up, h, axis=axis)[j, i] for axis in (1, 0)], axis=-1)
+        step = np.linalg.lstsq(jacobian, wanted - looked_up[j, i], rcond=None)[0]
+        at_x, at_y = np.array([x[j, i], y[j, i]]) + np.clip(step, -h, h)
+        return float(at_x), float(at_y)
+
     # -- one step ---------------------------------------------------------------------------------------------------
 
     def _step(self, part: float) -> None:
@@ -141,12 +171,13 @@ class Replay:
                 self._change(change)
         self._set_parameters()
         painted = False
+        self._leading.clear()
         for stroke in self.recipe.stroke:
             if dabs := stroke.at(self.tick):
                 painted |= self._draw(stroke, dabs, dt, part)
         if painted:
             self.masks.apply(self.fluid)
-        self.fluid.step(dt, self._forces(dt))
+        self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
         with self.device.stage("warp map"):
             self.warp.advance(self.fluid.velocity.read, dt * part)
         if self.density is not None:
@@ -195,14 +226,14 @@ class Replay:
         pressed = sum(amount for _, amount in tips) / len(tips)
         match stroke.tool:
             case "push":
-                self._brush.push(self.fluid, whole, dt, pressed)
+                self._lead(Push(whole, dt, pressed))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
                     if length:
                         self._brush.push(self.fluid, tip, length / BLOW, amount)
             case "twirl":
-                self._brush.twirl(self.fluid, whole, TWIRL * pressed)
+                self._lead(Twirl(whole, TWIRL * pressed))
             case "bloat":
                 self._brush.expand(self.fluid, whole, GROWTH * pressed)
             case "pinch":
@@ -216,6 +247,15 @@ class Replay:
                     self._paint(stroke, tip, amount, dt / len(tips))
                 return True
         return False
+
+    def _lead(self, motion: Push | Twirl) -> None:
+        """Let a brush lead the fluid: with what viscosity and drag will take of it, and again once they have."""
+        self._brush.lead(self.fluid, motion, headway(self.settings, motion.tip.radius))
+        self._leading.append(motion)
+
+    def _steer(self) -> None:
+        for motion in self._leading:
+            self._brush.lead(self.fluid, motion, yielding=True)
 
     def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
         match stroke.tool:
@@ -305,7 +345,7 @@ class Replay:
             self.tick = checkpoint.tick
 
     def _keep(self, recipe: Recipe) -> None:
-        if not self.checkpoints.has(recipe, self.tick):
+        if self.checkpoints.budget and not self.checkpoints.has(recipe, self.tick):
             self.checkpoints.add(Checkpoint(recipe, self.tick, self._state()))
 
     def _leave_passing(self) -> None:
@@ -321,3 +361,12 @@ class Replay:
             *(change.tick for change in self.recipe.change),
         )
         return self.tick in events
+
+
+def headway(settings: FluidSettings, radius: float) -> float:
+    """How many times a brush's motion is put in, so that about all of it is left after a tick of viscosity and drag.
+
+    An implicit step leaves 1 / (1 + dt mu k^2) of a mode k; a brush's own k^2 is about 12 / radius^2 (measured).
+    """
+    held = exp(settings.drag * settings.dt) * (1 + 12 * settings.dt * settings.viscosity / radius**2)
+    return min(held, MOST_HEADWAY)

@@ -99,7 +99,7 @@ def named(path: list[int | str], data: Any) -> tuple[str, str]:
     """The table and the key of `path` as a person calls them: ('force[2] "wind": ', "radius"), counted from 1."""
     table, key = "", ""
     for item in path:
-        data = data[item] if isinstance(data, dict) and item in data else _item(data, item)
+        data = _item(data, item)
         if isinstance(item, int) and isinstance(data, dict):
             title = data.get("name")
             table, key = f"{table}{key}[{item + 1}]" + (f' "{title}"' if title else "") + ": ", ""
@@ -109,7 +109,10 @@ def named(path: list[int | str], data: Any) -> tuple[str, str]:
 
 
 def _item(data: Any, item: int | str) -> Any:
-    return data[item] if isinstance(data, (list, tuple)) and isinstance(item, int) and item < len(data) else None
+    try:
+        return data[item]
+    except (KeyError, IndexError, TypeError):
+        return None
 
 
 def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseModel]) -> str:
