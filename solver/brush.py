@@ -44,29 +44,75 @@ class Tip:
         return low[0], low[1], high[0] - low[0], high[1] - low[1]
 
 
+@dataclass(frozen=True)
+class Push:
+    """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it."""
+
+    tip: Tip
+    dt: float
+    strength: float = 1.0
+
+    @property
+    def shader(self) -> str:
+        return "brush/push.frag"
+
+    def inputs(self) -> dict[str, object]:
+        (x0, y0), (x1, y1) = self.tip.start, self.tip.end
+        # Against the drag at the whole speed, and no stronger than along it.
+        speed = (1.0 if self.strength > 0 else -1.0) / self.dt
+        return {"brush_velocity": ((x1 - x0) * speed, (y1 - y0) * speed), "strength": abs(self.strength)}
+
+
+@dataclass(frozen=True)
+class Twirl:
+    """Turn the fluid under the tip at `rate` rad/s, positive clockwise."""
+
+    tip: Tip
+    rate: float
+
+    @property
+    def shader(self) -> str:
+        return "brush/twirl.frag"
+
+    def inputs(self) -> dict[str, object]:
+        return {"rate": self.rate}
+
+
 class Brush:
     """Draws tips into a fluid.
 
-    Push and twirl are closed loops: they add what the fluid lacks of the wanted motion at the brush, so that the
-    picture follows the pointer at its own speed however thick the fluid is, and a resting brush holds it still.
+    Push and twirl are closed loops: they add what the fluid lacks of the wanted motion at the brush, so that the picture
+    follows the pointer at its own speed however thick the fluid is, and a resting brush holds it still.
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self._motion = device.field((1, 1), 4, "motion at the brush")
 
+    def lead(self, fluid: Fluid, motion: Push | Twirl, headway: float = 1.0, yielding: bool = False) -> None:
+        """Add what the fluid lacks of a motion, `headway` times.
+
+        With `yielding` it spares what is thicker than the fluid at the tip, and what is frozen: for the last touch
+        before the projection, which viscosity does not spread any more.
+        """
+        h, tip = fluid.grid.h, motion.tip
+        at = (tip.end[0] / h, tip.end[1] / h)
+        reach = max(0.25 * tip.radius / h, 0.5)
+        probe = self.device.pass_("brush/probe.frag")
+        probe(self._motion, velocity=fluid.faces(), viscosity=fluid.viscosity, at=at, reach=reach, h=h)
+        region = tip.region(fluid.grid)
+        inputs = tip.inputs(fluid.grid) | motion.inputs() | {"motion": self._motion, "headway": headway}
+        masks = {"viscosity": fluid.viscosity, "solid": fluid.solid} if yielding else {}
+        paint = self.device.pass_(motion.shader, **({"YIELDING": 1} if yielding else {}))
+        fluid.add_impulse(lambda faces: paint(faces, add=True, region=region, **masks, **inputs))
+
     def push(self, fluid: Fluid, tip: Tip, dt: float, strength: float = 1.0) -> None:
-        """Carry the fluid under the tip along; strength 1 moves it at the tip's own speed, negative against it."""
-        velocity = ((tip.end[0] - tip.start[0]) / dt, (tip.end[1] - tip.start[1]) / dt)
-        if strength < 0:
-            velocity, strength = (-velocity[0], -velocity[1]), -strength
-        self._probe(fluid, tip)
-        self._draw(fluid, "brush/push.frag", tip, brush_velocity=velocity, strength=strength)
+        """Carry the fluid under the tip along; see `Push`."""
+        self.lead(fluid, Push(tip, dt, strength))
 
     def twirl(self, fluid: Fluid, tip: Tip, rate: float) -> None:
-        """Turn the fluid under the tip at `rate` rad/s, positive clockwise."""
-        self._probe(fluid, tip)
-        self._draw(fluid, "brush/twirl.frag", tip, rate=rate)
+        """Turn the fluid under the tip; see `Twirl`."""
+        self.lead(fluid, Twirl(tip, rate))
 
     def expand(self, fluid: Fluid, tip: Tip, rate: float) -> None:
         """Let the area under the tip grow (or, negative, shrink) at `rate` 1/s in the next projection."""
@@ -77,15 +123,3 @@ class Brush:
 
     def release(self) -> None:
         self._motion.release()
-
-    def _probe(self, fluid: Fluid, tip: Tip) -> None:
-        h = fluid.grid.h
-        at = (tip.end[0] / h, tip.end[1] / h)
-        reach = max(0.25 * tip.radius / h, 0.5)
-        self.device.pass_("brush/probe.frag")(self._motion, velocity=fluid.faces(), at=at, reach=reach, h=h)
-
-    def _draw(self, fluid: Fluid, shader: str, tip: Tip, **inputs: object) -> None:
-        region = tip.region(fluid.grid)
-        inputs |= tip.inputs(fluid.grid)
-        paint = self.device.pass_(shader)
-        fluid.add_impulse(lambda faces: paint(faces, add=True, region=region, motion=self._motion, **inputs))

@@ -56,11 +56,16 @@ class Fluid:
 
     # -- the paper's step -------------------------------------------------------------------------------------------
 
-    def step(self, dt: float, forces: Iterable[Force] = ()) -> None:
-        """Advance by `dt` seconds: w0 -> add force -> w1 -> advect -> w2 -> diffuse -> w3 -> project -> w4."""
+    def step(self, dt: float, forces: Iterable[Force] = (), steer: Callable[[], None] | None = None) -> None:
+        """Advance by `dt` seconds: w0 -> add force -> w1 -> advect -> w2 -> diffuse -> w3 -> project -> w4.
+
+        `steer` is called with w3 in place: brushes that lead the picture by hand make up there for what viscosity took.
+        """
         self.add_force(forces)
         self.advect(dt)
         self.diffuse(dt)
+        if steer is not None:
+            steer()
         self.project()
 
     def add_force(self, forces: Iterable[Force]) -> None:

@@ -1,0 +1,1 @@
+"""The window: everything that knows imgui, and, in `window.py` alone, glfw."""

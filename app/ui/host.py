@@ -1,0 +1,93 @@
+"""imgui on a GL context: fed with our events, drawn into any framebuffer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import moderngl
+from imgui_bundle import imgui
+
+from app.ui import theme
+from app.ui.events import Button, Event, Focus, Key, Mods, Move, Text, Wheel
+from solver.context import Device
+
+_NAMED = {
+    "left": imgui.Key.left_arrow, "right": imgui.Key.right_arrow, "up": imgui.Key.up_arrow,
+    "down": imgui.Key.down_arrow, "enter": imgui.Key.enter, "escape": imgui.Key.escape, "tab": imgui.Key.tab,
+    "backspace": imgui.Key.backspace, "delete": imgui.Key.delete, "home": imgui.Key.home, "end": imgui.Key.end,
+    "pageup": imgui.Key.page_up, "pagedown": imgui.Key.page_down, "space": imgui.Key.space,
+}  # fmt: skip
+_LETTERS = {letter: getattr(imgui.Key, letter) for letter in "acvxyz"}
+_KEYS = _NAMED | _LETTERS
+
+
+class Host:
+    """The one imgui context of the process.
+
+    Args:
+        device: the GL it draws with; its context must be current.
+        layout: where imgui keeps the layout of its windows; None keeps none.
+    """
+
+    def __init__(self, device: Device, layout: str = "") -> None:
+        self.device = device
+        self._context = imgui.create_context()
+        io = imgui.get_io()
+        io.set_ini_filename(layout)
+        # An exception in the middle of a frame must end in a message, not in an assertion about a missing End().
+        io.config_error_recovery_enable_assert = False
+        io.config_error_recovery_enable_tooltip = False
+        # Events are taken as they come: spread over frames by imgui, a fast drag would lag behind the pointer.
+        io.config_input_trickle_event_queue = True
+        io.config_flags |= imgui.ConfigFlags_.nav_enable_keyboard.value
+        io.config_nav_cursor_visible_auto = True
+        self.fonts = theme.load_fonts()
+        imgui.backends.opengl3_init("#version 330")
+
+    def begin(self, size: tuple[float, float], density: float, dt: float, events: Iterable[Event]) -> None:
+        """Start a frame of `size` points with `density` pixels each."""
+        io = imgui.get_io()
+        io.display_size = imgui.ImVec2(*size)
+        io.display_framebuffer_scale = imgui.ImVec2(density, density)
+        io.delta_time = max(dt, 1e-4)
+        for event in events:
+            self._feed(io, event)
+        imgui.backends.opengl3_new_frame()
+        imgui.new_frame()
+
+    def end(self, target: moderngl.Framebuffer) -> None:
+        """Finish the frame and draw it over what `target` holds."""
+        imgui.render()
+        target.use()
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+
+    def abandon(self) -> None:
+        """End a frame in which something went wrong, without drawing it."""
+        imgui.end_frame()
+
+    def release(self) -> None:
+        imgui.backends.opengl3_shutdown()
+        imgui.destroy_context(self._context)
+
+    def _feed(self, io: imgui.IO, event: Event) -> None:
+        match event:
+            case Move(x, y):
+                io.add_mouse_pos_event(x, y)
+            case Button(button, down, mods):
+                self._feed_mods(io, mods)
+                io.add_mouse_button_event(button, down)
+            case Wheel(dx, dy):
+                io.add_mouse_wheel_event(dx, dy)
+            case Key(key, down, mods):
+                self._feed_mods(io, mods)
+                if key in _KEYS:
+                    io.add_key_event(_KEYS[key], down)
+            case Text(text):
+                io.add_input_characters_utf8(text)
+            case Focus(focused):
+                io.add_focus_event(focused)
+
+    def _feed_mods(self, io: imgui.IO, mods: Mods) -> None:
+        io.add_key_event(imgui.Key.mod_ctrl, mods.ctrl)
+        io.add_key_event(imgui.Key.mod_shift, mods.shift)
+        io.add_key_event(imgui.Key.mod_alt, mods.alt)

@@ -1,0 +1,19 @@
+// How far the fluid at a node lets a brush lead it: 1 where it is no thicker than at the brush's tip, less in proportion to
+// how much thicker it is, 0 at frozen cells; the least of the four cells around. 1 everywhere unless YIELDING.
+#ifdef YIELDING
+uniform sampler2D u_viscosity; // lengths^2 / s
+uniform sampler2D u_solid;
+
+float yielding(vec2 node, float tip_viscosity) {
+    vec2 texel = 1.0 / vec2(textureSize(u_viscosity, 0));
+    float least = 1.0;
+    for (int k = 0; k < 4; ++k) {
+        vec2 place = (node + vec2(k & 1, k >> 1) - 0.5) * texel;
+        float thicker = max(texture(u_viscosity, place).r, 1e-9) / max(tip_viscosity, 1e-9);
+        least = min(least, (1.0 - step(0.5, texture(u_solid, place).r)) / max(thicker, 1.0));
+    }
+    return least;
+}
+#else
+float yielding(vec2 node, float tip_viscosity) { return 1.0; }
+#endif
