@@ -17,7 +17,7 @@ from solver.reduce import Reduction
 COARSEST = 64
 # Eigenvalues of D^-1 A that a smoothing sweep is for: the upper end is above all that occur, the lower one is about where
 # the next grid takes over.
-SMOOTHED = (0.9, 3.6)
+SMOOTHED = (0.7, 8 / 3)
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Plan:
     """
 
     steps: int = 2
-    sweeps: tuple[int, int] = (1, 2)
-    visits: tuple[int, ...] = (1, 1, 1, 2)
+    sweeps: tuple[int, int] = (2, 2)
+    visits: tuple[int, ...] = (1,)
 
 
 def plan_for(least: float, largest: float) -> Plan:
@@ -89,7 +89,7 @@ class Level:
         self.cells = device.field((2 * self.texels[0] + 1, 2 * self.texels[1] + 1), 4, f"{label} cells")
         self.packed = {
             name: device.field(ringed, 4, f"{label} {name}")
-            for name in ("cells_x", "cells_y", "nodes", "cell_halo", "node_halo", "open")
+            for name in ("cells_x", "cells_y", "nodes", "cell_halo", "node_halo", "inverse_u", "inverse_v", "open")
         }
         self.right = Pair(device, ringed, f"{label} right-hand side")
         self.faces = DoublePair(device, ringed, f"{label} faces")
@@ -162,6 +162,9 @@ class Viscosity:
 
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution."""
+        # NOTE FROM THE LEAD (remove when done): the error must be a fraction of the CHANGE v - v*, not of |v|: now a lid-
+        # driven cavity at Re 100 ends at u_min -.159 instead of -.214 (worse for smaller dt), because 0.7 % of |v| is
+        # wrong EVERY step. Solve A d = b - A v* for d, v = v* + d (FMG/CG on d). See tests/test_viscosity_change.py.
         finest = self.levels[0]
         load = self.device.pass_("viscosity/load.frag", **self._slip, **finest.defines)
         load(finest.right.fields, region=finest.region, velocity=velocity.read, **finest.matrix, **self._lid)
@@ -339,26 +342,24 @@ class Viscosity:
 def inverse_matrix(level: Level) -> np.ndarray:
     """The inverse of a level's matrix as `shaders/viscosity/exact.frag` reads it, (unknowns, unknowns / 4, 4) float32."""
     width, height = level.texels
-    packed = {name: level.packed[name].get()[1:-1, 1:-1] for name in ("cells_x", "cells_y", "nodes", "node_halo")}
+    packed = {name: field.get()[1:-1, 1:-1] for name, field in level.packed.items()}
 
     def unpacked(texels: np.ndarray) -> np.ndarray:
         return texels.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)
 
-    cells_x, cells_y, own_nodes = (
-        unpacked(packed[name]).astype(np.float64) for name in ("cells_x", "cells_y", "nodes")
-    )
+    cells_x, cells_y = (unpacked(packed[name]).astype(np.float64) for name in ("cells_x", "cells_y"))
     nodes = np.zeros((2 * height + 1, 2 * width + 1))
-    nodes[:-1, :-1] = np.abs(own_nodes)
+    nodes[:-1, :-1] = unpacked(packed["nodes"])
     nodes[:-1, -1] = packed["node_halo"][:, -1, :2].ravel()
     nodes[-1, :-1] = packed["node_halo"][-1, :, 2:].ravel()
     # Numbers of the unknowns in the order of the texels, -1 where a face is pinned, with a frame of pinned faces.
     texel = np.arange(width * height).reshape(height, width, 1) * 4 + np.arange(4)
-    u = np.pad(np.where(cells_x >= 0, unpacked(texel), -1), 1, constant_values=-1)
-    v = np.pad(np.where(own_nodes >= 0, unpacked(texel) + texel.size, -1), 1, constant_values=-1)
+    u = np.pad(np.where(unpacked(packed["inverse_u"]) > 0, unpacked(texel), -1), 1, constant_values=-1)
+    v = np.pad(np.where(unpacked(packed["inverse_v"]) > 0, unpacked(texel) + texel.size, -1), 1, constant_values=-1)
     count = 2 * texel.size
     matrix = np.eye(count).ravel()
     strains = (
-        (np.abs(cells_x), ((u[1:-1, 2:], 1), (u[1:-1, 1:-1], -1))),
+        (cells_x, ((u[1:-1, 2:], 1), (u[1:-1, 1:-1], -1))),
         (cells_y, ((v[2:, 1:-1], 1), (v[1:-1, 1:-1], -1))),
         (nodes, ((u[1:, 1:], 1), (u[:-1, 1:], -1), (v[1:, 1:], 1), (v[1:, :-1], -1))),
     )

@@ -1,0 +1,28 @@
+"""The viscous solve leaves a fraction of the change it makes: a steady state is a fixed point of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import reference
+from solver.context import Device
+from solver.params import Walls
+from solver.viscosity import Viscosity
+
+
+def test_error_is_a_fraction_of_the_change(device: Device) -> None:
+    n, dt = 32, 1 / 32
+    speed = (0.0, 0.0, 1.0, 0.0)
+    viscosity = np.full((n, n), 0.01)
+    faces = reference.smooth_velocity(n, n, seed=3)
+    solver = Viscosity(device, (n, n))
+    solid = device.field((n, n), 1, dtype="f1")
+    solver.set_coefficients(device.upload(viscosity), solid, dt, Walls("none", speed))
+    for _ in range(40):  # towards the steady state
+        faces = reference.viscous_step(faces, viscosity, dt, 1 / n, no_slip=True, speed=speed)
+    velocity = device.double_field((n, n), 2, "velocity")
+    velocity.read.set(faces)
+    solver.diffuse(velocity)
+    wanted = reference.viscous_step(faces, viscosity, dt, 1 / n, no_slip=True, speed=speed)
+    change = np.abs(wanted - faces).max()
+    assert np.abs(velocity.read.get() - wanted).max() < 0.02 * change + 1e-5
