@@ -127,7 +127,7 @@ def test_three_cycles_do_for_noise(device: Device) -> None:
     assert left_over(device, noise, np.zeros((217, 333), bool), 3) <= 1e-3
 
 
-@pytest.mark.parametrize("size", [(512, 512), (1024, 1024)])
+@pytest.mark.parametrize("size", [(512, 512), (333, 217), (512, 100), (257, 255)])
 def test_four_cycles_do_with_thin_walls(device: Device, size: tuple[int, int]) -> None:
     assert left_over(device, brush(size), walled(size), 4) <= 1e-3
 

@@ -2,10 +2,12 @@
 // quadratic interpolation. A coarse neighbour behind a wall is replaced by its mirror image; cells that the coarse cell
 // does not stand for take the mean of the coarse cells they touch.
 // in:  u_coarse   pressure / h at blocks of the coarser level;  u_links   see links.frag
+// With OPEN there are no solids: u_cells, the finer level's size in cells, takes the place of u_links.
 // out: pressure / h at blocks of the finer level
 // reads: 5
 uniform sampler2D u_coarse;
 uniform sampler2D u_links;
+uniform vec2 u_cells;
 
 in vec2 v_uv;
 out vec4 out_pressure;
@@ -33,21 +35,28 @@ void main() {
     vec3 middle = vec3(above.z, own.x, own.z), left = odd.x ? inner : outer, right = odd.x ? outer : inner;
     if (odd.y) { left = left.zyx; middle = middle.zyx; right = right.zyx; }
 
-    vec4 links = floor(texture(u_links, v_uv) * 255.0 + 0.5);
-    int open = int(links.g), taken = int(links.b);
     float here = middle.y;
-    vec4 raw = vec4(left.y, right.y, middle.x, middle.z);
-    vec4 sides = mix(vec4(here), raw, gates(open));
-    vec4 corners = mix(sides.xyxy + sides.zzww - here, vec4(left.x, right.x, left.z, right.z), gates(open >> 4));
-    left = vec3(corners.x, sides.x, corners.z) ;
+    vec4 raw = vec4(left.y, right.y, middle.x, middle.z), raw_corners = vec4(left.x, right.x, left.z, right.z);
+#ifdef OPEN
+    vec4 side_gates = vec4(cell.x > 0.5, 2.0 * cell.x + 2.0 < u_cells.x, cell.y > 0.5, 2.0 * cell.y + 2.0 < u_cells.y);
+    vec4 corner_gates = side_gates.xyxy * side_gates.zzww;
+#else
+    ivec3 links = ivec3(texture(u_links, v_uv).rgb * 255.0 + 0.5);
+    vec4 side_gates = gates(links.g), corner_gates = gates(links.g >> 4);
+#endif
+    vec4 sides = mix(vec4(here), raw, side_gates);
+    vec4 corners = mix(sides.xyxy + sides.zzww - here, raw_corners, corner_gates);
+    left = vec3(corners.x, sides.x, corners.z);
     right = vec3(corners.y, sides.y, corners.w);
     middle = vec3(sides.z, here, sides.w);
     vec3 west = middle + NEAR_FAR.x * (left - middle) + NEAR_FAR.y * (right - middle);
     vec3 east = middle + NEAR_FAR.x * (right - middle) + NEAR_FAR.y * (left - middle);
     vec4 centre = vec2(west.y, east.y).xyxy, up = vec2(west.x, east.x).xyxy, down = vec2(west.z, east.z).xyxy;
-    vec4 near = vec4(up.xy, down.xy) - centre, far = vec4(down.xy, up.xy) - centre;
-
-    vec4 horizontal = gates(taken), vertical = gates(taken >> 4);
-    vec4 orphans = (horizontal * raw.xyxy + vertical * raw.zzww) / max(horizontal + vertical, 1.0);
-    out_pressure = mix(orphans, centre + NEAR_FAR.x * near + NEAR_FAR.y * far, gates(int(links.r)));
+    vec4 near = vec4(up.xy, down.xy), far = vec4(down.xy, up.xy);
+    out_pressure = centre + NEAR_FAR.x * (near - centre) + NEAR_FAR.y * (far - centre);
+#ifndef OPEN
+    vec4 beside_gates = gates(links.b), above_gates = gates(links.b >> 4);
+    vec4 orphans = (beside_gates * raw.xyxy + above_gates * raw.zzww) / max(beside_gates + above_gates, 1.0);
+    out_pressure = mix(orphans, out_pressure, gates(links.r));
+#endif
 }

@@ -1,6 +1,6 @@
 // Right-hand side of the coarser level: the sum of the residual over what each coarse cell stands for.
 // (The coarse cells' sides are twice as long, which the factor 4 of the sum over the mean accounts for.)
-// in:  u_residual   at blocks of the finer level;  u_links   see links.frag
+// in:  u_residual   at blocks of the finer level;  u_links   see links.frag, not needed with OPEN (no solids)
 // out: right-hand side at blocks of the coarser level, the same unit
 // reads: 8
 uniform sampler2D u_residual;
@@ -10,10 +10,13 @@ out vec4 out_residual;
 
 float total(vec2 block, vec2 size) {
     vec2 uv = block / size;
-    int inside = int(texture(u_links, uv).r * 255.0 + 0.5);
-    vec4 members = vec4(inside & 1, (inside >> 1) & 1, (inside >> 2) & 1, (inside >> 3) & 1);
     // The coarser level is padded to an even number of cells.
-    return dot(texture(u_residual, uv), members) * float(all(lessThan(block, size)));
+    vec4 members = vec4(all(lessThan(block, size)));
+#ifndef OPEN
+    int inside = int(texture(u_links, uv).r * 255.0 + 0.5);
+    members *= vec4(inside & 1, (inside >> 1) & 1, (inside >> 2) & 1, (inside >> 3) & 1);
+#endif
+    return dot(texture(u_residual, uv), members);
 }
 
 void main() {
