@@ -129,6 +129,7 @@ class PaperWarpMap(WarpMap):
             h=self.grid.h,
         )
         self._near.swap()
+        self._steps += 1  # the whole map is not the base
         self._changed()
 
     def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
