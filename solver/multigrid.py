@@ -21,7 +21,7 @@ DIRECT_BLOCKS = 64
 def chebyshev_weights(sweeps: int, smallest: float) -> tuple[float, ...]:
     """Jacobi weights that together damp all modes with eigenvalues from `smallest` to 2 as evenly as can be.
 
-    Largest weight first: what rounding and a leading overshoot leave, the small ones then smooth.
+    The largest weight comes first, so that the others smooth what it throws up.
     """
     middle, half = (2.0 + smallest) / 2, (2.0 - smallest) / 2
     return tuple(sorted((1 / (middle + half * cos(pi * (k + 0.5) / sweeps)) for k in range(sweeps)), reverse=True))
@@ -81,7 +81,6 @@ class Pressure:
         self._inverse = device.field((4 * count, count), 4, "pressure inverse")
         self._base = device.field(blocks, 4, "pressure base")
         self._change = device.double_field(blocks, 4, "pressure change")
-        self._whole = device.field(blocks, 4, "pressure whole")
         self._applied = device.field(blocks, 4, "pressure applied")
         self._u, self._v = (device.field(blocks, 4, f"velocity {name} in blocks") for name in "uv")
         self._sums: list[Field] = []
@@ -92,7 +91,7 @@ class Pressure:
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self._levels, *self._sums, self._inverse, self._base, self._change, self._whole, self._applied):
+        for item in (*self._levels, *self._sums, self._inverse, self._base, self._change, self._applied):
             item.release()
         self._u.release()
         self._v.release()
@@ -121,7 +120,7 @@ class Pressure:
 
         Args:
             velocity: MAC velocity, lengths / s; its faces at edges and solids become exactly zero.
-            cycles: multigrid cycles; each leaves a tenth to a thirtieth of the divergence.
+            cycles: multigrid cycles; each leaves about a tenth of the divergence, and less of a smooth one.
             source: wanted divergence at cells, 1 / s; its mean over the fluid is taken off: nothing leaves the grid.
             warm: start from the last pressure, scaled to leave the least: never worse than to start from none.
         """
@@ -129,7 +128,8 @@ class Pressure:
         self._take_divergence(velocity.read, source)
         corrections = 0
         if warm:
-            finest.pressure.read, self._whole = self._whole, finest.pressure.read
+            pass_ = self.device.pass_("pressure/add.frag")
+            pass_(finest.pressure.read, a=self._base, b=self._change.read)
             self._scale_and_subtract(finest)
             self._keep_correction(corrections)
             corrections += 1
@@ -143,7 +143,7 @@ class Pressure:
             corrections += 1
         for part in (self._base, self._change.read)[corrections:]:
             part.clear()
-        self._draw("subtract_gradient", (self._u, self._v, self._whole), finest,
+        self._draw("subtract_gradient", (self._u, self._v), finest,
                    velocity=velocity.read, base=self._base, change=self._change.read)  # fmt: skip
         self.device.pass_("pressure/scatter_velocity.frag")(velocity.write, u=self._u, v=self._v)
         velocity.swap()
@@ -151,7 +151,7 @@ class Pressure:
     @property
     def pressure(self) -> np.ndarray:
         """The last pressure, (ny, nx) float32, lengths^2 / s: it includes the time step."""
-        return _cells(self._whole.get(), self.size) * np.float32(self.h)
+        return _cells(self._base.get() + self._change.read.get(), self.size) * np.float32(self.h)
 
     def divergence_norm(self, velocity: Field) -> float:
         """Root mean square divergence of a MAC velocity over all cells, 1 / s; waits for the GPU."""
