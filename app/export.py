@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -15,6 +14,7 @@ import numpy as np
 
 from app.animation import animation_writer, check_animation, frame_order, is_animation, reordered
 from app.files import replacing, writable
+from app.opening import check_picture
 from app.pictures import Picture, picture_format, write_picture
 from app.progress import Progress
 from app.recipe import Recipe
@@ -96,6 +96,7 @@ def run(device: Device, job: Job, progress: Progress) -> Report:
 
 class _Export:
     def __init__(self, device: Device, job: Job, progress: Progress) -> None:
+        check_picture(job.picture, job.recipe.fluid.grid)
         self.job = job
         self.recipe = job.recipe
         self.progress = progress
@@ -107,7 +108,7 @@ class _Export:
         self.size = result_size(job.recipe, job.picture)
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.numbers: list[dict[str, Any]] = []
-        device.timings.enabled = job.stats is not None
+        device.timings.enabled = self.replay.fluid.measuring = job.stats is not None
 
     def release(self) -> None:
         self.device.timings.enabled = False
@@ -208,12 +209,14 @@ class _Export:
     # -- numbers ----------------------------------------------------------------------------------------------------
 
     def _numbers(self, position: Fraction) -> dict[str, Any]:
-        replay = self.replay
+        replay, residuals = self.replay, self.replay.fluid.residuals
         return {
             "frame": len(self.numbers),
             "tick": float(position),
             "time": float(position) * self.recipe.fluid.dt,
-            **replay.fluid.statistics(),
+            **asdict(residuals),
+            "divergence_left": residuals.divergence_left,
+            **asdict(replay.fluid.motion()),
             **asdict(replay.warp.statistics()),
             "milliseconds": {stage: round(spent, 3) for stage, spent in self.device.timings.take().items()},
         }
@@ -221,7 +224,6 @@ class _Export:
     def _document(self, verdict: str | None) -> dict[str, Any]:
         return {
             "fluidwarp": 1,
-            "made": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
             "opengl": self.device.limits.renderer,
             "picture": [self.job.picture.width, self.job.picture.height],
             "result": list(self.size),

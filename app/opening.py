@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -9,8 +10,25 @@ from pathlib import Path
 from app.errors import UserError
 from app.pictures import Picture, read_picture
 from app.recipe import Recipe
+from solver.grid import SMALLEST_GRID
 
+SMALLEST_SIDE = 8  # pixels
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr", ".avif", ".gif", ".bmp")
+
+
+def check_picture(picture: Picture, cells: int) -> None:
+    """Make sure that a picture can be covered by square cells, `cells` of them along its longer side.
+
+    Raises:
+        UserError: if it is too small, or too narrow for that many.
+    """
+    shorter, longer = sorted((picture.width, picture.height))
+    size = f"the picture is {picture.width} x {picture.height} pixels"
+    if shorter < SMALLEST_SIDE:
+        raise UserError(f"{size}; a side must have at least {SMALLEST_SIDE}, so enlarge or crop it")
+    if cells * shorter < (SMALLEST_GRID - 0.5) * longer:
+        needed = math.ceil(SMALLEST_GRID * longer / shorter)
+        raise UserError(f"{size}, too narrow for a grid of {cells}; use --grid {needed} or more, or crop it")
 
 
 @dataclass(frozen=True)

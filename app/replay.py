@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from math import exp, hypot
@@ -9,11 +10,13 @@ from math import exp, hypot
 import numpy as np
 
 from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, State, copies
-from app.forces import build
+from app.errors import UserError
+from app.forces import BuiltForce, build
 from app.masks import solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
 from app.strokes import Change, Dab, Stroke
+from app.timelaws import Law
 from app.timeline import Observation, Sentinel
 from solver.brush import Brush, Push, Tip, Twirl
 from solver.context import Device
@@ -37,7 +40,45 @@ RESTORING = 6.0  # per second, the part of the displacement that is taken away
 
 MOST_HEADWAY = 20.0
 
+# What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
+FARTHEST = 2.0
+WIDEST = 3.0
+
 SOLVERS = {"mac": (Fluid, WarpMap), "paper": (PaperFluid, PaperWarpMap)}
+
+
+@dataclass(frozen=True)
+class LoadedForce:
+    """A force on the GPU, and the largest values in its fields."""
+
+    label: str
+    law: Law
+    faces: Field | None
+    divergence: Field | None
+    strongest: float
+    widest: float
+
+    @classmethod
+    def of(cls, device: Device, force: BuiltForce) -> LoadedForce:
+        fields = [None if a is None else device.upload(a, force.label) for a in (force.faces, force.divergence)]
+        peaks = [0.0 if a is None else float(np.abs(a).max()) for a in (force.faces, force.divergence)]
+        return cls(force.label, force.law, fields[0], fields[1], peaks[0], peaks[1])
+
+    def check(self, impulse: float, dt: float, time: float) -> None:
+        """Make sure that the force is one that a step can follow.
+
+        Raises:
+            UserError: if it throws the fluid farther than the picture, or swells it out of all measure, within a tick.
+        """
+        mend = "make its 'strength' or 'fluid.dt' smaller"
+        if (thrown := self.strongest * abs(impulse) * dt) > FARTHEST:
+            raise UserError(
+                f"{self.label}: at t = {time:.3g} s it throws the fluid {thrown:.3g} times the picture's size within "
+                f"one tick; {mend}"
+            )
+        if (swollen := self.widest * abs(impulse)) > WIDEST:
+            grown = f"makes areas e^{swollen:.3g} times as large within one tick"
+            raise UserError(f"{self.label}: at t = {time:.3g} s it {grown}; {mend}")
 
 
 class Replay:
@@ -208,13 +249,14 @@ class Replay:
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
         """The force fields and their impulses in this tick; sources go into the fluid's own."""
         start, pushes = self.tick * dt, []
-        for law, faces, divergence in self._forces_built:
-            impulse = law.impulse(start, start + dt, self)
-            if impulse and faces is not None:
-                pushes.append((faces, impulse))
-            if impulse and divergence is not None:
+        for force in self._forces_built:
+            impulse = force.law.impulse(start, start + dt, self)
+            force.check(impulse, dt, start)
+            if impulse and force.faces is not None:
+                pushes.append((force.faces, impulse))
+            if impulse and force.divergence is not None:
                 # The velocity that holds during this tick has to make all the room that the tick shall make.
-                self.fluid.add_source(divergence, impulse / dt)
+                self.fluid.add_source(force.divergence, impulse / dt)
         return pushes
 
     def _draw(self, stroke: Stroke, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
@@ -287,10 +329,8 @@ class Replay:
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
         self._frozen = solid(recipe.freeze, self.grid, self.pictures)
-        self._forces_built = [
-            (force.law, self._uploaded(force.faces, force.label), self._uploaded(force.divergence, force.label))
-            for force in build(recipe.force, self.grid, self.pictures, recipe.duration)
-        ]
+        built = build(recipe.force, self.grid, self.pictures, recipe.duration)
+        self._forces_built = [LoadedForce.of(self.device, force) for force in built]
         self._viscosity = cache(self._viscosity_over)
         self._set_parameters()
 
@@ -308,11 +348,8 @@ class Replay:
     def _viscosity_over(self, base: float) -> np.ndarray:
         return viscosity(self.recipe.viscosity, base, self.grid, self.pictures)
 
-    def _uploaded(self, array: np.ndarray | None, label: str) -> Field | None:
-        return None if array is None else self.device.upload(array, label)
-
     def _release_simulation(self) -> None:
-        fields = [field for _, *fields in self._forces_built for field in fields]
+        fields = [field for force in self._forces_built for field in (force.faces, force.divergence)]
         for thing in (self.fluid, self.warp, self.masks, self.density, *fields):
             if thing is not None:
                 thing.release()

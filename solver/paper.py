@@ -103,6 +103,9 @@ class PaperFluid(Fluid):
     def pressure(self) -> np.ndarray:
         return self._pressure.read.get()
 
+    def _viscous_residual(self, before: Field) -> float | None:
+        return None
+
     def release(self) -> None:
         super().release()
         for item in (self._pressure, self._divergence, self._before, self._faces):
