@@ -12,6 +12,7 @@ linearly.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
@@ -38,6 +39,7 @@ from app.schema import Fraction01, Model, Radius
 from solver.grid import Grid
 
 MOST_VISCOUS = 1e6
+FINE = 1024  # cells along the longer side, at least, that a picture is quantised on
 Viscosity = Annotated[float, Field(ge=0, le=MOST_VISCOUS)]
 
 
@@ -97,6 +99,14 @@ class _PictureLayer(_Layer):
     levels: Annotated[int, Field(ge=2, le=256)] | None = None
 
     def intensity(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+        if self.levels is None:
+            return self._shades(grid, pictures)
+        # The steps are cut on a fine grid and then averaged, or their edges would lie elsewhere on every grid.
+        finer = math.ceil(FINE / max(grid.nx, grid.ny))
+        steps = quantised(self._shades(Grid(grid.nx * finer, grid.ny * finer), pictures), self.levels)
+        return steps.reshape(grid.ny, finer, grid.nx, finer).mean(axis=(1, 3))
+
+    def _shades(self, grid: Grid, pictures: Pictures) -> np.ndarray:
         if self.segment:
             values = self.segment.weight(self.picture, grid, pictures)
         else:
@@ -110,7 +120,7 @@ class _PictureLayer(_Layer):
             values = 1.0 - values
         if self.blur > 0:
             values = blurred(values, self.blur, grid)
-        return quantised(values, self.levels) if self.levels else np.clip(values, 0.0, 1.0)
+        return np.clip(values, 0.0, 1.0)
 
 
 class _Path(_Layer):
