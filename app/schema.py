@@ -160,8 +160,12 @@ def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseMode
 
 
 def _shown(value: Any) -> str:
-    shown = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
-    if isinstance(value, (tuple, list)):
+    shown = repr(value)
+    if isinstance(value, bool):
+        shown = "true" if value else "false"
+    elif isinstance(value, str):
+        shown = f'"{value}"'
+    elif isinstance(value, (tuple, list)):
         shown = f"a list of {len(value)}"
     elif isinstance(value, dict):
         shown = "a table"

@@ -82,7 +82,7 @@ def test_save_and_load(tmp_path: Path):
         ("duration = 0", "line 1: 'duration' must be greater than 0, not 0"),
         ("duration = nan", "'duration' must be a finite number, not nan"),
         ("[fluid]\nviscosity = inf", "line 2: 'fluid.viscosity' must be a finite number, not inf"),
-        ("duration = '1'", "'duration' must be a number, not '1'"),
+        ("duration = '1'", "'duration' must be a number, not \"1\""),
         ("[fluid]\ngrid = 1.5", "'fluid.grid' must be a whole number, not 1.5"),
         ("[fluid]\nwalls = true", "'fluid.walls' must be one of 'free-slip' or 'no-slip', not true"),
         ("fluid = 3", "'fluid' must be a table, not 3"),

@@ -1,0 +1,273 @@
+"""The command line as its user meets it: in a process of its own, with files, and with everything that can be wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import cli
+from app.pictures import Picture, read_picture, write_picture
+
+ROOT = Path(__file__).parent.parent
+RECIPE = """
+picture = "cat.png"
+duration = 0.2
+[fluid]
+grid = 32
+dt = 0.02
+[[force]]
+name = "whirl"
+kind = "vortex"
+point = [0.5, 0.5]
+radius = 0.3
+strength = 5
+[output]
+fps = 20
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    y, x = np.mgrid[0:48, 0:64]
+    stripes = np.where((x // 8 + y // 8) % 2, 220, 40)
+    write_picture(tmp_path / "cat.png", Picture(np.stack([stripes, x * 3, y * 4], axis=-1).astype(np.uint8)))
+    (tmp_path / "a.toml").write_text(RECIPE)
+    return tmp_path
+
+
+def fluidwarp(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run `fluidwarp words...` in `folder`."""
+    return subprocess.run(
+        [sys.executable, "-m", "app", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+
+
+def here(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+# -- what works -------------------------------------------------------------------------------------------------------
+
+
+def test_a_picture_twice_is_the_same_bytes(folder: Path):
+    for name in ("one.png", "two.png"):
+        ran = fluidwarp(folder, "render", "a.toml", "-o", name)
+        assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
+    assert (folder / "one.png").read_bytes() == (folder / "two.png").read_bytes()
+    before, after = read_picture(folder / "cat.png").pixels, read_picture(folder / "one.png").pixels
+    assert after.shape == before.shape
+    assert (after != before).any()
+
+
+def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path):
+    assert fluidwarp(folder, "render", "a.toml", "-o", "end.png").returncode == 0
+    ran = fluidwarp(folder, "render", "a.toml", "-o", "f.%02d.png", "--stats", "s.json")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    frames = sorted(name for name in here(folder) if name.startswith("f."))
+    assert frames == [f"f.{number:02d}.png" for number in range(5)]
+    pixels = [read_picture(folder / name).pixels for name in (frames[0], "cat.png", frames[-1], "end.png")]
+    assert np.array_equal(pixels[0], pixels[1])
+    assert np.array_equal(pixels[2], pixels[3])
+    numbers = json.loads((folder / "s.json").read_text())["frames"]
+    assert [entry["tick"] for entry in numbers] == [0, 2.5, 5, 7.5, 10]
+    assert numbers[-1]["divergence_left"] < 1e-2
+    assert numbers[-1]["folds"] == 0
+    assert {"advect", "diffuse", "project", "warp map"} <= numbers[-1]["milliseconds"].keys()
+
+
+def test_options_instead_of_the_recipe(folder: Path):
+    write_picture(folder / "dog.png", Picture(np.zeros((30, 20, 3), np.uint8)))
+    words = ["--image", "dog.png", "--size", "60", "--grid", "16", "--solver", "paper", "--duration", "0.1"]
+    ran = fluidwarp(folder, "render", "a.toml", "-o", "out.jpg", *words)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert read_picture(folder / "out.jpg").pixels.shape == (60, 40, 3)
+
+
+def test_several_pictures(folder: Path):
+    write_picture(folder / "dog.png", Picture(np.zeros((30, 20, 3), np.uint8)))
+    ran = fluidwarp(folder, "render", "a.toml", "cat.png", "dog.png", "-o", "{name} warped.png")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert {"cat warped.png", "dog warped.png"} <= here(folder)
+
+
+def test_animation_stopped_and_turned(folder: Path):
+    (folder / "b.toml").write_text(
+        RECIPE + "[stop]\ndisplacement_above = 0.03\n[time]\nreverse = true\nping_pong = true"
+    )
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "b.gif")
+    assert ran.returncode == 0
+    assert "largest displacement 0.03" in ran.stderr
+    assert ran.stderr.startswith("fluidwarp: stopped at t = ")
+    assert (folder / "b.gif").read_bytes()[:6] == b"GIF89a"
+
+
+def test_density_mode_moves_values(folder: Path):
+    (folder / "b.toml").write_text('mode = "density"\n' + RECIPE + "[density]\nkappa = 0.01\n")
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "b.png")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    after = read_picture(folder / "b.png").pixels
+    assert after.shape == (48, 64, 3)
+    assert after[..., 0].std() < 0.6 * read_picture(folder / "cat.png").pixels[..., 0].std()
+
+
+def test_doctor(folder: Path):
+    ran = fluidwarp(folder, "doctor", DISPLAY="", WAYLAND_DISPLAY="")
+    assert ran.returncode == 0
+    assert "OpenGL" in ran.stdout
+    assert "no display" in ran.stdout
+
+
+# -- what does not ----------------------------------------------------------------------------------------------------
+
+
+def test_no_egl_is_told(folder: Path):
+    nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ""}
+    ran = fluidwarp(folder, "render", "a.toml", "-o", "out.png", **nothing)
+    assert ran.returncode != 0
+    assert "apt-get install" in ran.stderr
+    assert len(ran.stderr.splitlines()) <= 2
+    assert "out.png" not in here(folder)
+
+
+BAD = {
+    "no such recipe": (["b.toml", "-o", "x.png"], "b.toml does not exist"),
+    "no such name": (["nonesuch", "-o", "x.png"], "nonesuch does not exist; recipes that come with fluidwarp"),
+    "a picture as recipe": (["cat.png", "-o", "x.png"], "cat.png is a picture and not a recipe"),
+    "no such picture": (["a.toml", "-i", "dog.png", "-o", "x.png"], "dog.png"),
+    "truncated picture": (["a.toml", "-i", "cut.png", "-o", "x.png"], "cut.png"),
+    "no picture": (["a.toml", "-i", "a.toml", "-o", "x.png"], "a.toml"),
+    "1 x 1": (["a.toml", "-i", "dot.png", "-o", "x.png"], "1 x 1 pixels"),
+    "1 x 5000": (["a.toml", "-i", "line.png", "-o", "x.png"], "1 x 5000 pixels"),
+    "too narrow": (["a.toml", "-i", "strip.png", "-o", "x.png"], "--grid 160"),
+    "unknown ending": (["a.toml", "-o", "x.xyz"], "x.xyz"),
+    "no ending": (["a.toml", "-o", "x"], "Cannot write x"),
+    "no such folder": (["a.toml", "-o", "none/x.png"], "none"),
+    "a folder": (["a.toml", "-o", "sub.png"], "it is a folder"),
+    "stats nowhere": (["a.toml", "-o", "x.png", "--stats", "none/s.json"], "none"),
+    "several into one": (["a.toml", "cat.png", "cat.png", "-o", "x.png"], "{name}"),
+    "grid 0": (["a.toml", "-o", "x.png", "--grid", "0"], "'fluid.grid' must be at least 8, not 0"),
+    "fps nan": (["a.toml", "-o", "x.gif", "--fps", "nan"], "'output.fps' must be a finite number"),
+    "solver": (["a.toml", "-o", "x.png", "--solver", "best"], "'fluid.solver' must be one of 'mac' or 'paper'"),
+    "T = 0": (["T0.toml", "-o", "x.png"], "T0.toml, line 1: 'duration' must be greater than 0"),
+    "unknown key": (["key.toml", "-o", "x.png"], "key.toml, line 6: force[1] \"x\": unknown key 'radios'"),
+    "wrong type": (["type.toml", "-o", "x.png"], "type.toml, line 2: 'fluid.grid' must be a whole number, not \"64\""),
+    "radius 0": (["radius.toml", "-o", "x.png"], "'radius' must be greater than 0, not 0"),
+    "newer": (["newer.toml", "-o", "x.png"], "install a newer fluidwarp"),
+    "not a recipe": (["cat.bin", "-o", "x.png"], "not text"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_told_in_a_sentence(
+    case: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """In this process, as all of it is told before any GL is touched."""
+    words, expected = BAD[case]
+    point = '[[force]]\nname = "x"\nkind = "vortex"\npoint = [0.5, 0.5]\n'
+    for name, text in {
+        "T0": "duration = 0",
+        "key": f"duration = 1\n{point}radios = 1",
+        "type": '[fluid]\ngrid = "64"',
+        "radius": f"{point}radius = 0",
+        "newer": "version = 99",
+    }.items():
+        (folder / f"{name}.toml").write_text(text)
+    for name, shape in {"dot": (1, 1, 3), "line": (5000, 1, 3), "strip": (400, 20, 3)}.items():
+        write_picture(folder / f"{name}.png", Picture(np.zeros(shape, np.uint8)))
+    (folder / "cut.png").write_bytes((folder / "cat.png").read_bytes()[:60])
+    (folder / "cat.bin").write_bytes(bytes(range(256)))
+    (folder / "sub.png").mkdir()
+    before = here(folder)
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "argv", ["fluidwarp", "render", *words])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    told = capsys.readouterr()
+    assert ended.value.code not in (0, None)
+    assert told.out == ""
+    assert expected in told.err
+    assert told.err.startswith("fluidwarp: ")
+    assert 1 <= len(told.err.splitlines()) <= 2
+    assert here(folder) == before
+
+
+FORCES = {
+    "enormous": ("strength = 1e6", 'force[1] "x": at t = 0 s it throws the fluid'),
+    "too late": ("at = [7]", 'force[1] "x": it would act at 7 s'),
+    "formula": ('formula = "1/(t-0.1)"', "divides by zero"),
+}
+
+
+def test_bad_forces_name_the_force(folder: Path):
+    for text, expected in FORCES.values():
+        force = f'[[force]]\nname = "x"\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\n{text}\n'
+        (folder / "b.toml").write_text(f'picture = "cat.png"\nduration = 0.2\n[fluid]\ngrid = 32\n{force}')
+        ran = fluidwarp(folder, "render", "b.toml", "-o", "x.mp4")
+        assert ran.returncode != 0
+        assert expected in ran.stderr
+        assert len(ran.stderr.splitlines()) <= 2
+        assert here(folder) == {"a.toml", "b.toml", "cat.png"}
+
+
+def test_interrupted_leaves_nothing(folder: Path):
+    """As a user does it: Ctrl+C in the middle of a long animation."""
+    import signal
+
+    (folder / "long.toml").write_text(RECIPE.replace("duration = 0.2", "duration = 2000"))
+    started = subprocess.Popen(
+        [sys.executable, "-m", "app", "render", "long.toml", "-o", "x.mp4"],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    before = {"a.toml", "long.toml", "cat.png"}
+    for _ in range(200):
+        if here(folder) != before:
+            break
+        try:
+            started.wait(0.1)
+        except subprocess.TimeoutExpired:
+            continue
+        break
+    started.send_signal(signal.SIGINT)
+    _, told = started.communicate(timeout=60)
+    assert started.returncode == cli.INTERRUPTED
+    assert told == "fluidwarp: cancelled; nothing was written\n"
+    assert here(folder) == before
+
+
+def test_memory_does_not_grow_with_the_frames(folder: Path):
+    """Resident memory at the end of 10 and of 40 frames, in processes of their own."""
+    code = (
+        "import resource, sys; sys.argv = ['fluidwarp', 'render', 'a.toml', '-o', 'x.%03d.png', '--fps', sys.argv[1],"
+        " '--size', '640'];\n"
+        "from app.cli import cli\n"
+        "try: cli()\n"
+        "except SystemExit: print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    peaks = []
+    for fps in ("50", "200"):
+        ran = subprocess.run(
+            [sys.executable, "-c", code, fps],
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=100,
+        )
+        peaks.append(int(ran.stdout) / 1024)
+    assert peaks[1] < peaks[0] + 15
