@@ -81,6 +81,14 @@ class History:
             del self._entries[0]
             self._index -= 1
 
+    def amend(self, recipe: Recipe) -> None:
+        """Let the present be `recipe`, still as the same edit: the recording goes on while the fluid comes to rest."""
+        if recipe is self.recipe or recipe == self.recipe:
+            return
+        del self._entries[self._index + 1 :]
+        before = self._entries[self._index - 1].recipe if self._index else None
+        self._entries[self._index] = Entry(self._entries[self._index].name, recipe, _own_bytes(recipe, before))
+
     def undo(self) -> Recipe:
         """The recipe one edit earlier; the present one where there is none."""
         self._index = max(self._index - 1, 0)

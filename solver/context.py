@@ -64,6 +64,8 @@ class Device:
         self._passes: dict[tuple[str, tuple[tuple[str, object], ...]], Pass] = {}
         self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
         self._rest = ctx.simple_framebuffer((1, 1))
+        # Reads a field between its texels, where a look is enough.
+        self.linear = ctx.sampler(repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR))
         ctx.gc_mode = "auto"
         ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
 

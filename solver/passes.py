@@ -76,12 +76,23 @@ class Pass:
             framebuffer.scissor = None
         self.device.timings.count(width * height, self.reads)
 
-    def draw_into(self, framebuffer: moderngl.Framebuffer, **inputs: object) -> None:
-        """Draw over the viewport of a framebuffer that is not a field's, such as the window's."""
+    def draw_into(self, framebuffer: moderngl.Framebuffer, smooth: Sequence[str] = (), **inputs: object) -> None:
+        """Draw over the viewport of a framebuffer that is not a field's, such as the window's.
+
+        Args:
+            framebuffer: the target; its viewport says where.
+            smooth: names of inputs that are read with linear filtering, whatever their textures say.
+            inputs: the shader's uniforms without their `u_`.
+        """
         for name, value in inputs.items():
             self._bind(f"u_{name}", value)
+        units = [self._units[f"u_{name}"] for name in smooth if f"u_{name}" in self._units]
+        for unit in units:
+            self.device.linear.use(unit)
         framebuffer.use()
         self._vertices.render(moderngl.TRIANGLES, vertices=3)
+        for unit in units:
+            self.device.linear.clear(unit)
 
     def _bind(self, name: str, value: object) -> None:
         uniform = self._uniforms.get(name)

@@ -1,0 +1,29 @@
+"""Feels: named sets of fluid parameters, so that a person need not know what viscosity is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.recipe import FluidSettings
+
+
+@dataclass(frozen=True)
+class Feel:
+    """A named fluid: viscosity in longer sides squared per second, drag per second, and what it feels like."""
+
+    name: str
+    line: str
+    viscosity: float
+    drag: float
+
+    def fits(self, fluid: FluidSettings) -> bool:
+        return fluid.viscosity == self.viscosity and fluid.drag == self.drag
+
+
+PUTTY = Feel("Putty", "Stops with the brush", 0.3, 0.0)
+HONEY = Feel("Honey", "Sinks softly to rest", 0.02, 2.0)
+WATER = Feel("Water", "Swirls on by itself", 0.0006, 0.5)
+FEELS = (PUTTY, HONEY, WATER)
+"""From stiff to thin."""
+
+DEFAULT = HONEY

@@ -1,0 +1,457 @@
+"""Working on a document live: gestures become strokes, time goes on while something moves, every edit is in the history.
+
+Knows the solver and no window; the clock comes in from outside, as ticks.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.document import Document
+from app.project import Project
+from app.recipe import Recipe
+from app.replay import Replay
+from app.sampling import Pictures
+from app.strokes import Change, Stroke
+from app.tools import Gesture, Press, Tool, Touch
+from solver.context import Device
+
+REST = 0.004  # longer sides a second: a pixel of a screen in four frames
+LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each waits for the GPU
+KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
+MOST_COASTING = 60.0  # seconds
+
+
+class Session:
+    """A document being worked on, and its simulation at the playhead.
+
+    Args:
+        device: where it is simulated.
+        project: what is worked on.
+        budget: bytes of texture memory for checkpoints.
+
+    Attributes:
+        project: where it came from and is saved to.
+        document: the recipe with all its edits.
+        replay: the simulation.
+        playing: the recording is being played.
+        coasting: time goes on because the fluid still moves.
+        path: where the gesture that is under way has been, as fractions of the picture.
+        stroke: the stroke that is open.
+        notice: something the person should hear of, for the window to take.
+        changes: grows with everything that changes what is seen.
+    """
+
+    def __init__(self, device: Device, project: Project, budget: int = 400 * 2**20) -> None:
+        self.device = device
+        self.project = project
+        self.document = Document(project.picture, project.recipe, project.path)
+        self.pictures = Pictures(project.picture, project.folder)
+        self.replay = Replay(device, project.recipe, self.pictures, budget)
+        self.playing = False
+        self.coasting = False
+        self.path: list[tuple[float, float]] = []
+        self.stroke: Stroke | None = None
+        self.notice: str | None = None
+        self.changes = 0
+        self.last_place: tuple[float, float] | None = None
+        self._gesture: Gesture | None = None
+        self._tool: Tool | None = None
+        self._opposite = False
+        self._touch: Touch | None = None
+        # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
+        self._base = project.recipe
+        self._live = project.recipe
+        self._target: int | None = self.end or None
+        self._still = True
+        self._coasted = 0
+
+    # -- what it is now ---------------------------------------------------------------------------------------------
+
+    @property
+    def recipe(self) -> Recipe:
+        """The recipe as it is now, with the stroke that is open."""
+        return self._live
+
+    @property
+    def tick(self) -> int:
+        """The playhead."""
+        return self.replay.tick
+
+    @property
+    def end(self) -> int:
+        """Ticks recorded; 0 where nothing has been yet."""
+        recipe = self._live if hasattr(self, "_live") else self.project.recipe
+        return recipe.ticks if recipe.stroke or recipe.change or recipe.force else 0
+
+    @property
+    def dt(self) -> float:
+        return self._live.fluid.dt
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        return self.replay.grid.extent
+
+    @property
+    def is_painting(self) -> bool:
+        return self._gesture is not None
+
+    @property
+    def is_moving(self) -> bool:
+        """True while time goes on."""
+        return self.playing or self.coasting or self.is_painting or self.is_behind
+
+    @property
+    def is_behind(self) -> bool:
+        """True while the playhead is on its way to where it was sent."""
+        return self._target is not None and self._target != self.tick
+
+    @property
+    def target(self) -> int:
+        """Where the playhead is or is going."""
+        return self.tick if self._target is None else self._target
+
+    # -- painting ---------------------------------------------------------------------------------------------------
+
+    def press(self, tool: Tool, press: Press, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
+        """The pointer went down at (x, y), fractions of the picture: a gesture begins, and time with it."""
+        if tool.gesture is None:
+            return
+        self.release()
+        self._arrive()
+        self.playing = False
+        if self.tick < self.end:
+            self._cut()
+        self._tool, self._opposite = tool, press.opposite
+        self._touch = Touch(self.tick, *self._inside(x, y), pressure, shift)
+        self.path = [self._touch[1:3]]
+        self._gesture = tool.gesture(replace(press, last=self.last_place), self._touch)
+        self.replay.checkpoint()
+        self._hear(next(self._gesture))
+
+    def move(self, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
+        """The pointer moved; every sample counts."""
+        if self._gesture is None:
+            return
+        self._touch = Touch(self.tick, *self._inside(x, y), pressure, shift)
+        self.path.append(self._touch[1:3])
+        self._hear(self._gesture.send(self._touch))
+
+    def release(self) -> None:
+        """The pointer went up: the gesture becomes an entry of the history, and the fluid comes to rest by itself."""
+        if self._gesture is None:
+            return
+        gesture, self._gesture = self._gesture, None
+        stroke = self.stroke
+        try:
+            gesture.send(None)
+        except StopIteration as finished:
+            stroke = finished.value
+        self.stroke, path, self.path = None, self.path, []
+        if stroke is None:
+            return
+        self.last_place = path[-1]
+        ticks = max(self.tick, stroke.last_tick + 1)
+        self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=ticks * self.dt)
+        self.replay.use(self._live)
+        self.commit(self._label(stroke))
+        self._coast()
+
+    def cancel(self) -> None:
+        """Give up the gesture, as if it had not been."""
+        if self._gesture is None:
+            return
+        self._gesture.close()
+        self._gesture = self.stroke = None
+        self.path = []
+        self._show(self.document.recipe, self.document.recipe.ticks if self.end else 0)
+
+    def _hear(self, stroke: Stroke | None) -> None:
+        self.stroke = stroke
+        if stroke is not None:
+            ticks = max(self.tick + 1, 1)
+            self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=ticks * self.dt)
+            self.replay.use(self._live)
+        self.changes += 1
+
+    def _label(self, stroke: Stroke) -> str:
+        if self._tool is None:
+            return stroke.tool.capitalize()
+        if self._tool.directions and self._tool.masks or stroke.tool in ("bloat", "pinch"):
+            return stroke.tool.capitalize()
+        return self._tool.label
+
+    def _inside(self, x: float, y: float) -> tuple[float, float]:
+        """Places are kept within half a picture of it, and with as many digits as a recipe needs."""
+        return round(min(max(x, -0.5), 1.5), 5), round(min(max(y, -0.5), 1.5), 5)
+
+    # -- time -------------------------------------------------------------------------------------------------------
+
+    def advance(self, ticks: int, patience: float = 0.05) -> None:
+        """Let time go on by up to `ticks`, for at most `patience` seconds of work (but always by one)."""
+        deadline = time.perf_counter() + patience
+        if self.is_behind:
+            self._approach(deadline)
+            return
+        for _ in range(ticks):
+            if self.is_painting and (self.stroke is not None or self.coasting):
+                self._record()
+            elif self.coasting:
+                self._record()
+                self._look_for_rest()
+            elif self.playing:
+                if self.tick >= self.end:
+                    self.playing = False
+                    return
+                self._step()
+            else:
+                return
+            if time.perf_counter() > deadline:
+                return
+
+    def play(self) -> None:
+        """Play the recording, from the start when it is at its end; while the fluid moves, pause."""
+        self.release()
+        if self.coasting or self.playing:
+            self.pause()
+            return
+        self._arrive()
+        if self.end and self.tick >= self.end:
+            if self._is_fast():
+                self._coast()
+                return
+            self.seek(0)
+            self._arrive()
+        self.playing = self.tick < self.end
+
+    def pause(self) -> None:
+        """Let time stand still."""
+        self.release()
+        self.playing = self.coasting = False
+        self.changes += 1
+
+    def step(self) -> None:
+        """One tick forward; at the end of the recording, it is recorded."""
+        self.pause()
+        self._arrive()
+        if self.tick < self.end:
+            self._step()
+        elif self.end:
+            self._record()
+
+    def seek(self, tick: int) -> None:
+        """Send the playhead to a tick of the recording; it arrives over the next frames."""
+        self.release()
+        self.playing = self.coasting = False
+        self._target = min(max(tick, 0), self.end)
+        self.changes += 1
+
+    def settle(self, patience: float = 600.0) -> None:
+        """Let everything that moves come to rest, at once: for saving, for tests."""
+        deadline = time.perf_counter() + patience
+        self._arrive()
+        while self.coasting and time.perf_counter() < deadline:
+            self.advance(1)
+
+    def _coast(self) -> None:
+        self.coasting, self._coasted = True, 0
+        self.changes += 1
+
+    def _record(self) -> None:
+        """One tick more than there has been; the open stroke stays where the pointer is."""
+        if self.stroke is not None and self._gesture is not None and self.stroke.last_tick < self.tick:
+            assert self._touch is not None
+            self._touch = self._touch._replace(tick=self.tick)
+            self._hear(self._gesture.send(self._touch))
+        ticks = self.tick + 1
+        if self._live.ticks < ticks:
+            self._live = self._live.edited(duration=ticks * self.dt)
+            self.replay.use(self._live)
+            if self.stroke is None:
+                self.document.history.amend(self._live)
+                self._base = self._live
+        self._step()
+
+    def _step(self) -> None:
+        self.replay.advance()
+        if self.tick % KEEP_EVERY == 0:
+            self.replay.checkpoint()
+        self.changes += 1
+
+    def _look_for_rest(self) -> None:
+        self._coasted += 1
+        busy = any(stroke.last_tick >= self.tick for stroke in self._live.stroke)
+        if busy or self._coasted % LOOK_EVERY:
+            return
+        if not self._is_fast() or self._coasted * self.dt > MOST_COASTING:
+            self.coasting = False
+            self.replay.checkpoint()
+            self.changes += 1
+
+    def _is_fast(self) -> bool:
+        return self.replay.fluid.motion().largest_speed > REST
+
+    def _approach(self, deadline: float) -> None:
+        """Work towards the target until the deadline, by way of the nearest checkpoint."""
+        target, replay = self._target, self.replay
+        if target is None:
+            return
+        near = replay.checkpoints.nearest(self._live, target)
+        if target < replay.tick or (near is not None and near.tick > replay.tick):
+            replay.seek(near.tick if near is not None else 0)
+        while replay.tick < target:
+            self._step()
+            if time.perf_counter() > deadline:
+                break
+        self.changes += 1
+        if replay.tick == target:
+            self._target = None
+
+    def _arrive(self) -> None:
+        while self.is_behind:
+            self._approach(time.perf_counter() + 60)
+        self._target = None
+
+    # -- edits ------------------------------------------------------------------------------------------------------
+
+    def change(self, name: str, **settings: Any) -> None:
+        """Set something from the playhead on: viscosity, drag, walls, clear_velocity, reset_warp, clear_masks."""
+        self._arrive()
+        self.preview_change(**settings)
+        self.commit(name)
+        if any(settings.get(key) for key in ("clear_velocity", "reset_warp", "clear_masks")):
+            self._record()
+        self._coast_if_moving()
+
+    def preview_change(self, **settings: Any) -> None:
+        """As `change`, without an entry in the history yet: for a slider that is being dragged."""
+        self.release()
+        self._arrive()
+        self.playing = self.coasting = False
+        base = self._base
+        if not base.stroke and not base.change and self.tick == 0 and settings.keys() <= {"viscosity", "drag", "walls"}:
+            self._use(base.edited(fluid=base.fluid.model_copy(update=settings)))
+            return
+        if self.tick < self.end:
+            self._cut()
+            base = self._base
+        before = [change for change in base.change if change.tick != self.tick]
+        here = [change for change in base.change if change.tick == self.tick]
+        made = (here[-1] if here else Change(tick=self.tick)).model_copy(update=settings)
+        self._use(base.edited(change=(*before, made)))
+
+    def preview(self, **parts: Any) -> None:
+        """Replace parts of the recipe, without an entry in the history yet."""
+        self.release()
+        self._use(self._base.edited(**parts))
+
+    def commit(self, name: str) -> None:
+        """Make what was previewed an entry of the history."""
+        self.document.history.commit(name, self._live)
+        self._base = self._live
+        self.changes += 1
+
+    def edit(self, name: str, **parts: Any) -> None:
+        """Replace parts of the recipe, as one entry of the history."""
+        self.preview(**parts)
+        self.commit(name)
+
+    def set_grid(self, cells: int, name: str = "Quality") -> None:
+        """Simulate on another grid, by replaying all that has been done."""
+        if cells != self._live.fluid.grid:
+            self.edit(name, fluid=self._live.fluid.model_copy(update={"grid": cells}))
+
+    def undo(self) -> str | None:
+        """Take back the last edit; its name."""
+        self.release()
+        name = self.document.history.undo_name
+        if name is not None:
+            self._show(self.document.history.undo())
+        return name
+
+    def redo(self) -> str | None:
+        """Make an edit again that was taken back; its name."""
+        self.release()
+        name = self.document.history.redo_name
+        if name is not None:
+            self._show(self.document.history.redo())
+        return name
+
+    def go_to(self, index: int) -> None:
+        """Any state of the history."""
+        self.release()
+        self._show(self.document.history.go_to(index))
+
+    def _coast_if_moving(self) -> None:
+        if self.end and self.tick >= self.end and self._is_fast():
+            self._coast()
+
+    def _show(self, recipe: Recipe, tick: int | None = None) -> None:
+        """Another state of the work, with the playhead at its end."""
+        self.playing = self.coasting = False
+        self.replay.checkpoint()
+        self._base = recipe
+        self._use(recipe)
+        self._target = self.end if tick is None else min(tick, self.end)
+        self._approach(time.perf_counter() + 0.08)
+
+    def _use(self, recipe: Recipe) -> None:
+        """Simulate another recipe; what differs in the past is made again over the next frames."""
+        before, replay = self._live, self.replay
+        if recipe is before or recipe == before:
+            self._live = recipe
+            return
+        tick = self.target
+        if not recipe.is_set_up_as(before):
+            replay.seek(0)
+        else:
+            common = recipe.agrees_until(before)
+            if common < replay.tick:
+                near = replay.checkpoints.nearest(recipe, int(min(common, replay.tick)))
+                replay.seek(near.tick if near is not None else 0)
+        self._live = recipe
+        replay.use(recipe)
+        self._target = min(tick, self.end)
+        if self._target == replay.tick:
+            self._target = None
+        self.changes += 1
+
+    def _cut(self) -> None:
+        """Go on from the playhead: what was recorded after it is left to undo."""
+        base, tick = self._base, self.tick
+        strokes = []
+        for stroke in base.stroke:
+            kept = tuple(sample for sample in stroke.samples if sample[0] < tick)
+            if len(kept) == len(stroke.samples):
+                strokes.append(stroke)
+            elif kept and stroke.tool != "curve":
+                strokes.append(stroke.model_copy(update={"samples": kept}))
+        cut = base.edited(
+            stroke=tuple(strokes),
+            change=tuple(change for change in base.change if change.tick < tick),
+            duration=max(tick, 1) * self.dt,
+        )
+        if cut.stroke != base.stroke or cut.change != base.change:
+            self.notice = f"Going on from {tick * self.dt:.1f} s. What came after it is one Undo away."
+        self._base = self._live = cut
+        self.replay.use(cut)
+
+    # -- numbers ----------------------------------------------------------------------------------------------------
+
+    def divergence(self) -> float:
+        """The largest divergence that is left, 1 / s; reads the velocity back."""
+        return float(np.abs(self.replay.fluid.divergence()).max())
+
+    def saved(self, project: Project) -> None:
+        """Take note that the work has been saved as `project`."""
+        assert project.path is not None
+        self.project = project
+        self.document.saved(project.path)
+
+    def release_gpu(self) -> None:
+        """Free the textures."""
+        self.replay.release()

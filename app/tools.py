@@ -1,0 +1,183 @@
+"""The tools: how the samples of a pointer become a stroke, one small tool each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from itertools import pairwise
+from math import hypot
+from typing import NamedTuple
+
+from app.strokes import Stroke
+from app.strokes import Tool as StrokeTool
+
+LINE_SPEED = 0.8  # longer sides per second at which a stroke is drawn that was only clicked
+
+
+class Touch(NamedTuple):
+    """The pointer at a tick: x, y as fractions of the picture, pressure 0-1, and the modifiers held."""
+
+    tick: int
+    x: float
+    y: float
+    pressure: float = 1.0
+    shift: bool = False
+
+
+@dataclass(frozen=True)
+class BrushSettings:
+    """A brush as the person sets it: radius in longer sides, hardness and strength 0-1."""
+
+    radius: float = 0.12
+    hardness: float = 0.0
+    strength: float = 1.0
+
+
+@dataclass(frozen=True)
+class Press:
+    """What a gesture starts from.
+
+    Attributes:
+        brush: as set.
+        opposite: the tool's other direction was asked for.
+        extent: (width, height) of the picture, the longer of them 1.
+        dt: seconds a tick.
+        last: where the last stroke ended, for a straight line from there.
+    """
+
+    brush: BrushSettings
+    opposite: bool
+    extent: tuple[float, float]
+    dt: float
+    last: tuple[float, float] | None = None
+
+
+Gesture = Generator[Stroke | None, Touch | None, Stroke | None]
+"""Sent a touch, it yields the stroke so far (None while there is nothing to apply); sent None, it returns the stroke."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool of the strip.
+
+    Attributes:
+        name: its name and that of its icon.
+        label, hint: as the person reads them.
+        key: chooses it; with Shift, its opposite.
+        gesture: from a press to its strokes; None for tools that move the view and not the picture.
+        directions: what its two directions are called.
+        masks: it paints a mask, which then is shown.
+    """
+
+    name: str
+    label: str
+    key: str
+    hint: str
+    gesture: Callable[[Press, Touch], Gesture] | None = None
+    directions: tuple[str, str] | None = None
+    masks: bool = False
+
+
+def _stroke(press: Press, name: StrokeTool, reverse: bool, touch: Touch) -> Stroke:
+    brush = press.brush
+    return Stroke(
+        tool=name,
+        radius=brush.radius,
+        hardness=brush.hardness,
+        strength=brush.strength,
+        reverse=reverse,
+        samples=((touch.tick, touch.x, touch.y, touch.pressure),),
+    )
+
+
+def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callable[[Press, Touch], Gesture]:
+    """A tool that works where the pointer is: `backward` is its opposite, or else the stroke is reversed."""
+
+    def gesture(press: Press, first: Touch) -> Gesture:
+        name, reverse = forward, press.opposite
+        if backward is not None:
+            name, reverse = (backward if press.opposite else forward), False
+        if first.shift and press.last is not None:
+            return _line(press, _stroke(press, name, reverse, first), press.last)
+        return _follow(_stroke(press, name, reverse, first), press.extent)
+
+    return gesture
+
+
+def _follow(stroke: Stroke, extent: tuple[float, float]) -> Gesture:
+    """The stroke follows the pointer; with Shift along the axis it set out on."""
+    _, x0, y0, _ = stroke.samples[0]
+    axis: str | None = None
+    while True:
+        touch = yield stroke
+        if touch is None:
+            return stroke
+        x, y = touch.x, touch.y
+        if touch.shift:
+            dx, dy = (x - x0) * extent[0], (y - y0) * extent[1]
+            if axis is None and hypot(dx, dy) > 0.01:
+                axis = "x" if abs(dx) >= abs(dy) else "y"
+            x, y = (x, y0) if axis == "x" else (x0, y) if axis == "y" else (x0, y0)
+        stroke = stroke.with_sample(touch.tick, x, y, touch.pressure)
+
+
+def _line(press: Press, stroke: Stroke, start: tuple[float, float]) -> Gesture:
+    """A straight stroke from where the last one ended to where was clicked, at an even speed."""
+    tick, x, y, pressure = stroke.samples[0]
+    length = hypot((x - start[0]) * press.extent[0], (y - start[1]) * press.extent[1])
+    steps = max(2, round(length / LINE_SPEED / press.dt))
+    stroke = stroke.model_copy(update={"samples": ((tick, *start, pressure),)})
+    for k in range(1, steps + 1):
+        part = k / steps
+        stroke = stroke.with_sample(
+            tick + k, start[0] + (x - start[0]) * part, start[1] + (y - start[1]) * part, pressure
+        )
+    while (yield stroke) is not None:
+        pass
+    return stroke
+
+
+def _curve(press: Press, first: Touch) -> Gesture:
+    """A path is drawn while nothing happens; on release the fluid is blown along it."""
+    touches = [first]
+    while (touch := (yield None)) is not None:
+        before = touches[-1]
+        if hypot((touch.x - before.x) * press.extent[0], (touch.y - before.y) * press.extent[1]) > 0.004:
+            touches.append(touch)
+        last = touch
+        touches[-1] = last if len(touches) > 1 else first
+    if len(touches) < 2:
+        return None
+    end = touches[-1].tick
+    points = touches[::-1] if press.opposite else touches
+    stroke = _stroke(press, "curve", False, Touch(end, points[0].x, points[0].y, points[0].pressure))
+    for point in points[1:]:
+        stroke = stroke.with_sample(end, point.x, point.y, point.pressure)
+    return stroke
+
+
+TOOLS = (
+    Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against")),
+    Tool("curve", "Curve", "c", "Draw a path: the picture is blown along it", _curve, ("Forwards", "Backwards")),
+    Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
+    Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),
+    Tool(
+        "thicken", "Thicken", "v", "Paint where the fluid is thick and hardly bends",
+        painting("thicken", "thin"), ("Thicken", "Thin"), masks=True,
+    ),
+    Tool(
+        "freeze", "Freeze", "f", "Paint what must stay as it is", painting("freeze", "thaw"), ("Freeze", "Thaw"),
+        masks=True,
+    ),
+    Tool("smooth", "Smooth mask", "s", "Soften the edges of what you have painted", painting("smooth"), masks=True),
+    Tool("restore", "Restore", "r", "Hold to bring the picture back as it was", painting("restore")),
+    Tool("pan", "Pan", "h", "Drag to move the view (or hold Space with any tool)"),
+    Tool("zoom", "Zoom", "z", "Click to zoom in, with Alt to zoom out; drag left or right"),
+)  # fmt: skip
+TOOL = {tool.name: tool for tool in TOOLS}
+
+
+def path_length(stroke: Stroke, extent: tuple[float, float]) -> float:
+    """How long a stroke's path is, in longer sides."""
+    points = ((sample[1] * extent[0], sample[2] * extent[1]) for sample in stroke.samples)
+    return sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(points))

@@ -1,0 +1,142 @@
+"""Drawing the picture through its warp, with what is laid over it."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from app.pictures import Picture, to_bits
+from app.session import Session
+from app.ui.state import State
+from app.ui.theme import Palette
+from app.ui.viewport import Rect, Viewport
+from solver.context import Device
+
+LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
+EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
+ARROW = 26.0  # points between two arrows
+GRID_LINES = 24.0
+
+
+class Canvas:
+    """The canvas of one picture.
+
+    Args:
+        device: where it is drawn.
+        picture: shown as sRGB, at most `LARGEST` pixels along a side.
+    """
+
+    def __init__(self, device: Device, picture: Picture) -> None:
+        self.device = device
+        pixels = shown_pixels(picture, min(LARGEST, device.limits.max_texture_size))
+        height, width = pixels.shape[:2]
+        self.size = (picture.width, picture.height)
+        self._shrunk = width / picture.width
+        self._texture = device.ctx.texture((width, height), 4, pixels.tobytes())
+        self._texture.repeat_x = self._texture.repeat_y = False
+        self._texture.build_mipmaps()
+        self._still = device.field((1, 1), 2, "no displacement")
+
+    def draw(
+        self,
+        target: moderngl.Framebuffer,
+        height: int,
+        viewport: Viewport,
+        session: Session,
+        state: State,
+        palette: Palette,
+        scale: float,
+    ) -> None:
+        """Draw into `target`, `height` pixels high, what of the picture lies on the canvas."""
+        density, rect = viewport.density, viewport.rect
+        visible = _common(rect, viewport.canvas)
+        if visible is None:
+            return
+        replay = session.replay
+        texture, displacement = self._texture, self._still
+        if replay.density is not None:
+            texture = replay.density.state()[0].texture
+        elif not state.before:
+            # The fine map is dearer than the rest of the frame; while things move, nobody sees the difference.
+            displacement = replay.warp.composed(1 if session.is_moving else None)
+        self._filter(viewport)
+        defines: dict[str, object] = {}
+        inputs: dict[str, object] = {
+            "picture": texture,
+            "displacement": displacement,
+            "origin": (rect.x * density, rect.y * density),
+            "step": (1 / (rect.width * density), 1 / (rect.height * density)),
+            "extent": session.extent,
+            "split": 2.0 if state.before else (state.split if state.split is not None else -1e9),
+            "edges": EDGES[session.recipe.edges],
+            "light": palette.checker[1][:3],
+            "dark": palette.checker[0][:3],
+            "tile": 8.0 * scale * density,
+            "target_height": float(height),
+        }
+        self._add_overlays(defines, inputs, session, state, scale * density)
+        # One pixel more or less of a picture between pixels is nobody's; no pixel twice is what counts.
+        left, top = round(visible.x * density), round(visible.y * density)
+        right, bottom = round(visible.right * density), round(visible.bottom * density)
+        before = target.viewport
+        target.viewport = (left, height - bottom, right - left, bottom - top)
+        draw = self.device.pass_("view/canvas.frag", **defines)
+        draw.draw_into(target, ("displacement", "viscosity", "solid", "velocity"), **inputs)
+        target.viewport = before
+
+    def release(self) -> None:
+        self._texture.release()
+        self._still.release()
+
+    def _filter(self, viewport: Viewport) -> None:
+        zoom = viewport.scale * viewport.density / self._shrunk
+        small = moderngl.LINEAR_MIPMAP_NEAREST if zoom < 0.75 else moderngl.LINEAR
+        self._texture.filter = (small, moderngl.NEAREST if zoom >= 6 else moderngl.LINEAR)
+
+    def _add_overlays(
+        self, defines: dict[str, object], inputs: dict[str, object], session: Session, state: State, scale: float
+    ) -> None:
+        if state.before:
+            return
+        replay, shown = session.replay, state.overlays
+        painting = state.tool.masks
+        if shown["grid"].shown:
+            defines["GRID"] = 1
+            inputs |= {"grid": GRID_LINES, "grid_opacity": shown["grid"].opacity, "pixel": scale}
+        if shown["viscosity"].shown or (painting and state.tool_name in ("thicken", "smooth")):
+            defines["VISCOSITY"] = 1
+            base = max(session.replay.settings.viscosity, 1e-6)
+            inputs |= {"viscosity": replay.fluid.viscosity, "base": base}
+            inputs["viscosity_opacity"] = shown["viscosity"].opacity
+        if shown["frozen"].shown or (painting and state.tool_name in ("freeze", "smooth")):
+            defines["FROZEN"] = 1
+            inputs |= {"solid": replay.fluid.solid, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
+        if shown["velocity"].shown:
+            defines["ARROWS"] = 1
+            inputs |= {"velocity": replay.fluid.faces(), "arrow": ARROW * scale, "speed": 0.6}
+            inputs |= {"arrows_opacity": shown["velocity"].opacity, "arrow_colour": (1.0, 1.0, 1.0)}
+
+
+def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
+    """A picture as the canvas shows it: RGBA, 8 bits, premultiplied, at most `largest` pixels along a side."""
+    pixels = picture.pixels
+    step = -(-max(picture.width, picture.height) // largest)
+    if step > 1:
+        height, width = (size // step * step for size in pixels.shape[:2])
+        blocks = pixels[:height, :width].reshape(height // step, step, width // step, step, -1)
+        pixels = blocks.mean(axis=(1, 3), dtype=np.float32).astype(picture.pixels.dtype)
+    pixels = to_bits(pixels, 8, dither=False)
+    if pixels.shape[2] <= 2:
+        pixels = np.concatenate([pixels[..., :1].repeat(3, axis=2), pixels[..., 1:]], axis=2)
+    if pixels.shape[2] == 3:
+        opaque = np.full((*pixels.shape[:2], 1), 255, np.uint8)
+        return np.ascontiguousarray(np.concatenate([pixels, opaque], axis=2))
+    alpha = pixels[..., 3:].astype(np.uint16)
+    colours = ((pixels[..., :3] * alpha + 127) // 255).astype(np.uint8)
+    return np.ascontiguousarray(np.concatenate([colours, pixels[..., 3:]], axis=2))
+
+
+def _common(a: Rect, b: Rect) -> Rect | None:
+    x, y = max(a.x, b.x), max(a.y, b.y)
+    width, height = min(a.right, b.right) - x, min(a.bottom, b.bottom) - y
+    return Rect(x, y, width, height) if width > 0 and height > 0 else None

@@ -1,0 +1,66 @@
+"""What the window remembers between frames, apart from the work itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from app.tools import TOOL, BrushSettings, Tool
+
+SMALLEST, LARGEST = 0.005, 0.5  # of a brush's radius, in longer sides
+
+
+@dataclass
+class Overlay:
+    """Something that can be laid over the picture."""
+
+    name: str
+    label: str
+    key: str
+    shown: bool = False
+    opacity: float = 0.7
+
+
+def _overlays() -> dict[str, Overlay]:
+    names = (
+        ("grid", "Warp grid"),
+        ("viscosity", "Viscosity"),
+        ("frozen", "Frozen"),
+        ("velocity", "Velocity"),
+        ("forces", "Forces"),
+    )
+    return {name: Overlay(name, label, str(key)) for key, (name, label) in enumerate(names, 1)}
+
+
+@dataclass
+class State:
+    """The window's own state.
+
+    Attributes:
+        tool_name: the tool in hand.
+        brush: shared by all tools, so that changing the tool does not change its size.
+        opposite: tools that are switched to their other direction.
+        overlays: by name, in the order of their keys.
+        inspector: the inspector is open.
+        sections: which of its sections are open.
+        before: the picture is shown as it was, as long as a key is held.
+        split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
+        hint: the first hint is still shown.
+        statistics: numbers are shown over the canvas.
+        auto_quality: the grid follows the machine.
+    """
+
+    tool_name: str = "push"
+    brush: BrushSettings = BrushSettings()
+    opposite: dict[str, bool] = field(default_factory=dict)
+    overlays: dict[str, Overlay] = field(default_factory=_overlays)
+    inspector: bool = True
+    sections: dict[str, bool] = field(default_factory=dict)
+    before: bool = False
+    split: float | None = None
+    hint: bool = True
+    statistics: bool = False
+    auto_quality: bool = True
+
+    @property
+    def tool(self) -> Tool:
+        return TOOL[self.tool_name]

@@ -1,0 +1,377 @@
+"""Our own widgets on imgui: buttons with icons, sliders that say what they are, choices, sections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2, internal
+
+from app.ui import icons
+from app.ui.theme import GRID, Colour, Fonts, Palette, packed
+from app.ui.viewport import Rect
+
+PANEL = int(
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
+    | imgui.WindowFlags_.no_nav_focus
+)
+
+
+@dataclass
+class Slid:
+    """What a slider says: its value, whether it changed in this frame, and whether the person let go of it."""
+
+    value: float
+    changed: bool
+    done: bool
+
+
+@dataclass
+class Ui:
+    """What every panel draws with: colours, letters and the interface's scale."""
+
+    palette: Palette
+    fonts: Fonts
+    scale: float
+    density: float = 1.0
+
+    def px(self, points: float) -> float:
+        """Points of the design on this screen."""
+        return points * self.scale
+
+    def colour(self, colour: Colour, alpha: float = 1.0) -> int:
+        return packed(colour, alpha)
+
+    # -- containers -------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def panel(self, name: str, rect: Rect, padding: tuple[float, float] = (8, 8), flags: int = 0) -> Iterator[None]:
+        """A part of the window that stays where it is."""
+        imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
+        imgui.set_next_window_size(ImVec2(rect.width, rect.height))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(padding[0]), self.px(padding[1])))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
+        imgui.begin(name, None, PANEL | flags)
+        imgui.pop_style_var(2)
+        try:
+            yield
+        finally:
+            imgui.end()
+
+    @contextmanager
+    def floating(self, name: str, x: float, y: float, pivot: tuple[float, float], alpha: float = 0.94) -> Iterator[None]:
+        """A small panel that lies on the canvas and is as large as what is in it."""
+        imgui.set_next_window_pos(ImVec2(x, y), imgui.Cond_.always, ImVec2(*pivot))
+        imgui.set_next_window_bg_alpha(alpha)
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(6), self.px(4)))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(8))
+        imgui.begin(name, None, PANEL | imgui.WindowFlags_.always_auto_resize)
+        imgui.pop_style_var(2)
+        try:
+            yield
+        finally:
+            imgui.end()
+
+    @contextmanager
+    def enabled(self, condition: bool) -> Iterator[None]:
+        if not condition:
+            imgui.begin_disabled()
+        try:
+            yield
+        finally:
+            if not condition:
+                imgui.end_disabled()
+
+    # -- words ------------------------------------------------------------------------------------------------------
+
+    def text(self, text: str, colour: Colour | None = None, size: float = 0.0, bold: bool = False) -> None:
+        """Words; `size` in points of the design, 0 for the ordinary one."""
+        imgui.push_font(self.fonts.bold if bold else self.fonts.regular, size)
+        imgui.push_style_color(imgui.Col_.text, colour or self.palette.text)
+        imgui.text_unformatted(text)
+        imgui.pop_style_color()
+        imgui.pop_font()
+
+    def dim(self, text: str, size: float = 13.0) -> None:
+        self.text(text, self.palette.dim, size)
+
+    def wrapped(self, text: str, colour: Colour | None = None, size: float = 0.0) -> None:
+        imgui.push_text_wrap_pos(0.0)
+        self.text(text, colour, size)
+        imgui.pop_text_wrap_pos()
+
+    def tooltip(self, title: str, key: str = "", more: str = "") -> None:
+        """What the last item is, shown when the pointer rests on it."""
+        if not imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
+            return
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(10), self.px(7)))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(6))
+        if imgui.begin_tooltip():
+            self.text(title, size=14)
+            if key:
+                imgui.same_line(0, self.px(12))
+                self.text(keys_shown(key), self.palette.accent, 13)
+            if more:
+                imgui.push_text_wrap_pos(self.px(280))
+                self.dim(more)
+                imgui.pop_text_wrap_pos()
+            imgui.end_tooltip()
+        imgui.pop_style_var(2)
+
+    # -- buttons ----------------------------------------------------------------------------------------------------
+
+    def icon_button(
+        self,
+        name: str,
+        icon: str,
+        title: str = "",
+        key: str = "",
+        more: str = "",
+        active: bool = False,
+        enabled: bool = True,
+        size: float = 32,
+        icon_size: float = 20,
+    ) -> bool:
+        """A square button with an icon; `active` shows it as pressed in."""
+        side = self.px(size)
+        corner = imgui.get_cursor_screen_pos()
+        with self.enabled(enabled):
+            clicked = imgui.invisible_button(name, ImVec2(side, side))
+            hovered, held = imgui.is_item_hovered(), imgui.is_item_active()
+        if title:
+            self.tooltip(title, key, more)
+        draw, palette = imgui.get_window_draw_list(), self.palette
+        ground = palette.accent_soft if active else palette.pressed if held else palette.hover if hovered else None
+        if ground is not None:
+            draw.add_rect_filled(corner, corner + ImVec2(side, side), packed(ground), self.px(7))
+        colour = palette.accent if active else palette.text if hovered else palette.dim
+        inner = self.px(icon_size)
+        at = (side - inner) / 2
+        icons.draw(draw, icon, corner.x + at, corner.y + at, inner, packed(colour, 1.0 if enabled else 0.35))
+        return clicked
+
+    def button(self, label: str, primary: bool = False, width: float = 0.0, icon: str = "", height: float = 32) -> bool:
+        """A button with words; the primary one is what most people want next."""
+        palette, words = self.palette, label.split("##")[0]
+        imgui.push_font(self.fonts.bold if primary else self.fonts.regular, 14.0)
+        text = imgui.calc_text_size(words)
+        room = self.px(22) if icon else 0.0
+        size = ImVec2(self.px(width) if width > 0 else text.x + room + self.px(28), self.px(height))
+        if width < 0:
+            size.x = imgui.get_content_region_avail().x
+        corner = imgui.get_cursor_screen_pos()
+        clicked = imgui.invisible_button(label, size)
+        hovered, held, focused = imgui.is_item_hovered(), imgui.is_item_active(), imgui.is_item_focused()
+        ground = palette.accent if primary else palette.pressed if held else palette.hover if hovered else palette.raised
+        draw = imgui.get_window_draw_list()
+        alpha = imgui.get_style().alpha * (0.85 if primary and (hovered or held) else 1.0)
+        draw.add_rect_filled(corner, corner + size, packed(ground, alpha), self.px(6))
+        if focused and imgui.get_io().nav_visible:
+            draw.add_rect(corner, corner + size, packed(palette.text), self.px(6), self.px(1.5))
+        ink = palette.on_accent if primary else palette.text
+        x = corner.x + (size.x - text.x - room) / 2
+        if icon:
+            icons.draw(draw, icon, x, corner.y + (size.y - self.px(16)) / 2, self.px(16), packed(ink, alpha))
+        draw.add_text(ImVec2(x + room, corner.y + (size.y - text.y) / 2), packed(ink, alpha), words)
+        imgui.pop_font()
+        return clicked
+
+    def link(self, label: str) -> bool:
+        """A small button that looks like words."""
+        words = label.split("##")[0]
+        imgui.push_font(self.fonts.regular, 13.0)
+        size = imgui.calc_text_size(words)
+        corner = imgui.get_cursor_screen_pos()
+        clicked = imgui.invisible_button(label, ImVec2(size.x + self.px(4), size.y + self.px(4)))
+        hovered = imgui.is_item_hovered()
+        colour = self.palette.accent if hovered else self.palette.dim
+        imgui.get_window_draw_list().add_text(corner + ImVec2(self.px(2), self.px(2)), packed(colour), words)
+        imgui.pop_font()
+        return clicked
+
+    def segmented(self, name: str, choices: Sequence[str], index: int, width: float = 0.0) -> int:
+        """One of a few choices side by side; the index that is chosen now."""
+        palette, draw = self.palette, imgui.get_window_draw_list()
+        imgui.push_font(self.fonts.regular, 13.5)
+        widths = [imgui.calc_text_size(choice).x + self.px(20) for choice in choices]
+        if width:
+            whole = imgui.get_content_region_avail().x if width < 0 else self.px(width)
+            widths = [whole / len(choices)] * len(choices)
+        corner, height = imgui.get_cursor_screen_pos(), self.px(28)
+        draw.add_rect_filled(corner, corner + ImVec2(sum(widths), height), packed(palette.raised), self.px(6))
+        chosen, x = index, corner.x
+        imgui.begin_group()
+        for number, (choice, across) in enumerate(zip(choices, widths, strict=True)):
+            if number:
+                imgui.same_line(0, 0)
+            if imgui.invisible_button(f"{name}{number}", ImVec2(across, height)):
+                chosen = number
+            hovered = imgui.is_item_hovered()
+            box = self.px(2)
+            if number == index:
+                low, high = ImVec2(x + box, corner.y + box), ImVec2(x + across - box, corner.y + height - box)
+                draw.add_rect_filled(low, high, packed(palette.pressed), self.px(5))
+            size = imgui.calc_text_size(choice)
+            ink = palette.text if number == index or hovered else palette.dim
+            at = ImVec2(x + (across - size.x) / 2, corner.y + (height - size.y) / 2)
+            draw.add_text(at, packed(ink, imgui.get_style().alpha), choice)
+            x += across
+        imgui.end_group()
+        imgui.pop_font()
+        return chosen
+
+    def check(self, label: str, value: bool, key: str = "") -> bool:
+        """A switch over the whole width; its value now."""
+        palette, draw = self.palette, imgui.get_window_draw_list()
+        corner, width, height = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x, self.px(28)
+        if imgui.invisible_button(label, ImVec2(width, height)):
+            value = not value
+        hovered = imgui.is_item_hovered()
+        imgui.push_font(self.fonts.regular, 14.0)
+        words = label.split("##")[0]
+        text = imgui.calc_text_size(words)
+        ink = palette.text if hovered or value else palette.dim
+        y = corner.y + (height - text.y) / 2
+        draw.add_text(ImVec2(corner.x, y), packed(ink), words)
+        if key:
+            at = ImVec2(corner.x + text.x + self.px(8), y)
+            draw.add_text(at, packed(palette.faint), keys_shown(key))
+        imgui.pop_font()
+        track, thick = self.px(26), self.px(15)
+        x0, y0 = corner.x + width - track, corner.y + (height - thick) / 2
+        ground = palette.accent if value else palette.pressed
+        draw.add_rect_filled(ImVec2(x0, y0), ImVec2(x0 + track, y0 + thick), packed(ground), thick / 2)
+        knob = x0 + (track - thick / 2 if value else thick / 2)
+        inside = palette.on_accent if value else palette.dim
+        draw.add_circle_filled(ImVec2(knob, y0 + thick / 2), thick / 2 - self.px(2.5), packed(inside), 20)
+        return value
+
+    # -- sliders ----------------------------------------------------------------------------------------------------
+
+    def slider(
+        self,
+        name: str,
+        label: str,
+        value: float,
+        low: float,
+        high: float,
+        shown: str,
+        default: float | None = None,
+        logarithmic: bool = False,
+        width: float = -1.0,
+        title: str = "",
+        key: str = "",
+        more: str = "",
+    ) -> Slid:
+        """A slider with its label and value inside; Ctrl+click types a number, a double click goes back to `default`."""
+        palette = self.palette
+        across = imgui.get_content_region_avail().x if width < 0 else self.px(width)
+        corner = imgui.get_cursor_screen_pos()
+        ident = f"##{name}"
+        typing = internal.temp_input_is_active(imgui.get_id(ident))
+        clear = (0.0, 0.0, 0.0, 0.0)
+        imgui.set_next_item_width(across)
+        imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(self.px(9), self.px(6)))
+        imgui.push_style_color(imgui.Col_.slider_grab, clear)
+        imgui.push_style_color(imgui.Col_.slider_grab_active, clear)
+        imgui.push_style_color(imgui.Col_.text, palette.text if typing else clear)
+        flags: Any = imgui.SliderFlags_.always_clamp
+        if logarithmic:
+            flags |= imgui.SliderFlags_.logarithmic
+        imgui.push_font(self.fonts.regular, 14.0)
+        changed, new = imgui.slider_float(ident, value, low, high, "%.5g", flags)
+        done = imgui.is_item_deactivated_after_edit()
+        hovered, held = imgui.is_item_hovered(), imgui.is_item_active()
+        if hovered and default is not None and imgui.is_mouse_double_clicked(0) and not typing:
+            internal.clear_active_id()
+            new, changed, done = default, True, True
+        imgui.pop_style_color(3)
+        imgui.pop_style_var()
+        size = imgui.get_item_rect_size()
+        if not typing:
+            self._fill(corner, size, _fraction(new, low, high, logarithmic), hovered or held)
+            draw = imgui.get_window_draw_list()
+            y = corner.y + (size.y - imgui.get_font_size()) / 2
+            ink = imgui.get_style().alpha
+            draw.add_text(ImVec2(corner.x + self.px(9), y), packed(palette.dim, ink), label)
+            right = corner.x + size.x - self.px(9) - imgui.calc_text_size(shown).x
+            draw.add_text(ImVec2(right, y), packed(palette.text, ink), shown)
+        imgui.pop_font()
+        if title and not held:
+            self.tooltip(title, key, more)
+        return Slid(new, changed, done)
+
+    def _fill(self, corner: ImVec2, size: ImVec2, part: float, lit: bool) -> None:
+        draw, palette = imgui.get_window_draw_list(), self.palette
+        x = corner.x + max(size.x * part, 0)
+        radius = self.px(6)
+        if part > 0.005:
+            draw.push_clip_rect(corner, ImVec2(x, corner.y + size.y), True)
+            soft = packed(palette.accent, 0.34 if lit else 0.24)
+            draw.add_rect_filled(corner, corner + size, soft, radius)
+            draw.pop_clip_rect()
+        at = min(max(x, corner.x + self.px(2)), corner.x + size.x - self.px(2))
+        low, high = ImVec2(at - self.px(1), corner.y + self.px(5)), ImVec2(at + self.px(1), corner.y + size.y - self.px(5))
+        draw.add_rect_filled(low, high, packed(palette.accent), self.px(1))
+
+    # -- parts of the inspector -------------------------------------------------------------------------------------
+
+    def section(self, label: str, is_open: bool) -> bool:
+        """The head of a section that opens and closes; whether it is open now."""
+        palette, draw = self.palette, imgui.get_window_draw_list()
+        imgui.dummy(ImVec2(0, self.px(2)))
+        corner, width, height = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x, self.px(26)
+        if imgui.invisible_button(f"section {label}", ImVec2(width, height)):
+            is_open = not is_open
+        ink = palette.text if imgui.is_item_hovered() else palette.dim
+        icon = "chevron_down" if is_open else "chevron_right"
+        icons.draw(draw, icon, corner.x - self.px(2), corner.y + self.px(6), self.px(14), packed(ink), 2.2)
+        imgui.push_font(self.fonts.bold, 13.0)
+        draw.add_text(ImVec2(corner.x + self.px(17), corner.y + self.px(6)), packed(ink), label)
+        imgui.pop_font()
+        return is_open
+
+    def line(self) -> None:
+        """A thin line across, from edge to edge."""
+        imgui.dummy(ImVec2(0, self.px(2)))
+        window, corner = imgui.get_window_pos(), imgui.get_cursor_screen_pos()
+        right = ImVec2(window.x + imgui.get_window_width(), corner.y)
+        imgui.get_window_draw_list().add_line(ImVec2(window.x, corner.y), right, packed(self.palette.line), self.px(1))
+        imgui.dummy(ImVec2(0, self.px(1)))
+
+    def divider(self) -> None:
+        """A thin upright line between two groups of a bar."""
+        imgui.same_line(0, self.px(GRID))
+        corner = imgui.get_cursor_screen_pos()
+        low, high = ImVec2(corner.x, corner.y + self.px(6)), ImVec2(corner.x, corner.y + self.px(26))
+        imgui.get_window_draw_list().add_line(low, high, packed(self.palette.line), self.px(1))
+        imgui.dummy(ImVec2(self.px(1), self.px(32)))
+        imgui.same_line(0, self.px(GRID))
+
+
+def _fraction(value: float, low: float, high: float, logarithmic: bool) -> float:
+    from math import log
+
+    if logarithmic:
+        floor = max(low, high * 1e-6)
+        return min(max(log(max(value, floor) / floor) / log(high / floor), 0.0), 1.0)
+    return min(max((value - low) / (high - low), 0.0), 1.0)
+
+
+_NAMES = {
+    "ctrl": "Ctrl", "shift": "Shift", "alt": "Alt", "space": "Space", "left": "←", "right": "→", "escape": "Esc",
+    "delete": "Del", "home": "Home", "end": "End", "enter": "Enter", "tab": "Tab",
+}  # fmt: skip
+
+
+def keys_shown(chord: str) -> str:
+    """A chord as a person reads it: "ctrl+shift+z" is Ctrl+Shift+Z."""
+    if chord.endswith("++"):
+        return keys_shown(chord[:-2]) + "++"
+    return "+".join(_NAMES.get(part, part.upper()) for part in chord.split("+")) if chord != "+" else chord

@@ -1,0 +1,121 @@
+// Canvas: what lies under a pixel of the screen: the picture through the warp map, on a checkerboard, with its overlays.
+//   colour(x) = picture(x + D(x)),  x = (pixel - u_origin) u_step  in 0-1 of the picture
+// u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering; u_extent: width and height in longer
+// sides; u_split: left of this x the picture is as it was (0: nowhere); u_edges: 0 transparent, 1 black, 2 clamp,
+// 3 mirror, 4 wrap; u_tile: side of a square of the checkerboard, pixels.
+// GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY, FROZEN: tint of decades of
+// viscosity over u_base, hatch. ARROWS: velocity on MAC faces, lengths / s, of which u_speed fills an arrow.
+// The colours are told apart by those who do not see red and green apart (Okabe and Ito).
+// reads: 2, and up to 8 with overlays
+uniform sampler2D u_picture;
+uniform sampler2D u_displacement;
+uniform vec2 u_origin;
+uniform vec2 u_step;
+uniform vec2 u_extent;
+uniform float u_split;
+uniform int u_edges;
+uniform vec3 u_light;
+uniform vec3 u_dark;
+uniform float u_tile;
+uniform float u_target_height;
+#ifdef GRID
+uniform float u_grid;
+uniform float u_grid_opacity;
+uniform float u_pixel;
+#endif
+#ifdef VISCOSITY
+uniform sampler2D u_viscosity;
+uniform float u_base;
+uniform float u_viscosity_opacity;
+#endif
+#ifdef FROZEN
+uniform sampler2D u_solid;
+uniform float u_frozen_opacity;
+uniform float u_hatch;
+#endif
+#ifdef ARROWS
+uniform sampler2D u_velocity;
+uniform float u_arrow;
+uniform float u_speed;
+uniform float u_arrows_opacity;
+uniform vec3 u_arrow_colour;
+#endif
+layout(location = 0) out vec4 out_colour;
+
+float inside(vec2 place) { return float(all(greaterThanEqual(place, vec2(0.0))) && all(lessThanEqual(place, vec2(1.0)))); }
+
+vec4 look_up(vec2 place) {
+    if (u_edges == 2) place = clamp(place, 0.0, 1.0);
+    if (u_edges == 3) place = 1.0 - abs(mod(place, 2.0) - 1.0);
+    if (u_edges == 4) place = fract(place);
+    vec4 colour = texture(u_picture, place);
+    if (u_edges == 0) colour *= inside(place);
+    if (u_edges == 1 && inside(place) < 0.5) colour = vec4(0.0, 0.0, 0.0, 1.0);
+    return colour;
+}
+
+#ifdef ARROWS
+// Coverage of an arrow along v (of length 0-1) in a square from -1 to 1, whose pixel is `soft` wide.
+float arrow(vec2 p, vec2 v, float soft) {
+    float size = length(v);
+    if (size < 0.04) return 0.0;
+    vec2 along = v / size;
+    vec2 q = vec2(dot(p, along), abs(p.y * along.x - p.x * along.y));
+    float reach = 0.9 * min(size, 1.0), head = min(0.5, reach);
+    float shaft = max(q.y - 0.07, max(-reach - q.x, q.x - reach + head));
+    float tip = max(0.5 * (q.x - reach) + q.y, reach - head - q.x);
+    return 1.0 - smoothstep(-soft, soft, min(shaft, tip));
+}
+#endif
+
+void main() {
+    vec2 pixel = vec2(gl_FragCoord.x, u_target_height - gl_FragCoord.y) - u_origin;
+    vec2 x = pixel * u_step;
+    bool warped = x.x >= u_split;
+    vec2 place = x;
+    if (warped) place += texture(u_displacement, x).rg / u_extent;
+    vec4 colour = look_up(place);
+    if (colour.a < 0.999) {
+        vec2 tile = floor(gl_FragCoord.xy / u_tile);
+        colour.rgb += (1.0 - colour.a) * (mod(tile.x + tile.y, 2.0) < 0.5 ? u_light : u_dark);
+    }
+    vec3 seen = colour.rgb;
+    if (warped) {
+#ifdef VISCOSITY
+        float decades = log(max(texture(u_viscosity, x).r, 1e-9) / u_base) * 0.4342945;
+        vec3 tint = decades > 0.0 ? vec3(0.90, 0.62, 0.0) : vec3(0.34, 0.71, 0.91);
+        seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(decades) * 0.28, 0.0, 0.75));
+#endif
+#ifdef FROZEN
+        float frozen = smoothstep(0.3, 0.7, texture(u_solid, x).r);
+        float stripe = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / u_hatch) - 0.5) * 2.0;
+        vec3 ice = mix(vec3(0.0, 0.45, 0.70), vec3(0.80, 0.93, 1.0), smoothstep(0.60, 0.75, stripe));
+        seen = mix(seen, ice, u_frozen_opacity * frozen * 0.72);
+#endif
+#ifdef GRID
+        vec2 lines = place * u_extent * u_grid;
+        vec2 near = abs(fract(lines - 0.5) - 0.5);
+        vec2 wide = max(fwidth(lines), 1e-5);
+        vec2 line = 1.0 - smoothstep(0.3 * u_pixel, 1.1 * u_pixel, near / wide);
+        // Where lines are closer than their own width, none can be told apart.
+        line *= 1.0 - smoothstep(0.25, 0.6, wide);
+        vec2 shade = 1.0 - smoothstep(0.8 * u_pixel, 2.2 * u_pixel, near / wide);
+        seen = mix(seen, vec3(0.0), u_grid_opacity * 0.35 * max(shade.x, shade.y));
+        seen = mix(seen, vec3(1.0), u_grid_opacity * max(line.x, line.y));
+#endif
+#ifdef ARROWS
+        vec2 tile = (floor(pixel / u_arrow) + 0.5) * u_arrow;
+        vec2 middle = tile * u_step;
+        if (inside(middle) > 0.5) {
+            vec2 v = texture(u_velocity, middle).rg / u_speed;
+            float size = length(v);
+            if (size > 0.0) v *= sqrt(min(size, 1.0)) / size;
+            vec2 p = (pixel - tile) / (0.5 * u_arrow);
+            float soft = 2.0 / u_arrow;
+            seen = mix(seen, vec3(0.0), u_arrows_opacity * 0.6 * arrow(p * 0.9, v * 1.12, 2.0 * soft));
+            seen = mix(seen, u_arrow_colour, u_arrows_opacity * arrow(p, v, soft));
+        }
+#endif
+    }
+    out_colour = vec4(seen, 1.0);
+}
