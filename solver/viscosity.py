@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +26,13 @@ class Plan:
     """How much is solved: chosen once for each viscosity and time step, see `plan_for`.
 
     Attributes:
-        steps: conjugate gradient steps after the start on nested grids, each with one multigrid cycle.
+        nested: multigrid cycles on each coarser grid while the start is carried up through them.
+        steps: conjugate gradient steps after that, each with one multigrid cycle.
         sweeps: smoothing sweeps before and after the coarser grids: (on the finest, on the others).
         visits: how often a cycle goes from a grid to the next coarser one, from the finest on; the last holds below.
     """
 
+    nested: int = 1
     steps: int = 2
     sweeps: tuple[int, int] = (2, 2)
     visits: tuple[int, ...] = (1,)
@@ -99,6 +102,11 @@ class Level:
     def matrix(self) -> dict[str, object]:
         """The inputs of shaders/viscosity/block.glsl."""
         return {name: field for name, field in self.packed.items() if name != "open"}
+
+    @property
+    def inverse(self) -> dict[str, object]:
+        """1 / diagonal, as inputs."""
+        return {name: self.packed[name] for name in ("inverse_u", "inverse_v")}
 
     @property
     def is_coarsest(self) -> bool:
@@ -221,13 +229,26 @@ class Viscosity:
     # -- multigrid --------------------------------------------------------------------------------------------------
 
     def _start_on_nested_grids(self) -> None:
-        """A first solution: exact on the coarsest grid, then carried up and smoothed grid by grid."""
-        for finer, coarser in zip(self.levels, self.levels[1:], strict=False):
+        """A first solution: exact on the coarsest grid, then carried up and improved grid by grid."""
+        for finer, coarser in pairwise(self.levels):
             self._restrict(finer.right, coarser)
-        self._solve_exactly()
-        for coarser, finer in zip(self.levels[:0:-1], self.levels[-2::-1], strict=True):
-            self._prolong(coarser, finer, add=False)
+        self._solve_exactly(self.levels[-1].right)
+        for finer, coarser in reversed(list(pairwise(self.levels))):
+            prolong = self.device.pass_("viscosity/prolong.frag", START=1, **self._slip)
+            prolong(
+                finer.faces.write.fields,
+                region=finer.region,
+                **coarser.faces.read.inputs("coarse_"),
+                **coarser.right.inputs("coarse_right_"),
+                **finer.right.inputs(),
+                **finer.inverse,
+            )
+            finer.faces.swap()
             self._smooth(finer, finer.right, self._weights(finer)[::-1])
+            if finer.depth > 0 and self.plan.nested:
+                # A cycle's coarser grids are used up by now; this one's right-hand side is still wanted.
+                for _ in range(self.plan.nested):
+                    self._cycle(finer, finer.right, warm=True)
 
     def _cycle(self, level: Level, right: Pair, warm: bool = False) -> None:
         """One multigrid cycle for A faces = right, from rest or (`warm`) from the level's iterate."""
@@ -252,7 +273,7 @@ class Viscosity:
         self._restrict(level.faces.write, coarser)
         for visit in range(self._visits(level)):
             self._cycle(coarser, coarser.right, warm=visit > 0)
-        self._prolong(coarser, level, add=True)
+        self._prolong(coarser, level)
         self._smooth(level, right, weights[::-1])
 
     def _visits(self, level: Level) -> int:
@@ -287,25 +308,25 @@ class Viscosity:
         restrict = self.device.pass_("viscosity/restrict.frag", **self._slip)
         restrict(coarser.right.fields, region=coarser.region, open=coarser.packed["open"], **residual.inputs())
 
-    def _prolong(self, coarser: Level, finer: Level, add: bool) -> None:
-        prolong = self.device.pass_("viscosity/prolong.frag", **self._slip, **({"ADD": 1} if add else {}))
+    def _prolong(self, coarser: Level, finer: Level) -> None:
+        prolong = self.device.pass_("viscosity/prolong.frag", **self._slip)
         prolong(
             finer.faces.write.fields,
             region=finer.region,
-            open=finer.packed["open"],
             **coarser.faces.read.inputs("coarse_"),
             **finer.faces.read.inputs(),
+            **finer.inverse,
         )
         finer.faces.swap()
 
-    def _solve_exactly(self, right: Pair | None = None) -> None:
+    def _solve_exactly(self, right: Pair) -> None:
         level = self.levels[-1]
         exact = self.device.pass_("viscosity/exact.frag")
         exact(
             level.faces.write.fields,
             region=level.region,
             inverse=self._inverse,
-            **(right or level.right).inputs("right_"),
+            **right.inputs("right_"),
         )
         level.faces.swap()
 

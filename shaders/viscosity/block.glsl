@@ -3,22 +3,24 @@
 // what lies beyond a wall is at rest.
 // Matrix: A v = v - B^T K B v with the strains B: u_x and v_y in cells (K = 2 dt mu / h^2), u_y + v_x at nodes
 // (K = dt mu_node / h^2). Pinned faces (walls, solid cells) hold exactly zero and are no unknowns.
-uniform sampler2D u_cells_x;    // K of u_x in the cells; negative where the cell's left face is pinned
+uniform sampler2D u_cells_x;    // K of u_x in the cells
 uniform sampler2D u_cells_y;    // K of v_y in the cells (the same as cells_x on the finest grid)
-uniform sampler2D u_nodes;      // K of the cells' upper left nodes; negative where the cell's upper face is pinned
+uniform sampler2D u_nodes;      // K of the cells' upper left nodes
 uniform sampler2D u_cell_halo;  // xy: cells_x left of the texel, zw: cells_y above it
 uniform sampler2D u_node_halo;  // xy: nodes right of the texel, zw: nodes below it
+uniform sampler2D u_inverse_u;  // 1 / diagonal of A for u and for v; 0 for pinned faces
+uniform sampler2D u_inverse_v;
 
 struct Faces { vec4 u, v; };
-struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below; Faces open; };
+struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below; };
+
+Faces inverse_diagonal(vec2 at) { return Faces(texture(u_inverse_u, at), texture(u_inverse_v, at)); }
+vec4 open(vec4 inverse) { return vec4(greaterThan(inverse, vec4(0.0))); }
 
 Stiffness read_stiffness(vec2 at) {
     vec4 x = texture(u_cells_x, at), n = texture(u_nodes, at);
     vec4 cells = texture(u_cell_halo, at), nodes = texture(u_node_halo, at);
     Stiffness k;
-    k.open = Faces(step(0.0, x), step(0.0, n));
-    x = abs(x);
-    n = abs(n);
 #ifdef FINEST
     vec4 y = x;
 #else
@@ -32,11 +34,6 @@ Stiffness read_stiffness(vec2 at) {
     k.node_right = vec4(n.y, nodes.x, n.w, nodes.y);
     k.node_below = vec4(n.zw, nodes.zw);
     return k;
-}
-
-// The diagonal of A.
-Faces diagonal(Stiffness k) {
-    return Faces(1.0 + k.left + k.here_x + k.node + k.node_below, 1.0 + k.above + k.here_y + k.node + k.node_right);
 }
 
 // A f for the texel at `at` of the faces in textures fu, fv; `here` becomes their own values. 12 reads.

@@ -8,7 +8,9 @@ layout(location = 1) out vec4 out_cells_y;
 layout(location = 2) out vec4 out_nodes;
 layout(location = 3) out vec4 out_cell_halo;
 layout(location = 4) out vec4 out_node_halo;
-layout(location = 5) out vec4 out_open;
+layout(location = 5) out vec4 out_inverse_u;
+layout(location = 6) out vec4 out_inverse_v;
+layout(location = 7) out vec4 out_open;
 
 vec4 around[16]; // cells -1..2 by rows, 0 the upper left one of the texel
 
@@ -23,20 +25,25 @@ float node(int i, int j) {
     return open > 3.5 ? at(i, j).b : 0.0;
 #endif
 }
-// The sign says whether the face is open; a K of nothing keeps its sign too.
-float marked(float k, bool open) { return open ? k : -max(k, 1e-30); }
-
 void main() {
     ivec2 corner = 2 * (ivec2(gl_FragCoord.xy) - 1);
     for (int q = 0; q < 16; ++q) around[q] = cell(corner + ivec2(q % 4 - 1, q / 4 - 1));
+    vec4 n;
     for (int q = 0; q < 4; ++q) {
         int i = q % 2, j = q / 2;
         vec4 here = at(i, j);
-        out_cells_x[q] = marked(here.r, left_open(here));
+        out_cells_x[q] = here.r;
         out_cells_y[q] = here.g;
-        out_nodes[q] = marked(node(i, j), upper_open(here));
         out_open[q] = here.a;
+        n[q] = node(i, j);
     }
-    out_cell_halo = vec4(at(-1, 0).r, at(-1, 1).r, at(0, -1).g, at(1, -1).g);
-    out_node_halo = vec4(node(2, 0), node(2, 1), node(0, 2), node(1, 2));
+    vec2 right = vec2(node(2, 0), node(2, 1)), below = vec2(node(0, 2), node(1, 2));
+    vec4 cells = vec4(at(-1, 0).r, at(-1, 1).r, at(0, -1).g, at(1, -1).g);
+    out_nodes = n;
+    out_node_halo = vec4(right, below);
+    out_cell_halo = cells;
+    vec4 open_u = mod(out_open, 2.0), open_v = step(1.5, out_open);
+    vec4 x = out_cells_x, y = out_cells_y;
+    out_inverse_u = open_u / (1.0 + vec4(cells.x, x.x, cells.y, x.z) + x + n + vec4(n.zw, below));
+    out_inverse_v = open_v / (1.0 + vec4(cells.zw, y.xy) + y + n + vec4(n.y, right.x, n.w, right.y));
 }

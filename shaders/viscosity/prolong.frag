@@ -1,13 +1,21 @@
-// Prolong: the coarse correction on the finer grid, added to the iterate (ADD) or by itself.
-// u_coarse_u, u_coarse_v: coarse faces; u_u, u_v: the iterate; u_open: which fine faces are open (1 for u, plus 2 for v).
+// Prolong: the coarse correction on the finer grid, added to the iterate; or, with START, a first iterate: the coarse
+// solution, and for what the coarse grid cannot carry of the right-hand side, each face by itself:
+// f = P e + D^-1 (b - P b_coarse).
+// u_coarse_u, u_coarse_v: coarse faces e; u_u, u_v: the iterate, or b; u_coarse_right_u, u_coarse_right_v: b_coarse;
+// u_inverse_u, u_inverse_v: 1 / D, which is 0 for pinned faces.
 // Linear along the face's normal; 3/4 and 1/4 of the two nearest across it. A coarse face that is exactly zero is
 // pinned (or at rest, which makes no difference): at free-slip walls the other one then counts whole.
-// reads: 11
+// reads: 12
 uniform sampler2D u_coarse_u;
 uniform sampler2D u_coarse_v;
 uniform sampler2D u_u;
 uniform sampler2D u_v;
-uniform sampler2D u_open;
+uniform sampler2D u_inverse_u;
+uniform sampler2D u_inverse_v;
+#ifdef START
+uniform sampler2D u_coarse_right_u;
+uniform sampler2D u_coarse_right_v;
+#endif
 in vec2 v_uv;
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -42,11 +50,13 @@ void main() {
     bvec2 odd = equal(place & 1, ivec2(1));
     vec2 texel = 1.0 / vec2(textureSize(u_coarse_u, 0)), p = (vec2(place >> 1) + 1.5) * texel;
     vec2 x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
-    vec4 open = texture(u_open, v_uv);
-    out_u = mod(open, 2.0) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
-    out_v = step(1.5, open) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
-#ifdef ADD
-    out_u += texture(u_u, v_uv);
-    out_v += texture(u_v, v_uv);
+    vec4 inverse_u = texture(u_inverse_u, v_uv), inverse_v = texture(u_inverse_v, v_uv);
+    vec4 open_u = vec4(greaterThan(inverse_u, vec4(0.0))), open_v = vec4(greaterThan(inverse_v, vec4(0.0)));
+    vec4 u = texture(u_u, v_uv), v = texture(u_v, v_uv);
+#ifdef START
+    u = inverse_u * (u - spread(u_coarse_right_u, p, x, y, false, odd.x, odd.y));
+    v = inverse_v * (v - spread(u_coarse_right_v, p, y, x, true, odd.y, odd.x).xzyw);
 #endif
+    out_u = u + open_u * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
+    out_v = v + open_v * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
 }
