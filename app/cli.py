@@ -96,6 +96,7 @@ def render(
     output: Output = Path("out.png"),
     image: Annotated[Optional[Path], typer.Option("--image", "-i", help="The picture to warp.")] = None,  # noqa: UP045
     stats: Annotated[Optional[Path], typer.Option(help="Write numbers about every frame, as JSON.")] = None,  # noqa: UP045
+    map_: Annotated[Optional[Path], typer.Option("--map", help="Write the last frame's warp map (.exr ...).")] = None,  # noqa: UP045
     size: Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")] = None,  # noqa: UP045
     grid: Annotated[Optional[int], typer.Option(help="Cells along the longer side.")] = None,  # noqa: UP045
     solver: Annotated[Optional[str], typer.Option(help="mac or paper.")] = None,  # noqa: UP045
@@ -118,21 +119,23 @@ def render(
         "output": {"size": size, "fps": fps, "quality": quality},
         "time": {"start": start, "end": end},
     }
-    asked = _with_options(loaded.recipe, changed, duration)
+    asked = _with_options(loaded.recipe, changed, {"duration": duration})
     wanted = [*([image] if image else []), *(pictures or [])] or [None]
     if len(wanted) > 1 and "{name}" not in str(output):
         raise UserError(f"{len(wanted)} pictures cannot all become {output}; write for example out/{{name}}.png")
     for picture in wanted:
         target = Path(str(output).replace("{name}", picture.stem)) if picture else output
-        _render_one(asked, loaded, picture, target, stats)
+        _render_one(asked, loaded, picture, target, stats, map_)
 
 
-def _render_one(recipe: Recipe, loaded: Opened, picture: Path | None, target: Path, stats: Path | None) -> None:
+def _render_one(
+    recipe: Recipe, loaded: Opened, picture: Path | None, target: Path, stats: Path | None, map_: Path | None
+) -> None:
     from app.export import Job, run
     from app.progress import on_terminal
     from solver.context import Device
 
-    job = Job(recipe, loaded.picture(picture), loaded.folder, target, stats)
+    job = Job(recipe, loaded.picture(picture), loaded.folder, target, stats, map_)
     job.check()
     with on_terminal(target.name, recipe.ticks) as progress, Device.headless() as device:
         report = run(device, job, progress)
@@ -140,14 +143,50 @@ def _render_one(recipe: Recipe, loaded: Opened, picture: Path | None, target: Pa
         print(f"fluidwarp: {notice}", file=sys.stderr)
 
 
-def _with_options(recipe: Recipe, changed: dict[str, dict[str, Any]], duration: float | None) -> Recipe:
-    """The recipe with the options that were given instead of its own."""
-    parts: dict[str, Any] = {} if duration is None else {"duration": duration}
+def _with_options(recipe: Recipe, changed: dict[str, dict[str, Any]], single: dict[str, Any]) -> Recipe:
+    """The recipe with the options that were given instead of its own; `changed` are keys of its tables."""
+    parts = {name: value for name, value in single.items() if value is not None}
     for key, options in changed.items():
         given = {name: value for name, value in options.items() if value is not None}
         if given:
             parts[key] = getattr(recipe, key).model_copy(update=given)
     return recipe.edited(**parts).checked("the command line") if parts else recipe
+
+
+@cli.command()
+def apply(
+    map_: Annotated[Path, typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy.")],
+    picture: Annotated[Path, typer.Argument(help="The picture to warp by it.")],
+    output: Output,
+    edges: Annotated[str, typer.Option(help="transparent, black, clamp, mirror or wrap.")] = "transparent",
+    size: Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")] = None,  # noqa: UP045
+) -> None:
+    """Warp a picture by a map that was made before, or elsewhere."""
+    from app.export import apply_map
+    from app.files import writable
+    from app.maps import read_map
+    from app.pictures import picture_format, read_picture, write_picture
+    from app.recipe import Recipe
+    from solver.context import Device
+
+    picture_format(output)
+    writable(output)
+    wanted = _with_options(Recipe(), {"output": {"size": size}}, {"edges": edges})
+    given, source = read_map(map_), read_picture(picture)
+    with Device.headless() as device:
+        write_picture(output, apply_map(device, given, source, wanted))
+
+
+@cli.command()
+def convert(
+    map_: Annotated[Path, typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy.")],
+    output: Output,
+    offsets: Annotated[bool, typer.Option(help="Pixel offsets in an EXR or TIFF, instead of an ST map.")] = False,
+) -> None:
+    """Write a warp map in another format."""
+    from app.maps import read_map, write_map
+
+    write_map(output, read_map(map_), "offsets" if offsets else "st")
 
 
 @cli.command()

@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from app.animation import animation_writer, check_animation, frame_order, is_animation, reordered
+from app.errors import UserError
 from app.files import replacing, writable
+from app.maps import Displacement, check_map, cropped, write_map
 from app.opening import check_picture
 from app.pictures import Picture, picture_format, write_picture
 from app.progress import Progress
@@ -35,6 +37,7 @@ class Job:
         folder: where the names of auxiliary pictures in the recipe start from.
         output: the file, or the pattern of a sequence's files.
         stats: a JSON file for numbers about every frame.
+        map: a file for the last frame's warp map; see `app.maps`.
     """
 
     recipe: Recipe
@@ -42,6 +45,7 @@ class Job:
     folder: Path
     output: Path
     stats: Path | None = None
+    map: Path | None = None
 
     @property
     def is_animation(self) -> bool:
@@ -57,9 +61,11 @@ class Job:
             check_animation(self.output, self.recipe.output.fps)
         else:
             picture_format(self.output)
-        writable(self.output)
-        if self.stats is not None:
-            writable(self.stats)
+        if self.map is not None:
+            check_map(self.map)
+        for path in (self.output, self.stats, self.map):
+            if path is not None:
+                writable(path)
 
 
 @dataclass(frozen=True)
@@ -128,6 +134,8 @@ class _Export:
             picture = next(self._frames([Fraction(end)]))
             write_picture(job.output, job.picture.with_pixels(picture), quality=recipe.output.quality)
             count = 1
+        if job.map is not None:
+            write_map(job.map, displacement(self.replay, self.size))
         if job.stats is not None:
             with replacing(job.stats) as temporary:
                 temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
@@ -233,6 +241,30 @@ class _Export:
             "stopped": verdict,
             "frames": self.numbers,
         }
+
+
+def displacement(replay: Replay, size: tuple[int, int]) -> Displacement:
+    """The warp map at this moment, for a picture of `size`."""
+    # The grid's cells are square, and its sides whole cells: the picture is fitted to it by less than half a cell.
+    fit = np.divide(size, max(size)) / replay.grid.extent
+    return Displacement((replay.warp.read(size) * fit).astype(np.float32))
+
+
+def apply_map(device: Device, given: Displacement, picture: Picture, recipe: Recipe) -> Picture:
+    """The picture looked up through a map that was made before; edges and size as the recipe says.
+
+    Raises:
+        UserError: if the map has other proportions than the picture.
+    """
+    if given.forward:
+        raise UserError("this map tells where each point goes; to warp a picture, one of where it comes from is needed")
+    values = cropped(given.fitted(picture.width, picture.height)).values
+    sampler = Sampler(device)
+    try:
+        pixels = sampler.apply(values, picture.pixels, result_size(recipe, picture), Sampling(edges=recipe.edges))
+    finally:
+        sampler.release()
+    return picture.with_pixels(pixels)
 
 
 def result_size(recipe: Recipe, picture: Picture) -> tuple[int, int]:
