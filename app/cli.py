@@ -91,7 +91,9 @@ def edit(
 
 @cli.command()
 def render(
-    recipe: Annotated[str, typer.Argument(help="A recipe (.toml), or the name of one that comes with fluidwarp.")],
+    recipe: Annotated[
+        str, typer.Argument(help="A recipe (.toml) or project, or the name of a recipe that comes with fluidwarp.")
+    ],
     pictures: Annotated[Optional[list[Path]], typer.Argument(help="Pictures instead of the recipe's own.")] = None,  # noqa: UP045
     output: Output = Path("out.png"),
     image: Annotated[Optional[Path], typer.Option("--image", "-i", help="The picture to warp.")] = None,  # noqa: UP045

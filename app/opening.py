@@ -9,6 +9,7 @@ from pathlib import Path
 
 from app.errors import UserError
 from app.pictures import Picture, read_picture
+from app.project import Project, is_project, load
 from app.recipe import Recipe
 from solver.grid import SMALLEST_GRID
 
@@ -33,11 +34,12 @@ def check_picture(picture: Picture, cells: int) -> None:
 
 @dataclass(frozen=True)
 class Opened:
-    """A recipe that was found, and the folder that the names in it start from."""
+    """A recipe that was found, and the folder that the names in it start from; `project` where it came from one."""
 
     recipe: Recipe
     folder: Path
     label: str
+    project: Project | None = None
 
     def picture(self, other: Path | None = None) -> Picture:
         """The picture `other`, or else the recipe's own.
@@ -47,6 +49,8 @@ class Opened:
         """
         if other is not None:
             return read_picture(other)
+        if self.project is not None:
+            return self.project.picture
         if self.recipe.picture is None:
             raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
         return read_picture(self.folder / self.recipe.picture)
@@ -59,7 +63,7 @@ def shipped_recipes() -> dict[str, Path]:
 
 
 def open_recipe(name: str) -> Opened:
-    """The recipe in a file, or the one of this name that comes with fluidwarp.
+    """The recipe in a file or a project, or the one of this name that comes with fluidwarp.
 
     Raises:
         UserError: if there is none, naming those that there are.
@@ -73,4 +77,7 @@ def open_recipe(name: str) -> Opened:
         if name not in known:
             raise UserError(f"{name} does not exist; recipes that come with fluidwarp: {', '.join(known) or 'none'}")
         path = known[name]
+    if is_project(path):
+        project = load(path)
+        return Opened(project.recipe, project.folder, str(path), project)
     return Opened(Recipe.load(path), path.parent, str(path))

@@ -13,6 +13,7 @@ import pytest
 
 from app import cli
 from app.pictures import Picture, read_picture, write_picture
+from app.project import from_recipe, save
 
 ROOT = Path(__file__).parent.parent
 RECIPE = """
@@ -92,6 +93,16 @@ def test_options_instead_of_the_recipe(folder: Path):
     ran = fluidwarp(folder, "render", "a.toml", "-o", "out.jpg", *words)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert read_picture(folder / "out.jpg").pixels.shape == (60, 40, 3)
+
+
+def test_a_project_is_a_recipe(folder: Path):
+    """With its picture in it, and rendered to the same bytes."""
+    save(from_recipe(folder / "a.toml"), folder / "a.fluidwarp")
+    assert fluidwarp(folder, "render", "a.toml", "-o", "a.png").returncode == 0
+    (folder / "cat.png").unlink()
+    ran = fluidwarp(folder, "render", "a.fluidwarp", "-o", "b.png")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert (folder / "a.png").read_bytes() == (folder / "b.png").read_bytes()
 
 
 def test_several_pictures(folder: Path):
