@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from solver.field import DoubleField, Field
 from solver.params import Walls
 from solver.passes import Region
 from solver.reduce import Reduction
+from solver.stiff_parts import StiffParts
 
 # Texels (of 2 x 2 cells) of the coarsest grid, on which the inverse matrix is at hand.
 COARSEST = 64
@@ -29,18 +31,20 @@ class Plan:
         nested: multigrid cycles on each coarser grid while the start is carried up through them.
         steps: conjugate gradient steps after that, each with one multigrid cycle.
         sweeps: smoothing sweeps before and after the coarser grids: (on the finest, on the others).
+        stiff: dt mu / h^2 above which patches of fluid are moved as rigid pieces too; 0: none are.
         visits: how often a cycle goes from a grid to the next coarser one, from the finest on; the last holds below.
     """
 
     nested: int = 1
     steps: int = 2
     sweeps: tuple[int, int] = (2, 2)
+    stiff: float = 0.0
     visits: tuple[int, ...] = (1,)
 
 
 def plan_for(least: float, largest: float) -> Plan:
     """The plan for dt mu / h^2 between `least` and `largest`."""
-    return Plan()
+    return Plan(stiff=max(100.0, math.sqrt(least * largest)) if largest > 1e3 * least else 0.0)
 
 
 class Pair:
@@ -146,6 +150,7 @@ class Viscosity:
         self._residual = DoublePair(device, ringed, "viscous residual")
         self._direction = DoublePair(device, ringed, "viscous direction")
         self._stress = DoublePair(device, ringed, "viscous direction's stress")
+        self._stiff_parts = StiffParts(device, finest.texels)
         self._factors = device.double_field((1, 1), 4, "viscous step")
         self._products = device.field(ringed, 2, "viscous products")
         self._sum = Reduction(device, ringed, 2, "sum")
@@ -164,9 +169,13 @@ class Viscosity:
             pack = self.device.pass_("viscosity/pack.frag", **self._slip)
             pack(list(level.packed.values()), region=level.region, cells=level.cells)
             inputs, stage = {"cells": level.cells}, "viscosity/coarsen.frag"
-        values = viscosity.get()
-        self.plan = plan_for(float(values.min()) * dt_over_h2, float(values.max()) * dt_over_h2)
         self._inverse.set(inverse_matrix(self.levels[-1]))
+        frozen = solid.get() > 0
+        scaled = np.where(frozen, np.nan, viscosity.get() * dt_over_h2)
+        least, largest = (0.0, 0.0) if frozen.all() else (float(np.nanmin(scaled)), float(np.nanmax(scaled)))
+        self.plan = plan_for(least, largest)
+        stiff = scaled > self.plan.stiff if self.plan.stiff else np.zeros_like(frozen)
+        self._stiff_parts.find(stiff, frozen, self._apply_matrix)
 
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution."""
@@ -191,11 +200,18 @@ class Viscosity:
         solution, residual, direction, stress = self._solution, self._residual, self._direction, self._stress
         solution.read, finest.faces.read = finest.faces.read, solution.read
         self._residual_of(finest, solution.read, finest.right, residual.read)
+        if self._stiff_parts.count:
+            self._stiff_parts.fit(residual.read.fields, solution.read.fields, solution.write.fields)
+            solution.swap()
+            self._residual_of(finest, solution.read, finest.right, residual.read)
         products = [self._products]
         for step in range(self.plan.steps):
             first: dict[str, object] = {"FIRST": 1} if step == 0 else {}
             last: dict[str, object] = {"LAST": 1} if step == self.plan.steps - 1 else {}
             self._cycle(finest, residual.read)
+            if self._stiff_parts.count:
+                self._stiff_parts.fit(residual.read.fields, finest.faces.read.fields, finest.faces.write.fields)
+                finest.faces.swap()
             z, az = finest.faces.read, finest.faces.write
             measure = self.device.pass_("viscosity/measure.frag", **finest.defines)
             measure(
@@ -303,6 +319,15 @@ class Viscosity:
     def _residual_of(self, level: Level, faces: Pair, right: Pair, target: Pair) -> None:
         residual = self.device.pass_("viscosity/residual.frag", **level.defines)
         residual(target.fields, region=level.region, **faces.inputs(), **right.inputs("right_"), **level.matrix)
+
+    def _apply_matrix(self, draw: Callable[[tuple[Field, Field]], None]) -> tuple[Field, Field]:
+        """Minus the finest grid's matrix times the faces that `draw` fills, for `StiffParts.find`."""
+        finest = self.levels[0]
+        for field in (*finest.right.fields, *finest.faces.read.fields):
+            field.clear()
+        draw(finest.faces.read.fields)
+        self._residual_of(finest, finest.faces.read, finest.right, self._residual.read)
+        return self._residual.read.fields
 
     def _restrict(self, residual: Pair, coarser: Level) -> None:
         restrict = self.device.pass_("viscosity/restrict.frag", **self._slip)
