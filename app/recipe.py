@@ -234,7 +234,13 @@ class Recipe(Model):
 
         document = tomlkit.document()
         for key, value in plain(self).items():
-            document.add(key, tomlkit.item(value))
+            if isinstance(value, list) and value and isinstance(value[0], dict):
+                tables = tomlkit.aot()
+                for entry in value:
+                    tables.append(tomlkit.item({name: _inline(part) for name, part in entry.items()}))
+                document.add(key, tables)
+            else:
+                document.add(key, tomlkit.item(value))
         return tomlkit.dumps(document)
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -304,3 +310,14 @@ class Recipe(Model):
     def _set_up(self) -> tuple[object, ...]:
         """What is in force from the first tick on."""
         return self.picture, self.mode, self.density, self.fluid, self.viscosity, self.freeze, self.force
+
+
+def _inline(value: Any) -> Any:
+    """A table within a table of a list, as `{ ... }` on its own line: headers of headers are hard to read."""
+    import tomlkit
+
+    if not isinstance(value, dict):
+        return value
+    table = tomlkit.inline_table()
+    table.update({name: _inline(part) for name, part in value.items()})
+    return table

@@ -47,8 +47,11 @@ def plain(model: BaseModel) -> dict[str, Any]:
         for name, field in type(model).model_fields.items()
         if len(_choices(field)) == 1 or getattr(model, name) != field.default
     }
-    # A single value after a table would belong to the table.
-    return dict(sorted(told.items(), key=lambda item: _rank(item[1])))
+    # What it is comes first; and a single value after a table would belong to the table.
+    return dict(sorted(told.items(), key=lambda item: (_rank(item[1]), _HEADS.get(item[0], len(_HEADS)))))
+
+
+_HEADS = {"version": 0, "name": 1, "kind": 2, "tool": 3, "tick": 4}
 
 
 def _plain_value(value: Any) -> Any:

@@ -44,6 +44,41 @@ ping_pong = true
 size = 640
 fps = 25
 
+[[viscosity]]
+kind = "picture"
+picture = "source"
+range = [0.001, 10]
+levels = 4
+window = { box = [0.1, 0.1, 0.9, 0.9], shape = "ellipse", soft = 0.05 }
+
+[[freeze]]
+name = "border"
+kind = "constant"
+window = { box = [0.05, 0.05, 0.95, 0.95], invert = true }
+
+[[freeze]]
+kind = "path"
+points = [[0.1, 0.1], [0.2, 0.2]]
+
+[[force]]
+name = "hat"
+kind = "gradient"
+segment = { above = 0.5, window = { box = [0, 0, 1, 0.5] } }
+swell = true
+keys = [[0, 0], [1, 0.5]]
+interpolation = "smooth"
+
+[[force]]
+kind = "curve"
+points = [[0.1, 0.1], [0.5, 0.2], [0.9, 0.1]]
+direction = "normal"
+formula = "sin(2 * pi * t)"
+
+[[force]]
+kind = "sink"
+point = [0.5, 0.5]
+at = [0, 0.5]
+
 [[change]]
 tick = 10
 viscosity = 0.1
