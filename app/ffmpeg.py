@@ -15,6 +15,13 @@ from app.errors import Cancelled, UserError
 from app.files import cannot_write
 from app.progress import never
 
+EMPTY_WORDS = (
+    "Conversion failed",
+    "Error opening output",
+    "Error opening input",
+    "Nothing was written",
+    "Task finished",
+)
 PATIENCE = 0.1  # seconds between two looks at the wish to stop
 
 
@@ -117,15 +124,15 @@ class Ffmpeg:
             raise Cancelled
 
     def failure(self) -> UserError:
-        """What its last words mean for the user."""
+        """What its complaints mean for the user."""
         self._complaints.seek(0)
         said = self._complaints.read().decode("utf-8", "replace")
         if os.strerror(errno.ENOSPC) in said:
             return cannot_write(self._label, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
-        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in said.splitlines()]
-        lines = [line for line in lines if line and line != "Conversion failed!"]
-        last = lines[-1].rstrip(".") if lines else f"it ended with status {self._process.returncode}"
-        return UserError(f"Cannot {self._doing} {self._label}: ffmpeg says: {last}.")
+        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in said.splitlines() if line.strip()]
+        # the reason stands first, its consequences follow it
+        reason = lines[0].rstrip(".") if lines else f"it ended with status {self._process.returncode}"
+        return UserError(f"Cannot {self._doing} {self._label}: ffmpeg says: {reason}.")
 
 
 def run(arguments: Sequence[str], label: str, *, doing: str = "write", cancel: Callable[[], bool] = never) -> None:

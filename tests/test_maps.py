@@ -141,8 +141,15 @@ def test_converting_between_all_formats_keeps_the_map(tmp_path: Path):
     map_ = swirl(30, 20)
     path = tmp_path / "0.npy"
     write_map(path, map_)
-    steps: list[tuple[str, Kind]] = [(".exr", "st"), (".flo", "st"), (".tif", "offsets"), (".exr", "offsets")]
-    for index, (ending, kind) in enumerate([*steps, (".tif", "st"), (".npy", "st")]):
+    steps: list[tuple[str, Kind]] = [
+        (".exr", "st"),
+        (".flo", "st"),
+        (".tif", "offsets"),
+        (".exr", "offsets"),
+        (".tif", "st"),
+        (".npy", "st"),
+    ]
+    for index, (ending, kind) in enumerate(steps):
         following = tmp_path / f"{index + 1}{ending}"
         write_map(following, read_map(path), kind)
         path = following

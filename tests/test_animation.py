@@ -1,0 +1,487 @@
+"""Animations and clips: checked with ffprobe and Pillow; failures, a full disk and the wish to stop leave nothing."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageCms
+
+from app import animation, ffmpeg, files
+from app.animation import (
+    animation_writer,
+    check_animation,
+    frame_order,
+    is_animation,
+    order_length,
+    reordered,
+)
+from app.errors import Cancelled, UserError
+from app.pictures import Picture, read_picture, to_bits
+from app.video import read_clip
+
+SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+
+
+def frames(
+    count: int, channels: int = 3, height: int = 31, width: int = 45, dtype: type = np.uint8
+) -> Iterator[np.ndarray]:
+    """Smooth pictures that move, no two alike."""
+    y, x = np.mgrid[0:height, 0:width]
+    for index in range(count):
+        light = 127 + 100 * np.sin(x / 9 + index) * np.cos(y / 7)
+        planes = [light, 255 - light, np.full_like(light, index * 20 % 255), np.clip(x * 8, 0, 255)]
+        chosen = [[0], [0, 3], [0, 1, 2], [0, 1, 2, 3]][channels - 1]
+        eight = np.stack([planes[index] for index in chosen], axis=-1).astype(np.uint8)
+        yield eight if dtype is np.uint8 else to_bits(eight, np.dtype(dtype).itemsize * 8)
+
+
+def save(path: Path, count: int = 5, fps: float | Fraction = 12, channels: int = 3, dtype: type = np.uint8, **options):
+    with animation_writer(path, fps, **options) as write:
+        for frame in frames(count, channels, dtype=dtype):
+            write(frame)
+
+
+def probe(path: Path) -> list[dict]:
+    """The streams of a file as ffprobe has them."""
+    command = ["ffprobe", "-v", "error", "-count_frames", "-show_streams", "-of", "json", str(path)]
+    return json.loads(subprocess.run(command, capture_output=True, check=True).stdout)["streams"]
+
+
+def contents(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+# Formats ------------------------------------------------------------------------------------------------------------
+
+
+PIXEL_FORMATS = {  # without and with alpha
+    (".mp4", 8): ("h264", "yuv420p", "yuv420p"),
+    (".mp4", 16): ("h264", "yuv420p", "yuv420p"),
+    (".webm", 8): ("vp9", "yuv420p", "yuv420p"),  # alpha is a second stream, see below
+    (".mkv", 8): ("ffv1", "bgr0", "bgra"),
+    (".mkv", 16): ("ffv1", "gbrp16le", "gbrap16le"),
+    (".mov", 8): ("prores", "yuv444p1", "yuva444p1"),  # ffprobe says 10 or 12 bits, by its version
+    (".mov", 16): ("prores", "yuv444p1", "yuva444p1"),
+    (".apng", 8): ("apng", "rgb24", "rgba"),
+    (".gif", 8): ("gif", "bgra", "bgra"),
+}
+
+
+@pytest.mark.parametrize("channels", [2, 3])
+@pytest.mark.parametrize(("ending", "bits"), PIXEL_FORMATS)
+def test_ffprobe_finds_what_was_asked(tmp_path: Path, ending: str, bits: int, channels: int):
+    path = tmp_path / f"a{ending}"
+    save(path, 5, Fraction(30000, 1001) if ending == ".mp4" else 12, channels, np.uint8 if bits == 8 else np.uint16)
+    (stream,) = probe(path)
+    codec, plain, with_alpha = PIXEL_FORMATS[ending, bits]
+    assert stream["codec_name"] == codec
+    assert stream["pix_fmt"].startswith(with_alpha if channels in (2, 4) else plain)
+    even = ending in (".mp4", ".webm", ".mov")
+    assert (stream["width"], stream["height"]) == ((46, 32) if even else (45, 31))
+    assert int(stream["nb_read_frames"]) == 5
+    assert stream["r_frame_rate"] == ("30000/1001" if ending == ".mp4" else "12/1")
+    if ending in (".mp4", ".webm", ".mov"):
+        tags = stream["color_range"], stream["color_space"], stream["color_transfer"], stream["color_primaries"]
+        assert tags == ("tv", "bt709", "bt709", "bt709")
+    if ending == ".webm" and channels in (2, 4):
+        assert stream["tags"]["alpha_mode"] == "1"
+    if "duration" in stream:
+        assert float(stream["duration"]) == pytest.approx(5 / Fraction(stream["r_frame_rate"]), abs=0.02)
+    assert contents(tmp_path) == [path.name]
+
+
+def test_mp4_starts_fast_and_follows_the_crf(tmp_path: Path):
+    for crf in (10, 30):
+        save(tmp_path / f"{crf}.mp4", crf=crf)
+    data = (tmp_path / "10.mp4").read_bytes()
+    assert data.index(b"moov") < data.index(b"mdat")
+    assert b"crf=10.0" in data  # x264 writes its settings into the stream
+    assert len(data) > (tmp_path / "30.mp4").stat().st_size
+    save(tmp_path / "default.mp4")
+    assert b"crf=18.0" in (tmp_path / "default.mp4").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("ending", "dtype", "channels", "tolerance"),
+    [
+        (".mkv", np.uint8, 4, 0),
+        (".mkv", np.uint16, 4, 0),
+        (".mov", np.uint16, 4, 400),
+        (".mp4", np.uint8, 3, 6),
+        (".webm", np.uint8, 4, 6),
+        (".apng", np.uint8, 4, 0),
+        (".gif", np.uint8, 3, 12),
+    ],
+)
+def test_the_frames_come_back(tmp_path: Path, ending: str, dtype: type, channels: int, tolerance: float):
+    path = tmp_path / f"a{ending}"
+    save(path, 6, channels=channels, dtype=dtype)
+    read = list(read_clip(path).read_frames())
+    assert len(read) == 6
+    for seen, given in zip(read, frames(6, channels, dtype=dtype), strict=True):
+        assert seen.dtype == dtype
+        # the added edge repeats the last pixel
+        given = np.pad(
+            given, [(0, n - m) for n, m in zip(seen.shape[:2], given.shape[:2], strict=True)] + [(0, 0)], mode="edge"
+        )
+        difference = np.abs(seen[..., :channels].astype(int) - given)
+        shown = (
+            given[..., 3] > np.iinfo(dtype).max // 8 if channels == 4 and tolerance else np.ones(given.shape[:2], bool)
+        )
+        assert difference[shown].mean() <= tolerance / 2
+        assert np.quantile(difference[shown], 0.9) <= tolerance
+
+
+def test_alpha_is_laid_over_black_where_a_format_has_none(tmp_path: Path):
+    frame = np.full((16, 16, 4), (200, 100, 50, 128), np.uint8)
+    with animation_writer(tmp_path / "a.mp4", 10) as write:
+        write(frame)
+    (seen,) = read_clip(tmp_path / "a.mp4").read_frames()
+    assert np.abs(seen[8, 8].astype(int) - [100, 50, 25]).max() <= 3
+
+
+@pytest.mark.parametrize(("ending", "loops"), [*itertools.product([".gif", ".apng", ".webp"], [0, 1, 3])])
+def test_pillow_plays_animated_pictures(tmp_path: Path, ending: str, loops: int):
+    path = tmp_path / f"a{ending}"
+    save(path, 4, 10, channels=4, loops=loops)
+    with Image.open(path) as image:
+        assert image.n_frames == 4  # type: ignore[attr-defined]
+        # Pillow tells a GIF's repetitions, and none of a GIF that is shown once
+        told = image.info.get("loop")
+        assert told == ({0: 0, 1: None, 3: 2}[loops] if ending == ".gif" else loops)
+        image.seek(3)
+        image.load()
+        assert image.info["duration"] == pytest.approx(100)
+        seen = np.asarray(image.convert("RGBA")).astype(int)
+    *_, last = frames(4, 4)
+    opaque = last[..., 3] > 200
+    assert np.abs(seen - last)[opaque].mean() < 10
+    if ending == ".gif":
+        assert set(np.unique(seen[..., 3])) == {0, 255}
+
+
+@pytest.mark.parametrize(
+    ("ending", "dtype", "stored"),
+    [
+        (".png", np.uint8, np.uint8),
+        (".png", np.uint16, np.uint16),
+        (".tif", np.float32, np.float32),
+        (".exr", np.uint8, np.float32),
+        (".jpg", np.uint16, np.uint8),
+    ],
+)
+def test_sequences(tmp_path: Path, ending: str, dtype: type, stored: type):
+    like = Picture(np.zeros((1, 1, 3), np.uint8), icc=SRGB)
+    save(tmp_path / f"a.%04d{ending}", 3, dtype=dtype, first=98, like=like)
+    assert contents(tmp_path) == [f"a.{number:04d}{ending}" for number in (98, 99, 100)]
+    *_, last = frames(3, dtype=dtype)
+    read = read_picture(tmp_path / f"a.0100{ending}")
+    assert read.pixels.dtype == stored
+    if dtype == stored:
+        np.testing.assert_array_equal(read.pixels, last)
+    assert ending == ".exr" or read.icc == SRGB
+
+
+def test_a_single_frame_and_a_single_pixel(tmp_path: Path):
+    for ending in (".mp4", ".webm", ".mkv", ".mov", ".gif", ".apng", ".webp"):
+        with animation_writer(tmp_path / f"a{ending}", 25) as write:
+            write(np.full((1, 1, 1), 200, np.uint8))
+        assert (tmp_path / f"a{ending}").stat().st_size > 0
+
+
+MEASURE = """
+import resource, sys
+import numpy as np
+from app.animation import animation_writer
+path, count = sys.argv[1], int(sys.argv[2])
+ramp = np.arange(320, dtype=np.uint8)
+frame = np.stack([np.broadcast_to(ramp, (240, 320)), np.broadcast_to(ramp[:240, None], (240, 320))] * 2, axis=-1)
+with animation_writer(path, 25) as write:
+    for index in range(count):
+        write(np.roll(frame[..., :3], index, axis=0))
+for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN):
+    print(resource.getrusage(who).ru_maxrss)
+"""
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".gif"])
+def test_memory_does_not_grow_with_the_frames(tmp_path: Path, ending: str):
+    """Neither ours nor ffmpeg's, even for a GIF, whose palette needs all frames."""
+    peaks = []
+    for count in (70, 210):  # x264 looks some 50 frames ahead
+        command = [sys.executable, "-c", MEASURE, str(tmp_path / f"a{ending}"), str(count)]
+        root = Path(animation.__file__).parents[1]
+        told = subprocess.run(command, capture_output=True, check=True, cwd=root).stdout
+        peaks.append([int(kibibytes) for kibibytes in told.split()])
+    # 140 further frames have 31 MiB
+    assert np.max(np.diff(peaks, axis=0)) < 8_000
+
+
+# Names and rates ----------------------------------------------------------------------------------------------------
+
+
+def test_names_tell_what_is_wanted():
+    assert [name for name in ("a.mp4", "a.gif", "a.%04d.png", "a%d.exr", "a.webp", "a.png") if is_animation(name)] == [
+        "a.mp4",
+        "a.gif",
+        "a.%04d.png",
+        "a%d.exr",
+    ]
+    for name, rate, message in [
+        ("a.avi", 25, r"an animation ends in one of \.mp4"),
+        ("a.%04d.bmp", 25, "must end in one of .png"),
+        ("a.%d.%d.png", 25, "holds one number"),
+        ("a.mp4", 0, "a frame rate of 0 is not between"),
+        ("a.mp4", float("nan"), "a frame rate of nan is not between"),
+        ("a.gif", 60, "at most 50 frames a second"),
+    ]:
+        with pytest.raises(UserError, match=message):
+            check_animation(name, rate)
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.%04d.png"])
+def test_an_animation_needs_a_frame(tmp_path: Path, name: str):
+    with pytest.raises(UserError, match="has no frame"), animation_writer(tmp_path / name):
+        pass
+    assert contents(tmp_path) == []
+
+
+# Failures -----------------------------------------------------------------------------------------------------------
+
+
+NAMES = ["a.mp4", "a.webm", "a.mkv", "a.mov", "a.gif", "a.apng", "a.webp", "a.%04d.png"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("at", ["between frames", "while encoding"])
+def test_cancelling_leaves_what_was_there(tmp_path: Path, name: str, at: str):
+    earlier = tmp_path / (name % 0 if "%" in name else name)
+    earlier.write_bytes(b"earlier")
+    wish = threading.Event()
+
+    def work() -> None:
+        with animation_writer(tmp_path / name, cancel=wish.is_set) as write:
+            for index in itertools.count():
+                if at == "between frames" and index == 3:
+                    wish.set()
+                write(next(frames(1, height=200, width=300)))
+
+    if at == "while encoding":
+        threading.Timer(0.3, wish.set).start()
+    with pytest.raises(Cancelled):
+        work()
+    assert earlier.read_bytes() == b"earlier"
+    assert contents(tmp_path) == [earlier.name]
+
+
+def test_a_slow_encoder_is_stopped_within_half_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """One that takes nothing from us: the wish must be heard while we wait for it."""
+    sleeper = tmp_path / "sleeper"
+    sleeper.write_text("#!/bin/sh\nexec sleep 60\n")
+    sleeper.chmod(0o755)
+    monkeypatch.setattr(ffmpeg, "executable", lambda: str(sleeper))
+    asked: list[float] = []
+
+    def cancel() -> bool:
+        if asked or time.monotonic() - started > 0.3:
+            asked.append(time.monotonic())
+        return bool(asked)
+
+    def work() -> None:
+        with animation_writer(tmp_path / "a.mp4", cancel=cancel) as write:
+            for frame in frames(50, height=500, width=500):
+                write(frame)
+
+    started = time.monotonic()
+    with pytest.raises(Cancelled):
+        work()
+    assert time.monotonic() - asked[0] < 0.5
+    assert contents(tmp_path) == ["sleeper"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_error_between_frames_leaves_nothing(tmp_path: Path, name: str):
+    def work() -> None:
+        with animation_writer(tmp_path / name) as write:
+            for frame in frames(3):
+                write(frame)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        work()
+    assert contents(tmp_path) == []
+
+
+def test_an_encoder_that_dies_is_quoted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    with pytest.raises(UserError, match=r"Cannot write .*a\.mp4: ffmpeg says: .*nonsense") as raised:
+        save(tmp_path / "a.mp4", crf="nonsense")
+    assert "\n" not in str(raised.value)
+
+    dying = tmp_path / "dying"
+    dying.write_text("#!/bin/sh\nhead -c 100000 >/dev/null\necho '[x @ 0x1] out of luck' >&2\nexit 3\n")
+    dying.chmod(0o755)
+    monkeypatch.setattr(ffmpeg, "executable", lambda: str(dying))
+    with pytest.raises(UserError, match=r"a\.mp4: ffmpeg says: out of luck\."):
+        save(tmp_path / "a.mp4", 100)
+    assert contents(tmp_path) == ["dying"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str):
+    def link(path: Path) -> Path:
+        temporary = path.with_name(f".full{path.suffix}")
+        temporary.symlink_to("/dev/full")
+        return temporary
+
+    for module in (files, animation):
+        if "%" in name:  # the pictures' temporary files, not the folder's
+            monkeypatch.setattr(files, "temporary_beside", lambda path: link(path) if path.suffix else path)
+        else:
+            monkeypatch.setattr(module, "temporary_beside", link)
+    with pytest.raises(UserError, match="the disk is full; free some space"):
+        save(tmp_path / name, 30)
+    assert contents(tmp_path) == []
+
+
+def test_outputs_that_cannot_be(tmp_path: Path):
+    with pytest.raises(UserError, match="there is no folder"):
+        save(tmp_path / "nowhere" / "a.mp4")
+    with pytest.raises(UserError, match="there is no folder"):
+        save(tmp_path / "nowhere" / "a.%d.png")
+
+    def change_size() -> None:
+        with animation_writer(tmp_path / "a.mp4") as write:
+            write(np.zeros((4, 4, 3), np.uint8))
+            write(np.zeros((4, 5, 3), np.uint8))
+
+    with pytest.raises(ValueError, match="a frame"):
+        change_size()
+    assert contents(tmp_path) == []
+
+
+# Order of frames ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("count", "options", "expected"),
+    [
+        (4, {}, "0123"),
+        (4, {"rounds": 2}, "01230123"),
+        (4, {"ping_pong": True}, "012321"),
+        (4, {"ping_pong": True, "rounds": 2}, "012321012321"),
+        (3, {"hold_first": 2, "hold_last": 1}, "000122"),
+        (3, {"hold_first": 1, "hold_last": 1, "ping_pong": True}, "001221"),
+        (1, {"ping_pong": True, "hold_last": 2}, "000"),
+        (2, {"ping_pong": True}, "01"),
+        (0, {"hold_first": 3}, ""),
+    ],
+)
+def test_the_order_of_frames(count: int, options: dict, expected: str):
+    assert "".join(map(str, frame_order(count, **options))) == expected
+    assert order_length(count, **options) == len(expected)
+
+
+def test_reordering_keeps_the_frames_on_disk(tmp_path: Path):
+    given = list(frames(4, dtype=np.uint16))
+    shown = list(reordered(iter(given), frame_order(4, ping_pong=True, rounds=2, hold_last=1), tmp_path))
+    order = list(frame_order(4, ping_pong=True, rounds=2, hold_last=1))
+    for frame, index in zip(shown, order, strict=True):
+        np.testing.assert_array_equal(frame, given[index])
+    assert contents(tmp_path) == []
+
+
+# Clips in -----------------------------------------------------------------------------------------------------------
+
+
+def generate(path: Path, *arguments: str) -> Path:
+    command = [ffmpeg.executable(), "-v", "error", "-y", "-f", "lavfi", "-i"]
+    subprocess.run([*command, *arguments, str(path)], check=True)
+    return path
+
+
+def test_a_clip_tells_what_it_is(tmp_path: Path):
+    path = generate(tmp_path / "a.mp4", "testsrc=s=64x48:r=30000/1001:d=1", "-pix_fmt", "yuv420p")
+    clip = read_clip(path)
+    assert (clip.width, clip.height, clip.fps, clip.rotation, clip.sound) == (64, 48, Fraction(30000, 1001), 0, None)
+    assert (clip.bits, clip.alpha, clip.frames) == (8, False, 30)
+    assert sum(1 for _ in clip.read_frames()) == 30
+
+
+def test_a_turned_clip_is_read_upright(tmp_path: Path):
+    plain = generate(tmp_path / "a.mp4", "testsrc=s=64x48:r=10:d=0.5", "-pix_fmt", "yuv420p", "-crf", "5")
+    turned = tmp_path / "b.mp4"
+    command = [ffmpeg.executable(), "-v", "error", "-display_rotation", "-90", "-i", str(plain), "-c", "copy"]
+    subprocess.run([*command, str(turned)], check=True)
+    clip = read_clip(turned)
+    assert (clip.width, clip.height, clip.rotation) == (48, 64, 90)
+    upright = next(read_clip(plain).read_frames())
+    assert np.abs(next(clip.read_frames()).astype(int) - np.rot90(upright, -1)).mean() < 1
+
+
+def test_wide_pixels_become_square(tmp_path: Path):
+    clip = read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=0.5,setsar=3/2", "-c:v", "ffv1"))
+    assert (clip.width, clip.height) == (96, 48)
+    assert next(clip.read_frames()).shape == (48, 96, 3)
+
+
+def test_ten_bits_are_read_as_sixteen(tmp_path: Path):
+    clip = read_clip(
+        generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=0.5", "-c:v", "ffv1", "-pix_fmt", "yuv422p10")
+    )
+    assert clip.bits == 16
+    assert next(clip.read_frames()).dtype == np.uint16
+
+
+@pytest.mark.parametrize(
+    ("source", "ending", "codec"),
+    [
+        ("aac", ".mp4", "aac"),
+        ("pcm_s16le", ".mp4", "aac"),
+        ("aac", ".webm", "opus"),
+        ("libopus", ".webm", "opus"),
+        ("aac", ".mkv", "aac"),
+        ("pcm_s16le", ".mov", "pcm_s16le"),
+        ("libopus", ".mov", "pcm_s16le"),
+        ("aac", ".gif", None),
+    ],
+)
+def test_sound_is_carried_over(tmp_path: Path, source: str, ending: str, codec: str | None):
+    sound = ["-f", "lavfi", "-i", "sine=d=2", "-c:a", source]
+    clip = generate(tmp_path / "in.mkv", "testsrc=s=64x48:r=10:d=2", *sound)
+    save(tmp_path / f"a{ending}", 10, 10, sound=clip, frames=10)
+    video, *rest = probe(tmp_path / f"a{ending}")
+    assert int(video["nb_read_frames"]) == 10
+    assert [stream["codec_name"] for stream in rest] == ([codec] if codec else [])
+    if rest and "duration" in rest[0]:
+        assert float(rest[0]["duration"]) == pytest.approx(1, abs=0.1)
+
+
+def test_what_is_no_clip(tmp_path: Path):
+    (tmp_path / "empty.mp4").touch()
+    (tmp_path / "junk.mp4").write_bytes(b"junk" * 99)
+    save(tmp_path / "whole.mp4")
+    (tmp_path / "cut.mp4").write_bytes((tmp_path / "whole.mp4").read_bytes()[:300])
+    for name, message in {
+        "missing.mp4": "there is no such file",
+        "empty.mp4": "it is empty",
+        "junk.mp4": "it is no video, or damaged",
+        "cut.mp4": r"cut\.mp4",
+        ".": "it is a folder",
+    }.items():
+        with pytest.raises(UserError, match=message) as raised:
+            read_clip(tmp_path / name)
+        assert "\n" not in str(raised.value)
+    with pytest.raises(UserError, match="more than the limit of 100"):
+        read_clip(tmp_path / "whole.mp4", max_pixels=100)
+    with pytest.raises(Cancelled):
+        next(read_clip(tmp_path / "whole.mp4").read_frames(lambda: True))

@@ -1,0 +1,110 @@
+"""Progress and the wish to stop, as the command line and as the window use them."""
+
+from __future__ import annotations
+
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from app.errors import Cancelled
+from app.progress import Progress, interruptible, on_terminal
+
+ROOT = Path(__file__).parents[1]
+
+JOB = """
+import sys, time
+from app.errors import Cancelled
+from app.progress import on_terminal
+try:
+    with on_terminal("Rendering", int(sys.argv[1])) as progress:
+        print("started", flush=True)
+        for _ in range(int(sys.argv[1])):
+            time.sleep(0.01)
+            progress.advance()
+    print("finished")
+except Cancelled:
+    print("cancelled")
+"""
+
+
+def test_progress_reports_and_stops():
+    heard: list[tuple[int, int | None]] = []
+    wish = threading.Event()
+    progress = Progress(4, lambda done, total: heard.append((done, total)), wish.is_set)
+    assert progress.seconds_left is None
+    progress.advance()
+    time.sleep(0.02)
+    progress.advance(2)
+    assert heard == [(1, 4), (3, 4)]
+    assert progress.seconds_left is not None
+    assert 0 < progress.seconds_left < 1
+    wish.set()
+    with pytest.raises(Cancelled):
+        progress.advance()
+    assert len(heard) == 2
+
+
+def test_it_is_silent_when_piped():
+    done = subprocess.run([sys.executable, "-c", JOB, "5"], capture_output=True, cwd=ROOT, check=True)
+    assert (done.stdout, done.stderr) == (b"started\nfinished\n", b"")
+
+
+def test_a_terminal_sees_a_bar_with_the_time_left():
+    ours, theirs = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "80"}
+    job = subprocess.Popen(
+        [sys.executable, "-c", JOB, "60"], stdout=subprocess.PIPE, stderr=theirs, cwd=ROOT, env=environment
+    )
+    os.close(theirs)
+    seen = b""
+    try:
+        while block := os.read(ours, 4096):
+            seen += block
+    except OSError:  # the terminal is gone with its program
+        pass
+    os.close(ours)
+    assert job.wait() == 0
+    assert b"Rendering" in seen
+    assert b"/60" in seen
+    assert b"0:00:0" in seen
+
+
+def test_ctrl_c_stops_within_half_a_second():
+    job = subprocess.Popen([sys.executable, "-c", JOB, "6000"], stdout=subprocess.PIPE, cwd=ROOT)
+    assert job.stdout is not None
+    assert job.stdout.readline() == b"started\n"
+    asked = time.monotonic()
+    job.send_signal(signal.SIGINT)
+    assert job.stdout.read() == b"cancelled\n"
+    assert time.monotonic() - asked < 0.5
+    assert job.wait() == 0
+
+
+def test_signals_are_given_back():
+    before = signal.getsignal(signal.SIGINT)
+    with interruptible() as cancel:
+        assert not cancel()
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert cancel()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_other_threads_may_use_it():
+    counted: list[int] = []
+
+    def work() -> None:
+        with on_terminal("x", 2) as progress:
+            progress.advance(2)
+            counted.append(progress.done)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert counted == [2]
