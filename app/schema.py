@@ -92,7 +92,7 @@ def _path_in(data: Any, loc: tuple[int | str, ...]) -> list[int | str]:
     for position, item in enumerate(loc):
         if (isinstance(data, dict) and item in data) or (isinstance(data, (list, tuple)) and isinstance(item, int)):
             path.append(item)
-            data = data[item] if not isinstance(item, int) or item < len(data) else None
+            data = _item(data, item)
         elif position == len(loc) - 1 and isinstance(data, dict) and item != data.get("type", data.get("kind")):
             path.append(item)
     return path

@@ -15,7 +15,7 @@ def probe() -> dict[str, str]:
 
     problems: list[str] = []
     glfw.ERROR_REPORTING = False
-    glfw.set_error_callback(lambda code, words: problems.append(words.decode("utf-8", "replace")))
+    glfw.set_error_callback(lambda code, words: problems.append(_text(words)))
     if not glfw.init():
         return {"error": "; ".join(problems) or "GLFW does not start"}
     try:
@@ -30,6 +30,10 @@ def probe() -> dict[str, str]:
         return {"platform": platforms.get(glfw.get_platform(), "other"), "opengl": _version(glfw, window)}
     finally:
         glfw.terminate()
+
+
+def _text(words: str | bytes) -> str:
+    return words if isinstance(words, str) else words.decode("utf-8", "replace")
 
 
 def _version(glfw: object, window: object) -> str:
