@@ -20,17 +20,20 @@ PAD = 4
 def padded_faces(
     faces: Faces, no_slip: bool = False, speed: tuple[float, ...] = (0, 0, 0, 0)
 ) -> tuple[np.ndarray, ...]:
-    """u and v with PAD ghost faces on every side, from (ny, nx, 2): zero on and beyond walls for the normal component;
-    for the tangential one the nearest inside, or 2 U minus it."""
-    u, v = (np.asarray(faces[..., axis], np.float64) for axis in (0, 1))
-    u = np.pad(u, ((PAD, PAD), (0, 0)), mode="edge")[:, 1:]
-    v = np.pad(v, ((0, 0), (PAD, PAD)), mode="edge")[1:]
+    """u and v with PAD ghost faces on every side, from (ny, nx, 2): the normal component zero on walls and odd beyond,
+    the tangential one even, or 2 U minus its image."""
+    u, v = (np.array(faces[..., axis], np.float64) for axis in (0, 1))
+    u = np.pad(u[:, 1:], ((PAD, PAD), (0, 0)), mode="symmetric")
+    v = np.pad(v[1:], ((0, 0), (PAD, PAD)), mode="symmetric")
     if no_slip:
         u[:PAD] = 2 * speed[2] - u[:PAD]
         u[-PAD:] = 2 * speed[3] - u[-PAD:]
         v[:, :PAD] = 2 * speed[0] - v[:, :PAD]
         v[:, -PAD:] = 2 * speed[1] - v[:, -PAD:]
-    return np.pad(u, ((0, 0), (PAD + 1, PAD))), np.pad(v, ((PAD + 1, PAD), (0, 0)))
+    # The walls' faces are added as zeros, and what is beyond them mirrored with the other sign.
+    u = np.pad(np.pad(u, ((0, 0), (1, 1))), ((0, 0), (PAD, PAD)), mode="reflect", reflect_type="odd")
+    v = np.pad(np.pad(v, ((1, 1), (0, 0))), ((PAD, PAD), (0, 0)), mode="reflect", reflect_type="odd")
+    return u[:, :-1], v[:-1]
 
 
 def interpolate(

@@ -168,3 +168,19 @@ def test_state_brings_a_moment_back_exactly(device: Device, kind: type[Fluid]) -
         fluid.step(1 / 60)
     np.testing.assert_array_equal(fluid.velocity.read.get(), wanted)
     fluid.release()
+
+
+@pytest.mark.parametrize("courant", [0.5, 20.0])
+def test_energy_never_grows(device: Device, courant: float) -> None:
+    """Unconditionally stable: without a force the kinetic energy falls, whatever the step."""
+    grid = Grid(64, 48)
+    fluid = Fluid(device, grid)
+    fluid.set_velocity(reference.smooth_velocity(64, 48, seed=4, cells=3))
+    fluid.project()
+    energy = [fluid.motion().kinetic_energy]
+    for _ in range(100):
+        fluid.step(courant * grid.h)
+        energy.append(fluid.motion().kinetic_energy)
+    assert max(energy) < 1.02 * energy[0]
+    assert energy[-1] < energy[0]
+    fluid.release()

@@ -21,13 +21,12 @@ void main() {
     vec2 to_v = 0.5 * (here + texture(u_trace, v_uv - vec2(0.0, texel.y)).rg);
     vec2 corner = floor(cell + 0.5 * (to_u + to_v));
     vec2 fu = clamp(cell + to_u - corner, -1.0, 2.0), fv = clamp(cell + to_v - corner, -1.0, 2.0);
-    vec4 column = corner.x + vec4(-1.0, 0.0, 1.0, 2.0), row = corner.y + vec4(-1.0, 0.0, 1.0, 2.0);
     float add_u, add_v;
-    vec4 ux = wall_normal(cubic_lagrange(fu.x), column, size.x);
-    vec4 uy = wall_tangential(cubic_lagrange(fu.y), row, size.y, u_wall_speed.zw, add_u);
-    vec4 vx = wall_tangential(cubic_lagrange(fv.x), column, size.x, u_wall_speed.xy, add_v);
-    vec4 vy = wall_normal(cubic_lagrange(fv.y), row, size.y);
-    vec4 x = (column + 0.5) * texel.x, y = (row + 0.5) * texel.y;
+    vec4 ux = wall_normal(cubic_lagrange(fu.x), corner.x, size.x);
+    vec4 uy = wall_tangential(cubic_lagrange(fu.y), corner.y, size.y, u_wall_speed.zw, add_u);
+    vec4 vx = wall_tangential(cubic_lagrange(fv.x), corner.x, size.x, u_wall_speed.xy, add_v);
+    vec4 vy = wall_normal(cubic_lagrange(fv.y), corner.y, size.y);
+    vec4 x = (corner.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (corner.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
     vec2 sum = vec2(add_u * dot(ux, vec4(1.0)), add_v * dot(vy, vec4(1.0)));
     for (int j = 0; j < 4; ++j) {
         vec2 a = texture(u_velocity, vec2(x.x, y[j])).rg, b = texture(u_velocity, vec2(x.y, y[j])).rg;
