@@ -76,6 +76,7 @@ class Fluid:
         self.residuals = Residuals()
         self._has_source = False
         self._solids_changed = True
+        self._solids_of: np.ndarray | None = None
         self._coefficients_of: object = None
         self._viscosity_solver = Viscosity(device, grid.size)
         self._pressure_solver = Pressure(device, grid.size)
@@ -141,9 +142,7 @@ class Fluid:
     def project(self) -> None:
         """w4 = w3 - grad q with lap q = div w3 - source: divergence-free but for the brushes' sources."""
         with self.device.stage("project"):
-            if self._solids_changed:
-                self._pressure_solver.set_solids(self.solid)
-                self._solids_changed = False
+            self._take_up_solids()
             source = self.source if self._has_source else None
             self._pressure_solver.project(self.velocity, self.params.pressure_cycles, source)
             self.device.pass_("stages/carry_pressure.frag")(
@@ -275,6 +274,15 @@ class Fluid:
             item.release()
         self._viscosity_solver.release()
         self._pressure_solver.release()
+
+    def _take_up_solids(self) -> None:
+        """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""
+        if self._solids_changed:
+            solid = self.solid.get()
+            if self._solids_of is None or not np.array_equal(solid, self._solids_of):
+                self._pressure_solver.set_solids(self.solid if solid.any() else None)
+                self._solids_of = solid
+            self._solids_changed = False
 
     def _wall_defines(self) -> dict[str, object]:
         return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
