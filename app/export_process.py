@@ -1,0 +1,83 @@
+"""An export in a process of its own, with a GL of its own: the same replay as the command line's."""
+
+from __future__ import annotations
+
+import multiprocessing
+from multiprocessing.connection import Connection
+from typing import Any
+
+from app.export import Job
+
+PATIENCE = 5.0  # seconds that a cancelled export has to clean up after itself
+
+
+class ExportProcess:
+    """A job that is being done elsewhere.
+
+    Attributes:
+        job: what is done.
+        part: how much of it is done, 0-1.
+        is_done: it has ended, well or not.
+        error: why it failed, as a sentence; "" if it did not.
+        cancelled: it was stopped.
+    """
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self.part = 0.0
+        self.is_done = False
+        self.error = ""
+        self.cancelled = False
+        # A forked process would share this one's GL, which no driver survives.
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._wish = context.Event()
+        self._process = context.Process(target=_work, args=(job, theirs, self._wish), daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def poll(self) -> None:
+        """Hear how far it is."""
+        try:
+            while self._pipe.poll():
+                kind, value = self._pipe.recv()
+                if kind == "part":
+                    self.part = value
+                else:
+                    self.is_done = True
+                    self.error = value if kind == "error" else ""
+                    self.cancelled = kind == "cancelled"
+        except (EOFError, OSError):
+            if not self.is_done:
+                self.is_done = True
+                self.error = f"The export of {self.job.output.name} stopped unexpectedly; try a smaller size."
+        if self.is_done:
+            self._process.join(PATIENCE)
+
+    def stop(self) -> None:
+        """Cancel it, and wait until it has cleaned up."""
+        self._wish.set()
+        self._process.join(PATIENCE)
+        if self._process.is_alive():
+            self._process.terminate()
+
+
+def _work(job: Job, pipe: Connection, wish: Any) -> None:
+    from app.errors import Cancelled, UserError
+    from app.export import run
+    from app.progress import Progress
+    from solver.context import Device
+
+    def report(done: int, total: int | None) -> None:
+        pipe.send(("part", done / total if total else 0.0))
+
+    try:
+        with Device.headless() as device:
+            run(device, job, Progress(report=report, cancel=wish.is_set))
+        pipe.send(("done", ""))
+    except Cancelled:
+        pipe.send(("cancelled", ""))
+    except UserError as error:
+        pipe.send(("error", str(error)))
+    except Exception as error:
+        pipe.send(("error", f"The export failed: {error}"))

@@ -1,0 +1,133 @@
+"""Choosing a file inside the window, where the system has no dialog for it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.ui import icons
+from app.ui.dialogs import Dialog
+from app.ui.theme import packed
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+
+class Browser(Dialog):
+    """A list of a folder's files.
+
+    Args:
+        title: what the file is chosen for.
+        folder: where to begin.
+        endings: the files that are shown, by how their names end.
+        chosen: is told the file.
+        name: proposes a name; None chooses among what there is.
+    """
+
+    width, height = 640, 460
+
+    def __init__(
+        self, title: str, folder: Path, endings: tuple[str, ...], chosen: Callable[[Path], None], name: str | None = None
+    ) -> None:
+        super().__init__(title)
+        self.endings = endings
+        self.name = name or ""
+        self.writes = name is not None
+        self._chosen = chosen
+        self._selected: Path | None = None
+        self._confirm = False
+        self.go(folder if folder.is_dir() else Path.home())
+
+    def go(self, folder: Path) -> None:
+        """Show another folder."""
+        self.folder, self.typed = folder, str(folder)
+        self._selected, self._problem = None, ""
+        try:
+            inside = [Path(entry.path) for entry in os.scandir(folder) if not entry.name.startswith(".")]
+        except OSError as error:
+            self._problem, inside = error.strerror or "it cannot be read", []
+        folders = [path for path in inside if path.is_dir()]
+        files = [path for path in inside if path.suffix.lower() in self.endings and path.is_file()]
+        self._inside = sorted(folders, key=_by_name) + sorted(files, key=_by_name)
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        if ui.icon_button("up", "up", "The folder above", size=30):
+            self.go(self.folder.parent)
+        imgui.same_line()
+        imgui.set_next_item_width(-1)
+        entered, self.typed = imgui.input_text("##folder", self.typed, imgui.InputTextFlags_.enter_returns_true)
+        if entered:
+            typed = Path(self.typed).expanduser()
+            if typed.is_dir():
+                self.go(typed)
+            elif typed.exists() or self.writes:
+                return not self._take(typed)
+        foot = ui.px(88 if self.writes else 48)
+        imgui.begin_child("files", ImVec2(0, -foot))
+        going: Path | None = None
+        done = False
+        for path in self._inside:
+            going, done = self._row(ui, path, going, done)
+        if not self._inside:
+            ui.dim(self._problem or "Nothing here that can be opened.")
+        imgui.end_child()
+        if going is not None:
+            self.go(going)
+        if self.writes:
+            imgui.set_next_item_width(-1)
+            entered, self.name = imgui.input_text("##name", self.name, imgui.InputTextFlags_.enter_returns_true)
+            done = done or entered
+        done = self._foot(ui) or done
+        if done:
+            target = (self.folder / self.name if self.name else None) if self.writes else self._selected
+            if target is not None:
+                return not self._take(target)
+        return True
+
+    def _row(self, ui: Ui, path: Path, going: Path | None, done: bool) -> tuple[Path | None, bool]:
+        corner = imgui.get_cursor_screen_pos()
+        flags = imgui.SelectableFlags_.allow_double_click
+        picked, _ = imgui.selectable(f"##{path.name}", path == self._selected, flags, ImVec2(0, ui.px(26)))
+        draw = imgui.get_window_draw_list()
+        icon = "folder" if path.is_dir() else "picture"
+        ink = packed(ui.palette.accent if path.is_dir() else ui.palette.dim)
+        icons.draw(draw, icon, corner.x + ui.px(4), corner.y + ui.px(4), ui.px(18), ink)
+        draw.add_text(ImVec2(corner.x + ui.px(30), corner.y + ui.px(5)), packed(ui.palette.text), path.name)
+        if picked:
+            twice = imgui.is_mouse_double_clicked(0)
+            if path.is_dir():
+                return (path if twice else going), done
+            self._selected = path
+            if self.writes:
+                self.name = path.name
+            return going, done or twice
+        return going, done
+
+    def _foot(self, ui: Ui) -> bool:
+        label = "Replace" if self._confirm else self.title.split()[0]
+        if self._confirm:
+            ui.text(f"{self.name} is there already.", ui.palette.accent, 14)
+            imgui.same_line()
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(204))
+        if ui.button("Cancel", width=88):
+            self.close()
+        imgui.same_line()
+        return ui.button(label, primary=True, width=88)
+
+    def _take(self, path: Path) -> bool:
+        """Hand the file over; False where the person has to say first that it may be replaced."""
+        if self.writes and path.exists() and not self._confirm:
+            self._confirm = True
+            return False
+        self._chosen(path)
+        return True
+
+
+def _by_name(path: Path) -> str:
+    return path.name.casefold()

@@ -1,0 +1,180 @@
+"""Dialogs: what has to be answered before anything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.ui.actions import ACTIONS
+from app.ui.widgets import Ui, keys_shown
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+
+class Dialog:
+    """A window over everything, until it is answered or Escape is pressed."""
+
+    width, height = 480.0, 0.0
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self._open = True
+
+    def close(self) -> None:
+        self._open = False
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        """Draw what is in it; False once it is done with."""
+        raise NotImplementedError
+
+    def draw(self, ui: Ui, editor: Editor) -> bool:
+        """Draw it; False once it is done with."""
+        name = f"###dialog{id(self)}"
+        if not imgui.is_popup_open(name):
+            imgui.open_popup(name)
+        display = imgui.get_io().display_size
+        imgui.set_next_window_pos(ImVec2(display.x / 2, display.y / 2), imgui.Cond_.always, ImVec2(0.5, 0.5))
+        width = min(ui.px(self.width), display.x - ui.px(32))
+        height = min(ui.px(self.height), display.y - ui.px(32)) if self.height else 0.0
+        imgui.set_next_window_size(ImVec2(width, height))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(24), ui.px(20)))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(12))
+        flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
+        flags |= imgui.WindowFlags_.no_saved_settings
+        if not self.height:
+            flags |= imgui.WindowFlags_.always_auto_resize
+        shown, _ = imgui.begin_popup_modal(name, None, flags)
+        imgui.pop_style_var(2)
+        if not shown:
+            return self._open
+        try:
+            ui.text(self.title, size=19, bold=True)
+            imgui.dummy(ImVec2(0, ui.px(4)))
+            going_on = self.body(ui, editor) and self._open
+            # Only the topmost dialog hears Escape; it may just have opened another one.
+            if imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active() and editor.dialogs[-1] is self:
+                going_on = False
+            if not going_on or editor.dialogs[-1] is not self:
+                imgui.close_current_popup()
+        finally:
+            imgui.end_popup()
+        if not going_on and editor.dialogs[-1] is not self:
+            editor.dialogs.remove(self)
+            return True
+        return going_on
+
+
+class Unsaved(Dialog):
+    """Asks what shall become of unsaved work."""
+
+    def __init__(self, what: str, then: Callable[[], None]) -> None:
+        super().__init__("Save your changes first?")
+        self._what = what
+        self._then = then
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        name = editor.session.project.name
+        ui.wrapped(f"What you have done to “{name}” is lost if you {self._what} without saving.", ui.palette.dim, 14)
+        imgui.dummy(ImVec2(0, ui.px(8)))
+        if ui.button("Don't save", width=108):
+            self._then()
+            return False
+        imgui.same_line(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
+        if ui.button("Cancel", width=96):
+            return False
+        imgui.same_line()
+        if ui.button("Save", primary=True, width=96):
+            if editor.session.project.path is None:
+                editor.files.ask_save(self._then)
+            elif editor.files.save():
+                self._then()
+            return False
+        return True
+
+
+class Shortcuts(Dialog):
+    """The sheet of all keys."""
+
+    width, height = 860, 620
+
+    def __init__(self) -> None:
+        super().__init__("Keyboard and mouse")
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        groups: dict[str, list[tuple[str, str]]] = {}
+        for action in ACTIONS.values():
+            if action.keys:
+                groups.setdefault(action.group, []).append((action.label, keys_shown(action.key)))
+        groups["Mouse"] = [
+            ("Paint", "Drag"),
+            ("The other direction", "Alt + drag"),
+            ("Straight along an axis", "Shift + drag"),
+            ("Straight from the last end", "Shift + click"),
+            ("Brush size and hardness", "Right drag"),
+            ("Pan", "Middle drag"),
+            ("Pan with any tool", "Space + drag"),
+            ("Zoom", "Wheel"),
+            ("As it was, while held", "\\"),
+            ("Back to default", "Double click"),
+            ("Type a number", "Ctrl + click"),
+        ]
+        columns = (("File", "Edit", "Time"), ("Tools", "Brush"), ("View", "Help", "Mouse"))
+        imgui.begin_child("keys", ImVec2(0, -ui.px(44)))
+        if imgui.begin_table("sheet", 3):
+            imgui.table_next_row()
+            for column in columns:
+                imgui.table_next_column()
+                for group in column:
+                    self._group(ui, group, groups[group])
+            imgui.end_table()
+        imgui.end_child()
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
+        return not ui.button("Close", primary=True, width=96)
+
+    def _group(self, ui: Ui, name: str, rows: list[tuple[str, str]]) -> None:
+        ui.text(name, ui.palette.accent, 13, bold=True)
+        imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(3)))
+        right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - ui.px(16)
+        for label, keys in rows:
+            ui.text(label, size=13.5)
+            imgui.push_font(ui.fonts.regular, 13.5)
+            width = imgui.calc_text_size(keys).x
+            imgui.pop_font()
+            imgui.same_line(right - width)
+            ui.text(keys, ui.palette.dim, 13.5)
+        imgui.pop_style_var()
+        imgui.dummy(ImVec2(0, ui.px(6)))
+
+
+class Preferring(Dialog):
+    """What the person likes."""
+
+    width = 420
+
+    def __init__(self) -> None:
+        super().__init__("Preferences")
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        likes = editor.preferences
+        ui.dim("Theme")
+        themes = ("dark", "light")
+        likes.theme = themes[ui.segmented("theme", ("Dark", "Light"), themes.index(likes.theme), -1)]
+        ui.dim("Size of the interface")
+        scales = (0.85, 1.0, 1.25, 1.5, 2.0)
+        names = [f"{scale:.0%}".replace("%", " %") for scale in scales]
+        nearest = min(range(len(scales)), key=lambda k: abs(scales[k] - likes.scale))
+        likes.scale = scales[ui.segmented("scale", names, nearest, -1)]
+        imgui.dummy(ImVec2(0, ui.px(2)))
+        likes.embed = ui.check("Keep the picture inside the project", likes.embed)
+        automatic = ui.check("Choose the quality automatically", editor.state.auto_quality)
+        editor.state.auto_quality = likes.auto_quality = automatic
+        imgui.dummy(ImVec2(0, ui.px(8)))
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
+        if ui.button("Done", primary=True, width=96):
+            likes.save()
+            return False
+        return True

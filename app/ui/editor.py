@@ -1,0 +1,388 @@
+"""The editor: one frame is a function of its state, the events since the last one, and the time passed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import moderngl
+from imgui_bundle import imgui
+
+from app.errors import UserError
+from app.project import Project
+from app.session import Session
+from app.ui import panels, theme
+from app.ui.actions import ACTIONS, BY_KEY
+from app.ui.canvas import Canvas
+from app.ui.clock import Clock
+from app.ui.dialogs import Dialog, Preferring, Shortcuts, Unsaved
+from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Wheel
+from app.ui.exporting import ExportDialog, Exports
+from app.ui.files import Files
+from app.ui.hand import Hand
+from app.ui.host import Host
+from app.ui.layout import Layout
+from app.ui.messages import Messages
+from app.ui.numbers import Numbers
+from app.ui.preferences import Preferences
+from app.ui.quality import Quality
+from app.ui.state import LARGEST, SMALLEST, State
+from app.ui.viewport import Viewport
+from app.ui.widgets import Ui
+from solver.context import Device
+
+
+class Editor:
+    """The whole window but for the window itself.
+
+    Args:
+        device: the GL of the window, or a headless one.
+        project: what is open first.
+        preferences: what the person likes.
+
+    Attributes:
+        closed: the person has left.
+        clipboard: puts a text on the clipboard; the window sets it.
+    """
+
+    def __init__(self, device: Device, project: Project, preferences: Preferences | None = None) -> None:
+        self.device = device
+        self.preferences = preferences or Preferences()
+        self.state = State(
+            inspector=self.preferences.inspector,
+            hint=self.preferences.hint,
+            auto_quality=self.preferences.auto_quality,
+        )
+        self.host = Host(device)
+        self.ui = Ui(theme.PALETTES[self.preferences.theme], self.host.fonts, self.preferences.scale)
+        self.messages = Messages()
+        self.hand = Hand(self)
+        self.files = Files(self)
+        self.exports = Exports(self.messages)
+        self.clock = Clock()
+        self.quality = Quality(self)
+        self.numbers = Numbers()
+        self.dialogs: list[Dialog] = []
+        self.closed = False
+        self.clipboard: Callable[[str], None] = imgui.set_clipboard_text
+        self.layout = Layout.of(1280, 800, 1.0, True)
+        self._styled: tuple[object, ...] = ()
+        self._held_by_imgui = False
+        self._popup_open = False
+        self._sessions: list[tuple[Session, Canvas]] = []
+        self._index = -1
+        self.view = Viewport(self.layout.canvas, (1, 1))
+        self.open(project)
+
+    # -- the work that is open --------------------------------------------------------------------------------------
+
+    @property
+    def session(self) -> Session:
+        return self._sessions[self._index][0]
+
+    @property
+    def canvas(self) -> Canvas:
+        return self._sessions[self._index][1]
+
+    @property
+    def is_dirty(self) -> bool:
+        return self.session.document.is_dirty
+
+    @property
+    def title(self) -> str:
+        return f"{self.session.project.name}{' *' if self.is_dirty else ''} - fluidwarp"
+
+    def open(self, project: Project) -> None:
+        """Work on another project; Undo at its very start comes back to this one."""
+        canvas = Canvas(self.device, project.picture)
+        try:
+            session = Session(self.device, project)
+        except Exception:
+            canvas.release()
+            raise
+        for old in self._sessions[self._index + 1 :]:
+            self._close(*old)
+        # One step back is enough, and its checkpoints are dear.
+        kept = self._sessions[: self._index + 1][-1:]
+        for old in self._sessions[: max(self._index, 0)]:
+            self._close(*old)
+        self._sessions = [*kept, (session, canvas)]
+        self._turn_to(len(self._sessions) - 1)
+        self.quality.opened()
+
+    def undo(self) -> None:
+        if self.session.document.history.can_undo:
+            self.session.undo()
+        elif self._index > 0:
+            self._turn_to(self._index - 1)
+
+    def redo(self) -> None:
+        if self.session.document.history.can_redo:
+            self.session.redo()
+        elif self._index < len(self._sessions) - 1:
+            self._turn_to(self._index + 1)
+
+    @property
+    def can_undo(self) -> bool:
+        return self.session.document.history.can_undo or self._index > 0 or self.session.is_painting
+
+    @property
+    def can_redo(self) -> bool:
+        return self.session.document.history.can_redo or self._index < len(self._sessions) - 1
+
+    def change(self, name: str, **settings: Any) -> None:
+        """Change the fluid from the playhead on."""
+        if self.session.end or settings.keys() <= {"viscosity", "drag", "walls"}:
+            self.session.change(name, **settings)
+
+    def _turn_to(self, index: int) -> None:
+        if self._index >= 0:
+            self.session.pause()
+        self._index = index
+        self.view = Viewport(self.layout.canvas, self.canvas.size, self.ui.density)
+
+    def _close(self, session: Session, canvas: Canvas) -> None:
+        session.release_gpu()
+        canvas.release()
+
+    # -- a frame ----------------------------------------------------------------------------------------------------
+
+    def frame(
+        self,
+        target: moderngl.Framebuffer,
+        size: tuple[int, int],
+        dt: float,
+        events: Sequence[Event] = (),
+        density: float = 1.0,
+        scale: float = 1.0,
+    ) -> None:
+        """Take in `events`, let `dt` seconds go by, and draw everything into `target`.
+
+        Args:
+            target: a framebuffer of `size` pixels.
+            size: width and height in pixels.
+            dt: seconds since the last frame.
+            events: in their order.
+            density: pixels a point of the events' coordinates.
+            scale: of the interface, as the screen asks for; the preferences' own comes on top.
+        """
+        with self.clock.measure("frame"):
+            self._lay_out((size[0] / density, size[1] / density), density, scale)
+            self._hear(events)
+            with self.clock.measure("simulate"):
+                self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
+            self.quality.look(dt)
+            self._draw(target, size, dt, events)
+        self.clock.frame_done()
+
+    def wants_frame(self) -> bool:
+        """True while something moves by itself."""
+        return self.session.is_moving or self.exports.is_running or self.files.is_waiting or self.clock.settling > 0
+
+    def wait(self) -> float:
+        """Seconds that may pass before the next frame if no event comes."""
+        if self.wants_frame():
+            return 0.0
+        return min(self.messages.next_in or 60.0, 60.0)
+
+    def _lay_out(self, size: tuple[float, float], density: float, scale: float) -> None:
+        self.ui.scale = scale * self.preferences.scale
+        self.ui.density = density
+        styled = (self.preferences.theme, self.ui.scale)
+        if styled != self._styled:
+            self._styled = styled
+            self.ui.palette = theme.PALETTES[self.preferences.theme]
+            theme.apply(self.ui.palette, self.ui.scale)
+        self.layout = Layout.of(*size, self.ui.scale, self.state.inspector)
+        self.view = replace(self.view, canvas=self.layout.canvas, density=density)
+
+    def _hear(self, events: Sequence[Event]) -> None:
+        for event in events:
+            self.clock.settling = 3
+            try:
+                self._hear_one(event)
+            except UserError as error:
+                self.messages.warn(str(error))
+
+    def _hear_one(self, event: Event) -> None:
+        match event:
+            case Key(key, down, mods, repeat):
+                if key == "\\":
+                    self.state.before = down and not self._is_typing
+                if down and not self._is_typing and not self.dialogs:
+                    self._key(key, mods.chord(key), repeat)
+                if not self.dialogs and not self._is_typing:
+                    self.hand.hear(event)
+            case Move() | Button() | Wheel():
+                self.hand.hear(event)
+            case Focus(False):
+                self.hand.let_go()
+                self.state.before = False
+            case Drop(paths) if paths:
+                self.files.open(Path(paths[0]))
+            case CloseWish():
+                self.do("quit")
+
+    def _key(self, key: str, chord: str, repeat: bool) -> None:
+        action = BY_KEY.get(chord) or (BY_KEY.get(key) if key in "{}+=" else None)
+        # Space is also held to pan, so that it plays only once it is let go.
+        if action is None or key == "space" or (repeat and not action.repeats):
+            return
+        self.do(action.name)
+
+    def do(self, name: str) -> None:
+        """Do one of the actions, if it can be done now."""
+        action = ACTIONS[name]
+        if not action.enabled(self):
+            return
+        try:
+            action.run(self)
+        except UserError as error:
+            self.messages.warn(str(error))
+
+    def _draw(self, target: moderngl.Framebuffer, size: tuple[int, int], dt: float, events: Sequence[Event]) -> None:
+        target.viewport = (0, 0, *size)
+        target.clear(*self.ui.palette.ground)
+        with self.clock.measure("canvas"):
+            self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
+        self.host.begin((size[0] / self.ui.density, size[1] / self.ui.density), self.ui.density, dt, events)
+        try:
+            with self.clock.measure("panels"):
+                panels.draw(self.ui, self)
+                if self.session.notice:
+                    self.messages.say(self.session.notice)
+                    self.session.notice = None
+                self.exports.draw(self.ui, self.layout.canvas)
+                self.messages.draw(self.ui, self.layout.canvas, dt)
+                self._draw_dialog()
+        except UserError as error:
+            self.messages.warn(str(error))
+        io = imgui.get_io()
+        self._held_by_imgui = io.want_capture_mouse
+        self._is_typing_now = io.want_text_input
+        anywhere = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
+        self._popup_open = imgui.is_popup_open("", anywhere)
+        with self.clock.measure("interface"):
+            self.host.end(target)
+
+    def _draw_dialog(self) -> None:
+        self.files.poll()
+        if self.dialogs and not self.dialogs[-1].draw(self.ui, self):
+            self.dialogs.pop()
+
+    _is_typing_now = False
+
+    @property
+    def _is_typing(self) -> bool:
+        return self._is_typing_now
+
+    # -- the canvas -------------------------------------------------------------------------------------------------
+
+    def is_canvas_at(self, x: float, y: float) -> bool:
+        """True if nothing lies over the canvas at a point of the screen."""
+        if self.dialogs or self._popup_open or not self.layout.canvas.contains(x, y):
+            return False
+        return not any(rect.contains(x, y) for rect in panels.floating_rects())
+
+    @property
+    def shows_ring(self) -> bool:
+        """The brush's ring is drawn where the pointer is."""
+        tool = self.state.tool
+        return tool.gesture is not None and self.hand.is_over_canvas and self.hand.drag in (None, "paint", "brush")
+
+    def choose_tool(self, name: str, opposite: bool) -> None:
+        self.state.tool_name = name
+        if self.state.tool.directions:
+            self.state.opposite[name] = opposite
+
+    def resize_brush(self, factor: float) -> None:
+        brush = self.state.brush
+        self.state.brush = replace(brush, radius=min(max(brush.radius * factor, SMALLEST), LARGEST))
+
+    def harden_brush(self, by: float) -> None:
+        brush = self.state.brush
+        self.state.brush = replace(brush, hardness=round(min(max(brush.hardness + by, 0.0), 1.0), 3))
+
+    def strengthen_brush(self, by: float) -> None:
+        brush = self.state.brush
+        self.state.brush = replace(brush, strength=round(min(max(brush.strength + by, 0.05), 1.0), 3))
+
+    def zoom_step(self, up: bool) -> None:
+        canvas = self.layout.canvas
+        over = canvas.contains(self.hand.x, self.hand.y)
+        middle = (self.hand.x, self.hand.y) if over else (canvas.x + canvas.width / 2, canvas.y + canvas.height / 2)
+        self.view = self.view.stepped(up, *middle)
+
+    def zoom_fit(self) -> None:
+        self.view = self.view.fitted()
+
+    def zoom_to(self, zoom: float) -> None:
+        canvas = self.layout.canvas
+        self.view = self.view.zoomed(zoom, canvas.x + canvas.width / 2, canvas.y + canvas.height / 2)
+
+    # -- what is shown ----------------------------------------------------------------------------------------------
+
+    def toggle_split(self) -> None:
+        self.state.split = 0.5 if self.state.split is None else None
+
+    def toggle_inspector(self) -> None:
+        self.state.inspector = self.preferences.inspector = not self.state.inspector
+        self.preferences.save()
+
+    def toggle_statistics(self) -> None:
+        self.state.statistics = not self.state.statistics
+        self.device.timings.enabled = self.state.statistics
+
+    def toggle_theme(self) -> None:
+        self.preferences.theme = "light" if self.preferences.theme == "dark" else "dark"
+        self.preferences.save()
+
+    def toggle_overlay(self, name: str) -> None:
+        overlay = self.state.overlays[name]
+        overlay.shown = not overlay.shown
+
+    def step_back(self) -> None:
+        self.session.seek(self.session.target - 1)
+
+    # -- dialogs ----------------------------------------------------------------------------------------------------
+
+    def show_shortcuts(self) -> None:
+        self.dialogs.append(Shortcuts())
+
+    def ask_preferences(self) -> None:
+        self.dialogs.append(Preferring())
+
+    def ask_export(self) -> None:
+        self.session.release()
+        self.dialogs.append(ExportDialog(self.session, self.preferences.folder))
+
+    def ask_quit(self) -> None:
+        """Leave, after having asked about what is not saved."""
+        self.unless_unsaved("quit", self._quit)
+
+    def unless_unsaved(self, what: str, then: Callable[[], None]) -> None:
+        """Do something that would lose unsaved work, once the person has said what shall become of it."""
+        self.session.release()
+        if self.is_dirty:
+            self.dialogs.append(Unsaved(what, then))
+        else:
+            then()
+
+    def copy_recipe(self) -> None:
+        self.clipboard(self.session.recipe.text())
+        self.messages.done("The recipe is on the clipboard, as TOML.")
+
+    def _quit(self) -> None:
+        self.exports.cancel()
+        self.closed = True
+
+    def release(self) -> None:
+        """Free everything."""
+        self.exports.cancel()
+        self.preferences.hint = self.state.hint
+        self.preferences.save()
+        for work in self._sessions:
+            self._close(*work)
+        self.host.release()

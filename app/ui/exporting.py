@@ -1,0 +1,189 @@
+"""Export from the window: asks what is wanted, and does it in a process of its own, so that the window stays usable."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.errors import UserError
+from app.export import Job
+from app.export_process import ExportProcess
+from app.session import Session
+from app.ui.dialogs import Dialog
+from app.ui.messages import Messages
+from app.ui.theme import packed
+from app.ui.viewport import Rect
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+PICTURES = (("PNG", ".png"), ("JPEG", ".jpg"), ("TIFF", ".tif"))
+ANIMATIONS = (("MP4", ".mp4"), ("GIF", ".gif"), ("PNG sequence", ".%04d.png"))
+FINER = (("As seen", 1), ("2 x", 2))
+
+
+class ExportDialog(Dialog):
+    """What is to be written: picture or animation, size, rate, part."""
+
+    width = 500
+
+    def __init__(self, session: Session, folder: str) -> None:
+        super().__init__("Export")
+        self.session = session
+        self.animation = False
+        self.format = [0, 0]
+        self.picture = session.project.picture
+        self.size = max(self.picture.width, self.picture.height)
+        self.quality = session.recipe.output.quality
+        self.fps = session.recipe.output.fps
+        seconds = session.end * session.dt
+        self.start, self.end = 0.0, seconds
+        self.finer = 0
+        self.folder = Path(folder) if folder and Path(folder).is_dir() else Path.home()
+        self.name = f"{session.project.name} warped"
+
+    @property
+    def ending(self) -> str:
+        return (ANIMATIONS if self.animation else PICTURES)[self.format[self.animation]][1]
+
+    @property
+    def output(self) -> Path:
+        return self.folder / (self.name + self.ending)
+
+    def job(self) -> Job:
+        """What the person has asked for."""
+        session = self.session
+        recipe = session.document.recipe
+        tick = max(session.target, 1)
+        if not self.animation:
+            # The picture that is seen: the warp at the playhead.
+            recipe = recipe.edited(duration=tick * recipe.fluid.dt)
+        grid = min(recipe.fluid.grid * FINER[self.finer][1], 1024)
+        own = max(self.picture.width, self.picture.height)
+        output = recipe.output.model_copy(
+            update={"size": None if self.size == own else self.size, "fps": self.fps, "quality": self.quality}
+        )
+        part = recipe.time.model_copy(update={"start": self.start, "end": max(self.end, self.start)})
+        recipe = recipe.edited(
+            output=output,
+            time=part if self.animation else recipe.time,
+            fluid=recipe.fluid if grid == recipe.fluid.grid else recipe.fluid.model_copy(update={"grid": grid}),
+        )
+        return Job(recipe, self.picture, session.project.folder, self.output)
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        self.animation = bool(ui.segmented("kind", ("Picture", "Animation"), int(self.animation), -1))
+        choices = ANIMATIONS if self.animation else PICTURES
+        kind = int(self.animation)
+        self.format[kind] = ui.segmented("format", [label for label, _ in choices], self.format[kind], -1)
+        own = max(self.picture.width, self.picture.height)
+        width, height = (round(side * self.size / own) for side in (self.picture.width, self.picture.height))
+        slid = ui.slider("size", "Size", self.size, 16, max(own * 2, 64), f"{width} x {height} pixels", own)
+        self.size = round(slid.value)
+        if self.ending in (".jpg", ".mp4"):
+            slid = ui.slider("quality", "Quality", self.quality, 1, 100, f"{self.quality}", 90)
+            self.quality = round(slid.value)
+        if self.animation:
+            seconds = self.session.end * self.session.dt
+            slid = ui.slider("fps", "Frames a second", self.fps, 1, 60, f"{self.fps:g}", 30)
+            self.fps = float(round(slid.value))
+            if seconds > 0:
+                self.start = ui.slider("from", "From", self.start, 0, seconds, f"{self.start:.2f} s", 0.0).value
+                self.end = ui.slider("to", "To", self.end, 0, seconds, f"{self.end:.2f} s", seconds).value
+        ui.dim("Simulate on the grid")
+        self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
+        if self.finer:
+            ui.dim("Finer detail, longer work; it may look a little different from what you see.")
+        imgui.dummy(ImVec2(0, ui.px(2)))
+        ui.dim("File")
+        imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
+        _, self.name = imgui.input_text("##name", self.name)
+        imgui.same_line()
+        if ui.button("Browse", width=96, height=30):
+            editor.files.ask_where("Export to", self.output, (self.ending,), self._chosen)
+        ui.dim(str(self.output))
+        imgui.dummy(ImVec2(0, ui.px(6)))
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
+        if ui.button("Cancel", width=96):
+            return False
+        imgui.same_line()
+        with ui.enabled(bool(self.name.strip()) and not editor.exports.is_running):
+            if ui.button("Export", primary=True, width=96):
+                return not self._start(editor)
+        return True
+
+    def _start(self, editor: Editor) -> bool:
+        try:
+            editor.exports.start(self.job())
+        except UserError as error:
+            editor.messages.warn(str(error))
+            return False
+        editor.preferences.folder = str(self.folder)
+        return True
+
+    def _chosen(self, path: Path) -> None:
+        name = path.name
+        self.folder = path.parent
+        self.name = name[: -len(self.ending)] if name.endswith(self.ending) else path.stem
+
+
+class Exports:
+    """The export that is under way, if any."""
+
+    def __init__(self, messages: Messages) -> None:
+        self.messages = messages
+        self._process: ExportProcess | None = None
+
+    @property
+    def is_running(self) -> bool:
+        return self._process is not None
+
+    def start(self, job: Job) -> None:
+        """Begin a job.
+
+        Raises:
+            UserError: if it cannot be written, as far as that can be known beforehand.
+        """
+        job.check()
+        job = replace(job, picture=job.picture)
+        self._process = ExportProcess(job)
+
+    def cancel(self) -> None:
+        """Stop the job; nothing of it is left."""
+        if self._process is not None:
+            self._process.stop()
+            self._process = None
+
+    def draw(self, ui: Ui, canvas: Rect) -> None:
+        """How far it is, with a button to stop it."""
+        process = self._process
+        if process is None:
+            return
+        process.poll()
+        if process.is_done:
+            self._process = None
+            if process.error:
+                self.messages.warn(process.error)
+            elif not process.cancelled:
+                self.messages.done(f"Exported {process.job.output.name} to {process.job.output.parent}")
+            return
+        with ui.floating("exporting", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
+            imgui.begin_group()
+            ui.text(f"Exporting {process.job.output.name}", size=14)
+            corner, width = imgui.get_cursor_screen_pos(), ui.px(280)
+            lines = imgui.get_window_draw_list()
+            high = ImVec2(corner.x + width, corner.y + ui.px(5))
+            lines.add_rect_filled(corner, high, packed(ui.palette.pressed), ui.px(3))
+            part = ImVec2(corner.x + max(width * process.part, ui.px(5)), high.y)
+            lines.add_rect_filled(corner, part, packed(ui.palette.accent), ui.px(3))
+            imgui.dummy(ImVec2(width, ui.px(8)))
+            imgui.end_group()
+            imgui.same_line(0, ui.px(16))
+            if ui.button("Cancel##export", height=30):
+                self.cancel()
+                self.messages.say("Export cancelled; nothing was written.")

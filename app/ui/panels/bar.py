@@ -1,0 +1,163 @@
+"""The bar above the picture: the tool in hand and what can be set about it; undo, compare, export."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.presets import FEELS
+from app.ui.actions import ACTIONS
+from app.ui.state import LARGEST, SMALLEST
+from app.ui.widgets import Ui, keys_shown
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+MENU = (
+    "open", "recent", "", "save", "save_as", "apply_to", "copy_recipe", "", "export", "", "preferences", "shortcuts",
+    "", "quit",
+)  # fmt: skip
+
+
+def draw(ui: Ui, editor: Editor) -> None:
+    """The whole bar."""
+    with ui.panel("bar", editor.layout.bar, (8, 8)):
+        if ui.icon_button("menu", "menu", "Menu"):
+            imgui.open_popup("main menu")
+        _menu(ui, editor)
+        ui.divider()
+        tool = editor.state.tool
+        if tool.gesture is not None:
+            _brush(ui, editor)
+        else:
+            _aligned(ui, tool.label, tool.hint)
+        _right(ui, editor)
+
+
+def _aligned(ui: Ui, title: str, hint: str = "") -> None:
+    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(7))
+    ui.text(title, bold=True)
+    if hint:
+        imgui.same_line(0, ui.px(12))
+        ui.dim(hint, 14)
+
+
+def _brush(ui: Ui, editor: Editor) -> None:
+    state, tool = editor.state, editor.state.tool
+    wide = imgui.get_window_width() > ui.px(1080)
+    label = tool.label
+    imgui.begin_group()
+    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(7))
+    ui.text(label, bold=True)
+    imgui.end_group()
+    if tool.directions:
+        imgui.same_line(0, ui.px(16))
+        imgui.begin_group()
+        imgui.set_cursor_pos_y(ui.px(10))
+        back = state.opposite.get(tool.name, False)
+        state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(back)))
+        imgui.end_group()
+        ui.tooltip("Direction", f"shift+{tool.key}", "Hold Alt for the other one.")
+    imgui.same_line(0, ui.px(16))
+    brush, width = state.brush, 148 if wide else 112
+    imgui.set_cursor_pos_y(ui.px(9))
+    size = brush.radius * max(editor.canvas.size) * 2
+    slid = ui.slider(
+        "size", "Size", brush.radius, SMALLEST, LARGEST, f"{size:.0f} px", default=0.12, logarithmic=True, width=width,
+        title="Size of the brush", key="[", more="] makes it larger. Or drag with the right button.",
+    )  # fmt: skip
+    if slid.changed:
+        brush = replace(brush, radius=slid.value)
+    imgui.same_line()
+    imgui.set_cursor_pos_y(ui.px(9))
+    slid = ui.slider(
+        "hardness", "Hardness", brush.hardness, 0, 1, f"{brush.hardness:.0%}", default=0.0, width=width,
+        title="Hardness", key="{", more="} makes it harder. A soft brush bends the picture gently.",
+    )  # fmt: skip
+    if slid.changed:
+        brush = replace(brush, hardness=slid.value)
+    imgui.same_line()
+    imgui.set_cursor_pos_y(ui.px(9))
+    slid = ui.slider(
+        "strength", "Strength", brush.strength, 0.05, 1, f"{brush.strength:.0%}", default=1.0, width=width,
+        title="Strength", key=";", more="' makes it stronger. Full strength moves the picture as fast as the pointer.",
+    )  # fmt: skip
+    if slid.changed:
+        brush = replace(brush, strength=slid.value)
+    state.brush = brush
+    if imgui.get_window_width() > ui.px(1180) and not editor.state.inspector:
+        imgui.same_line(0, ui.px(16))
+        imgui.set_cursor_pos_y(ui.px(10))
+        feels(ui, editor, "bar feel")
+
+
+def feels(ui: Ui, editor: Editor, name: str, width: float = 0.0) -> None:
+    """The choice between the feels."""
+    session = editor.session
+    fluid = session.recipe.fluid_at(session.tick)
+    now = next((number for number, feel in enumerate(FEELS) if feel.fits(fluid)), -1)
+    chosen = ui.segmented(name, [feel.name for feel in FEELS], now, width)
+    if chosen != now:
+        feel = FEELS[chosen]
+        session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+
+
+def _right(ui: Ui, editor: Editor) -> None:
+    width = ui.px(4 * 32 + 3 * 4 + 17 + 96 + 8)
+    imgui.same_line()
+    imgui.set_cursor_pos(ImVec2(max(imgui.get_window_width() - width, imgui.get_cursor_pos_x()), ui.px(8)))
+    history = editor.session.document.history
+    undo, redo = history.undo_name, history.redo_name
+    if ui.icon_button("undo", "undo", f"Undo {undo}" if undo else "Undo", "ctrl+z", enabled=editor.can_undo):
+        editor.do("undo")
+    imgui.same_line(0, ui.px(4))
+    title = f"Redo {redo}" if redo else "Redo"
+    if ui.icon_button("redo", "redo", title, "ctrl+shift+z", enabled=editor.can_redo):
+        editor.do("redo")
+    imgui.same_line(0, ui.px(4))
+    more = "Drag the line. Or hold \\ to see the picture as it was."
+    if ui.icon_button("split", "compare", "Compare", "y", more, active=editor.state.split is not None):
+        editor.do("split")
+    imgui.same_line(0, ui.px(4))
+    if ui.icon_button("inspector", "inspector", "Inspector", "tab", active=editor.state.inspector):
+        editor.do("inspector")
+    ui.divider()
+    if ui.button("Export", primary=True, width=92, icon="export"):
+        editor.do("export")
+    ui.tooltip("Export a picture or an animation", "ctrl+e")
+
+
+def _menu(ui: Ui, editor: Editor) -> None:
+    imgui.set_next_window_pos(ImVec2(ui.px(8), editor.layout.bar.height))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(7)))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(8), ui.px(8)))
+    if imgui.begin_popup("main menu"):
+        for name in MENU:
+            if not name:
+                imgui.separator()
+            elif name == "recent":
+                _recent(ui, editor)
+            else:
+                action = ACTIONS[name]
+                keys = keys_shown(action.key) + "   "
+                if imgui.menu_item(f"{action.label}    ", keys, False, action.enabled(editor))[0]:
+                    editor.do(name)
+        imgui.end_popup()
+    imgui.pop_style_var(2)
+
+
+def _recent(ui: Ui, editor: Editor) -> None:
+    from pathlib import Path
+
+    recent = editor.preferences.recent
+    if imgui.begin_menu("Open recent", bool(recent)):
+        for name in list(recent):
+            path = Path(name)
+            if imgui.menu_item(f"{path.name}##{name}", "", False)[0]:
+                editor.files.open(path)
+            if imgui.is_item_hovered():
+                imgui.set_tooltip(str(path.parent))
+        imgui.end_menu()

@@ -1,0 +1,208 @@
+"""What lies on the canvas: the brush's ring, the split, the zoom, the first hint, statistics."""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.ui.state import Overlay
+from app.ui.theme import Colour, packed, rgb
+from app.ui.viewport import Rect
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+_rects: list[Rect] = []
+WHITE, BLACK = rgb("ffffff"), rgb("000000")
+
+
+def floating_rects() -> list[Rect]:
+    """Where the canvas is covered by something that can be clicked, as of the last frame."""
+    return _rects
+
+
+def draw(ui: Ui, editor: Editor) -> None:
+    """Everything that lies on the canvas."""
+    _rects.clear()
+    canvas = editor.layout.canvas
+    lines = imgui.get_background_draw_list()
+    lines.push_clip_rect(ImVec2(canvas.x, canvas.y), ImVec2(canvas.right, canvas.bottom), True)
+    if editor.state.overlays["forces"].shown:
+        _forces(ui, editor, lines)
+    _split(ui, editor, lines)
+    _path(ui, editor, lines)
+    if editor.shows_ring:
+        _ring(ui, editor, lines)
+    lines.pop_clip_rect()
+    _zoom(ui, editor)
+    if editor.state.hint:
+        _hint(ui, editor)
+    if editor.state.statistics:
+        _statistics(ui, editor)
+    if editor.session.is_behind:
+        _catching_up(ui, editor)
+
+
+def _ring(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
+    """A ring as large as the brush, and one where its hard core ends; light on dark and dark on light."""
+    hand, brush = editor.hand, editor.state.brush
+    x, y = hand._start if hand.drag == "brush" else (hand.x, hand.y)
+    radius = brush.radius * editor.view.longer
+    core = 0.9 * brush.hardness * radius
+    middle, count = ImVec2(x, y), max(32, min(int(radius), 96))
+    soft = rgb("000000", 0.45)
+    lines.add_circle(middle, radius, packed(soft), count, ui.px(2.6))
+    lines.add_circle(middle, radius, packed(WHITE, 0.95), count, ui.px(1.2))
+    if brush.hardness > 0.02:
+        lines.add_circle(middle, core, packed(soft, 0.7), count, ui.px(1.8))
+        lines.add_circle(middle, core, packed(WHITE, 0.5), count, ui.px(1.0))
+    lines.add_circle_filled(middle, ui.px(2.2), packed(soft), 12)
+    lines.add_circle_filled(middle, ui.px(1.4), packed(WHITE), 12)
+    opposite = editor.state.opposite.get(editor.state.tool_name, False) != hand.mods.alt
+    if opposite:
+        reach = ui.px(5)
+        lines.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), packed(soft), ui.px(3.2))
+        lines.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), packed(WHITE), ui.px(1.6))
+
+
+def _path(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
+    """The path of a curve that is being drawn."""
+    session = editor.session
+    if session.stroke is not None or len(session.path) < 2:
+        return
+    points = [ImVec2(*editor.view.to_screen(*place)) for place in session.path]
+    lines.add_polyline(points, packed(BLACK, 0.45), ui.px(5), 0)
+    lines.add_polyline(points, packed(ui.palette.accent), ui.px(2.4), 0)
+    _arrow_head(lines, points[max(len(points) - 6, 0)], points[-1], ui.px(10), ui.palette.accent)
+
+
+def _arrow_head(lines: imgui.ImDrawList, start: ImVec2, end: ImVec2, size: float, colour: Colour) -> None:
+    dx, dy = end.x - start.x, end.y - start.y
+    length = hypot(dx, dy)
+    if length < 1e-3:
+        return
+    dx, dy = dx / length * size, dy / length * size
+    left = ImVec2(end.x - dx - dy * 0.6, end.y - dy + dx * 0.6)
+    right = ImVec2(end.x - dx + dy * 0.6, end.y - dy - dx * 0.6)
+    lines.add_triangle_filled(end, left, right, packed(colour))
+
+
+def _forces(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
+    """Where strokes push, up to the playhead; older ones fainter."""
+    session = editor.session
+    overlay: Overlay = editor.state.overlays["forces"]
+    for stroke in session.recipe.stroke[-60:]:
+        if stroke.first_tick > session.tick or stroke.tool not in ("push", "curve"):
+            continue
+        step = max(len(stroke.samples) // 40, 1)
+        places = [sample[1:3] for sample in stroke.samples[::step]]
+        points = [ImVec2(*editor.view.to_screen(*place)) for place in places]
+        active = stroke.last_tick >= session.tick - 1
+        alpha = overlay.opacity * (1.0 if active else 0.6)
+        lines.add_polyline(points, packed(BLACK, 0.5 * alpha), ui.px(4.5), 0)
+        colour = (*ui.palette.accent[:3], alpha)
+        lines.add_polyline(points, packed(colour), ui.px(2), 0)
+        if len(points) > 1:
+            _arrow_head(lines, points[-2], points[-1], ui.px(9), colour)
+
+
+def _split(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
+    split = editor.state.split
+    if split is None or editor.state.before:
+        return
+    rect, canvas = editor.view.rect, editor.layout.canvas
+    x = rect.x + split * rect.width
+    top, bottom = max(rect.y, canvas.y), min(rect.bottom, canvas.bottom)
+    lines.add_line(ImVec2(x, top), ImVec2(x, bottom), packed(BLACK, 0.4), ui.px(4))
+    lines.add_line(ImVec2(x, top), ImVec2(x, bottom), packed(WHITE), ui.px(1.6))
+    middle, radius = ImVec2(x, (top + bottom) / 2), ui.px(13)
+    lines.add_circle_filled(middle, radius, packed(WHITE), 28)
+    for side in (-1, 1):
+        tip = ImVec2(x + side * ui.px(8), middle.y)
+        low, high = ImVec2(x + side * ui.px(3), middle.y - ui.px(4)), ImVec2(x + side * ui.px(3), middle.y + ui.px(4))
+        lines.add_triangle_filled(tip, low, high, packed(rgb("222222")))
+    imgui.push_font(ui.fonts.bold, 12.0)
+    for label, left in (("Before", True), ("After", False)):
+        size = imgui.calc_text_size(label)
+        at = ImVec2(x - size.x - ui.px(18) if left else x + ui.px(18), top + ui.px(14))
+        box = ImVec2(ui.px(7), ui.px(3))
+        lines.add_rect_filled(at - box, at + size + box, packed(BLACK, 0.5), ui.px(5))
+        lines.add_text(at, packed(WHITE), label)
+    imgui.pop_font()
+
+
+def _zoom(ui: Ui, editor: Editor) -> None:
+    canvas = editor.layout.canvas
+    with ui.floating("zoom", canvas.right - ui.px(12), canvas.bottom - ui.px(12), (1, 1), 0.88):
+        if ui.icon_button("out", "minus", "Zoom out", "-", size=24, icon_size=14):
+            editor.do("zoom_out")
+        imgui.same_line(0, ui.px(2))
+        label = f"{editor.view.percent:.0f} %"
+        corner = imgui.get_cursor_screen_pos()
+        width = ui.px(52)
+        if imgui.invisible_button("percent", ImVec2(width, ui.px(24))):
+            editor.do("actual")
+        ui.tooltip("To 100 %", "ctrl+1")
+        imgui.push_font(ui.fonts.regular, 13.0)
+        size = imgui.calc_text_size(label)
+        at = ImVec2(corner.x + (width - size.x) / 2, corner.y + (ui.px(24) - size.y) / 2)
+        imgui.get_window_draw_list().add_text(at, packed(ui.palette.text), label)
+        imgui.pop_font()
+        imgui.same_line(0, ui.px(2))
+        if ui.icon_button("in", "plus", "Zoom in", "+", size=24, icon_size=14):
+            editor.do("zoom_in")
+        imgui.same_line(0, ui.px(2))
+        fitted = editor.view.zoom is None
+        if ui.icon_button("fit", "fit", "Fit", "0", size=24, icon_size=15, active=fitted):
+            editor.do("fit")
+        _remember()
+
+
+def _hint(ui: Ui, editor: Editor) -> None:
+    canvas = editor.layout.canvas
+    with ui.floating("hint", canvas.x + canvas.width / 2, canvas.bottom - ui.px(14), (0.5, 1), 0.9):
+        imgui.dummy(ImVec2(ui.px(4), ui.px(24)))
+        imgui.same_line(0, 0)
+        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(4))
+        ui.text("Drag on the picture to push it.", size=14, bold=True)
+        imgui.same_line(0, ui.px(8))
+        ui.dim("Drop your own picture here, or press Ctrl+O.", 14)
+        imgui.same_line(0, ui.px(6))
+        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() - ui.px(4))
+        if ui.icon_button("no hint", "close", size=24, icon_size=12):
+            editor.state.hint = False
+        _remember()
+
+
+def _statistics(ui: Ui, editor: Editor) -> None:
+    canvas, session = editor.layout.canvas, editor.session
+    stats = editor.numbers.take(session)
+    with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85):
+        clock = editor.clock.milliseconds
+        ui.dim(f"Frame  {clock.get('frame', 0):.1f} ms    simulate {clock.get('simulate', 0):.1f}")
+        for name, value in stats.stages.items():
+            ui.dim(f"    {name}  {value:.1f} ms")
+        if stats.map is not None:
+            ui.dim(f"det J  {stats.map.det_min:.2f} to {stats.map.det_max:.2f}    folds {stats.map.folds}")
+            ui.dim(f"Divergence  {stats.divergence:.1e} / s")
+        grid = session.replay.grid
+        ui.dim(f"Grid {grid.nx} x {grid.ny}    tick {session.tick}")
+
+
+def _catching_up(ui: Ui, editor: Editor) -> None:
+    session, canvas = editor.session, editor.layout.canvas
+    left = session.target - session.tick
+    if left < 12:
+        return
+    with ui.floating("catching up", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9):
+        imgui.dummy(ImVec2(0, 0))
+        ui.dim(f"  Simulating: {session.tick} of {session.target} steps  ", 13.5)
+
+
+def _remember() -> None:
+    place, size = imgui.get_window_pos(), imgui.get_window_size()
+    _rects.append(Rect(place.x, place.y, size.x, size.y))

@@ -1,0 +1,163 @@
+"""The inspector on the right: the fluid, what is seen, the edits, and numbers for those who want them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.presets import DEFAULT, FEELS
+from app.ui.theme import packed
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+GRIDS = (128, 192, 256, 384)
+EDGES = ("clamp", "mirror", "wrap", "transparent", "black")
+WALLS = ("free-slip", "no-slip")
+
+
+def draw(ui: Ui, editor: Editor) -> None:
+    """All sections, one below the other."""
+    rect = editor.layout.inspector
+    if rect is None:
+        return
+    with ui.panel("inspector", rect, (16, 8), imgui.WindowFlags_.none):
+        imgui.begin_child("sections")
+        for name, label, section, opened in (
+            ("fluid", "Fluid", _fluid, True),
+            ("view", "Overlays", _view, True),
+            ("quality", "Picture and quality", _quality, False),
+            ("masks", "Masks and motion", _masks, False),
+            ("history", "History", _history, True),
+            ("numbers", "Statistics", _numbers, False),
+        ):
+            sections = editor.state.sections
+            sections[name] = ui.section(label, sections.get(name, opened))
+            if sections[name]:
+                section(ui, editor)
+                imgui.dummy(ImVec2(0, ui.px(4)))
+            ui.line()
+        imgui.end_child()
+
+
+def _fluid(ui: Ui, editor: Editor) -> None:
+    session = editor.session
+    fluid = session.recipe.fluid_at(session.tick)
+    now = next((feel for feel in FEELS if feel.fits(fluid)), None)
+    chosen = ui.segmented("feel", [feel.name for feel in FEELS], FEELS.index(now) if now else -1, -1)
+    if chosen >= 0 and FEELS[chosen] is not now:
+        feel = FEELS[chosen]
+        session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+    ui.dim(f"{now.line}." if now else "Your own mixture.")
+    viscosity = max(fluid.viscosity, 1e-5)
+    slid = ui.slider(
+        "viscosity", "Viscosity", viscosity, 1e-5, 10.0, f"{viscosity:.2g}", DEFAULT.viscosity, logarithmic=True,
+        title="Viscosity",
+        more="How thick the fluid is. Thin fluids swirl on, thick ones move as one piece and stop at once.",
+    )  # fmt: skip
+    if slid.changed:
+        session.preview_change(viscosity=slid.value)
+    if slid.done:
+        session.commit("Viscosity")
+    slid = ui.slider(
+        "drag", "Drag", fluid.drag, 0.0, 10.0, f"{fluid.drag:.1f} / s", DEFAULT.drag,
+        title="Drag", more="How fast all motion dies away. At 0 only viscosity brings it to rest.",
+    )  # fmt: skip
+    if slid.changed:
+        session.preview_change(drag=slid.value)
+    if slid.done:
+        session.commit("Drag")
+    slip = WALLS.index(fluid.walls)
+    chosen = ui.segmented("walls", ("Edges glide", "Edges hold"), slip, -1)
+    if chosen != slip:
+        session.change("Edges of the fluid", walls=WALLS[chosen])
+    ui.tooltip("At the picture's edges", more="The fluid glides along them, or sticks to them.")
+
+
+def _view(ui: Ui, editor: Editor) -> None:
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(4)))
+    for overlay in editor.state.overlays.values():
+        overlay.shown = ui.check(f"{overlay.label}##overlay", overlay.shown, overlay.key)
+        if overlay.shown:
+            slid = ui.slider(f"opacity {overlay.name}", "Opacity", overlay.opacity, 0, 1, f"{overlay.opacity:.0%}", 0.7)
+            overlay.opacity = slid.value
+    imgui.pop_style_var()
+
+
+def _quality(ui: Ui, editor: Editor) -> None:
+    session = editor.session
+    width, height = editor.canvas.size
+    ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits")
+    grid = session.recipe.fluid.grid
+    index = GRIDS.index(grid) if grid in GRIDS else -1
+    chosen = ui.segmented("grid", [str(cells) for cells in GRIDS], index, -1)
+    ui.tooltip("Cells along the longer side", more="More is finer and slower. What is seen is what is exported.")
+    if chosen != index and chosen >= 0:
+        session.set_grid(GRIDS[chosen], f"Grid of {GRIDS[chosen]}")
+    ui.dim("Beyond the edges of the picture")
+    labels = ("Its outermost pixels", "Mirrored", "Repeated", "Transparent", "Black")
+    imgui.set_next_item_width(-1)
+    changed, number = imgui.combo("##edges", EDGES.index(session.recipe.edges), list(labels))
+    if changed:
+        session.edit("Edges of the picture", edges=EDGES[number])
+
+
+def _masks(ui: Ui, editor: Editor) -> None:
+    for name, label in (
+        ("clear_masks", "Clear the masks"),
+        ("clear_velocity", "Stop all motion"),
+        ("reset_warp", "Reset the warp"),
+    ):
+        with ui.enabled(editor.session.end > 0):
+            if ui.button(label, width=-1, height=30):
+                editor.do(name)
+    if ui.button("Copy as recipe", width=-1, height=30):
+        editor.do("copy_recipe")
+
+
+def _history(ui: Ui, editor: Editor) -> None:
+    history, palette = editor.session.document.history, ui.palette
+    entries, present = history.entries, history.index
+    height = min(len(entries), 8) * ui.px(26) + ui.px(4)
+    imgui.begin_child("entries", ImVec2(0, height))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
+    clipper = imgui.ListClipper()
+    clipper.begin(len(entries), ui.px(26))
+    chosen: int | None = None
+    while clipper.step():
+        for number in range(clipper.display_start, clipper.display_end):
+            corner = imgui.get_cursor_screen_pos()
+            if imgui.invisible_button(f"entry {number}", ImVec2(imgui.get_content_region_avail().x, ui.px(26))):
+                chosen = number
+            draw = imgui.get_window_draw_list()
+            if imgui.is_item_hovered() or number == present:
+                low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+                ground = palette.accent_soft if number == present else palette.hover
+                draw.add_rect_filled(low, high, packed(ground), ui.px(5))
+            ink = palette.text if number <= present else palette.faint
+            imgui.push_font(ui.fonts.regular, 13.5)
+            draw.add_text(ImVec2(corner.x + ui.px(8), corner.y + ui.px(5)), packed(ink), entries[number].name)
+            imgui.pop_font()
+    clipper.end()
+    if editor.state.sections.get("seen", -1) != present:
+        editor.state.sections["seen"] = present  # pyright: ignore[reportArgumentType]
+        imgui.set_scroll_y(max(present * ui.px(26) - height / 2, 0))
+    imgui.pop_style_var()
+    imgui.end_child()
+    if chosen is not None and chosen != present:
+        editor.session.go_to(chosen)
+
+
+def _numbers(ui: Ui, editor: Editor) -> None:
+    before = editor.state.statistics
+    after = ui.check("Show over the picture", before, "ctrl+i")
+    if after != before:
+        editor.do("statistics")
+    for name, value in editor.clock.milliseconds.items():
+        ui.dim(f"{name.capitalize()}: {value:.1f} ms")
+    ui.dim(f"{editor.device.limits.renderer.split('(')[0]}")
+
+

@@ -1,0 +1,37 @@
+"""The strip of tools on the left."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.tools import TOOLS
+from app.ui.theme import packed
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+GROUP_ENDS = ("pinch", "bloat", "smooth", "restore")
+
+
+def draw(ui: Ui, editor: Editor) -> None:
+    """One button for each tool."""
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, ui.px(4)))
+    with ui.panel("tools", editor.layout.strip, (4, 8)):
+        for tool in TOOLS:
+            active = editor.state.tool_name == tool.name
+            more = tool.hint
+            if tool.directions:
+                more += f". Alt: {tool.directions[1].lower()}."
+            if ui.icon_button(tool.name, tool.name, tool.label, tool.key, more, active, size=40, icon_size=22):
+                editor.choose_tool(tool.name, editor.state.opposite.get(tool.name, False))
+            if tool.name in GROUP_ENDS:
+                corner, width = imgui.get_cursor_screen_pos(), ui.px(40)
+                low = ImVec2(corner.x + ui.px(8), corner.y + ui.px(3))
+                high = ImVec2(corner.x + width - ui.px(8), corner.y + ui.px(3))
+                imgui.get_window_draw_list().add_line(low, high, packed(ui.palette.line), ui.px(1))
+                imgui.dummy(ImVec2(width, ui.px(6)))
+    imgui.pop_style_var()

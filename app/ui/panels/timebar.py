@@ -1,0 +1,109 @@
+"""The timeline along the bottom: play, scrub, and go on from anywhere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.ui.theme import Colour, blend, packed, rgb
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+# Blocks on the track, by what the stroke does; told apart without red against green.
+KINDS: dict[str, Colour] = {
+    "push": rgb("f2a93b"), "curve": rgb("f2a93b"), "twirl": rgb("cc79a7"), "bloat": rgb("56b4e9"),
+    "pinch": rgb("56b4e9"), "restore": rgb("bdbdbd"),
+}  # fmt: skip
+MASKS = rgb("0f86c9")
+
+
+def draw(ui: Ui, editor: Editor) -> None:
+    """Buttons, the time, the track, and how much of the warp is seen."""
+    session = editor.session
+    with ui.panel("timeline", editor.layout.timebar, (8, 12)):
+        some = session.end > 0
+        if ui.icon_button("start", "back", "To the start", "home", enabled=some):
+            editor.do("start")
+        imgui.same_line(0, ui.px(2))
+        moving = session.playing or session.coasting
+        title = "Pause" if moving else "Play"
+        if ui.icon_button("play", "pause" if moving else "play", title, "space", "Tap Space.", enabled=some):
+            editor.do("play")
+        imgui.same_line(0, ui.px(2))
+        if ui.icon_button("step", "step", "One step on", ".", enabled=some):
+            editor.do("step")
+        imgui.same_line(0, ui.px(10))
+        _time(ui, session.target * session.dt, session.end * session.dt)
+        imgui.same_line(0, ui.px(16))
+        amount = ui.px(168)
+        _track(ui, editor, imgui.get_content_region_avail().x - amount - ui.px(16))
+        imgui.same_line(0, ui.px(16))
+        imgui.set_cursor_pos_y(ui.px(13))
+        part = session.target / session.end if some else 1.0
+        with ui.enabled(some):
+            slid = ui.slider(
+                "amount", "Amount", part, 0, 1, f"{part:.0%}", 1.0, width=168, title="Amount of the warp",
+                more="Goes back along the way the picture came, so that nothing folds on the way.",
+            )  # fmt: skip
+        if slid.changed and some:
+            session.seek(round(slid.value * session.end))
+
+
+def _time(ui: Ui, now: float, end: float) -> None:
+    corner = imgui.get_cursor_screen_pos()
+    imgui.push_font(ui.fonts.regular, 14.0)
+    shown = f"{now:.2f}"
+    draw = imgui.get_window_draw_list()
+    y = corner.y + (ui.px(32) - imgui.get_font_size()) / 2
+    right = corner.x + ui.px(42)
+    draw.add_text(ImVec2(right - imgui.calc_text_size(shown).x, y), packed(ui.palette.text), shown)
+    draw.add_text(ImVec2(right + ui.px(5), y), packed(ui.palette.faint), f"/  {end:.2f} s")
+    imgui.pop_font()
+    imgui.dummy(ImVec2(ui.px(108), ui.px(32)))
+
+
+def _track(ui: Ui, editor: Editor, width: float) -> None:
+    session, palette = editor.session, ui.palette
+    width = max(width, ui.px(40))
+    corner, height = imgui.get_cursor_screen_pos(), ui.px(32)
+    imgui.invisible_button("track", ImVec2(width, height))
+    hovered, held = imgui.is_item_hovered(), imgui.is_item_active()
+    inset = ui.px(7)
+    x0, x1 = corner.x + inset, corner.x + width - inset
+    end = session.end
+    if held and end:
+        part = min(max((imgui.get_mouse_pos().x - x0) / (x1 - x0), 0.0), 1.0)
+        tick = round(part * end)
+        if tick != session.target:
+            session.seek(tick)
+    draw = imgui.get_window_draw_list()
+    top, bottom = corner.y + ui.px(10), corner.y + ui.px(22)
+    draw.add_rect_filled(ImVec2(x0, top), ImVec2(x1, bottom), packed(palette.raised), ui.px(4))
+    if not end:
+        return
+
+    def across(tick: float) -> float:
+        return x0 + (x1 - x0) * min(tick / end, 1.0)
+
+    now = across(session.target)
+    played = blend(palette.raised, palette.accent, 0.16)
+    draw.add_rect_filled(ImVec2(x0, top), ImVec2(now, bottom), packed(played), ui.px(4))
+    for stroke in session.recipe.stroke:
+        a, b = across(stroke.first_tick), across(stroke.last_tick + 1)
+        colour = KINDS.get(stroke.tool, MASKS)
+        faded = 1.0 if stroke.first_tick < session.target else 0.45
+        low, high = ImVec2(a, top + ui.px(3)), ImVec2(max(b - ui.px(1), a + ui.px(2)), bottom - ui.px(3))
+        draw.add_rect_filled(low, high, packed(colour, faded), ui.px(2))
+    for change in session.recipe.change:
+        x = across(change.tick)
+        draw.add_line(ImVec2(x, top), ImVec2(x, bottom), packed(palette.dim), ui.px(1))
+    radius = ui.px(7 if hovered or held else 6)
+    ink = palette.text
+    draw.add_line(ImVec2(now, top - ui.px(4)), ImVec2(now, bottom + ui.px(4)), packed(ink), ui.px(2))
+    draw.add_circle_filled(ImVec2(now, (top + bottom) / 2), radius, packed(ink), 24)
+    if hovered and not held:
+        ui.tooltip("The recording", more="Drag to go through it both ways. Paint anywhere to go on from there.")

@@ -1,0 +1,74 @@
+"""What a person likes, and what was opened lately: kept in the user's configuration folder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+MOST_RECENT = 10
+
+
+@dataclass
+class Preferences:
+    """Kept between sessions; `path` None keeps nothing, for tests.
+
+    Attributes:
+        theme: "dark" or "light".
+        scale: of the interface, 1 as the screen asks for.
+        recent: paths of what was opened lately, newest first.
+        embed: projects hold their picture.
+    """
+
+    theme: str = "dark"
+    scale: float = 1.0
+    inspector: bool = True
+    auto_quality: bool = True
+    embed: bool = True
+    hint: bool = True
+    recent: list[str] = field(default_factory=list)
+    folder: str = ""
+    grid: int = 0
+    path: Path | None = field(default=None, compare=False)
+
+    @classmethod
+    def load(cls) -> Preferences:
+        """From the configuration folder; what is missing or broken there is as by default."""
+        from platformdirs import user_config_path
+
+        path = user_config_path("fluidwarp") / "preferences.json"
+        try:
+            data: Any = json.loads(path.read_text("utf-8"))
+        except (OSError, ValueError):
+            data = {}
+        kept = cls(path=path)
+        if isinstance(data, dict):
+            for part in fields(cls):
+                value = data.get(part.name)
+                if part.name != "path" and isinstance(value, type(getattr(kept, part.name))):
+                    setattr(kept, part.name, value)
+        kept.theme = kept.theme if kept.theme in ("dark", "light") else "dark"
+        kept.scale = min(max(kept.scale, 0.75), 3.0)
+        kept.recent = [str(name) for name in kept.recent][:MOST_RECENT]
+        return kept
+
+    def save(self) -> None:
+        """To the configuration folder, if it can be written."""
+        if self.path is None:
+            return
+        data = {key: value for key, value in asdict(self).items() if key != "path"}
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            temporary = self.path.with_suffix(".new")
+            temporary.write_text(json.dumps(data, indent=1), "utf-8")
+            temporary.replace(self.path)
+        except OSError:
+            pass  # preferences are not worth a message
+
+    def opened(self, path: Path) -> None:
+        """Take note of a file that was opened or saved."""
+        name = str(path.resolve())
+        self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
+        self.folder = str(path.resolve().parent)
+        self.save()
