@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import UserError
+from app.opening import shipped_recipes
 from app.recipe import Recipe
 from app.strokes import Change, Dab, Stroke
 
@@ -206,3 +207,11 @@ def test_past_before_the_parting_is_the_same():
         part = whole.model_copy(update={"samples": whole.samples[:length]})
         until = int(min(Recipe(stroke=(whole,)).agrees_until(Recipe(stroke=(part,))), 20))
         assert all(whole.at(tick) == part.at(tick) for tick in range(until))
+
+
+@pytest.mark.parametrize("path", shipped_recipes().values(), ids=shipped_recipes().keys())
+def test_shipped_recipes_are_valid(path: Path):
+    recipe = Recipe.load(path)
+    assert recipe.name
+    assert recipe.picture
+    assert (path.parent / recipe.picture).is_file()
