@@ -111,24 +111,28 @@ class StiffParts:
         response[:, 1 : self.count + 1, :3] = np.moveaxis(_inverses(matrix), 1, 0)
         self._response.set(response)
 
-    def fit(self, residual: tuple[Field, Field], faces: tuple[Field, Field], target: tuple[Field, Field]) -> None:
-        """Write to `target` the faces with the motions added that the residual asks for."""
+    def fit(
+        self, residual: tuple[Field, Field], target: tuple[Field, Field], faces: tuple[Field, Field] | None = None
+    ) -> None:
+        """Write to `target` the motions that the residual asks for, added to `faces`."""
         self._gather(residual)
         motions = self.device.pass_("viscosity/part_motions.frag")
         motions(self._motions, loads=self._loads, parts=self._parts, response=self._response)
-        self._move(faces, target)
+        self._move(faces or self._rest, target)
+
+    @property
+    def _fields(self) -> tuple[Field, ...]:
+        maps = self._entries, self._loads, self._parts, self._response, self._motions
+        return *maps, *self._rest, *self._part_of
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return sum(field.nbytes for field in self._fields)
 
     def release(self) -> None:
         """Free the textures."""
-        for field in (
-            self._entries,
-            self._loads,
-            self._parts,
-            self._response,
-            self._motions,
-            *self._rest,
-            *self._part_of,
-        ):
+        for field in self._fields:
             field.release()
 
     def _gather(self, residual: tuple[Field, Field]) -> None:
@@ -164,7 +168,7 @@ class StiffParts:
         return padded.reshape(height, 2, width, 2).transpose(0, 2, 1, 3).reshape(height, width, 4)
 
     def _list_entries(self, packed: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Upload the entries; the part of each, and the beginnings of `parts`, by part: (first entry, entries, 0, 0)."""
+        """Upload the entries; the part of each, and the beginnings of `parts`: (first entry, entries, 0, 0) by part."""
         width, height = self.texels
         tiles_wide, tiles_high = -(-width // TILE), -(-height // TILE)
         tile = (np.arange(height)[:, None] // TILE) * tiles_wide + np.arange(width) // TILE
@@ -188,7 +192,7 @@ class StiffParts:
 
 
 def _inverses(matrices: np.ndarray) -> np.ndarray:
-    """Inverses of symmetric positive matrices (parts, 3, 3) that carry rounding errors; nil where there is no telling."""
+    """Inverses of symmetric positive matrices (parts, 3, 3) with rounding errors; nil where there is no telling."""
     symmetric = 0.5 * (matrices + matrices.transpose(0, 2, 1))
     values, vectors = np.linalg.eigh(symmetric)
     with np.errstate(divide="ignore"):

@@ -1,6 +1,6 @@
-// Advance: one step of conjugate gradients (Chronopoulos and Gear 1989), all its vectors at once.
+// Advance: one step of conjugate gradients, all its vectors at once.
 // p = z + beta p, s = A z + beta s (which is A p), f += alpha p, r -= alpha s.
-// u_factors: (alpha, beta); the others: the vectors, packed faces. FIRST: p and s begin here. LAST: only f is wanted.
+// u_factors: (alpha, beta); the others: the vectors, packed faces. FIRST: f, p and s begin here. LAST: only f is wanted.
 // reads: 13
 uniform sampler2D u_factors;
 uniform sampler2D u_z_u;
@@ -38,8 +38,12 @@ vec4 onward(sampler2D latest, sampler2D before, float beta) { return texture(lat
 void main() {
     vec2 factors = texelFetch(u_factors, ivec2(0), 0).xy;
     vec4 p_u = onward(u_z_u, u_p_u, factors.y), p_v = onward(u_z_v, u_p_v, factors.y);
-    out_u = texture(u_u, v_uv) + factors.x * p_u;
-    out_v = texture(u_v, v_uv) + factors.x * p_v;
+    out_u = factors.x * p_u;
+    out_v = factors.x * p_v;
+#ifndef FIRST
+    out_u += texture(u_u, v_uv);
+    out_v += texture(u_v, v_uv);
+#endif
 #ifndef LAST
     vec4 s_u = onward(u_az_u, u_s_u, factors.y), s_v = onward(u_az_v, u_s_v, factors.y);
     out_p_u = p_u;

@@ -1,6 +1,7 @@
-// Gradients: the two factors of a step of conjugate gradients (Chronopoulos and Gear 1989), on one texel.
-// u_products: sums of r . z and z . A z, a few texels; u_before: this texel of the step before (FIRST: there is none).
-// beta = rz / rz_before, alpha = rz / (z.Az - beta rz / alpha_before); out: (alpha, beta, rz, 0).
+// Gradients: the two factors of a step of flexible conjugate gradients, on one texel.
+// u_products: sums of r . z, z . A z and z . s, a few texels; u_before: this texel of the step before (FIRST: none).
+// p = z + beta p_before with p . A p_before = 0, and alpha the way along p to the least energy; with s = A p_before:
+// beta = -z.s / p_before.s, p.Ap = z.Az - (z.s)^2 / p_before.s, alpha = r.z / p.Ap. Out: (alpha, beta, p.Ap, 0).
 // A step that rounding has spoiled is not taken.
 // reads: 26
 uniform sampler2D u_products;
@@ -9,17 +10,17 @@ layout(location = 0) out vec4 out_factors;
 
 void main() {
     ivec2 size = textureSize(u_products, 0);
-    vec2 sum = vec2(0.0);
+    vec3 sum = vec3(0.0);
     for (int j = 0; j < size.y; ++j)
-        for (int i = 0; i < size.x; ++i) sum += texelFetch(u_products, ivec2(i, j), 0).rg;
+        for (int i = 0; i < size.x; ++i) sum += texelFetch(u_products, ivec2(i, j), 0).xyz;
     float rz = sum.x, curvature = sum.y, beta = 0.0;
 #ifndef FIRST
-    vec4 before = texelFetch(u_before, ivec2(0), 0);
-    if (before.x > 0.0 && before.z > 0.0) {
-        beta = rz / before.z;
-        curvature -= beta * rz / before.x;
+    float before = texelFetch(u_before, ivec2(0), 0).z;
+    if (before > 0.0) {
+        beta = -sum.z / before;
+        curvature += beta * sum.z;
     }
 #endif
-    bool sound = rz > 0.0 && curvature > 0.0 && rz < 1e37;
-    out_factors = sound ? vec4(rz / curvature, beta, rz, 0.0) : vec4(0.0);
+    bool sound = curvature > 1e-6 * sum.y && sum.y < 1e37 && abs(rz) < 1e37;
+    out_factors = sound ? vec4(rz / curvature, beta, curvature, 0.0) : vec4(0.0);
 }
