@@ -21,7 +21,7 @@ class Feel:
 
 
 PUTTY = Feel("Putty", "Stops with the brush", 0.3, 0.0)
-HONEY = Feel("Honey", "Sinks softly to rest", 0.02, 2.0)
+HONEY = Feel("Honey", "Sinks softly to rest", 0.03, 2.0)
 WATER = Feel("Water", "Swirls on by itself", 0.0006, 0.5)
 FEELS = (PUTTY, HONEY, WATER)
 """From stiff to thin."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from app.strokes import Stroke
 from app.strokes import Tool as StrokeTool
 
+FASTEST = 2.0  # longer sides per second that a brush can follow
 LINE_SPEED = 0.8  # longer sides per second at which a stroke is drawn that was only clicked
 
 
@@ -28,7 +29,7 @@ class Touch(NamedTuple):
 class BrushSettings:
     """A brush as the person sets it: radius in longer sides, hardness and strength 0-1."""
 
-    radius: float = 0.12
+    radius: float = 0.15
     hardness: float = 0.0
     strength: float = 1.0
 
@@ -99,26 +100,78 @@ def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callabl
             name, reverse = (backward if press.opposite else forward), False
         if first.shift and press.last is not None:
             return _line(press, _stroke(press, name, reverse, first), press.last)
-        return _follow(_stroke(press, name, reverse, first), press.extent)
+        return _follow(_stroke(press, name, reverse, first), press)
 
     return gesture
 
 
-def _follow(stroke: Stroke, extent: tuple[float, float]) -> Gesture:
-    """The stroke follows the pointer; with Shift along the axis it set out on."""
+def _follow(stroke: Stroke, press: Press) -> Gesture:
+    """The stroke follows the pointer; with Shift along the axis it set out on.
+
+    A pointer that is faster than the fluid can be carried is followed along its path at that speed, also after it is let
+    go: on a slow machine, where there are few ticks to a movement, nothing is torn.
+    """
     _, x0, y0, _ = stroke.samples[0]
+    path = _Path(press.extent, FASTEST * press.dt, (x0, y0))
+    tick, pressure = stroke.samples[0][0], stroke.samples[0][3]
     axis: str | None = None
-    while True:
-        touch = yield stroke
-        if touch is None:
-            return stroke
-        x, y = touch.x, touch.y
+    while (touch := (yield stroke)) is not None:
+        x, y, pressure = touch.x, touch.y, touch.pressure
         if touch.shift:
-            dx, dy = (x - x0) * extent[0], (y - y0) * extent[1]
+            dx, dy = (x - x0) * press.extent[0], (y - y0) * press.extent[1]
             if axis is None and hypot(dx, dy) > 0.01:
                 axis = "x" if abs(dx) >= abs(dy) else "y"
             x, y = (x, y0) if axis == "x" else (x0, y) if axis == "y" else (x0, y0)
-        stroke = stroke.with_sample(touch.tick, x, y, touch.pressure)
+        if touch.tick > tick:
+            path.refresh()
+            tick = touch.tick
+        path.wanted.append((x, y))
+        for place in path.follow():
+            stroke = stroke.with_sample(tick, *place, pressure)
+    while path.wanted:
+        tick += 1
+        path.refresh()
+        for place in path.follow():
+            stroke = stroke.with_sample(tick, *place, pressure)
+    return stroke
+
+
+class _Path:
+    """Where a brush has still to go, of which it can do only so much in a tick.
+
+    Args:
+        extent: of the picture.
+        reach: longer sides a tick.
+        place: where it is.
+    """
+
+    def __init__(self, extent: tuple[float, float], reach: float, place: tuple[float, float]) -> None:
+        self.wanted: list[tuple[float, float]] = []
+        self._extent, self._reach, self._place = extent, reach, place
+        self._left = reach
+
+    def refresh(self) -> None:
+        """A new tick begins."""
+        self._left = self._reach
+
+    def follow(self) -> list[tuple[float, float]]:
+        """The places that are reached now; where nothing is left to do, the brush stays where it is."""
+        reached = []
+        while self.wanted:
+            (x, y), (px, py) = self.wanted[0], self._place
+            far = hypot((x - px) * self._extent[0], (y - py) * self._extent[1])
+            if far > self._left:
+                part = self._left / far
+                if part > 1e-6:
+                    self._place = round(px + (x - px) * part, 5), round(py + (y - py) * part, 5)
+                    reached.append(self._place)
+                self._left = 0.0
+                break
+            self._left -= far
+            self._place = x, y
+            reached.append(self._place)
+            self.wanted.pop(0)
+        return reached
 
 
 def _line(press: Press, stroke: Stroke, start: tuple[float, float]) -> Gesture:

@@ -313,9 +313,11 @@ class Ui:
         radius = self.px(6)
         if part > 0.005:
             draw.push_clip_rect(corner, ImVec2(x, corner.y + size.y), True)
-            soft = packed(palette.accent, 0.34 if lit else 0.24)
+            soft = packed(palette.accent, 0.42 if lit else 0.30)
             draw.add_rect_filled(corner, corner + size, soft, radius)
             draw.pop_clip_rect()
+        if not lit:
+            return
         at = min(max(x, corner.x + self.px(2)), corner.x + size.x - self.px(2))
         low, high = ImVec2(at - self.px(1), corner.y + self.px(5)), ImVec2(at + self.px(1), corner.y + size.y - self.px(5))
         draw.add_rect_filled(low, high, packed(palette.accent), self.px(1))
@@ -325,25 +327,23 @@ class Ui:
     def section(self, label: str, is_open: bool) -> bool:
         """The head of a section that opens and closes; whether it is open now."""
         palette, draw = self.palette, imgui.get_window_draw_list()
-        imgui.dummy(ImVec2(0, self.px(2)))
-        corner, width, height = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x, self.px(26)
+        corner, width, height = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x, self.px(28)
         if imgui.invisible_button(f"section {label}", ImVec2(width, height)):
             is_open = not is_open
         ink = palette.text if imgui.is_item_hovered() else palette.dim
         icon = "chevron_down" if is_open else "chevron_right"
-        icons.draw(draw, icon, corner.x - self.px(2), corner.y + self.px(6), self.px(14), packed(ink), 2.2)
+        icons.draw(draw, icon, corner.x - self.px(2), corner.y + self.px(7), self.px(14), packed(ink), 2.2)
         imgui.push_font(self.fonts.bold, 13.0)
-        draw.add_text(ImVec2(corner.x + self.px(17), corner.y + self.px(6)), packed(ink), label)
+        draw.add_text(ImVec2(corner.x + self.px(17), corner.y + self.px(7)), packed(ink), label)
         imgui.pop_font()
         return is_open
 
     def line(self) -> None:
         """A thin line across, from edge to edge."""
-        imgui.dummy(ImVec2(0, self.px(2)))
         window, corner = imgui.get_window_pos(), imgui.get_cursor_screen_pos()
-        right = ImVec2(window.x + imgui.get_window_width(), corner.y)
-        imgui.get_window_draw_list().add_line(ImVec2(window.x, corner.y), right, packed(self.palette.line), self.px(1))
-        imgui.dummy(ImVec2(0, self.px(1)))
+        y = corner.y - self.px(4)
+        right = ImVec2(window.x + imgui.get_window_width(), y)
+        imgui.get_window_draw_list().add_line(ImVec2(window.x, y), right, packed(self.palette.line), self.px(1))
 
     def divider(self) -> None:
         """A thin upright line between two groups of a bar."""

@@ -63,16 +63,16 @@ def _brush(ui: Ui, editor: Editor) -> None:
         ui.tooltip("Direction", f"shift+{tool.key}", "Hold Alt for the other one.")
     imgui.same_line(0, ui.px(16))
     brush, width = state.brush, 148 if wide else 112
-    imgui.set_cursor_pos_y(ui.px(9))
+    imgui.set_cursor_pos_y(ui.px(10))
     size = brush.radius * max(editor.canvas.size) * 2
     slid = ui.slider(
-        "size", "Size", brush.radius, SMALLEST, LARGEST, f"{size:.0f} px", default=0.12, logarithmic=True, width=width,
+        "size", "Size", brush.radius, SMALLEST, LARGEST, f"{size:.0f} px", default=0.15, logarithmic=True, width=width,
         title="Size of the brush", key="[", more="] makes it larger. Or drag with the right button.",
     )  # fmt: skip
     if slid.changed:
         brush = replace(brush, radius=slid.value)
     imgui.same_line()
-    imgui.set_cursor_pos_y(ui.px(9))
+    imgui.set_cursor_pos_y(ui.px(10))
     slid = ui.slider(
         "hardness", "Hardness", brush.hardness, 0, 1, f"{brush.hardness:.0%}", default=0.0, width=width,
         title="Hardness", key="{", more="} makes it harder. A soft brush bends the picture gently.",
@@ -80,7 +80,7 @@ def _brush(ui: Ui, editor: Editor) -> None:
     if slid.changed:
         brush = replace(brush, hardness=slid.value)
     imgui.same_line()
-    imgui.set_cursor_pos_y(ui.px(9))
+    imgui.set_cursor_pos_y(ui.px(10))
     slid = ui.slider(
         "strength", "Strength", brush.strength, 0.05, 1, f"{brush.strength:.0%}", default=1.0, width=width,
         title="Strength", key=";", more="' makes it stronger. Full strength moves the picture as fast as the pointer.",

@@ -48,18 +48,19 @@ def draw(ui: Ui, editor: Editor) -> None:
 
 
 def _ring(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
-    """A ring as large as the brush, and one where its hard core ends; light on dark and dark on light."""
+    """A faint ring as far as the brush reaches, a bright one where it is half as strong: apart when soft, one when hard."""
     hand, brush = editor.hand, editor.state.brush
     x, y = hand._start if hand.drag == "brush" else (hand.x, hand.y)
-    radius = brush.radius * editor.view.longer
-    core = 0.9 * brush.hardness * radius
-    middle, count = ImVec2(x, y), max(32, min(int(radius), 96))
+    reach = brush.radius * editor.view.longer
+    core = 0.9 * brush.hardness
+    # Where the brush is half as strong as in its middle: (1 - q^2)^3 = 1/2, between the core and the reach.
+    half = reach * (core + 0.4542 * (1 - core))
+    middle, count = ImVec2(x, y), max(32, min(int(reach), 96))
     soft = rgb("000000", 0.45)
-    lines.add_circle(middle, radius, packed(soft), count, ui.px(2.6))
-    lines.add_circle(middle, radius, packed(WHITE, 0.95), count, ui.px(1.2))
-    if brush.hardness > 0.02:
-        lines.add_circle(middle, core, packed(soft, 0.7), count, ui.px(1.8))
-        lines.add_circle(middle, core, packed(WHITE, 0.5), count, ui.px(1.0))
+    lines.add_circle(middle, reach, packed(soft, 0.5), count, ui.px(2.0))
+    lines.add_circle(middle, reach, packed(WHITE, 0.55), count, ui.px(1.0))
+    lines.add_circle(middle, half, packed(soft), count, ui.px(2.6))
+    lines.add_circle(middle, half, packed(WHITE, 0.95), count, ui.px(1.3))
     lines.add_circle_filled(middle, ui.px(2.2), packed(soft), 12)
     lines.add_circle_filled(middle, ui.px(1.4), packed(WHITE), 12)
     opposite = editor.state.opposite.get(editor.state.tool_name, False) != hand.mods.alt

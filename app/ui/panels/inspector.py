@@ -24,7 +24,7 @@ def draw(ui: Ui, editor: Editor) -> None:
     rect = editor.layout.inspector
     if rect is None:
         return
-    with ui.panel("inspector", rect, (16, 8), imgui.WindowFlags_.none):
+    with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none):
         imgui.begin_child("sections")
         for name, label, section, opened in (
             ("fluid", "Fluid", _fluid, True),
@@ -38,7 +38,7 @@ def draw(ui: Ui, editor: Editor) -> None:
             sections[name] = ui.section(label, sections.get(name, opened))
             if sections[name]:
                 section(ui, editor)
-                imgui.dummy(ImVec2(0, ui.px(4)))
+                imgui.dummy(ImVec2(0, 0))
             ui.line()
         imgui.end_child()
 

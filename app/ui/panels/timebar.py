@@ -42,7 +42,7 @@ def draw(ui: Ui, editor: Editor) -> None:
         amount = ui.px(168)
         _track(ui, editor, imgui.get_content_region_avail().x - amount - ui.px(16))
         imgui.same_line(0, ui.px(16))
-        imgui.set_cursor_pos_y(ui.px(13))
+        imgui.set_cursor_pos_y(ui.px(14))
         part = session.target / session.end if some else 1.0
         with ui.enabled(some):
             slid = ui.slider(

@@ -1,0 +1,267 @@
+"""The window: the only place that knows glfw. It turns callbacks into events, and hands the editor a framebuffer."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import glfw
+import moderngl
+
+from app.errors import UserError
+from app.ui.editor import Editor
+from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
+from app.ui.files import load_any
+from app.ui.preferences import Preferences
+from solver.context import Device
+
+TITLE = "fluidwarp"
+SIZE = (1280, 800)
+SMALLEST = (720, 480)
+FASTEST = 1 / 120  # seconds between two frames where the screen does not set the pace
+NO_DISPLAY = 2
+
+_NAMED = {
+    glfw.KEY_SPACE: "space", glfw.KEY_ESCAPE: "escape", glfw.KEY_ENTER: "enter", glfw.KEY_KP_ENTER: "enter",
+    glfw.KEY_TAB: "tab", glfw.KEY_BACKSPACE: "backspace", glfw.KEY_DELETE: "delete", glfw.KEY_LEFT: "left",
+    glfw.KEY_RIGHT: "right", glfw.KEY_UP: "up", glfw.KEY_DOWN: "down", glfw.KEY_HOME: "home", glfw.KEY_END: "end",
+    glfw.KEY_PAGE_UP: "pageup", glfw.KEY_PAGE_DOWN: "pagedown",
+} | {getattr(glfw, f"KEY_F{number}"): f"f{number}" for number in range(1, 13)}  # fmt: skip
+_CURSORS = {
+    "arrow": glfw.ARROW_CURSOR, "hand": glfw.HAND_CURSOR, "crosshair": glfw.CROSSHAIR_CURSOR,
+    "resize_ew": glfw.HRESIZE_CURSOR, "text": glfw.IBEAM_CURSOR,
+}  # fmt: skip
+
+
+class _Loader:
+    """How moderngl finds the functions of the GL that glfw has made current."""
+
+    def load_opengl_function(self, name: str) -> int:
+        return glfw.get_proc_address(name) or 0
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def release(self) -> None:
+        pass
+
+
+class Window:
+    """A window of the system with a GL, and the events that happen in it."""
+
+    def __init__(self) -> None:
+        # Errors are read where they matter; glfw's warnings about them would only be noise.
+        glfw.ERROR_REPORTING = False
+        if not glfw.init():
+            raise UserError(_why(), NO_DISPLAY)
+        glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+        glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+        glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+        glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
+        glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+        glfw.window_hint(glfw.SAMPLES, 0)
+        glfw.window_hint(glfw.DEPTH_BITS, 0)
+        glfw.window_hint_string(glfw.X11_CLASS_NAME, TITLE)
+        self.handle = glfw.create_window(*_fitting(SIZE), TITLE, None, None)
+        if not self.handle:
+            why = _why()
+            glfw.terminate()
+            raise UserError(why, NO_DISPLAY)
+        glfw.make_context_current(self.handle)
+        glfw.swap_interval(1)
+        glfw.set_window_size_limits(self.handle, *SMALLEST, glfw.DONT_CARE, glfw.DONT_CARE)
+        self.events: list[Event] = []
+        self._held = Mods()
+        self._title = TITLE
+        self._cursor = "arrow"
+        self._cursors: dict[str, Any] = {}
+        self._must_draw = True
+        self._listen()
+        self.device = Device(moderngl.create_context(require=330, context=_Loader()))
+
+    # -- what the editor is given -----------------------------------------------------------------------------------
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """In pixels."""
+        return glfw.get_framebuffer_size(self.handle)
+
+    @property
+    def density(self) -> float:
+        """Pixels a point of the pointer's coordinates."""
+        points = glfw.get_window_size(self.handle)
+        return max(self.size[0], 1) / max(points[0], 1)
+
+    @property
+    def scale(self) -> float:
+        """Of the interface, in points."""
+        return max(glfw.get_window_content_scale(self.handle)[0] / self.density, 0.5)
+
+    def show(self, editor: Editor) -> None:
+        """Run the editor until the person leaves."""
+        last = time.perf_counter()
+        editor.clipboard = lambda text: glfw.set_clipboard_string(self.handle, text)
+        editor.files.native = True
+        screen = self.device.ctx.detect_framebuffer(0)
+        while not editor.closed:
+            # The first frame after a rest starts the clock anew.
+            rested = self._wait(editor)
+            events, self.events = self.events, []
+            if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
+                continue
+            now = time.perf_counter()
+            dt = 1 / 60 if rested else now - last
+            last = now
+            editor.frame(screen, self.size, dt, events, self.density, self.scale)
+            self._must_draw = False
+            self._show_title(editor)
+            self._show_cursor(editor.hand.cursor)
+            glfw.swap_buffers(self.handle)
+            spare = FASTEST - (time.perf_counter() - now)
+            if spare > 0:
+                time.sleep(spare)
+
+    def close(self) -> None:
+        glfw.destroy_window(self.handle)
+        glfw.terminate()
+
+    # -- what happens in it -----------------------------------------------------------------------------------------
+
+    def _wait(self, editor: Editor) -> bool:
+        """Wait until there is something to draw; True if there was nothing for a while."""
+        glfw.poll_events()
+        if self.events or self._must_draw or editor.wants_frame():
+            return False
+        started = time.perf_counter()
+        glfw.wait_events_timeout(min(editor.wait(), 1.0))
+        while not (self.events or self._must_draw) and time.perf_counter() - started < editor.wait():
+            glfw.wait_events_timeout(1.0)
+        return True
+
+    def _listen(self) -> None:
+        handle = self.handle
+        glfw.set_cursor_pos_callback(handle, lambda _, x, y: self._add(Move(x, y, 1.0, self._held)))
+        glfw.set_cursor_enter_callback(handle, lambda _, inside: None if inside else self._left())
+        glfw.set_mouse_button_callback(handle, self._button)
+        glfw.set_scroll_callback(handle, lambda _, dx, dy: self._add(Wheel(dx, dy, self._held)))
+        glfw.set_key_callback(handle, self._key)
+        glfw.set_char_callback(handle, lambda _, code: self._add(Text(chr(code))))
+        glfw.set_drop_callback(handle, lambda _, paths: self._add(Drop(tuple(paths))))
+        glfw.set_window_focus_callback(handle, lambda _, focused: self._add(Focus(bool(focused))))
+        glfw.set_window_close_callback(handle, self._close_wish)
+        glfw.set_framebuffer_size_callback(handle, lambda *_: self._redraw())
+        glfw.set_window_refresh_callback(handle, lambda *_: self._redraw())
+
+    def _add(self, event: Event) -> None:
+        self.events.append(event)
+
+    def _redraw(self) -> None:
+        self._must_draw = True
+
+    def _left(self) -> None:
+        """The pointer left the window; a drag goes on outside."""
+        if not any(glfw.get_mouse_button(self.handle, button) for button in range(3)):
+            self._add(Move(-1e4, -1e4))
+
+    def _close_wish(self, handle: Any) -> None:
+        glfw.set_window_should_close(handle, False)
+        self._add(CloseWish())
+
+    def _button(self, handle: Any, button: int, action: int, mods: int) -> None:
+        if button <= glfw.MOUSE_BUTTON_MIDDLE:
+            self._held = _mods(mods)
+            self._add(Button(button, action == glfw.PRESS, self._held))
+
+    def _key(self, handle: Any, key: int, code: int, action: int, mods: int) -> None:
+        name = _NAMED.get(key) or glfw.get_key_name(key, code)
+        # A modifier's own event does not yet, or does still, have it among the modifiers.
+        self._held = _with_own(_mods(mods), key, action)
+        if name:
+            self._add(Key(name.lower(), action != glfw.RELEASE, self._held, action == glfw.REPEAT))
+        else:
+            self._add(Key("", action != glfw.RELEASE, self._held))
+
+    def _show_title(self, editor: Editor) -> None:
+        if editor.title != self._title:
+            self._title = editor.title
+            glfw.set_window_title(self.handle, self._title)
+
+    def _show_cursor(self, name: str) -> None:
+        if name == self._cursor:
+            return
+        self._cursor = name
+        hidden = name == "none"
+        glfw.set_input_mode(self.handle, glfw.CURSOR, glfw.CURSOR_HIDDEN if hidden else glfw.CURSOR_NORMAL)
+        if not hidden:
+            if name not in self._cursors:
+                self._cursors[name] = glfw.create_standard_cursor(_CURSORS[name])
+            glfw.set_cursor(self.handle, self._cursors[name])
+
+
+def run(file: Path | None = None) -> None:
+    """Open the editor with a file, or with the sample picture.
+
+    Raises:
+        UserError: if there is no window to be had (status 2), or the file cannot be read.
+    """
+    project = load_any(file or sample())
+    window = Window()
+    try:
+        editor = Editor(window.device, project, Preferences.load())
+        if file is not None:
+            editor.preferences.opened(file)
+        try:
+            window.show(editor)
+        finally:
+            editor.release()
+    finally:
+        window.close()
+
+
+def sample() -> Path:
+    """The picture the editor opens with."""
+    from importlib import resources
+
+    folder = Path(str(resources.files("assets")))
+    return next(path for path in (folder / "sample.webp", folder / "sample.jpg") if path.exists())
+
+
+def _mods(bits: int) -> Mods:
+    ctrl = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
+    return Mods(bool(bits & ctrl), bool(bits & glfw.MOD_SHIFT), bool(bits & glfw.MOD_ALT))
+
+
+def _with_own(mods: Mods, key: int, action: int) -> Mods:
+    from dataclasses import replace
+
+    down = action != glfw.RELEASE
+    own = {
+        glfw.KEY_LEFT_ALT: "alt", glfw.KEY_RIGHT_ALT: "alt", glfw.KEY_LEFT_SHIFT: "shift",
+        glfw.KEY_RIGHT_SHIFT: "shift", glfw.KEY_LEFT_CONTROL: "ctrl", glfw.KEY_RIGHT_CONTROL: "ctrl",
+    }.get(key)  # fmt: skip
+    return replace(mods, **{own: down}) if own else mods
+
+
+def _fitting(size: tuple[int, int]) -> tuple[int, int]:
+    """The size, or what of it the screen has room for."""
+    monitor = glfw.get_primary_monitor()
+    if not monitor:
+        return size
+    _, _, width, height = glfw.get_monitor_workarea(monitor)
+    return min(size[0], width or size[0]), min(size[1], height or size[1])
+
+
+def _why() -> str:
+    """Why there is no window, and what to do instead."""
+    code, words = glfw.get_error()
+    text = words.decode("utf-8", "replace") if isinstance(words, bytes) else str(words or "no reason given")
+    text = text.removeprefix("X11: ").removeprefix("GLX: ").removeprefix("Wayland: ")
+    return (
+        f"no window can be opened here ({text}). `fluidwarp render RECIPE PICTURE -o OUT.png` works without one; "
+        "`fluidwarp doctor` says what is missing."
+    )
