@@ -19,6 +19,7 @@ from app.errors import Cancelled, UserError
 from app.files import cannot_write, replacing, replacing_many, temporary_beside
 from app.pictures import Picture, picture_format, to_bits, write_picture
 from app.progress import never
+from app.video import sound_codec
 
 T = TypeVar("T")
 
@@ -96,7 +97,7 @@ ANIMATIONS = {
     ".webm": Container("WebM", _webm, even=True, sound=("opus", "vorbis"), encoder=("libopus", "-b:a", "128k")),
     ".mkv": Container("FFV1", _ffv1, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("flac",)),
     ".mov": Container("ProRes", _prores, even=True, sound=("pcm_s16le", "pcm_s24le", "aac"), encoder=("pcm_s16le",)),
-    ".gif": Container("GIF", _ffv1),  # by way of a lossless file, see _GifWriter
+    ".gif": Container("GIF", _ffv1),  # by way of a lossless file, see _gif_writer
     ".apng": Container("APNG", _apng),
     ".webp": Container("animated WebP", _webp),
 }
@@ -165,7 +166,7 @@ def animation_writer(
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
     with replacing(path) as temporary:
-        if container.encoding is _ffv1 and temporary.suffix.lower() == ".gif":
+        if container.name == "GIF":
             with _gif_writer(temporary, str(path), rate, loops, cancel) as write:
                 yield write
             return
@@ -249,9 +250,7 @@ def _sound(
     """ffmpeg's input and output options that carry the sound of a file over."""
     if sound is None or not container.sound:
         return [], []
-    from app.video import read_clip
-
-    codec = read_clip(sound).sound
+    codec = sound_codec(sound)
     if codec is None:
         return [], []
     length = [] if frames is None else ["-t", f"{float(frames / rate):.6f}"]

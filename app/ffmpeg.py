@@ -55,6 +55,7 @@ class Ffmpeg:
             stdout=subprocess.PIPE,
             stderr=self._complaints,
             bufsize=0,
+            pipesize=1 << 18,
             start_new_session=True,  # Ctrl+C is ours to handle
         )
         assert self._process.stdin is not None

@@ -228,7 +228,8 @@ def _decoding(file: Path, name: str) -> Iterator[None]:
         raise UserError(message) from error
 
 
-def _check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
+def check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
+    """Raise `UserError` for more than `max_pixels`, telling how to raise the limit."""
     if width * height > max_pixels:
         raise UserError(
             f"Cannot read {file}: {width} x {height} pixels are more than the limit of {max_pixels}; "
@@ -239,9 +240,9 @@ def _check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
 def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
     from PIL import Image
 
-    Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; ours is in _check_size
+    Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; ours is in check_size
     with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
-        _check_size(file, *image.size, max_pixels)
+        check_size(file, *image.size, max_pixels)
         icc = image.info.get("icc_profile")
         if name == "PNG" and _png_bits(file) == 16:
             import imagecodecs
@@ -255,8 +256,8 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
         exif = image.getexif()
         orientation = exif.get(ORIENTATION, 1)
         texts = {key: str(text) for key, text in getattr(image, "text", {}).items() if key != "XML:com.adobe.xmp"}
-        if comment := image.info.get("comment"):
-            texts["Comment"] = comment.decode("utf-8", "replace") if isinstance(comment, bytes) else str(comment)
+        if isinstance(comment := image.info.get("comment"), bytes):
+            texts["Comment"] = comment.decode("utf-8", "replace")
         xmp = image.info.get("xmp")
         return Picture(
             upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
@@ -264,7 +265,7 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
             exif=_upright_exif(exif),
             xmp=_upright_xmp(xmp.encode() if isinstance(xmp, str) else xmp),
             dpi=_positive(image.info.get("dpi")),
-            texts=texts,
+            texts={key: text.replace("\0", "") for key, text in texts.items() if key},
         )
 
 
@@ -343,7 +344,7 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
     tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
     with tifffile.TiffFile(file) as tiff:
         page = tiff.pages.first
-        _check_size(file, page.imagewidth, page.imagelength, max_pixels)
+        check_size(file, page.imagewidth, page.imagelength, max_pixels)
         tags = {tag.code: tag.value for tag in page.tags}
         samples = [axis for axis in page.axes if axis in "YXS"]
         if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
@@ -427,7 +428,7 @@ def read_exr(file: Path, max_pixels: int = MAX_PIXELS) -> tuple[dict[str, np.nda
         header = OpenEXR.File(str(file), header_only=True).header()
         for window in ("dataWindow", "displayWindow"):
             (left, top), (right, bottom) = header[window]
-            _check_size(file, int(right) - int(left) + 1, int(bottom) - int(top) + 1, max_pixels)
+            check_size(file, int(right) - int(left) + 1, int(bottom) - int(top) + 1, max_pixels)
         exr = OpenEXR.File(str(file), separate_channels=True)
         # a file that ends early is announced on stdout, not raised: it just has no part
         channels = exr.channels() if exr.parts else {}
@@ -550,7 +551,9 @@ def _encode_pillow(picture: Picture, chosen: Format, quality: int) -> bytes:
     if picture.xmp:
         options["xmp"] = picture.xmp
     if chosen is JPEG:
-        options |= {"subsampling": 0, "optimize": True, "comment": picture.texts.get("Comment", "")}
+        # optimizing gains a few per cent, and needs the whole file in memory once more
+        small = picture.width * picture.height < 2**24
+        options |= {"subsampling": 0, "optimize": small, "comment": picture.texts.get("Comment", "")}
         if picture.dpi:
             options["dpi"] = tuple(round(value) for value in picture.dpi)
     elif chosen is WEBP:

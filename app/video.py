@@ -14,7 +14,7 @@ import numpy as np
 
 from app import ffmpeg
 from app.errors import UserError
-from app.pictures import MAX_PIXELS
+from app.pictures import MAX_PIXELS, check_size
 from app.progress import never
 
 
@@ -56,15 +56,10 @@ class Clip:
 def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
     """Look into a video file; raises `UserError` when it is none."""
     file = Path(path)
-    if file.is_dir():
-        raise UserError(f"Cannot read {path}: it is a folder; give the name of a video.")
-    if not file.exists():
-        raise UserError(f"Cannot read {path}: there is no such file; check the name.")
     told = _banner(file)
     video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
     if video is None:
-        reason = "it is empty" if file.stat().st_size == 0 else "it is no video, or damaged"
-        raise UserError(f"Cannot read {path}: {reason}; give the name of a video.")
+        raise UserError(f"Cannot read {path}: it is no video, or damaged; give the name of a video.")
     kind = re.search(r"Video: [^,]*, ?(?:none, )?(\w+)", video)
     pixel_format = kind.group(1) if kind else ""
     hidden = "Video: vp9" in video and "alpha_mode" in told  # a second stream, which only libvpx decodes
@@ -74,12 +69,10 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
     square = aspect is None or aspect.group(1) == aspect.group(2)
     filters = f"scale={'iw' if square else 'iw*sar'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
     width, height, fps = _shown(file, filters)
-    if width * height > max_pixels:
-        raise UserError(f"Cannot read {path}: {width} x {height} pixels are more than the limit of {max_pixels}.")
+    check_size(file, width, height, max_pixels)
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
     seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
     rotation = re.search(r"rotation of (-?[\d.]+) degrees", told)
-    sound = re.search(r"Stream #0.*: Audio: (\w+)", told)
     return Clip(
         path=file,
         width=width,
@@ -87,7 +80,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
         fps=fps,
         frames=max(1, round(seconds * fps)) if seconds is not None else None,
         rotation=round(-float(rotation.group(1))) % 360 if rotation else 0,
-        sound=sound.group(1) if sound else None,
+        sound=_sound_codec(told),
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
         alpha=alpha,
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
@@ -95,8 +88,27 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
     )
 
 
+def sound_codec(path: str | os.PathLike[str]) -> str | None:
+    """The codec of a file's first sound track, None when it has no sound; raises `UserError` when it has nothing."""
+    told = _banner(Path(path))
+    if "Stream #0" not in told:
+        raise UserError(f"Cannot read {path}: there is neither picture nor sound in it; give the name of a clip.")
+    return _sound_codec(told)
+
+
+def _sound_codec(told: str) -> str | None:
+    found = re.search(r"Stream #0.*: Audio: (\w+)", told)
+    return found.group(1) if found else None
+
+
 def _banner(file: Path) -> str:
     """What ffmpeg says of a file it opens; imageio-ffmpeg brings no ffprobe."""
+    if file.is_dir():
+        raise UserError(f"Cannot read {file}: it is a folder; give the name of a video.")
+    if not file.exists():
+        raise UserError(f"Cannot read {file}: there is no such file; check the name.")
+    if file.stat().st_size == 0:
+        raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
     command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}"]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     return done.stderr.decode("utf-8", "replace")

@@ -466,6 +466,16 @@ def test_sound_is_carried_over(tmp_path: Path, source: str, ending: str, codec: 
         assert float(rest[0]["duration"]) == pytest.approx(1, abs=0.1)
 
 
+def test_sound_from_a_file_without_pictures(tmp_path: Path):
+    sound = generate(tmp_path / "a.wav", "sine=d=1")
+    save(tmp_path / "a.mp4", 10, 10, sound=sound)
+    assert [stream["codec_name"] for stream in probe(tmp_path / "a.mp4")] == ["h264", "aac"]
+    (tmp_path / "junk").write_bytes(b"junk" * 9)
+    with pytest.raises(UserError, match="neither picture nor sound"):
+        save(tmp_path / "b.mp4", sound=tmp_path / "junk")
+    assert not (tmp_path / "b.mp4").exists()
+
+
 def test_what_is_no_clip(tmp_path: Path):
     (tmp_path / "empty.mp4").touch()
     (tmp_path / "junk.mp4").write_bytes(b"junk" * 99)
@@ -473,7 +483,7 @@ def test_what_is_no_clip(tmp_path: Path):
     (tmp_path / "cut.mp4").write_bytes((tmp_path / "whole.mp4").read_bytes()[:300])
     for name, message in {
         "missing.mp4": "there is no such file",
-        "empty.mp4": "it is empty",
+        "empty.mp4": "the file is empty",
         "junk.mp4": "it is no video, or damaged",
         "cut.mp4": r"cut\.mp4",
         ".": "it is a folder",
