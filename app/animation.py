@@ -307,7 +307,10 @@ def sequence_writer(
             nonlocal number
             if cancel():
                 raise Cancelled
-            write_one(folder / (pattern.name % number), item)
+            try:
+                write_one(folder / (pattern.name % number), item)
+            except UserError as error:  # the folder's temporary name says nothing to the user
+                raise UserError(str(error).replace(str(folder), str(pattern.parent)), error.status) from error
             number += 1
 
         yield write

@@ -348,7 +348,8 @@ def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str)
             monkeypatch.setattr(files, "temporary_beside", lambda path: link(path) if path.suffix else path)
         else:
             monkeypatch.setattr(module, "temporary_beside", link)
-    with pytest.raises(UserError, match="the disk is full; free some space"):
+    shown = name % 0 if "%" in name else name
+    with pytest.raises(UserError, match=f"^Cannot write {tmp_path / shown}: the disk is full; free some space"):
         save(tmp_path / name, 30)
     assert contents(tmp_path) == []
 
