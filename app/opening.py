@@ -10,7 +10,6 @@ from pathlib import Path
 from app.errors import UserError
 from app.pictures import Picture, read_picture
 from app.project import Project, is_project, load
-from app.project import Project, is_project, load
 from app.recipe import Recipe
 from solver.grid import SMALLEST_GRID
 
@@ -52,8 +51,6 @@ class Opened:
             return read_picture(other)
         if self.project is not None:
             return self.project.picture
-        if self.project is not None:
-            return self.project.picture
         if self.recipe.picture is None:
             raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
         return read_picture(self.folder / self.recipe.picture)
@@ -80,9 +77,6 @@ def open_recipe(name: str) -> Opened:
         if name not in known:
             raise UserError(f"{name} does not exist; recipes that come with fluidwarp: {', '.join(known) or 'none'}")
         path = known[name]
-    if is_project(path):
-        project = load(path)
-        return Opened(project.recipe, project.folder, str(path), project)
     if is_project(path):
         project = load(path)
         return Opened(project.recipe, project.folder, str(path), project)
