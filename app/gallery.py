@@ -1,0 +1,400 @@
+"""The paper's figures made again: for each its result, its animation, and a contact sheet as the paper sets it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from app.animation import animation_writer
+from app.errors import UserError
+from app.files import MENDS
+from app.forces import GradientForce
+from app.pictures import Picture, linear_to_srgb, read_picture, srgb_to_linear, to_bits, write_picture
+from app.progress import Progress
+from app.recipe import Recipe
+from app.replay import Replay
+from app.sampling import Pictures
+from solver.context import Device
+from solver.grid import Grid
+from solver.sampling import Sampler, Sampling
+from solver.warp import MapStatistics
+
+FPS = 30
+LINGER = 24  # frames that the last one stands still
+FINER = 3  # places a pixel, along each side, of the reference that sharpness is measured against
+COMPARED = 512  # pixels along the longer side, in which displacements are told
+
+Numbers = dict[str, str]
+
+
+@dataclass(frozen=True)
+class Played:
+    """A recipe that has been played to its end.
+
+    Attributes:
+        source, result: (h, w, 3) uint8.
+        stills: the results at the times that were asked for.
+        field: the sum of the forces at the cells' centres, (ny, nx, 2).
+        viscosity, frozen: of the cells.
+        displacement: the map at the cells' centres, (ny, nx, 2); `fine` the same at FINER x FINER places a pixel.
+    """
+
+    recipe: Recipe
+    grid: Grid
+    source: np.ndarray
+    result: np.ndarray
+    stills: Mapping[float, np.ndarray]
+    field: np.ndarray
+    viscosity: np.ndarray
+    frozen: np.ndarray
+    displacement: np.ndarray
+    fine: np.ndarray
+    statistics: MapStatistics
+
+
+class Studio:
+    """Plays recipes of the gallery and puts what comes of them into a folder."""
+
+    def __init__(self, device: Device, folder: Path, progress: Progress) -> None:
+        self.device = device
+        self.folder = folder
+        self.progress = progress
+        self.sampler = Sampler(device)
+
+    def release(self) -> None:
+        """Free the textures."""
+        self.sampler.release()
+
+    def play(
+        self,
+        name: str,
+        stills: Iterable[float] = (),
+        save_as: str | None = None,
+        measured: bool = False,
+        **parts: object,
+    ) -> Played:
+        """Play the recipe `name`, changed by `parts`, and write its result and animation; `measured` reads `fine`."""
+        recipe = load(name).edited(**parts)
+        assert recipe.picture is not None
+        picture = read_picture(recipes_folder() / recipe.picture)
+        source = rgb(picture.pixels)
+        pictures = Pictures(Picture(source), recipes_folder())
+        replay = Replay(self.device, recipe, pictures, budget=0)
+        ticks = {round(time / recipe.fluid.dt): time for time in stills}
+        kept: dict[float, np.ndarray] = {}
+        frame = source
+        label = save_as or name
+        try:
+            with animation_writer(self.folder / f"{label}.mp4", FPS, cancel=self.progress.cancel) as write:
+                write(frame)
+                for tick in range(1, recipe.ticks + 1):
+                    replay.advance()
+                    frame = self._frame(replay, source)
+                    write(frame)
+                    if tick in ticks:
+                        kept[ticks[tick]] = frame
+                    self.progress.advance()
+                for _ in range(LINGER):
+                    write(frame)
+            write_picture(self.folder / f"{label}.png", Picture(frame))
+            height, width = source.shape[:2]
+            return Played(
+                recipe=recipe,
+                grid=replay.grid,
+                source=source,
+                result=frame,
+                stills=kept,
+                field=force_field(recipe, replay.grid, pictures),
+                viscosity=replay.fluid.viscosity.get(),
+                frozen=replay.fluid.solid.get() > 0,
+                displacement=replay.warp.read(),
+                fine=replay.warp.read((width * FINER, height * FINER)) if measured else np.empty((0, 0, 2)),
+                statistics=replay.warp.statistics(),
+            )
+        finally:
+            replay.release()
+
+    def _frame(self, replay: Replay, source: np.ndarray) -> np.ndarray:
+        if replay.density is not None:
+            return (np.clip(replay.density.get()[..., :3], 0, 1) * 255 + 0.5).astype(np.uint8)
+        how = Sampling(edges=replay.recipe.edges)
+        return self.sampler.apply(replay.warp, source, how=how)
+
+    def sheet(self, name: str, title: str, panels: list[tuple[str, np.ndarray]]) -> None:
+        """Write a contact sheet: panels side by side, with their captions."""
+        write_picture(self.folder / f"{name}-sheet.png", Picture(contact_sheet(title, panels)))
+
+
+def recipes_folder() -> Path:
+    """Where the gallery's recipes and pictures lie."""
+    return Path(str(resources.files("assets"))) / "gallery"
+
+
+def load(name: str) -> Recipe:
+    """A recipe of the gallery."""
+    return Recipe.load(recipes_folder() / f"{name}.toml")
+
+
+def rgb(pixels: np.ndarray) -> np.ndarray:
+    """(h, w, 3) uint8 of any picture."""
+    return np.ascontiguousarray(np.broadcast_to(to_bits(pixels, 8)[..., :3], (*pixels.shape[:2], 3)))
+
+
+# The figures --------------------------------------------------------------------------------------------------------
+
+
+def figure_1(studio: Studio) -> Numbers:
+    """Density mode, blurred and fading, against coordinate mode, sharp."""
+    density = studio.play("figure-1", save_as="figure-1-density", mode="density")
+    moved = studio.play("figure-1", measured=True)
+    studio.sheet(
+        "figure-1",
+        "Figure 1: moving the values of a picture, and moving its coordinates",
+        [
+            ("a  source", moved.source),
+            ("b  forces", arrows(moved.source, moved.field)),
+            ("c  values moved: blurred", density.result),
+            ("d  coordinates moved: sharp", moved.result),
+        ],
+    )
+    reference = sharpness(spline_warp(light(moved.source), moved.fine))
+    return {
+        "sharpness, coordinates": f"{sharpness(light(moved.result)) / reference:.1%}",
+        "sharpness, density": f"{sharpness(light(density.result)) / reference:.1%}",
+        **_shape(moved),
+    }
+
+
+def figure_3(studio: Studio) -> Numbers:
+    """A train leaving the station, after a short and after a long time."""
+    train = studio.play("figure-3", stills=[0.5])
+    write_picture(studio.folder / "figure-3-short.png", Picture(train.stills[0.5]))
+    studio.sheet(
+        "figure-3",
+        "Figure 3: a train leaving the station, by one instantaneous force",
+        [
+            ("a  source", train.source),
+            ("b  the force, along a curve", arrows(train.source, train.field)),
+            ("c  after 0.5 s", train.stills[0.5]),
+            (f"d  after {train.recipe.duration:g} s", train.result),
+        ],
+    )
+    return _shape(train)
+
+
+def figure_4(studio: Studio) -> Numbers:
+    """Pere Tanguy's hat melting."""
+    hat = studio.play("figure-4")
+    low, high = hat.viscosity.min(), hat.viscosity.max()
+    studio.sheet(
+        "figure-4",
+        "Figure 4: melting the hat",
+        [
+            ("a  source", hat.source),
+            ("b  forces: gradient of the hat's outline", arrows(hat.source, hat.field)),
+            (f"c  viscosity, {low:.2g} (dark) to {high:.2g}", shades(hat.viscosity, hat.source)),
+            ("d  result", hat.result),
+        ],
+    )
+    return _shape(hat)
+
+
+def figure_5(studio: Studio) -> Numbers:
+    """Lifting a corner of the mouth."""
+    return _portrait(studio, "figure-5", "lifting a corner of the mouth")
+
+
+def figure_6(studio: Studio) -> Numbers:
+    """Raising a brow."""
+    return _portrait(studio, "figure-6", "raising a brow")
+
+
+FIGURES: dict[str, Callable[[Studio], Numbers]] = {
+    "figure-1": figure_1,
+    "figure-3": figure_3,
+    "figure-4": figure_4,
+    "figure-5": figure_5,
+    "figure-6": figure_6,
+}
+RECIPES = ("figure-1", "figure-1", "figure-3", "figure-4", "figure-5", "figure-5-freeze", "figure-6", "figure-6-freeze")
+
+
+def _portrait(studio: Studio, name: str, what: str) -> Numbers:
+    thick, frozen = studio.play(name), studio.play(f"{name}-freeze")
+    pictures = Pictures(Picture(thick.source), recipes_folder())
+    (lift,) = thick.recipe.force
+    assert isinstance(lift, GradientForce)
+    studio.sheet(
+        name,
+        f"Figure {name[-1]}: {what}",
+        [
+            ("a  source", thick.source),
+            ("b  viscosity: dark flows", shades(thick.viscosity, thick.source)),
+            (
+                "c  forces: the gradient of this",
+                arrows(rgb(pictures.load(lift.picture).pixels), thick.field, 60, pale=0.0),
+            ),
+            ("d  result", thick.result),
+            ("e  the same, frozen outside", frozen.result),
+        ],
+    )
+    outside = thick.viscosity > 0.98 * thick.viscosity.max()
+    moved, moved_frozen = (np.linalg.norm(one.displacement, axis=-1) * COMPARED for one in (thick, frozen))
+    return {
+        "px outside, mean": f"{moved[outside].mean():.3f}",
+        "px inside, mean": f"{moved[~outside].mean():.1f}",
+        "px inside, most": f"{moved[~outside].max():.1f}",
+        "frozen: px outside, most": f"{moved_frozen[frozen.frozen].max():.3g}",
+        "frozen: px inside, most": f"{moved_frozen.max():.1f}",
+        "det J": f"{thick.statistics.det_min:.2f} to {thick.statistics.det_max:.2f}",
+    }
+
+
+def _shape(played: Played) -> Numbers:
+    found = played.statistics
+    return {
+        "px, most": f"{found.displacement_max * COMPARED:.1f}",
+        "det J": f"{found.det_min:.2f} to {found.det_max:.2f}",
+    }
+
+
+def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]:
+    """Render every figure into `folder`; returns what was measured on each.
+
+    Raises:
+        UserError: if the folder cannot be written to.
+        Cancelled: if `progress` says so.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = MENDS.get(error.errno or 0, error.strerror or str(error))
+        raise UserError(f"Cannot write to {folder}: {reason}.") from None
+    progress.total = sum(load(name).ticks for name in RECIPES)
+    studio = Studio(device, folder, progress)
+    try:
+        return {name: figure(studio) for name, figure in FIGURES.items()}
+    finally:
+        studio.release()
+
+
+# What is measured ---------------------------------------------------------------------------------------------------
+
+
+def light(pixels: np.ndarray) -> np.ndarray:
+    """The luminance (h, w) float64 of (h, w, 3) uint8, in linear light: what pictures are mixed in."""
+    return srgb_to_linear(pixels / 255) @ np.array([0.2126, 0.7152, 0.0722])
+
+
+def sharpness(luminance: np.ndarray) -> float:
+    """Gradient energy as the eye sees it: the mean squared gradient, without the outermost pixels."""
+    rows, columns = np.gradient(linear_to_srgb(np.clip(luminance, 0, 1)))
+    return float((rows**2 + columns**2)[2:-2, 2:-2].mean())
+
+
+def spline_warp(values: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """`values` (h, w) looked up at x + D(x) by the interpolating cubic B-spline, clamped at the edge: the reference.
+
+    `displacement` (h k, w k, 2) has k x k places a pixel, which are averaged as a pixel averages what it sees.
+    """
+    height, width = values.shape
+    k = len(displacement) // height
+    coefficients = values
+    for n in (height, width):
+        # The spline whose values at the pixels are the picture's; its ends mirror.
+        matrix = np.diag(np.full(n, 4.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
+        matrix[0, 1] = matrix[-1, -2] = 2.0
+        coefficients = np.linalg.solve(matrix / 6, coefficients).T
+    row, column = (np.mgrid[0 : height * k, 0 : width * k] + 0.5) / k - 0.5
+    row = np.clip(row + displacement[..., 1] * max(height, width), 0, height - 1)
+    column = np.clip(column + displacement[..., 0] * max(height, width), 0, width - 1)
+    result = np.zeros(row.shape)
+    top, left = np.floor(row).astype(int), np.floor(column).astype(int)
+    for i, row_weight in enumerate(_spline_weights(row - top), -1):
+        for j, column_weight in enumerate(_spline_weights(column - left), -1):
+            result += row_weight * column_weight * coefficients[_mirrored(top + i, height), _mirrored(left + j, width)]
+    return result.reshape(height, k, width, k).mean(axis=(1, 3))
+
+
+def _spline_weights(t: np.ndarray) -> tuple[np.ndarray, ...]:
+    return (1 - t) ** 3 / 6, 2 / 3 - t**2 + t**3 / 2, 2 / 3 - (1 - t) ** 2 + (1 - t) ** 3 / 2, t**3 / 6
+
+
+def _mirrored(index: np.ndarray, n: int) -> np.ndarray:
+    return n - 1 - np.abs(n - 1 - np.abs(index))
+
+
+# What is shown ------------------------------------------------------------------------------------------------------
+
+PAPER, INK, FORCE = (250, 249, 246), (38, 38, 44), (214, 40, 40)
+PANEL, MARGIN = 420, 28
+
+
+def force_field(recipe: Recipe, grid: Grid, pictures: Pictures) -> np.ndarray:
+    """The sum of the recipe's forces at the cells' centres, (ny, nx, 2); a swelling one as its flow."""
+    total = np.zeros((grid.ny + 1, grid.nx + 1, 2), np.float32)
+    for force in recipe.force:
+        if isinstance(force, GradientForce):
+            force = force.model_copy(update={"swell": False})
+        faces = force.faces(grid, pictures)
+        if faces is not None:
+            total[:-1, :-1] += faces
+    return 0.5 * np.stack([total[:-1, :-1, 0] + total[:-1, 1:, 0], total[:-1, :-1, 1] + total[1:, :-1, 1]], axis=-1)
+
+
+def arrows(background: np.ndarray, field: np.ndarray, across: int = 34, pale: float = 0.65) -> np.ndarray:
+    """A vector field as arrows over a paled picture, (h, w, 3) uint8; their length goes by the root of its size."""
+    height, width = background.shape[:2]
+    finer = 2
+    image = Image.fromarray(((1 - pale) * background + pale * np.array(PAPER)).astype(np.uint8))
+    image = image.resize((width * finer, height * finer))
+    pen = ImageDraw.Draw(image)
+    step = max(width, height) / across
+    size = np.linalg.norm(field, axis=-1)
+    for y in np.arange(step / 2, height, step):
+        for x in np.arange(step / 2, width, step):
+            cell = int(y / height * len(field)), int(x / width * field.shape[1])
+            part = float(size[cell] / size.max())
+            if part > 0.02:
+                way = field[cell] / size[cell]
+                _arrow(pen, np.array([x, y]) * finer, way, step * finer * (0.35 + 0.85 * part**0.5))
+    return np.asarray(image.resize((width, height), Image.Resampling.BOX))
+
+
+def _arrow(pen: ImageDraw.ImageDraw, middle: np.ndarray, way: np.ndarray, length: float) -> None:
+    across = np.array([-way[1], way[0]])
+    tail, tip = middle - way * length / 2, middle + way * length / 2
+    neck = tip - way * 0.38 * length
+    pen.line([*tail, *neck], FORCE, max(2, round(0.11 * length)))
+    pen.polygon([*tip, *(neck + across * 0.2 * length), *(neck - across * 0.2 * length)], FORCE)
+
+
+def shades(viscosity: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """Viscosity as greys, the most viscous white, in equal factors; (h, w, 3) uint8 of the size of `like`."""
+    logarithm = np.log(np.maximum(viscosity, 1e-9))
+    values = (logarithm - logarithm.min()) / max(float(np.ptp(logarithm)), 1e-9)
+    image = Image.fromarray(np.round(values * 255).astype(np.uint8)).resize(like.shape[1::-1], Image.Resampling.NEAREST)
+    return rgb(np.asarray(image)[..., None])
+
+
+def contact_sheet(title: str, panels: list[tuple[str, np.ndarray]]) -> np.ndarray:
+    """Panels of one height side by side, captions below and the title above, (h, w, 3) uint8."""
+    images = []
+    for _, pixels in panels:
+        height, width = pixels.shape[:2]
+        images.append(Image.fromarray(pixels).resize((round(width * PANEL / height), PANEL), Image.Resampling.LANCZOS))
+    sheet_width = sum(image.width for image in images) + MARGIN * (len(images) + 1)
+    sheet = Image.new("RGB", (sheet_width, PANEL + 4 * MARGIN), PAPER)
+    pen = ImageDraw.Draw(sheet)
+    pen.text((MARGIN, 0.9 * MARGIN), title, INK, ImageFont.load_default(24), anchor="lm")
+    left = MARGIN
+    for (caption, _), image in zip(panels, images, strict=True):
+        sheet.paste(image, (left, 2 * MARGIN))
+        pen.text((left, PANEL + 2.7 * MARGIN), caption, INK, ImageFont.load_default(19), anchor="lm")
+        left += image.width + MARGIN
+    return np.asarray(sheet)
