@@ -192,6 +192,23 @@ def convert(
 
 
 @cli.command()
+def gallery(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="The folder to write to.")] = Path(
+        "gallery"
+    ),
+) -> None:
+    """Make the paper's figures again: results, animations and contact sheets."""
+    from app.gallery import make
+    from app.progress import on_terminal
+    from solver.context import Device
+
+    with on_terminal("gallery", None) as progress, Device.headless() as device:
+        measured = make(device, output, progress)
+    for figure, numbers in measured.items():
+        print(f"{figure}: {', '.join(f'{name} {number}' for name, number in numbers.items())}")
+
+
+@cli.command()
 def doctor() -> None:
     """Say which OpenGL is there, whether a window can be opened, and what to install otherwise."""
     from rich.console import Console

@@ -30,6 +30,7 @@ from solver.params import FluidParams, Walls
 from solver.warp import WarpMap
 
 CHECKPOINT_EVERY = 16  # ticks
+FINER = 3  # times finer than the simulation's grid a point is sought
 
 # What a tool of strength 1 does under a brush at full pressure.
 TWIRL = 4.0  # radians per second
@@ -191,13 +192,15 @@ class Replay:
     def whereabouts(self, point: tuple[float, float]) -> tuple[float, float]:
         """Where a point of the original (fractions of width and height) is now, in longer sides.
 
-        The cell that is looked up nearest to it, and from there one step of Newton's method: exact to second order.
+        The place that is looked up nearest to it, and from there one step of Newton's method: exact to second order.
         """
-        h, (x, y) = self.grid.h, self.grid.centres()
-        looked_up = self.warp.read().astype(np.float64) + np.stack([x, y], axis=-1)
+        fine = Grid(self.grid.nx * FINER, self.grid.ny * FINER)
+        h, (x, y) = fine.h, fine.centres()
+        looked_up = self.warp.read(fine.size).astype(np.float64) + np.stack([x, y], axis=-1)
         wanted = np.multiply(point, self.grid.extent)
         j, i = np.unravel_index(((looked_up - wanted) ** 2).sum(axis=-1).argmin(), x.shape)
-        jacobian = np.stack([np.gradient(looked_up, h, axis=axis)[j, i] for axis in (1, 0)], axis=-1)
+        around = looked_up[max(j - 1, 0) : j + 2, max(i - 1, 0) : i + 2]
+        jacobian = np.stack([np.gradient(around, h, axis=axis).mean(axis=(0, 1)) for axis in (1, 0)], axis=-1)
         step = np.linalg.lstsq(jacobian, wanted - looked_up[j, i], rcond=None)[0]
         at_x, at_y = np.array([x[j, i], y[j, i]]) + np.clip(step, -h, h)
         return float(at_x), float(at_y)
