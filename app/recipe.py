@@ -19,6 +19,7 @@ from app.strokes import Change, Stroke
 
 VERSION = 1
 MOST_TICKS = 1_000_000
+_SAMPLES = "\ue000 samples"  # a character that nobody writes
 
 Seconds = Annotated[float, Field(ge=0, le=100_000)]
 
@@ -232,16 +233,21 @@ class Recipe(Model):
         """The recipe as TOML, without what is as by default; `parse` gives the same recipe back, bit for bit."""
         import tomlkit
 
-        document = tomlkit.document()
+        document, samples = tomlkit.document(), []
         for key, value in plain(self).items():
-            if isinstance(value, list) and value and isinstance(value[0], dict):
-                tables = tomlkit.aot()
-                for entry in value:
-                    tables.append(tomlkit.item({name: _inline(part) for name, part in entry.items()}))
-                document.add(key, tables)
-            else:
+            if not (isinstance(value, list) and value and isinstance(value[0], dict)):
                 document.add(key, tomlkit.item(value))
-        return tomlkit.dumps(document)
+                continue
+            tables = tomlkit.aot()
+            for entry in value:
+                if key == "stroke":
+                    # Of samples there are thousands, and tomlkit takes its time over each; a list's repr is TOML too.
+                    samples.append(repr(entry["samples"]))
+                    entry["samples"] = _SAMPLES
+                tables.append(tomlkit.item({name: _inline(part) for name, part in entry.items()}))
+            document.add(key, tables)
+        pieces = tomlkit.dumps(document).split(f'"{_SAMPLES}"')
+        return "".join(part for pair in zip_longest(pieces, samples, fillvalue="") for part in pair)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the recipe to `path`, all of it or nothing.
