@@ -41,7 +41,7 @@ class Masks:
 
     def thicken(self, tip: Tip, decades: float) -> None:
         """Thicken by `decades` at the tip's centre; negative thins."""
-        self._paint(self.thickness, tip, add=decades, limits=(THINNEST, THICKEST))
+        self._paint(self.thickness, tip, more=decades, limits=(THINNEST, THICKEST))
 
     def freeze(self, tip: Tip, amount: float) -> None:
         """Freeze by `amount` (0-1); negative thaws."""
@@ -85,6 +85,6 @@ class Masks:
             item.release()
 
     def _paint(self, mask: DoubleField, tip: Tip, **inputs: object) -> None:
-        inputs = {"add": 0.0, "mix": 0.0, "towards": 0.0, "limits": (-1.0, 1.0), **inputs, **tip.inputs(self.grid)}
+        inputs = {"more": 0.0, "mix": 0.0, "towards": 0.0, "limits": (-1.0, 1.0), **inputs, **tip.inputs(self.grid)}
         self.device.pass_("brush/paint.frag")(mask.write, mask=mask.read, **inputs)
         mask.swap()
