@@ -79,7 +79,7 @@ class Tool:
     masks: bool = False
 
 
-def _stroke(press: Press, name: StrokeTool, reverse: bool, touch: Touch) -> Stroke:
+def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke:
     brush = press.brush
     return Stroke(
         tool=name,
@@ -87,7 +87,7 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, touch: Touch) -> Stro
         hardness=brush.hardness,
         strength=brush.strength,
         reverse=reverse,
-        samples=((touch.tick, touch.x, touch.y, touch.pressure),),
+        samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )
 
 
@@ -192,21 +192,15 @@ def _line(press: Press, stroke: Stroke, start: tuple[float, float]) -> Gesture:
 
 def _curve(press: Press, first: Touch) -> Gesture:
     """A path is drawn while nothing happens; on release the fluid is blown along it."""
-    touches = [first]
+    touches, last = [first], first
     while (touch := (yield None)) is not None:
-        before = touches[-1]
+        before, last = touches[-1], touch
         if hypot((touch.x - before.x) * press.extent[0], (touch.y - before.y) * press.extent[1]) > 0.004:
             touches.append(touch)
-        last = touch
-        touches[-1] = last if len(touches) > 1 else first
     if len(touches) < 2:
         return None
-    end = touches[-1].tick
     points = touches[::-1] if press.opposite else touches
-    stroke = _stroke(press, "curve", False, Touch(end, points[0].x, points[0].y, points[0].pressure))
-    for point in points[1:]:
-        stroke = stroke.with_sample(end, point.x, point.y, point.pressure)
-    return stroke
+    return _stroke(press, "curve", False, *(point._replace(tick=last.tick) for point in points))
 
 
 TOOLS = (

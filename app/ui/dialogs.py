@@ -124,7 +124,7 @@ class Shortcuts(Dialog):
         ]
         columns = (("File", "Edit", "Time"), ("Tools", "Brush"), ("View", "Help", "Mouse"))
         imgui.begin_child("keys", ImVec2(0, -ui.px(44)))
-        if imgui.begin_table("sheet", 3):
+        if imgui.begin_table("sheet", 3, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_row()
             for column in columns:
                 imgui.table_next_column()
@@ -138,13 +138,14 @@ class Shortcuts(Dialog):
     def _group(self, ui: Ui, name: str, rows: list[tuple[str, str]]) -> None:
         ui.text(name, ui.palette.accent, 13, bold=True)
         imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(3)))
-        right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - ui.px(16)
+        right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - ui.px(20)
         for label, keys in rows:
             ui.text(label, size=13.5)
             imgui.push_font(ui.fonts.regular, 13.5)
             width = imgui.calc_text_size(keys).x
             imgui.pop_font()
-            imgui.same_line(right - width)
+            imgui.same_line()
+            imgui.set_cursor_pos_x(right - width)
             ui.text(keys, ui.palette.dim, 13.5)
         imgui.pop_style_var()
         imgui.dummy(ImVec2(0, ui.px(6)))

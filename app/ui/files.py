@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from app import project as projects
 from app.errors import UserError
-from app.opening import PICTURE_ENDINGS
+from app.opening import PICTURE_ENDINGS, check_picture
 from app.project import SUFFIX, Project
 from app.recipe import Recipe
 from app.ui.browser import Browser
@@ -164,10 +164,13 @@ def load_any(path: Path) -> Project:
         UserError: if it is none of them, or cannot be read.
     """
     if path.suffix.lower() == ".toml":
-        return projects.from_recipe(path)
-    if projects.is_project(path):
-        return projects.load(path)
-    return projects.from_picture(path, fresh_recipe())
+        project = projects.from_recipe(path)
+    elif projects.is_project(path):
+        project = projects.load(path)
+    else:
+        project = projects.from_picture(path, fresh_recipe())
+    check_picture(project.picture, project.recipe.fluid.grid)
+    return project
 
 
 def fresh_recipe() -> Recipe:

@@ -83,7 +83,7 @@ void main() {
     if (warped) {
 #ifdef VISCOSITY
         float decades = log(max(texture(u_viscosity, x).r, 1e-9) / u_base) * 0.4342945;
-        vec3 tint = decades > 0.0 ? vec3(0.90, 0.62, 0.0) : vec3(0.34, 0.71, 0.91);
+        vec3 tint = decades > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
         seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(decades) * 0.28, 0.0, 0.75));
 #endif
 #ifdef FROZEN
