@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -172,7 +173,10 @@ class _Export:
                     cancel=self.progress.cancel,
                 )
             )
-            for frame in reordered(self._frames(positions), order, self.job.output.parent):
+            frames = self._frames(positions)
+            # Only what goes back needs frames that are past, which are kept on the disk.
+            goes_back = playback.reverse or playback.ping_pong
+            for frame in reordered(frames, order, self.job.output.parent) if goes_back else held(frames, order):
                 write(frame)
         return len(order)
 
@@ -241,6 +245,13 @@ class _Export:
             "stopped": verdict,
             "frames": self.numbers,
         }
+
+
+def held(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]:
+    """Frames in an `order` that never goes back, each as often as it is in it."""
+    for frame, (_, repeats) in zip(frames, groupby(order), strict=True):
+        for _ in repeats:
+            yield frame
 
 
 def displacement(replay: Replay, size: tuple[int, int]) -> Displacement:
