@@ -36,8 +36,8 @@ class Sampling:
     Attributes:
         quality: interpolation between pixels.
         edges: what lies beyond the picture. "transparent" is black where the picture has no alpha.
-        samples: places looked up along a side of each pixel of the result; "auto" follows the largest stretch of the map
-            there, sigma: clamp(ceil(2 sigma), 2, 8), and 1 where the map only shifts.
+        samples: places looked up along a side of each pixel of the result; "auto" follows the stretch s of the map in
+            that direction there: clamp(ceil(1.5 s), 2, 8), and 1 where the map only shifts.
         linear_light: mix in linear light; uint8 and uint16 are taken as sRGB, float32 as linear already.
         dither: spread the rounding to 8 bits by a fixed pattern; by default where light is mixed.
     """
@@ -49,6 +49,36 @@ class Sampling:
     dither: bool | None = None
 
 
+class GivenMap:
+    """A map made elsewhere, laid over the whole of any picture.
+
+    Args:
+        device: the device.
+        displacement: (h, w, 2) from 6 x 6, in its own longer sides.
+
+    Raises:
+        SamplingError: on another shape.
+    """
+
+    version = 0
+
+    def __init__(self, device: Device, displacement: np.ndarray) -> None:
+        if displacement.ndim != 3 or displacement.shape[2] != 2 or min(displacement.shape[:2]) < 6:
+            raise SamplingError(f"a map of shape {displacement.shape} was given, (h, w, 2) from 6 x 6 is wanted")
+        height, width = displacement.shape[:2]
+        self.device = device
+        self.extent = width / max(width, height), height / max(width, height)
+        self._field = device.upload(displacement.astype(np.float32, copy=False), "given map")
+
+    def composed(self) -> Field:
+        """The displacement."""
+        return self._field
+
+    def release(self) -> None:
+        """Free the texture."""
+        self._field.release()
+
+
 @dataclass(frozen=True)
 class _Job:
     """One picture, one map and one size, with what follows from them."""
@@ -56,6 +86,7 @@ class _Job:
     displacement: Field
     extent: tuple[float, float]
     slack: float
+    key: tuple[object, ...]
     picture: np.ndarray
     size: tuple[int, int]
     how: Sampling
@@ -96,30 +127,35 @@ class _Job:
         return self.source_size[0] / self.extent[0], self.source_size[1] / self.extent[1]
 
     @property
+    def is_repeated(self) -> bool:
+        return self.how.edges in ("mirror", "wrap")
+
+    @property
     def inside(self) -> tuple[float, float, float, float]:
         """Left, top, right and bottom bounds, in pixels, beyond which there is nothing."""
-        if self.how.edges not in ("transparent", "black"):
-            return (-1e30, -1e30, 1e30, 1e30)
         # What is a part of a texel of the map outside is there because of the interpolation, not of the fluid.
         width, height = self.source_size
         return (-self.slack, -self.slack, width + self.slack, height + self.slack)
 
-    @property
-    def defines(self) -> dict[str, object]:
+    def defines(self, whole: bool) -> dict[str, object]:
         """Of `look_up.frag`."""
         kind, levels = _KINDS[self.picture.dtype]
         samples = self.how.samples
         dither = self.is_curved if self.how.dither is None else self.how.dither
         flags = {
+            "WHOLE": whole,
+            "ZOOMED": self.zoom != (1.0, 1.0),
+            "BOUNDED": self.how.edges in ("transparent", "black"),
             "SINGLE": self.is_single,
             "PREPARED": self.is_prepared,
             "LINEAR_LIGHT": self.is_curved and self.is_prepared,
             "CLAMPED": levels > 0,
             "DITHER": dither and kind == "f1" and self.how.quality != "nearest",
+            "OPAQUE": not self.has_alpha,
             "GREY_ALPHA": self.channels == 2,
         }
         values: dict[str, object] = {name: 1 for name, wanted in flags.items() if wanted}
-        values |= {"TAPS": _TAPS[self.how.quality], "LEVELS": levels}
+        values |= {"TAPS": _TAPS[self.how.quality]}
         values |= {"LEAST_SAMPLES": 2 if samples == "auto" else samples}
         values |= {"MOST_SAMPLES": MOST_SAMPLES if samples == "auto" else samples}
         return values
@@ -141,10 +177,11 @@ class Sampler:
         self.tile = tile
         self._fields: dict[str, Field] = {}
         self._textures: dict[str, tuple[moderngl.Texture, tuple[object, ...]]] = {}
+        self._spread_for: tuple[object, ...] = ()
 
     def apply(
         self,
-        warp: WarpMap | np.ndarray,
+        warp: WarpMap | GivenMap,
         picture: np.ndarray,
         size: tuple[int, int] | None = None,
         how: Sampling | None = None,
@@ -152,7 +189,7 @@ class Sampler:
         """The picture looked up at x + D(x).
 
         Args:
-            warp: the map; or a displacement (h, w, 2) from 6 x 6, in its own longer sides, laid over the whole picture.
+            warp: the map, laid over the whole of the picture.
             picture: (h, w) or (h, w, 1-4), uint8, uint16 or float32, straight alpha last.
             size: (width, height) of the result, by default the picture's.
             how: see `Sampling`.
@@ -171,7 +208,7 @@ class Sampler:
 
     def bands(
         self,
-        warp: WarpMap | np.ndarray,
+        warp: WarpMap | GivenMap,
         picture: np.ndarray,
         size: tuple[int, int] | None = None,
         how: Sampling | None = None,
@@ -184,23 +221,18 @@ class Sampler:
         job = self._job(warp, picture, size, how or Sampling())
         width, height = job.size
         rows, columns = (height, width) if self._fits(job.size) else (self.tile[1], self.tile[0])
-        whole = self._fits(job.source_size) and job.how.edges not in ("mirror", "wrap")
+        whole = self._fits(job.source_size) and not job.is_repeated
         if whole:
             self._load(job, (0, 0, *job.source_size))
         for top in range(0, height, rows):
             bottom = min(top + rows, height)
             shape = bottom - top, width, job.channels
-            if result is None:
-                band = np.empty(shape, job.picture.dtype)
-            else:
-                band = result[top:bottom].reshape(shape)
+            band = np.empty(shape, job.picture.dtype) if result is None else result[top:bottom].reshape(shape)
             for left in range(0, width, columns):
                 right = min(left + columns, width)
                 self._draw(job, (left, top, right, bottom), whole)
                 self._take(job, band[:, left:right])
             yield band.reshape(bottom - top, width, *picture.shape[2:])
-        if not isinstance(warp, WarpMap):
-            job.displacement.release()
 
     def release(self) -> None:
         """Free the textures."""
@@ -213,23 +245,16 @@ class Sampler:
 
     # -- one tile ---------------------------------------------------------------------------------------------------
 
-    def _job(
-        self, warp: WarpMap | np.ndarray, picture: np.ndarray, size: tuple[int, int] | None, how: Sampling
-    ) -> _Job:
+    def _job(self, warp: WarpMap | GivenMap, picture: np.ndarray, size: tuple[int, int] | None, how: Sampling) -> _Job:
         if picture.dtype not in _KINDS or picture.ndim not in (2, 3) or picture.size == 0:
             raise SamplingError(f"a picture of shape {picture.shape} of {picture.dtype} cannot be looked up")
         shaped = picture.reshape(*picture.shape[:2], -1)
         if shaped.shape[2] > 4:
             raise SamplingError(f"a picture of {shaped.shape[2]} channels cannot be looked up, 1 to 4 can")
         size = size or (picture.shape[1], picture.shape[0])
-        if isinstance(warp, WarpMap):
-            field, extent = warp.composed(), warp.grid.extent
-            return _Job(field, extent, 0.5 * picture.shape[1] / field.width, shaped, size, how)
-        if warp.ndim != 3 or warp.shape[2] != 2 or min(warp.shape[:2]) < 6:
-            raise SamplingError(f"a map of shape {warp.shape} was given, (h, w, 2) from 6 x 6 is wanted")
-        height, width = warp.shape[:2]
-        extent = width / max(width, height), height / max(width, height)
-        return _Job(self.device.upload(warp.astype(np.float32), "given map"), extent, 0.01, shaped, size, how)
+        field = warp.composed()
+        slack = 0.5 * picture.shape[1] / field.width if isinstance(warp, WarpMap) else 0.01
+        return _Job(field, warp.extent, slack, (warp, warp.version), shaped, size, how)
 
     def _fits(self, size: tuple[int, int]) -> bool:
         # The lattice of corners is one larger than the picture.
@@ -242,9 +267,9 @@ class Sampler:
         kind, _ = _KINDS[job.picture.dtype]
         self._field("result", (right - left, bottom - top), _TARGET_COMPONENTS[job.channels], kind)
         if whole:
-            self._look_up(job, lattice, (left, top), (0, 0, right - left, bottom - top), (0, 0, *job.source_size))
+            self._look_up(job, lattice, (left, top), (0, 0, right - left, bottom - top), None)
         else:
-            places = lattice.get() * np.float32(job.longer)
+            places = lattice.get() * np.array(job.longer, np.float32)
             more = 0 if job.is_single else 1
             places[..., 0] += (np.arange(left, right + more) * job.zoom[0])[None, :]
             places[..., 1] += (np.arange(top, bottom + more) * job.zoom[1])[:, None]
@@ -264,7 +289,7 @@ class Sampler:
         within = places[y : y + height + more, x : x + width + more].reshape(-1, 2)
         low = np.floor(within.min(axis=0)).astype(int) - _REACH
         high = np.ceil(within.max(axis=0) + np.array(job.zoom)).astype(int) + _REACH
-        if job.how.edges not in ("mirror", "wrap"):
+        if not job.is_repeated:
             limits = np.array(job.source_size)
             low, high = np.clip(low, 0, limits - 1), np.clip(high, 1, limits)
         piece = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
@@ -290,6 +315,10 @@ class Sampler:
         more, shift = (0, 0.5) if job.is_single else (1, 0.0)
         width, height = right - left + more, bottom - top + more
         source = job.displacement
+        key = (*job.key, job.size, job.is_single, tile)
+        if key == self._spread_for:  # the same map over a film or a batch of pictures
+            return self._fields["lattice"]
+        self._spread_for = key
         rows = self._field("along x", (width, source.height), 2, "f4")
         lattice = self._field("lattice", (width, height), 2, "f4")
         scale_x, scale_y = source.width / job.size[0], source.height / job.size[1]
@@ -305,11 +334,14 @@ class Sampler:
         lattice: Field,
         origin: tuple[int, int],
         region: tuple[int, int, int, int],
-        piece: tuple[int, int, int, int],
+        piece: tuple[int, int, int, int] | None,
     ) -> None:
+        """Draw a region of a tile from a piece of the picture, or from all of it."""
         raw, _ = self._textures["raw"]
+        defines = job.defines(whole=piece is None)
+        piece = piece or (0, 0, *job.source_size)
         opaque = job.how.edges == "black" or not job.has_alpha
-        self.device.pass_("sampling/look_up.frag", **job.defines)(
+        self.device.pass_("sampling/look_up.frag", **defines)(
             self._fields["result"],
             region=region,
             source=self._fields["prepared"] if job.is_prepared else raw,
@@ -330,14 +362,14 @@ class Sampler:
         """Upload a piece of the picture (left, top, right, bottom) and prepare it."""
         left, top, right, bottom = piece
         width, height = right - left, bottom - top
-        if job.how.edges in ("mirror", "wrap"):
+        if job.is_repeated:
             columns = _edge_index(np.arange(left, right), job.source_size[0], job.how.edges)
             rows = _edge_index(np.arange(top, bottom), job.source_size[1], job.how.edges)
             pixels = job.picture[rows[:, None], columns]
         else:
             pixels = job.picture[top:bottom, left:right]
         kind, _ = _KINDS[job.picture.dtype]
-        raw = self._texture("raw", (width, height), job.channels, kind)
+        raw = self._texture("raw", (width, height), job.channels, kind, exact=piece == (0, 0, *job.source_size))
         raw.write(np.ascontiguousarray(pixels), viewport=(0, 0, width, height))
         if job.is_prepared:
             prepared = self._field("prepared", raw.size, 4, "f4")
@@ -364,10 +396,11 @@ class Sampler:
             self._fields[role] = self.device.field(size, components, f"sampling, {role}", dtype)
         return self._fields[role]
 
-    def _texture(self, role: str, size: tuple[int, int], components: int, dtype: str) -> moderngl.Texture:
-        """The texture kept for `role`, at least of that size; not a field, as it need not be drawn into."""
+    def _texture(self, role: str, size: tuple[int, int], components: int, dtype: str, exact: bool) -> moderngl.Texture:
+        """The texture kept for `role`, of that size or larger; not a field, as it need not be drawn into."""
         kept, kind = self._textures.get(role, (None, ()))
-        if kept is None or kind != (components, dtype) or kept.width < size[0] or kept.height < size[1]:
+        enough = kept is not None and (kept.size == size or (not exact and min(np.subtract(kept.size, size)) >= 0))
+        if kept is None or kind != (components, dtype) or not enough:
             if kept is not None:
                 kept.release()
             texture = self.device.ctx.texture(size, components, dtype=dtype, alignment=1)

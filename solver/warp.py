@@ -87,6 +87,7 @@ class WarpMap:
         self._composed: dict[int, Field] = {}
         self._fresh: set[int] = set()  # the scales at which `_composed` holds the present map
         self._steps = 0  # since the last fold
+        self.version = 0  # counts the changes, for those who keep what they made of the map
 
     # -- moving it --------------------------------------------------------------------------------------------------
 
@@ -194,6 +195,11 @@ class WarpMap:
         self._changed()
 
     @property
+    def extent(self) -> tuple[float, float]:
+        """(width, height) of the domain, the longer of them 1."""
+        return self.grid.extent
+
+    @property
     def nbytes(self) -> int:
         """Bytes of texture memory, as long as nothing is read at other sizes."""
         own = [self._near.read, self._near.write, self._base.read, self._base.write]
@@ -271,6 +277,7 @@ class WarpMap:
         self.device.pass_("warp/resample.frag")(target, displacement=source, origin=origin, step=step)
 
     def _changed(self) -> None:
+        self.version += 1
         self._fresh.clear()
 
 

@@ -1,5 +1,6 @@
-// Look up: the picture at x + D(x), the mean of k x k places within each pixel of the result.
-// k follows the largest stretch sigma of the map over the pixel: clamp(ceil(2 sigma), 2, 8), or 1 at its centre.
+// Look up: the picture at x + D(x), the mean of places spread evenly over each pixel of the result.
+// Along x and along y there are clamp(ceil(2 s), 2, 8) of them, s the stretch of the map in that direction over the
+// pixel, or one at the centre where the map only shifts.
 //
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels; premultiplied
 // where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
@@ -7,9 +8,9 @@
 // u_pixel: the result's pixel of the first fragment; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_inside: left, top, right, bottom bounds, pixels, beyond which
 // there is u_outside.
-// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_SAMPLES, MOST_SAMPLES for k; SINGLE; PREPARED;
-// LINEAR_LIGHT to encode; LEVELS: code values to round to, with DITHER or to the nearest; GREY_ALPHA; CLAMPED: 0-1.
-// reads: 65
+// Defines: WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_SAMPLES, MOST_SAMPLES; SINGLE; PREPARED;
+// OPAQUE if the picture has no alpha; LINEAR_LIGHT to encode; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA.
+// reads: 69
 #include "lib/srgb.glsl"
 uniform sampler2D u_source;
 uniform sampler2D u_raw;
@@ -23,35 +24,61 @@ uniform vec4 u_inside;
 uniform vec4 u_outside;
 layout(location = 0) out vec4 out_color;
 
+// A component that is never read costs nothing.
+#ifdef OPAQUE
+#define COLOR vec3
+#define PARTS rgb
+#else
+#define COLOR vec4
+#define PARTS rgba
+#endif
+
+// The whole picture is clamped to its edges by the texture itself.
+#ifdef WHOLE
+#define CORNER 0.0
+#define WITHIN(place, count) (place)
+#else
+#define CORNER u_corner
+#define WITHIN(place, count) min(max(place, 0.5), (count) - 0.5)
+#endif
+
+// Weights and whole parts of the taps around f in [0, 1].
 #if TAPS == 4
-#define WEIGHTS vec4
+#define EACH vec4
+const vec4 OFFSETS = vec4(-0.5, 0.5, 1.5, 2.5);
 vec4 tap_weights(float f) {
     return vec4(f * (-0.5 + f * (1.0 - 0.5 * f)), 1.0 + f * f * (-2.5 + 1.5 * f), f * (0.5 + f * (2.0 - 1.5 * f)),
                 f * f * (-0.5 + 0.5 * f));
 }
 #elif TAPS == 2
-#define WEIGHTS vec2
+#define EACH vec2
+const vec2 OFFSETS = vec2(0.5, 1.5);
 vec2 tap_weights(float f) { return vec2(1.0 - f, f); }
 #endif
 
 // The picture at `part` pixels from the corner of the pixel `whole`, two parts so that large pictures lose no precision.
-vec4 picture(vec2 whole, vec2 part) {
-    vec2 place = whole + part;
-    if (any(lessThan(place, u_inside.xy)) || any(greaterThan(place, u_inside.zw)))
-        return u_outside;
-    vec2 texel = 1.0 / vec2(textureSize(u_source, 0)), last = u_extent - 0.5;
+COLOR picture(vec2 whole, vec2 part) {
+    vec2 texel = 1.0 / vec2(textureSize(u_source, 0));
 #if TAPS == 1
-    return texture(u_source, clamp(whole - u_corner + floor(part) + 0.5, vec2(0.5), last) * texel);
+    COLOR sum = texture(u_source, WITHIN(whole - CORNER + floor(part) + 0.5, u_extent) * texel).PARTS;
 #else
-    vec2 cell = floor(part - 0.5), f = part - 0.5 - cell;
-    vec2 first = whole - u_corner + cell + 1.5 - float(TAPS / 2);
-    WEIGHTS wx = tap_weights(f.x), wy = tap_weights(f.y);
-    vec4 sum = vec4(0.0);
-    for (int j = 0; j < TAPS; ++j)
+    vec2 cell = floor(part - 0.5), f = part - 0.5 - cell, first = whole - CORNER + cell;
+    EACH wx = tap_weights(f.x), wy = tap_weights(f.y);
+    EACH x = WITHIN(first.x + OFFSETS, u_extent.x) * texel.x, y = WITHIN(first.y + OFFSETS, u_extent.y) * texel.y;
+    COLOR sum = COLOR(0.0);
+    for (int j = 0; j < TAPS; ++j) {
+        COLOR row = COLOR(0.0);
         for (int i = 0; i < TAPS; ++i)
-            sum += wx[i] * wy[j] * texture(u_source, clamp(first + vec2(i, j), vec2(0.5), last) * texel);
-    return sum;
+            row += wx[i] * texture(u_source, vec2(x[i], y[j])).PARTS;
+        sum += wy[j] * row;
+    }
 #endif
+#ifdef BOUNDED
+    vec2 place = whole + part;
+    bool inside = all(greaterThanEqual(vec4(place, u_inside.zw), vec4(u_inside.xy, place)));
+    sum = inside ? sum : u_outside.PARTS;
+#endif
+    return sum;
 }
 
 // Deterministic noise in 0-1 that is even over every small neighbourhood (Jimenez 2014, interleaved gradient noise).
@@ -62,37 +89,40 @@ vec2 displacement(int i, int j) {
 }
 
 void main() {
-    vec2 pixel = floor(gl_FragCoord.xy) + u_pixel, whole = floor(pixel * u_zoom), rest = pixel * u_zoom - whole;
-    vec4 color;
-    vec2 centre;
-    bool copied;
+    vec2 pixel = floor(gl_FragCoord.xy) + u_pixel;
+#ifdef ZOOMED
+    vec2 zoom = u_zoom, whole = floor(pixel * zoom), rest = pixel * zoom - whole;
+#else
+    const vec2 zoom = vec2(1.0), rest = vec2(0.0);
+    vec2 whole = pixel;
+#endif
 #ifdef SINGLE
-    centre = rest + 0.5 * u_zoom + displacement(0, 0);
-    color = picture(whole, centre);
-    copied = true;
+    vec2 centre = rest + 0.5 * zoom + displacement(0, 0);
+    COLOR color = picture(whole, centre);
+    bool shifted = true;
 #else
     vec2 a = displacement(0, 0), b = displacement(1, 0), c = displacement(0, 1), d = displacement(1, 1);
-    vec2 dx = 0.5 * (b - a + d - c), dy = 0.5 * (c - a + d - b), bend = a - b - c + d;
-    centre = rest + 0.5 * u_zoom + 0.25 * (a + b + c + d);
-    vec2 jx = dx + vec2(u_zoom.x, 0.0), jy = dy + vec2(0.0, u_zoom.y);
-    float sum = dot(jx, jx) + dot(jy, jy), stretch = dot(jx, jx) - dot(jy, jy), shear = 2.0 * dot(jx, jy);
-    float sigma = sqrt(0.5 * (sum + sqrt(stretch * stretch + shear * shear)));
+    vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d), bend = a - b - c + d;
+    vec2 along_x = 0.5 * (b - a + d - c) + vec2(zoom.x, 0.0), along_y = 0.5 * (c - a + d - b) + vec2(0.0, zoom.y);
     // Where the map only shifts, one place is enough, and keeps the picture as sharp as it is; between that and a real
     // distortion the places move apart, so that no seam shows.
-    float apart = smoothstep(0.0, 0.05, length(jx - vec2(1.0, 0.0)) + length(jy - vec2(0.0, 1.0)));
-    copied = apart < 1e-3;
-    int k = copied ? 1 : int(clamp(ceil(2.0 * sigma), float(LEAST_SAMPLES), float(MOST_SAMPLES)));
-    color = vec4(0.0);
-    for (int j = 0; j < k; ++j)
-        for (int i = 0; i < k; ++i) {
-            vec2 off = apart * ((vec2(i, j) + 0.5) / float(k) - 0.5);
-            color += picture(whole, centre + off.x * jx + off.y * jy + (off.x * off.y) * bend);
-        }
-    color /= float(k * k);
+    float apart = smoothstep(0.0, 0.05, length(along_x - vec2(1.0, 0.0)) + length(along_y - vec2(0.0, 1.0)));
+    bool shifted = apart < 1e-3;
+    vec2 stretch = vec2(length(along_x), length(along_y));
+    vec2 samples = shifted ? vec2(1.0) : clamp(ceil(1.5 * stretch), float(LEAST_SAMPLES), float(MOST_SAMPLES));
+    // As far apart as gives them the variance of the pixel itself: a mean of fourth order.
+    vec2 spread = samples.x * samples.y > 1.0 ? apart * inversesqrt(1.0 - 1.0 / (samples * samples)) : vec2(0.0);
+    COLOR color = COLOR(0.0);
+    vec2 place = vec2(0.5);
+    for (int n = int(samples.x * samples.y); n > 0; --n) {
+        vec2 off = spread * (place / samples - 0.5);
+        color += picture(whole, centre + off.x * along_x + off.y * along_y + (off.x * off.y) * bend);
+        place = place.x + 1.0 < samples.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
+    }
+    color /= samples.x * samples.y;
 #endif
 
-#ifdef PREPARED
-    // The overshoot of the cubic.
+#if defined(PREPARED) && !defined(OPAQUE)
     color.a = clamp(color.a, 0.0, 1.0);
     color.rgb = color.a > 0.0 ? color.rgb / color.a : vec3(0.0);
 #endif
@@ -103,19 +133,18 @@ void main() {
     color.rgb = linear_to_srgb(color.rgb);
 #endif
 #ifdef DITHER
-    color.rgb = floor(color.rgb * LEVELS + even_noise(pixel)) / LEVELS;
+    color.rgb = floor(color.rgb * 255.0 + even_noise(pixel)) / 255.0;
 #endif
 #ifdef PREPARED
     // Moved by whole pixels, and above all not at all: the very values of the picture.
-    vec2 nearest = floor(centre);
-    vec2 place = whole - u_corner + nearest + 0.5;
-    copied = copied && all(lessThan(abs(centre - nearest - 0.5), vec2(1.0 / 1024.0)))
-          && all(greaterThan(place, vec2(0.0))) && all(lessThan(place, u_extent));
-    if (copied)
-        color = texture(u_raw, place / vec2(textureSize(u_raw, 0)));
+    vec2 nearest = floor(centre), same = whole - CORNER + nearest + 0.5;
+    bool copied = shifted && all(lessThan(abs(centre - nearest - 0.5), vec2(1.0 / 1024.0)))
+               && all(greaterThan(same, vec2(0.0))) && all(lessThan(same, u_extent));
+    COLOR value = texture(u_raw, same / vec2(textureSize(u_raw, 0))).PARTS;
+    color = copied ? value : color;
 #endif
 #ifdef GREY_ALPHA
     color.g = color.a;
 #endif
-    out_color = color;
+    out_color.PARTS = color;
 }

@@ -1,9 +1,9 @@
-// Spread: a displacement taken at the lattice of a picture in one direction, by a six-point Lagrange quintic; drawn once
-// along x and then along y, which reads 12 texels where both at once would read 36.
+// Spread: a displacement taken at the lattice of a picture in one direction, by a four-point Lagrange cubic; drawn once
+// along x and then along y, which reads 8 texels where both at once would read 16.
 // u_displacement: longer sides; u_first: lattice point of the first fragment, in pixels of the picture;
 // u_scale: texels of the displacement to a pixel. Define ALONG_X for the first of the two.
-// reads: 6
-#include "lib/quintic.glsl"
+// reads: 4
+#include "lib/cubic.glsl"
 uniform sampler2D u_displacement;
 uniform float u_first;
 uniform float u_scale;
@@ -20,11 +20,10 @@ void main() {
 #endif
     float place = (along - 0.5 + u_first) * u_scale - 0.5;
     // Beyond the outermost texels the same polynomial goes on.
-    float cell = clamp(floor(place), 2.0, count - 4.0);
-    float weights[6];
-    quintic_lagrange(place - cell, weights);
+    float cell = clamp(floor(place), 1.0, count - 3.0);
+    vec4 weights = cubic_lagrange(place - cell);
     vec2 sum = vec2(0.0);
-    for (int i = 0; i < 6; ++i)
-        sum += weights[i] * texture(u_displacement, first + next * (cell + float(i) - 1.5)).rg;
+    for (int i = 0; i < 4; ++i)
+        sum += weights[i] * texture(u_displacement, first + next * (cell + float(i) - 0.5)).rg;
     out_displacement = sum;
 }

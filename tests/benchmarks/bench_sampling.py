@@ -1,0 +1,89 @@
+"""What looking a 3840 x 2160 picture up through a map costs, beside OpenCV's remap in the same run.
+
+    python tests/benchmarks/bench_sampling.py
+
+Ours are from an array to an array: upload, map, samples, read back. OpenCV is given its maps ready made.
+"""
+
+from __future__ import annotations
+
+import platform
+import statistics
+import time
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from solver.context import Device
+from solver.grid import Grid
+from solver.sampling import GivenMap, Sampler, Sampling
+from solver.warp import WarpMap
+
+WIDTH, HEIGHT = 3840, 2160
+ROUNDS = 5
+
+
+def picture(width: int, height: int) -> np.ndarray:
+    """Soft colours with fine noise, as a photograph has, (height, width, 3) uint8."""
+    rng = np.random.default_rng(0)
+    coarse = rng.uniform(30, 220, (height // 60, width // 60, 3)).astype(np.float32)
+    soft = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
+    return np.clip(soft + rng.normal(0, 8, soft.shape), 0, 255).astype(np.uint8)
+
+
+def twirl(grid: Grid) -> np.ndarray:
+    """A turn of one radian that dies away towards the edges, and a little compression, (ny, nx, 2)."""
+    x, y = grid.centres()
+    dx, dy = x - grid.extent[0] / 2, y - grid.extent[1] / 2
+    r2 = (dx**2 + dy**2) / 0.2**2
+    turn, squeeze = np.exp(-r2), 1 + 0.2 * np.exp(-r2)
+    u = squeeze * (np.cos(turn) * dx - np.sin(turn) * dy) - dx
+    v = squeeze * (np.sin(turn) * dx + np.cos(turn) * dy) - dy
+    return np.stack([u, v], axis=-1).astype(np.float32)
+
+
+def main() -> None:
+    device = Device.headless()
+    grid = Grid.for_picture(WIDTH, HEIGHT, 512)
+    warp = WarpMap(device, grid)
+    warp.set(twirl(grid))
+    source = picture(WIDTH, HEIGHT)
+    displacement = warp.read((WIDTH, HEIGHT)) * WIDTH
+    x = (np.arange(WIDTH, dtype=np.float32) + displacement[..., 0]).astype(np.float32)
+    y = (np.arange(HEIGHT, dtype=np.float32)[:, None] + displacement[..., 1]).astype(np.float32)
+    sampler = Sampler(device)
+    fast = Sampling("bilinear", samples=1, linear_light=False)
+    full = GivenMap(device, displacement / np.float32(WIDTH))
+
+    def remap(kind: int) -> Callable[[], object]:
+        return lambda: cv2.remap(source, x, y, kind)
+
+    rows: dict[str, Callable[[], object]] = {
+        "OpenCV remap, bilinear": remap(cv2.INTER_LINEAR),
+        "bilinear, one sample, in gamma": lambda: sampler.apply(warp, source, how=fast),
+        "the same, given a map of the picture's size": lambda: sampler.apply(full, source, how=fast),
+        "OpenCV remap, Lanczos-4": remap(cv2.INTER_LANCZOS4),
+        "Catmull-Rom, samples by stretch, linear light": lambda: sampler.apply(warp, source),
+        "bilinear, samples by stretch, linear light": lambda: sampler.apply(warp, source, how=Sampling("bilinear")),
+    }
+    taken: dict[str, list[float]] = {name: [] for name in rows}
+    for round_ in range(ROUNDS + 1):
+        for name, row in rows.items():
+            start = time.perf_counter()
+            row()
+            if round_:
+                taken[name].append((time.perf_counter() - start) * 1e3)
+    middle = {name: statistics.median(times) for name, times in taken.items()}
+
+    print(f"{platform.machine()}, {platform.processor() or platform.system()}; {device.limits.renderer}")
+    print(f"OpenCV {cv2.__version__} on {cv2.getNumThreads()} threads; {WIDTH} x {HEIGHT} RGB, 8 bits; map {grid.size}")
+    print(f"{'':46} {'ms':>7} {'/ bilinear':>11} {'/ Lanczos-4':>11}")
+    for name, value in middle.items():
+        of_linear = value / middle["OpenCV remap, bilinear"]
+        of_lanczos = value / middle["OpenCV remap, Lanczos-4"]
+        print(f"{name:46} {value:7.1f} {of_linear:11.2f} {of_lanczos:11.2f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,170 @@
+"""Looking pictures up: exact where nothing moves, like OpenCV, the same in tiles, right in light and alpha."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from solver.context import Device
+from solver.grid import Grid
+from solver.sampling import GivenMap, Sampler, Sampling, SamplingError
+from solver.warp import WarpMap
+
+KINDS = {"8": (np.uint8, 255), "16": (np.uint16, 65535), "float": (np.float32, 1)}
+
+
+def noise(shape: tuple[int, ...], kind: str, seed: int = 0) -> np.ndarray:
+    dtype, top = KINDS[kind]
+    return (np.random.default_rng(seed).random(shape) * top).astype(dtype)
+
+
+def waves(size: tuple[int, int], amplitude: float, seed: int = 0) -> np.ndarray:
+    """A smooth random displacement (h, w, 2)."""
+    rng = np.random.default_rng(seed)
+    field = np.stack([ndimage.gaussian_filter(rng.standard_normal(size[::-1]), 8) for _ in "xy"], axis=-1)
+    return (amplitude * field / np.abs(field).max()).astype(np.float32)
+
+
+def shift(size: tuple[int, int], x: float, y: float) -> np.ndarray:
+    """A displacement by (x, y) pixels everywhere."""
+    return np.tile(np.float32([x, y]) / np.float32(max(size)), (size[1], size[0], 1))
+
+
+def srgb_to_linear(code: np.ndarray) -> np.ndarray:
+    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+
+
+def linear_to_srgb(light: np.ndarray) -> np.ndarray:
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0) ** (1 / 2.4) - 0.055)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("channels", [0, 1, 2, 3, 4])
+def test_identity_returns_the_picture_bit_for_bit(device: Device, kind: str, channels: int) -> None:
+    picture = noise((61, 83, channels) if channels else (61, 83), kind)
+    warp = WarpMap(device, Grid(16, 12))
+    sampler = Sampler(device)
+    for how in (
+        Sampling(),
+        Sampling("bilinear", samples=1),
+        Sampling("nearest", linear_light=False),
+        Sampling(dither=True, edges="clamp"),
+    ):
+        np.testing.assert_array_equal(sampler.apply(warp, picture, how=how), picture)
+
+
+def test_a_shift_by_whole_pixels_is_exact_and_what_comes_in_is_empty(device: Device) -> None:
+    picture = noise((40, 60, 4), "8")
+    found = Sampler(device).apply(GivenMap(device, shift((60, 40), 7, -3)), picture)
+    np.testing.assert_array_equal(found[3:, :53], picture[:37, 7:])
+    assert not found[:2].any()
+    assert not found[:, 54:].any()
+
+
+@pytest.mark.parametrize("size", [(640, 480), (300, 700)])
+def test_bilinear_agrees_with_opencv(device: Device, size: tuple[int, int]) -> None:
+    width, height = size
+    picture = noise((height, width, 3), "8")
+    displacement = waves(size, 0.06)
+    pixels = displacement * max(size)
+    x = np.arange(width, dtype=np.float32) + pixels[..., 0]
+    y = np.arange(height, dtype=np.float32)[:, None] + pixels[..., 1]
+    wanted = cv2.remap(picture.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    how = Sampling("bilinear", "clamp", samples=1, linear_light=False)
+    found = Sampler(device).apply(GivenMap(device, displacement), picture, how=how)
+    assert np.abs(found - wanted).max() <= 1.0
+
+
+@pytest.mark.parametrize("edges", ["transparent", "black", "clamp", "mirror", "wrap"])
+def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
+    warp = GivenMap(device, waves((230, 150), 0.2))
+    whole, tiled = Sampler(device), Sampler(device, whole=12_000, tile=(64, 50))
+    for picture in (noise((150, 230, 3), "8"), noise((150, 230, 2), "16"), noise((150, 230), "float")):
+        for size in (None, (301, 190)):
+            how = Sampling(edges=edges)  # type: ignore[arg-type]
+            wanted = whole.apply(warp, picture, size, how)
+            np.testing.assert_array_equal(tiled.apply(warp, picture, size, how), wanted)
+            np.testing.assert_array_equal(np.concatenate(list(tiled.bands(warp, picture, size, how))), wanted)
+
+
+def test_no_precision_is_lost_across_a_wide_picture(device: Device) -> None:
+    """A shift by a quarter of a pixel at x = 11,900 gives what it gives at x = 100."""
+    patch = noise((24, 100), "float")
+    picture = np.tile(patch, (1, 120))
+    how = Sampling("bilinear", "wrap", samples=1)
+    found = Sampler(device).apply(GivenMap(device, shift((12000, 24), 0.25, 0.0)[:, :6]), picture, how=how)
+    np.testing.assert_allclose(found[:, 11800:11900], found[:, 100:200], atol=1e-6)
+
+
+def test_chart_beside_many_samples(device: Device) -> None:
+    """Twirl and compression of a hard chart: 42 dB against 24 x 24 samples in linear light."""
+    n = 256
+    x, y = np.meshgrid((np.arange(n) + 0.5) / n - 0.5, (np.arange(n) + 0.5) / n - 0.5)
+    radius, angle = np.hypot(x, y), np.arctan2(y, x)
+    star, plate = np.sin(36 * angle) > 0, 0.5 + 0.5 * np.cos(90 * np.pi * radius**2)
+    checks, rings = (np.floor(x * 32) + np.floor(y * 32)) % 2, np.sin(40 * np.pi * radius) > 0
+    value = np.where(y < 0, np.where(x < 0, star, plate), np.where(x < 0, checks, rings))
+    picture = np.round(np.stack([value, 0.8 * value + 0.1, 1 - value], axis=-1) * 255).astype(np.uint8)
+    turn, squeeze = 3 * np.exp(-((radius / 0.25) ** 2)), 1 + 1.5 * np.exp(-((radius / 0.3) ** 2))
+    u, v = np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y
+    warp = GivenMap(device, np.stack([squeeze * u - x, squeeze * v - y], axis=-1))
+    light = srgb_to_linear(picture / 255.0).astype(np.float32)
+    many = Sampler(device).apply(warp, light, how=Sampling(edges="clamp", samples=24))
+    wanted = 255 * np.clip(linear_to_srgb(many.astype(np.float64)), 0, 1)
+    found = Sampler(device).apply(warp, picture, how=Sampling(edges="clamp"))
+    assert 10 * np.log10(255**2 / np.mean((found - wanted) ** 2)) > 46
+
+
+def test_colour_of_transparent_pixels_does_not_bleed(device: Device) -> None:
+    picture = np.zeros((32, 32, 4), np.uint8)
+    picture[..., 0] = 255
+    picture[:, 16:] = 0, 255, 0, 255
+    found = Sampler(device).apply(GivenMap(device, shift((32, 32), 0.5, 0.0)), picture)
+    visible = found[found[..., 3] > 0]
+    assert (visible[:, 0] == 0).all()
+    assert (visible[:, 1] == 255).all()
+
+
+def test_half_black_half_white_is_half_the_light(device: Device) -> None:
+    picture = np.zeros((32, 32), np.uint8)
+    picture[:, 1::2] = 255
+    warp = GivenMap(device, shift((32, 32), 0.5, 0.0))
+    light = Sampler(device).apply(warp, picture, how=Sampling("bilinear", "clamp", dither=False))
+    assert abs(int(light[16, 16]) - 188) <= 1
+    code = Sampler(device).apply(warp, picture, how=Sampling("bilinear", "clamp", linear_light=False))
+    assert abs(int(code[16, 16]) - 128) <= 1
+
+
+def test_dithering_keeps_the_mean(device: Device) -> None:
+    picture = np.tile(np.linspace(50, 54, 256).astype(np.uint8), (64, 1))
+    warp, how = GivenMap(device, shift((256, 64), 0.4, 0.0)), Sampling("bilinear", "clamp")
+    found = Sampler(device).apply(warp, picture, how=how)
+    exact = Sampler(device).apply(warp, picture.astype(np.uint16) * 257, how=how)
+    assert abs(found.mean() - exact.mean() / 257) < 0.01
+
+
+def test_result_of_another_size_follows_the_map(device: Device) -> None:
+    """A smooth picture through a map, at half and twice its size, is the same picture."""
+    x, y = np.meshgrid((np.arange(120) + 0.5) / 120, (np.arange(80) + 0.5) / 80)
+    picture = (0.5 + 0.4 * np.sin(7 * x) * np.cos(5 * y)).astype(np.float32)
+    warp = WarpMap(device, Grid(24, 16))
+    warp.set(waves((24, 16), 0.03))
+    sampler = Sampler(device)
+    for factor in (0.5, 2.0):
+        size = round(120 * factor), round(80 * factor)
+        found = sampler.apply(warp, picture, size, Sampling(edges="clamp"))
+        assert found.shape == size[::-1]
+        back = cv2.resize(found, (120, 80), interpolation=cv2.INTER_CUBIC)
+        assert np.abs(back - sampler.apply(warp, picture, None, Sampling(edges="clamp")))[4:-4, 4:-4].max() < 0.01
+
+
+def test_what_cannot_be_looked_up_says_so(device: Device) -> None:
+    warp, sampler = WarpMap(device, Grid(16, 16)), Sampler(device)
+    with pytest.raises(SamplingError, match="float64"):
+        sampler.apply(warp, np.zeros((8, 8)))
+    with pytest.raises(SamplingError, match="channels"):
+        sampler.apply(warp, np.zeros((8, 8, 5), np.uint8))
+    with pytest.raises(SamplingError, match="map of shape"):
+        GivenMap(device, np.zeros((8, 8)))
