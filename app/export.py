@@ -25,7 +25,7 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.timeline import Sentinel, Timeline, frame_positions
 from solver.context import Device
-from solver.sampling import Sampler, Sampling
+from solver.sampling import GivenMap, Sampler, Sampling
 
 
 @dataclass(frozen=True)
@@ -211,8 +211,9 @@ class _Export:
         """The densities as 8-bit colours, in the result's size."""
         channels = 4 if self.job.picture.has_alpha else 3
         pixels = (np.clip(values[..., :channels], 0, 1) * 255 + 0.5).astype(np.uint8)
-        still = np.zeros((8, 8, 2), np.float32)
-        return pixels if self.size == pixels.shape[1::-1] else self.sampler.apply(still, pixels, self.size)
+        if self.size == pixels.shape[1::-1]:
+            return pixels
+        return self.sampler.apply(GivenMap(self.device, np.zeros((8, 8, 2))), pixels, self.size)
 
     def _advance(self) -> None:
         self.replay.advance()
@@ -272,7 +273,8 @@ def apply_map(device: Device, given: Displacement, picture: Picture, recipe: Rec
     values = cropped(given.fitted(picture.width, picture.height)).values
     sampler = Sampler(device)
     try:
-        pixels = sampler.apply(values, picture.pixels, result_size(recipe, picture), Sampling(edges=recipe.edges))
+        size, how = result_size(recipe, picture), Sampling(edges=recipe.edges)
+        pixels = sampler.apply(GivenMap(device, values), picture.pixels, size, how)
     finally:
         sampler.release()
     return picture.with_pixels(pixels)
