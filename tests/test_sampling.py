@@ -29,7 +29,7 @@ def waves(size: tuple[int, int], amplitude: float, seed: int = 0) -> np.ndarray:
 
 def shift(size: tuple[int, int], x: float, y: float) -> np.ndarray:
     """A displacement by (x, y) pixels everywhere."""
-    return np.tile(np.float32([x, y]) / np.float32(max(size)), (size[1], size[0], 1))
+    return np.tile(np.array([x, y], np.float32) / max(size), (size[1], size[0], 1))
 
 
 def srgb_to_linear(code: np.ndarray) -> np.ndarray:
