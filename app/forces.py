@@ -182,9 +182,10 @@ class FieldForce(_Force):
 class GradientForce(_Force):
     """The gradient of a picture, or of a segmentation of it, blurred. Strength: that across a straight, full edge.
 
-    By itself an incompressible fluid balances a gradient by pressure and does not move at all. (In the paper it moves
-    because few Jacobi sweeps leave most of the divergence.) So either the force acts only `within` a window, whose
-    border makes it push, or it `swells`: then it is a velocity, lengths / s, whose divergence the projection leaves in.
+    By itself an incompressible fluid balances a gradient by pressure and stands still; where the viscosity varies, only
+    the splitting into stages moves it a little. (In the paper it moves because few Jacobi sweeps leave most of the
+    divergence.) So either the force acts only `within` a window, whose border makes it push, or it `swells`: then it is
+    a velocity, lengths / s, whose divergence the projection leaves in, and what is chosen grows.
 
     Attributes:
         picture: "source" or a file.

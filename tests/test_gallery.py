@@ -1,0 +1,94 @@
+"""The gallery: what it measures, what it shows, and what Figures 1, 5 and 6 must reach."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import gallery
+from app.errors import UserError
+from app.gallery import Studio, arrows, contact_sheet, load, shades, sharpness, spline_warp
+from app.pictures import read_picture
+from app.progress import Progress
+from app.sampling import Pictures
+from solver.context import Device
+from solver.grid import Grid
+
+
+@pytest.fixture
+def studio(device: Device, tmp_path: Path):
+    made = Studio(device, tmp_path, Progress())
+    yield made
+    made.release()
+
+
+def test_the_reference_spline_interpolates_and_shifts() -> None:
+    y, x = np.mgrid[0:40, 0:60]
+    wave = 0.5 + 0.4 * np.sin(x / 5) * np.cos(y / 6)
+    still = np.zeros((40, 60, 2))
+    assert spline_warp(wave, still) == pytest.approx(wave, abs=1e-12)
+    shifted = spline_warp(wave, np.broadcast_to([2.5 / 60, 0], (40, 60, 2)))
+    exact = 0.5 + 0.4 * np.sin((x + 2.5) / 5) * np.cos(y / 6)
+    assert shifted[5:-5, 5:-8] == pytest.approx(exact[5:-5, 5:-8], abs=1e-4)
+    fine = spline_warp(wave, np.zeros((120, 180, 2)))
+    assert fine[5:-5, 5:-5] == pytest.approx(wave[5:-5, 5:-5], abs=0.01), "the mean over a pixel"
+
+
+def test_blur_takes_sharpness_away() -> None:
+    noise = np.random.default_rng(0).random((50, 50))
+    blurred = (noise + np.roll(noise, 1, 0) + np.roll(noise, 1, 1) + np.roll(noise, (1, 1), (0, 1))) / 4
+    assert sharpness(blurred) < 0.5 * sharpness(noise)
+
+
+def test_the_parts_of_a_sheet() -> None:
+    picture = np.full((50, 100, 3), 200, np.uint8)
+    field = np.zeros((25, 50, 2))
+    field[10:15, 20:30] = [1, 0]
+    drawn = arrows(picture, field)
+    assert drawn.shape == picture.shape
+    assert (drawn[20:30, 40:60, 0] > drawn[20:30, 40:60, 1] + 50).any(), "red arrows where the force is"
+    assert np.ptp(drawn[:, :20].reshape(-1, 3), axis=0).max() == 0, "and none where it is not"
+    grey = shades(np.geomspace(1e-3, 1, 25 * 50).reshape(25, 50), picture)
+    assert (grey.min(), grey.max(), grey.shape) == (0, 255, picture.shape)
+    sheet = contact_sheet("title", [("a", picture), ("b", drawn)])
+    assert sheet.shape == (gallery.PANEL + 4 * gallery.MARGIN, 4 * gallery.PANEL + 3 * gallery.MARGIN, 3)
+
+
+@pytest.mark.parametrize("name", sorted(set(gallery.RECIPES)))
+def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str) -> None:
+    from app.forces import build
+
+    recipe = load(name)
+    assert recipe.picture is not None
+    pictures = Pictures(read_picture(gallery.recipes_folder() / recipe.picture), gallery.recipes_folder())
+    grid = Grid.for_picture(pictures.source.width, pictures.source.height, 64)
+    assert build(recipe.force, grid, pictures, recipe.duration)
+    assert pictures.notices == []
+
+
+@pytest.mark.parametrize("name", ["figure-5", "figure-6"])
+def test_portraits_move_in_the_window_only(name: str, studio: Studio) -> None:
+    numbers = gallery.FIGURES[name](studio)
+    assert float(numbers["px outside, mean"]) < 0.25
+    assert float(numbers["px inside, most"]) > 8
+    assert float(numbers["frozen: px outside, most"]) == 0
+    assert float(numbers["frozen: px inside, most"]) > 8
+    assert float(numbers["det J"].split()[0]) > 0.2
+    written = {path.name for path in studio.folder.iterdir()}
+    assert written == {
+        f"{name}.png", f"{name}.mp4", f"{name}-freeze.png", f"{name}-freeze.mp4", f"{name}-sheet.png"
+    }  # fmt: skip
+
+
+def test_coordinates_stay_sharp_and_values_blur(studio: Studio) -> None:
+    numbers = gallery.figure_1(studio)
+    assert float(numbers["sharpness, coordinates"].rstrip("%")) >= 95
+    assert float(numbers["sharpness, density"].rstrip("%")) < 60
+
+
+def test_a_folder_that_cannot_be_made_is_told(device: Device, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match=r"Cannot write to .*file/in"):
+        gallery.make(device, tmp_path / "file" / "in", Progress())
