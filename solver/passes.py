@@ -44,13 +44,22 @@ class Pass:
                 if member.gl_type == 0x8B5E:  # GL_SAMPLER_2D
                     self._units[name] = member.value = len(self._units)
 
-    def __call__(self, target: Target, *, add: bool = False, region: Region | None = None, **inputs: object) -> None:
+    def __call__(
+        self,
+        target: Target,
+        *,
+        add: bool = False,
+        region: Region | None = None,
+        vertices: int = 3,
+        **inputs: object,
+    ) -> None:
         """Draw into `target`.
 
         Args:
             target: a field, or several fields of one size.
             add: add to what the target holds (float blending) instead of replacing it.
             region: (x, y, width, height) in texels, to draw only there; clipped to the target.
+            vertices: of the triangles, where the pass has a vertex shader of its own.
             inputs: the shader's uniforms without their `u_`.
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
@@ -69,7 +78,7 @@ class Pass:
             ctx.enable_only(moderngl.BLEND)
             ctx.blend_func = moderngl.ONE, moderngl.ONE
         framebuffer.use()
-        self._vertices.render(moderngl.TRIANGLES, vertices=3)
+        self._vertices.render(moderngl.TRIANGLES, vertices=vertices)
         if add:
             ctx.enable_only(moderngl.NOTHING)
         if region is not None:

@@ -30,6 +30,11 @@ def read_shader(path: str) -> str:
         raise ShaderError(f"shaders/{path} does not exist") from error
 
 
+def shader_exists(path: str) -> bool:
+    """True if there is a `shaders/<path>`."""
+    return resources.files("shaders").joinpath(*PurePosixPath(path).parts).is_file()
+
+
 def _flatten(path: str, seen: set[str]) -> list[tuple[str, str, int]]:
     """The lines of a shader with its includes laid in once each, as (text, file, line number)."""
     lines: list[tuple[str, str, int]] = []
@@ -59,12 +64,13 @@ def declared_reads(path: str) -> int:
 
 
 def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, object]) -> moderngl.Program:
-    """The full-screen program of a fragment shader.
+    """The program of a fragment shader: over the whole screen, or with the vertex shader of the same name beside it.
 
     Raises:
         ShaderError: if it does not compile; names the file and the line, includes resolved.
     """
-    vertex_source, _ = assemble(FULL_SCREEN_VERTEX, {})
+    own = fragment.replace(".frag", ".vert")
+    vertex_source, _ = assemble(own if shader_exists(own) else FULL_SCREEN_VERTEX, {})
     source, table = assemble(fragment, defines)
 
     def place(match: re.Match[str]) -> str:

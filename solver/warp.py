@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from solver.context import Device
 from solver.field import Field, FieldError
+from solver.forward import ForwardMap
 from solver.grid import Grid
+from solver.points import draw_at
 from solver.reduce import Reduction
 
 Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
 CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last fold
-_ROW = 256  # points in a row of the texture that lists them
 STEEPEST = 1.0  # largest |grad D| that the cubic carries well
 
 
@@ -208,6 +210,7 @@ class WarpMap:
 
     def release(self) -> None:
         """Free the textures."""
+        self.forward.release()
         for thing in (self._near, self._base, self._trace, self._largest, self._total, *self._composed.values()):
             thing.release()
         self._find_largest.release()
@@ -242,7 +245,12 @@ class WarpMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
-        return at_points(self.device, points, self.grid.extent, "warp/compose.frag", **self._parts())
+        return draw_at(self.device, points, self.grid.extent, "warp/compose.frag", **self._parts())
+
+    @cached_property
+    def forward(self) -> ForwardMap:
+        """The inverse: where points of the original go."""
+        return ForwardMap(self)
 
     def statistics(self) -> MapStatistics:
         """How the whole map distorts; waits for the GPU."""
@@ -279,23 +287,6 @@ class WarpMap:
     def _changed(self) -> None:
         self.version += 1
         self._fresh.clear()
-
-
-def at_points(
-    device: Device, points: np.ndarray, domain: tuple[float, float], shader: str, **inputs: Any
-) -> np.ndarray:
-    """What a shader that includes `lib/place.glsl` draws at points (n, 2), in longer sides: float32 (n, 2)."""
-    points = np.asarray(points, np.float64).reshape(-1, 2)
-    rows = max(1, -(-len(points) // _ROW))
-    listed = np.zeros((rows * _ROW, 2))
-    listed[: len(points)] = points / domain
-    places = device.upload(listed.reshape(rows, _ROW, 2).astype(np.float32), "points")
-    found = device.field(places.size, 2, "found at points")
-    device.pass_(shader, POINTS=1)(found, points=places, **inputs)
-    values = found.get().reshape(-1, 2)[: len(points)]
-    places.release()
-    found.release()
-    return values
 
 
 def _runge_kutta(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 import reference
 from flows import VORTEX_TIME, vortex, vortex_faces
-
 from solver.context import Device
 from solver.field import FieldError
 from solver.grid import Grid
@@ -186,3 +186,33 @@ def test_restoring_makes_the_identity_under_the_brush_without_folds(device: Devi
     np.testing.assert_allclose(warp.read()[far > 0.32], before[far > 0.32], atol=2e-3)
     warp.reset()
     assert not warp.read().any()
+
+
+def test_forward_map_follows_the_particles(device: Device) -> None:
+    """Half a turn of the vortex: points of the original are found where particles have gone, and back."""
+    grid = Grid(64, 64)
+    warp = WarpMap(device, grid)
+    end, steps = 1.5, 150
+    for step in range(steps):
+        warp.advance_prescribed(vortex, end / steps, step * end / steps)
+    x, y = grid.centres()
+    true_x, true_y = reference.follow(vortex, x, y, 0.0, end, 200)
+    found = warp.forward.read()
+    error = np.hypot(x + found[..., 0] - true_x, y + found[..., 1] - true_y)
+    assert error.mean() < 0.003 * grid.h
+    assert error.max() < 0.05 * grid.h
+    points = np.stack([x, y], axis=-1).reshape(-1, 2)
+    gone = points + warp.forward.at(points)
+    np.testing.assert_allclose(gone.reshape(64, 64, 2), np.stack([x, y], axis=-1) + found, atol=1e-6)
+    assert np.abs(gone + warp.at(gone) - points).mean() < 1e-3 * grid.h
+
+
+def test_forward_map_of_a_folded_one_is_finite(device: Device) -> None:
+    grid = Grid(32, 20)
+    warp = WarpMap(device, grid)
+    warp.set(smooth(np.random.default_rng(8), grid.size, 0.4))
+    assert warp.statistics().folds > 0
+    found = warp.forward.read()
+    x, _ = grid.centres()
+    assert np.isfinite(found).all()
+    assert (np.abs(x + found[..., 0] - 0.5) <= 0.5 + 1e-6).all()

@@ -11,6 +11,11 @@
 // Defines: WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_SAMPLES, MOST_SAMPLES; SINGLE; PREPARED;
 // OPAQUE if the picture has no alpha; LINEAR_LIGHT to encode; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA.
 // reads: 69
+#ifndef TAPS
+#define TAPS 4
+#define LEAST_SAMPLES 2
+#define MOST_SAMPLES 8
+#endif
 #include "lib/srgb.glsl"
 uniform sampler2D u_source;
 uniform sampler2D u_raw;

@@ -1,0 +1,35 @@
+// Invert: F(y) = x - y with x + D(x) = y, by Newton's method from a guess.
+// u_displacement (D), u_guess (F): longer sides, over the same domain; u_extent: its width and height, longer sides;
+// y: see lib/place.glsl.
+// reads: 113
+#include "lib/displacement.glsl"
+#include "lib/place.glsl"
+uniform sampler2D u_displacement;
+uniform sampler2D u_guess;
+uniform vec2 u_extent;
+layout(location = 0) out vec2 out_displacement;
+
+const int ROUNDS = 7;
+const float FARTHEST = 2.0;  // texels that one round may go
+
+void main() {
+    vec2 place = fragment_place(), density = vec2(textureSize(u_displacement, 0)) / u_extent;
+    vec2 target = place * u_extent, found = texture(u_guess, place).rg, best = found;
+    float least = 1e30;
+    for (int round = 0; round < ROUNDS; ++round) {
+        mat2 slope;
+        // What is left over, without the rounding of the places themselves.
+        vec2 rest = found + cubic_displacement(u_displacement, (target + found) * density, slope);
+        float error = dot(rest, rest);
+        best = error < least ? found : best;
+        least = min(error, least);
+        mat2 jacobian = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
+        float determinant = jacobian[0].x * jacobian[1].y - jacobian[1].x * jacobian[0].y;
+        determinant = determinant < 0.0 ? min(determinant, -1e-4) : max(determinant, 1e-4);
+        vec2 back = vec2(jacobian[1].y * rest.x - jacobian[1].x * rest.y,
+                         jacobian[0].x * rest.y - jacobian[0].y * rest.x) / determinant;
+        back *= min(1.0, FARTHEST / max(length(back * density), 1e-20));
+        found = clamp(target + found - back, vec2(0.0), u_extent) - target;
+    }
+    out_displacement = best;
+}

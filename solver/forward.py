@@ -1,0 +1,62 @@
+"""The forward map: where every point of the original goes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.points import draw_at
+
+if TYPE_CHECKING:
+    from solver.warp import WarpMap
+
+
+class ForwardMap:
+    """The inverse of a warp map: y -> y + F(y) gives, for a point of the original, its place in the result.
+
+    Found when asked for: the map's cells are drawn as triangles where they are looked up, which gives every point a
+    start on the right branch however far the map has been stirred, and Newton's method does the rest. Where the map is
+    folded one of the branches is taken; a point that is looked up nowhere keeps the nearest place that was tried.
+    """
+
+    def __init__(self, warp: WarpMap) -> None:
+        self._warp = warp
+        self._guess = warp.device.field(warp.grid.size, 2, "forward map, guess")
+        self._guessed = -1
+
+    def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
+        """The displacement F at the pixel centres of a picture of `size`, by default the grid's.
+
+        Returns:
+            float32 (height, width, 2), longer sides.
+        """
+        field = self._warp.device.field(size or self._warp.grid.size, 2, "forward map, to read")
+        invert = self._warp.device.pass_("warp/invert.frag")
+        invert(field, **self._inputs(), origin=(0.0, 0.0), step=field.texel)
+        displacement = field.get()
+        field.release()
+        return displacement
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """The displacement F at points (n, 2) of the original, in longer sides: float32 (n, 2)."""
+        return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **self._inputs())
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return self._guess.nbytes
+
+    def release(self) -> None:
+        """Free the texture."""
+        self._guess.release()
+
+    def _inputs(self) -> dict[str, Any]:
+        warp = self._warp
+        if self._guessed != warp.version:
+            self._guess.clear()
+            cells = (warp.grid.nx + 1) * (warp.grid.ny + 1)
+            scatter = warp.device.pass_("warp/scatter.frag")
+            scatter(self._guess, vertices=6 * cells, displacement=warp.composed(1), extent=warp.extent)
+            self._guessed = warp.version
+        return {"displacement": warp.composed(), "guess": self._guess, "extent": warp.extent}

@@ -1,0 +1,26 @@
+"""Drawing at points out of a list instead of on a lattice."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from solver.context import Device
+
+_ROW = 256  # points in a row of the texture that lists them
+
+
+def draw_at(device: Device, points: np.ndarray, domain: tuple[float, float], shader: str, **inputs: Any) -> np.ndarray:
+    """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, 2)."""
+    points = np.asarray(points, np.float64).reshape(-1, 2)
+    rows = max(1, -(-len(points) // _ROW))
+    listed = np.zeros((rows * _ROW, 2))
+    listed[: len(points)] = points / domain
+    places = device.upload(listed.reshape(rows, _ROW, 2).astype(np.float32), "points")
+    found = device.field(places.size, 2, "found at points")
+    device.pass_(shader, POINTS=1)(found, points=places, **inputs)
+    values = found.get().reshape(-1, 2)[: len(points)]
+    places.release()
+    found.release()
+    return values
