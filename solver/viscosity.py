@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +28,9 @@ class Plan:
     """How much is solved: chosen once for each viscosity and time step, see `plan_for`.
 
     Attributes:
-        grids: start on nested grids; without them the sweeps begin with v* itself, and there are no steps.
-        nested: multigrid cycles on each coarser grid while the start is carried up through them.
-        steps: conjugate gradient steps after that, each with one multigrid cycle.
+        grids: correct v* on nested grids; without them, and without all that follows, it is only smoothed.
+        nested: multigrid cycles on each coarser grid while that correction is carried up through them.
+        steps: conjugate gradient steps after v* and that correction, each with one multigrid cycle.
         sweeps: smoothing sweeps before and after the coarser grids: (on the finest, on the others).
         stiff: dt mu / h^2 above which patches of fluid are moved as rigid pieces too; 0: none are.
     """
@@ -44,13 +45,15 @@ class Plan:
 def plan_for(least: float, largest: float) -> Plan:
     """The plan for dt mu / h^2 between `least` and `largest`; the errors are for velocities smooth on the grid's scale.
 
-    Barely viscous: two sweeps, below 0.1 %. Uniform: nested grids alone, below 1 %. Varying: two steps as well, about 1 %
-    where the viscosity varies a hundredfold and 5 % where it varies 1e5-fold (thin lines of a few cells: 3 and 10 %).
+    Barely viscous: two sweeps, below 0.1 %. Uniform: nested grids, below 1 %. Varying: two steps as well, 1 % where the
+    viscosity varies a hundredfold and 5 % where it varies 1e5-fold (lines of a few cells: 3 and 12 %).
     """
     if largest <= 0.05:
-        return Plan(grids=False, steps=0, sweeps=(2, 1))
+        return Plan(grids=False)
     if largest <= 3.0 * least:
-        return Plan(nested=0 if largest <= 0.5 else 1 if largest <= 30.0 else 2, steps=0, sweeps=(2, 1))
+        if largest <= 10.0:
+            return Plan(nested=0, steps=0, sweeps=(2, 1))
+        return Plan(nested=1 if largest <= 50.0 else 2, steps=0, sweeps=(2, 1))
     # Rigid pieces pay only where they are far stiffer than what is around them.
     return Plan(stiff=max(100.0, math.sqrt(least * largest)) if largest > 300.0 * least else 0.0)
 
@@ -66,7 +69,7 @@ class Pair:
     def fields(self) -> tuple[Field, Field]:
         return self.u, self.v
 
-    def inputs(self, name: str = "") -> dict[str, object]:
+    def inputs(self, name: str = "") -> dict[str, Any]:
         """The pair as a pass's inputs `<name>u` and `<name>v`."""
         return {f"{name}u": self.u, f"{name}v": self.v}
 
@@ -108,15 +111,15 @@ class Level:
         }
         self.right = Pair(device, ringed, f"{label} right-hand side")
         self.faces = DoublePair(device, ringed, f"{label} faces")
-        self.defines: dict[str, object] = {"FINEST": 1} if depth == 0 else {}
+        self.defines: dict[str, Any] = {"FINEST": 1} if depth == 0 else {}
 
     @property
-    def matrix(self) -> dict[str, object]:
+    def matrix(self) -> dict[str, Any]:
         """The inputs of shaders/viscosity/block.glsl."""
         return {name: field for name, field in self.packed.items() if name != "open"}
 
     @property
-    def inverse(self) -> dict[str, object]:
+    def inverse(self) -> dict[str, Any]:
         """1 / diagonal, as inputs."""
         return {name: self.packed[name] for name in ("inverse_u", "inverse_v")}
 
@@ -144,8 +147,8 @@ class Viscosity:
         self.device = device
         self.size = size
         self.plan = Plan()
-        self._slip: dict[str, object] = {}
-        self._walls: dict[str, object] = {}
+        self._slip: dict[str, Any] = {}
+        self._walls: dict[str, Any] = {}
         self.levels: list[Level] = []
         while not self.levels or not self.levels[-1].is_coarsest:
             self.levels.append(Level(device, size, len(self.levels)))
@@ -171,7 +174,7 @@ class Viscosity:
         self._slip = {"NO_SLIP": 1} if walls.slip == "none" else {}
         self._walls = {"wall_speed": walls.speed} if any(walls.speed) and self._slip else self._resting_walls
         dt_over_h2 = dt * max(self.size) ** 2
-        inputs: dict[str, object] = {"viscosity": viscosity, "solid": solid, "dt_over_h2": dt_over_h2}
+        inputs: dict[str, Any] = {"viscosity": viscosity, "solid": solid, "dt_over_h2": dt_over_h2}
         stage = "viscosity/coefficients.frag"
         for level in self.levels:
             self.device.pass_(stage)(level.cells, **inputs)
@@ -207,7 +210,7 @@ class Viscosity:
         self.device.pass_("viscosity/store.frag")(velocity.write, **solution.inputs())
         velocity.swap()
 
-    def _load(self, velocity: Field, target: Pair, walls: dict[str, object]) -> None:
+    def _load(self, velocity: Field, target: Pair, walls: dict[str, Any]) -> None:
         finest = self.levels[0]
         load = self.device.pass_("viscosity/load.frag", **self._slip, **finest.defines)
         load(target.fields, region=finest.region, velocity=velocity, **finest.matrix, **walls)
@@ -226,7 +229,8 @@ class Viscosity:
         yield self._nested_grids
         if self._stiff_parts.count:
             yield self._rigid_motions
-        for _ in range(self.plan.steps):
+        # With one grid the solution is exact by now.
+        for _ in range(self.plan.steps if len(self.levels) > 1 else 0):
             yield self._cycle_and_motions
 
     def _rigid_motions(self) -> Pair:
@@ -247,7 +251,7 @@ class Viscosity:
         """Go along z, made conjugate to the direction before, as far as the energy falls."""
         finest = self.levels[0]
         solution, residual, direction, stress = self._solution, self._residual, self._direction, self._stress
-        defines: dict[str, object] = {"FIRST": 1} if first else {}
+        defines: dict[str, Any] = {"FIRST": 1} if first else {}
         measure = self.device.pass_("viscosity/measure.frag", **finest.defines, **defines)
         measure(
             (*self._az.fields, self._products),
@@ -407,7 +411,7 @@ class Viscosity:
         return left / wanted if wanted else 0.0
 
     @property
-    def _resting_walls(self) -> dict[str, object]:
+    def _resting_walls(self) -> dict[str, Any]:
         return {"wall_speed": (0.0, 0.0, 0.0, 0.0)} if self._slip else {}
 
     @property

@@ -1,8 +1,8 @@
 // Gradients: the two factors of a step of flexible conjugate gradients, on one texel.
 // u_products: sums of r . z, z . A z and z . s, a few texels; u_before: this texel of the step before (FIRST: none).
 // p = z + beta p_before with p . A p_before = 0, and alpha the way along p to the least energy; with s = A p_before:
-// beta = -z.s / p_before.s, p.Ap = z.Az - (z.s)^2 / p_before.s, alpha = r.z / p.Ap. Out: (alpha, beta, p.Ap, 0).
-// A step that rounding has spoiled is not taken.
+// beta = -z.s / p_before.s, p.Ap = z.Az - (z.s)^2 / p_before.s, alpha = r.z / p.Ap.
+// Out: (alpha, beta, p.Ap, 0). A step that rounding has spoiled is not taken.
 // reads: 26
 uniform sampler2D u_products;
 uniform sampler2D u_before;

@@ -1,0 +1,282 @@
+"""The implicit viscous step against exact solutions, sparse direct solves and closed forms."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.fft
+from scipy import ndimage
+
+import reference
+from solver.context import Device
+from solver.params import Walls
+from solver.stiff_parts import MOST_PARTS, SMALLEST_PART, connected_parts
+from solver.viscosity import Viscosity
+
+
+class Step:
+    """A viscous step of given coefficients, as often as one likes; dt / h^2 is one unless dt is given."""
+
+    def __init__(
+        self,
+        device: Device,
+        viscosity: np.ndarray,
+        dt: float | None = None,
+        solid: np.ndarray | None = None,
+        walls: Walls | None = None,
+    ) -> None:
+        ny, nx = viscosity.shape
+        self.h = 1 / max(nx, ny)
+        self.dt = self.h**2 if dt is None else dt
+        self.walls = walls or Walls()
+        self.solid = np.zeros((ny, nx), bool) if solid is None else solid
+        # What the GPU is given, and so what the reference must be given too.
+        self.viscosity = viscosity.astype(np.float32)
+        self.device = device
+        self.solver = Viscosity(device, (nx, ny))
+        solid_field = device.upload(self.solid.astype(np.uint8) * np.uint8(255))
+        self.solver.set_coefficients(device.upload(self.viscosity), solid_field, self.dt, self.walls)
+        self.velocity = device.double_field((nx, ny), 2, "velocity")
+
+    def __call__(self, faces: np.ndarray) -> np.ndarray:
+        self.velocity.read.set(faces)
+        self.solver.diffuse(self.velocity)
+        return self.velocity.read.get().astype(np.float64)
+
+    def exact(self, faces: np.ndarray) -> np.ndarray:
+        return reference.viscous_step(
+            faces,
+            self.viscosity.astype(np.float64),
+            self.dt,
+            self.h,
+            solid=self.solid,
+            no_slip=self.walls.slip == "none",
+            speed=self.walls.speed,
+        )
+
+    def with_plan(self, **changes: Any) -> Step:
+        self.solver.plan = dataclasses.replace(self.solver.plan, **changes)
+        return self
+
+
+def error(found: np.ndarray, wanted: np.ndarray) -> float:
+    return float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+
+
+def curl(stream: np.ndarray) -> np.ndarray:
+    """Faces (ny, nx, 2) from a stream function at the (ny + 1, nx + 1) nodes, zero on the walls."""
+    x, y = np.linspace(0, 1, stream.shape[1]), np.linspace(0, 1, stream.shape[0])[:, None]
+    stream = stream * np.sin(np.pi * x) * np.sin(np.pi * y)
+    faces = np.stack([stream[1:, :-1] - stream[:-1, :-1], stream[:-1, :-1] - stream[:-1, 1:]], axis=-1)
+    return (faces / np.abs(faces).max()).astype(np.float32)
+
+
+def push(ny: int, nx: int) -> np.ndarray:
+    """A stroke of a brush."""
+    y, x = np.mgrid[: ny + 1, : nx + 1] / max(nx, ny)
+    return curl(np.exp(-((x - 0.4) ** 2 + (y - 0.35) ** 2) / 0.0072) * (2 * (y - 0.35) - (x - 0.4)))
+
+
+def vortices(ny: int, nx: int) -> np.ndarray:
+    return curl(ndimage.gaussian_filter(np.random.default_rng(2).standard_normal((ny + 1, nx + 1)), max(nx, ny) / 20))
+
+
+def noise(ny: int, nx: int) -> np.ndarray:
+    faces = np.random.default_rng(3).standard_normal((ny, nx, 2)).astype(np.float32)
+    faces[:, 0, 0] = faces[0, :, 1] = 0
+    return faces
+
+
+def mask(kind: str, ny: int, nx: int) -> np.ndarray:
+    """Masks from 0 (thin) to 1 (thick)."""
+    y, x = (np.mgrid[:ny, :nx] + 0.5) / max(nx, ny)
+    random = np.random.default_rng(1).standard_normal((ny, nx))
+    if kind == "disc":
+        return (np.hypot(x - 0.5, y - 0.45) < 0.2) * 1.0
+    if kind == "soft disc":
+        return np.clip((0.25 - np.hypot(x - 0.5, y - 0.5)) / 0.1, 0, 1)
+    if kind == "stripes":
+        return (x * 6 % 1 < 0.5) * 1.0
+    if kind in ("blobs", "soft blobs"):
+        blobs = ndimage.gaussian_filter(random, max(nx, ny) / 16)
+        blobs /= blobs.std()
+        return (blobs > 0.5) * 1.0 if kind == "blobs" else np.clip(0.8 * blobs, 0, 1)
+    if kind == "lines":
+        lines = np.abs(np.hypot(x - 0.5, y - 0.5) - 0.3) < 1.5 / max(nx, ny)
+        for angle in (0.3, 1.1, 2.2):
+            lines |= np.abs((x - 0.5) * np.sin(angle) - (y - 0.5) * np.cos(angle)) < 1.5 / max(nx, ny)
+        return lines * 1.0
+    if kind == "checkerboard":
+        return np.add(*np.mgrid[:ny, :nx]) % 2 * 1.0
+    return (random > 0) * 1.0
+
+
+@pytest.mark.parametrize(
+    ("nx", "ny", "walls", "with_solid"),
+    [
+        (8, 8, Walls(), False),
+        (9, 8, Walls("none"), True),
+        (64, 48, Walls("none", (0.3, -0.2, 1.0, 0.5)), False),
+        (53, 37, Walls(), True),
+        (40, 61, Walls("none", (0.3, -0.2, 1.0, 0.5)), True),
+    ],
+)
+def test_converges_to_the_direct_solution(device: Device, nx: int, ny: int, walls: Walls, with_solid: bool) -> None:
+    y, x = np.mgrid[:ny, :nx]
+    solid = (np.hypot(x - nx / 3, y - ny / 2) < min(nx, ny) / 6) & with_solid
+    viscosity = 10 ** (2 * np.random.default_rng(0).random((ny, nx)))
+    step = Step(device, viscosity, solid=solid, walls=walls).with_plan(steps=25)
+    found, wanted = step(noise(ny, nx)), step.exact(noise(ny, nx))
+    assert error(found, wanted) < 2e-6
+    still = solid | np.roll(solid, 1, 1)
+    assert not found[still, 0].any()
+    assert not found[:, 0, 0].any()
+
+
+@pytest.mark.parametrize("contrast", [1e2, 1e5])
+@pytest.mark.parametrize("kind", ["disc", "stripes", "blobs", "soft disc", "soft blobs", "lines"])
+def test_painted_masks_as_solved_live(device: Device, kind: str, contrast: float) -> None:
+    size = 90, 100
+    step = Step(device, contrast ** mask(kind, *size))
+    # The hardest are nearly rigid in pieces and pliant between them: lines of three cells; two blobs on one thin neck.
+    allowed = {1e2: 0.01, 1e5: 0.05} | {"lines": {1e2: 0.04, 1e5: 0.12}, "blobs": {1e5: 0.11}}.get(kind, {})
+    for faces in (push(*size), vortices(*size)):
+        assert error(step(faces), step.exact(faces)) < allowed[contrast]
+
+
+def uniform_exactly(faces: np.ndarray, k: float) -> np.ndarray:
+    """The step of uniform dt mu / h^2 = k between free-slip walls, by sines and cosines."""
+    fft: Any = scipy.fft  # its annotations are those of a dispatcher
+    ny, nx = faces.shape[:2]
+    u, v = np.zeros((2, ny, nx))
+    u[:, 1:] = fft.dct(fft.dst(faces[:, 1:, 0], 1, axis=1), axis=0)
+    v[1:] = fft.dct(fft.dst(faces[1:, :, 1], 1, axis=0), axis=1)
+    x, y = 2 * np.sin(np.pi * np.arange(nx) / 2 / nx), 2 * np.sin(np.pi * np.arange(ny) / 2 / ny)[:, None]
+    along_u, along_v, across = 1 + k * (2 * x**2 + y**2), 1 + k * (2 * y**2 + x**2), k * x * y
+    determinant = along_u * along_v - across**2
+    u, v = (along_v * u - across * v) / determinant, (along_u * v - across * u) / determinant
+    result = np.zeros(faces.shape)
+    result[:, 1:, 0] = fft.idst(fft.idct(u[:, 1:], axis=0), 1, axis=1)
+    result[1:, :, 1] = fft.idst(fft.idct(v[1:], axis=1), 1, axis=0)
+    return result
+
+
+@pytest.mark.parametrize("k", [1e-4, 0.01, 0.3, 4.0, 30.0, 300.0, 1e4, 1e6])
+def test_uniform_viscosity_as_solved_live(device: Device, k: float) -> None:
+    size = 180, 256
+    step = Step(device, np.full(size, k / 256**-2), dt=256.0**-4)
+    for faces in (push(*size), vortices(*size)):
+        wanted = uniform_exactly(faces.astype(np.float64), k)
+        found = step(faces)
+        assert error(found, wanted) < 0.01
+        # Where little changes, little may be wrong, or it adds up from step to step.
+        assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted - faces) + 1e-6 * np.linalg.norm(faces)
+
+
+def test_no_viscosity_changes_nothing(device: Device) -> None:
+    step, faces = Step(device, np.zeros((20, 30))), noise(20, 30)
+    np.testing.assert_array_equal(step(faces), faces)
+
+
+@pytest.mark.parametrize("kind", ["checkerboard", "noise", "disc", "lines"])
+@pytest.mark.parametrize("least", [1e-6, 1.0, 1e5])
+def test_nothing_blows_up(device: Device, kind: str, least: float) -> None:
+    size = 40, 56
+    step, faces = Step(device, least * 1e6 ** mask(kind, *size)), noise(*size)
+    for _ in range(3):
+        before, faces = faces, step(faces)
+        assert np.linalg.norm(faces) <= 1.001 * np.linalg.norm(before)
+
+
+@pytest.mark.parametrize("thick_on_top", [False, True])
+def test_two_layer_couette(device: Device, thick_on_top: bool) -> None:
+    """Steady shear of two layers, contrast 1e5: the interface moves at mu1 / (mu1 + mu2) of the wall's speed."""
+    ny, nx, contrast = 8, 160, 1e5
+    upper, lower = (contrast, 1.0) if thick_on_top else (1.0, contrast)
+    viscosity = np.repeat([upper, lower], ny // 2)[:, None] * np.full(nx, 1e3)
+    step = Step(device, viscosity, walls=Walls("none", (0, 0, 1, 0))).with_plan(steps=12)
+    faces = np.zeros((ny, nx, 2))
+    for _ in range(6):
+        faces = step(faces)
+    interface = upper / (upper + lower)
+    depth = (np.arange(ny) + 0.5) / ny
+    wanted = np.interp(depth, [0, 0.5, 1], [1, interface, 0])
+    # In the middle of so long a box its ends are not felt.
+    np.testing.assert_allclose(faces[:, nx // 2, 0], wanted, atol=1e-5)
+
+
+def test_manufactured_step_is_of_second_order(device: Device) -> None:
+    """The vortex under mu = 10^(-2 + 2.5 (1 + sin 2 pi x sin 2 pi y)), no-slip, dt = 1."""
+
+    def velocity(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            np.sin(np.pi * x) ** 2 * np.sin(2 * np.pi * y),
+            -np.sin(2 * np.pi * x) * np.sin(np.pi * y) ** 2,
+        )
+
+    def viscosity(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return 10 ** (-2 + 2.5 * (1 + np.sin(2 * np.pi * x) * np.sin(2 * np.pi * y)))
+
+    def stress(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        mu, stretch = viscosity(x, y), np.pi * np.sin(2 * np.pi * x) * np.sin(2 * np.pi * y)
+        shear = (
+            2
+            * np.pi
+            * (np.sin(np.pi * x) ** 2 * np.cos(2 * np.pi * y) - np.cos(2 * np.pi * x) * np.sin(np.pi * y) ** 2)
+        )
+        return 2 * mu * stretch, mu * shear, -2 * mu * stretch
+
+    def derivative(values: list[np.ndarray], e: float) -> np.ndarray:
+        return (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * e)
+
+    def right_hand_side(x: np.ndarray, y: np.ndarray, component: int) -> np.ndarray:
+        e = 1e-3
+        at = (-2 * e, -e, e, 2 * e)
+        along_x = derivative([stress(x + d, y)[component] for d in at], e)
+        along_y = derivative([stress(x, y + d)[component + 1] for d in at], e)
+        return velocity(x, y)[component] - along_x - along_y
+
+    errors = []
+    for n in (24, 48, 96):
+        j, i = np.mgrid[:n, :n] / n
+        half = 0.5 / n
+        v_star = np.stack([right_hand_side(i, j + half, 0), right_hand_side(i + half, j, 1)], axis=-1)
+        wanted = np.stack([velocity(i, j + half)[0], velocity(i + half, j)[1]], axis=-1)
+        v_star[:, 0, 0] = v_star[0, :, 1] = 0
+        step = Step(device, viscosity(i + half, j + half), dt=1.0, walls=Walls("none")).with_plan(steps=20)
+        errors.append(error(step(v_star), wanted))
+    assert errors[0] / errors[1] > 2**1.9
+    assert errors[1] / errors[2] > 2**1.9
+
+
+def test_residual_says_how_well_it_was_solved(device: Device) -> None:
+    size = 48, 64
+    step, faces = Step(device, 1e2 ** mask("disc", *size)), vortices(*size)
+    before = device.upload(faces)
+    unsolved = step.solver.residual_norm(before, before)
+    step(faces)
+    live = step.solver.residual_norm(before, step.velocity.read)
+    step.with_plan(steps=20)(faces)
+    assert step.solver.residual_norm(before, step.velocity.read) < 1e-4 < live < unsolved
+
+
+def test_the_same_step_twice_is_the_same(device: Device) -> None:
+    size = 48, 64
+    step, faces = Step(device, 1e5 ** mask("blobs", *size)), vortices(*size)
+    np.testing.assert_array_equal(step(faces), step(faces))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_connected_parts_are_those_of_scipy(seed: int) -> None:
+    random = np.random.default_rng(seed).standard_normal((61, 83))
+    inside = ndimage.gaussian_filter(random, (0.5, 1, 3)[seed]) > 0
+    label: Any = ndimage.label
+    found, (wanted, count) = connected_parts(inside), label(inside)
+    sizes = np.sort(np.bincount(wanted.ravel(), minlength=count + 1)[1:])[::-1]
+    kept = sizes[:MOST_PARTS][sizes[:MOST_PARTS] >= SMALLEST_PART]
+    np.testing.assert_array_equal(np.bincount(found.ravel())[1:], kept)
+    for number in range(1, found.max() + 1):
+        assert len(np.unique(wanted[found == number])) == 1
