@@ -50,7 +50,7 @@ class ExportProcess:
         except (EOFError, OSError):
             if not self.is_done:
                 self.is_done = True
-                self.error = f"The export of {self.job.output.name} stopped unexpectedly; try a smaller size."
+                self.error = f"The export of {self.job.target.name} stopped unexpectedly; try a smaller size."
         if self.is_done:
             self._process.join(PATIENCE)
 

@@ -215,5 +215,5 @@ def _renamed(data: Any, names: dict[str, str], key: str = "") -> Any:
     return names.get(data, data) if isinstance(data, str) and key in PICTURE_KEYS else data
 
 
-PICTURE_KEYS = frozenset({"picture", "mask"})
-"""The keys of a recipe that name a picture."""
+PICTURE_KEYS = frozenset({"picture", "map", "mask"})
+"""The keys of a recipe that name a picture, or a map."""

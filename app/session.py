@@ -1,4 +1,4 @@
-"""Working on a document live: gestures become strokes, time goes on while something moves, every edit is in the history.
+"""Working on a document live: gestures become strokes, time goes on while something moves, every edit is kept.
 
 Knows the solver and no window; the clock comes in from outside, as ticks.
 """
@@ -181,7 +181,7 @@ class Session:
     def _label(self, stroke: Stroke) -> str:
         if self._tool is None:
             return stroke.tool.capitalize()
-        if self._tool.directions and self._tool.masks or stroke.tool in ("bloat", "pinch"):
+        if (self._tool.directions and self._tool.masks) or stroke.tool in ("bloat", "pinch"):
             return stroke.tool.capitalize()
         return self._tool.label
 

@@ -54,7 +54,7 @@ class Press:
 
 
 Gesture = Generator[Stroke | None, Touch | None, Stroke | None]
-"""Sent a touch, it yields the stroke so far (None while there is nothing to apply); sent None, it returns the stroke."""
+"""Sent a touch, it yields the stroke so far (None while nothing is to be applied); sent None, it returns the stroke."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,8 @@ def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callabl
 def _follow(stroke: Stroke, press: Press) -> Gesture:
     """The stroke follows the pointer; with Shift along the axis it set out on.
 
-    A pointer that is faster than the fluid can be carried is followed along its path at that speed, also after it is let
-    go: on a slow machine, where there are few ticks to a movement, nothing is torn.
+    A pointer that is faster than the fluid can be carried is followed along its path at that speed, also after it is
+    let go: on a slow machine, where there are few ticks to a movement, nothing is torn.
     """
     _, x0, y0, _ = stroke.samples[0]
     path = _Path(press.extent, FASTEST * press.dt, (x0, y0))

@@ -33,7 +33,12 @@ class Browser(Dialog):
     width, height = 640, 460
 
     def __init__(
-        self, title: str, folder: Path, endings: tuple[str, ...], chosen: Callable[[Path], None], name: str | None = None
+        self,
+        title: str,
+        folder: Path,
+        endings: tuple[str, ...],
+        chosen: Callable[[Path], None],
+        name: str | None = None,
     ) -> None:
         super().__init__(title)
         self.endings = endings

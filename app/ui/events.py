@@ -1,4 +1,4 @@
-"""What a person does, as values: the editor's frame is a function of its state, a list of these, and the time passed."""
+"""What a person does, as values: the editor's frame is a function of its state, these, and the time passed."""
 
 from __future__ import annotations
 

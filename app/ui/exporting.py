@@ -170,11 +170,11 @@ class Exports:
             if process.error:
                 self.messages.warn(process.error)
             elif not process.cancelled:
-                self.messages.done(f"Exported {process.job.output.name} to {process.job.output.parent}")
+                self.messages.done(f"Exported {process.job.target.name} to {process.job.target.parent}")
             return
         with ui.floating("exporting", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
             imgui.begin_group()
-            ui.text(f"Exporting {process.job.output.name}", size=14)
+            ui.text(f"Exporting {process.job.target.name}", size=14)
             corner, width = imgui.get_cursor_screen_pos(), ui.px(280)
             lines = imgui.get_window_draw_list()
             high = ImVec2(corner.x + width, corner.y + ui.px(5))

@@ -118,10 +118,10 @@ class Files:
         if self._waiting is None or not self._waiting[0].ready(0):
             return
         (dialog, chosen), self._waiting = self._waiting, None
-        answer = dialog.result()
-        answer = answer[0] if isinstance(answer, list) and answer else answer
-        if answer:
-            chosen(Path(answer))
+        answer: str | list[str] = dialog.result()
+        name = answer if isinstance(answer, str) else next(iter(answer), "")
+        if name:
+            chosen(Path(name))
 
     def _folder(self) -> Path:
         folder = Path(self.editor.preferences.folder or Path.home())
@@ -134,7 +134,9 @@ class Files:
             from imgui_bundle import portable_file_dialogs as dialogs
 
             patterns = " ".join(f"*{ending}" for ending in endings)
-            dialog = dialogs.open_file(title, str(self._folder()), ["Pictures and projects", patterns, "All files", "*"])
+            dialog = dialogs.open_file(
+                title, str(self._folder()), ["Pictures and projects", patterns, "All files", "*"]
+            )
             self._waiting = (dialog, chosen)
         else:
             self.editor.dialogs.append(Browser(title, self._folder(), endings, chosen))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
+from typing import Any
 
 from imgui_bundle import imgui
 
 Points = list[tuple[float, float]]
 
-# M x y, L x y: move, line. A cx cy r from to: an arc in degrees, clockwise from three o'clock, joined to what came before
-# it. C cx cy r: a circle of its own. D cx cy r: a filled dot. Z closes. Q cx cy x y: a quadratic curve.
+# M x y, L x y: move, line. A cx cy r from to: an arc in degrees, clockwise from three o'clock, joined to what came
+# before it. C cx cy r: a circle of its own. D cx cy r: a filled dot. Z closes. Q cx cy x y: a quadratic curve.
 PATHS = {
     "push": "M3 17 Q8 17 10.5 13.5 Q13 10 19 10 M15.2 6 L19.4 10 L15.2 14 M3 11 Q6.5 11 8.2 8.2 M3 21.5 Q13 21.5 15 18",
     "curve": "M4 19 Q5 6 12 12 Q19 18 19.5 5.5 M16 8.4 L19.6 4.6 L22 9.2 D4 19 1.7",
@@ -90,10 +91,12 @@ def _shape(name: str) -> tuple[list[tuple[Points, bool]], list[tuple[float, floa
                     a, b, c = (1 - t) ** 2, 2 * t * (1 - t), t * t
                     here.append((a * x0 + b * x1 + c * x2, a * y0 + b * y1 + c * y2))
             case "A":
-                here += _arc(*numbers)
+                x, y, radius, start, end = numbers
+                here += _arc(x, y, radius, start, end)
             case "C":
                 finish()
-                lines.append((_arc(*numbers[:3], 0, 360)[:-1], True))
+                x, y, radius = numbers
+                lines.append((_arc(x, y, radius, 0, 360)[:-1], True))
             case "D":
                 finish()
                 dots.append((numbers[0], numbers[1], numbers[2]))
@@ -116,7 +119,7 @@ def draw(
     k = size / 24
     lines, dots = _shape(name)
     for points, closed in lines:
-        places = [imgui.ImVec2(x + px * k, y + py * k) for px, py in points]
+        places: list[Any] = [imgui.ImVec2(x + px * k, y + py * k) for px, py in points]
         if closed and name in FILLED:
             target.add_convex_poly_filled(places, colour)
         flags = imgui.ImDrawFlags_.closed if closed else 0

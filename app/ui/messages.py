@@ -92,4 +92,4 @@ class Messages:
         return height
 
     def _add(self, message: Message) -> None:
-        self.shown = [other for other in self.shown if other.text != message.text][-(MOST - 1) :] + [message]
+        self.shown = [*[other for other in self.shown if other.text != message.text][-(MOST - 1) :], message]

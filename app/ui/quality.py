@@ -58,6 +58,6 @@ class Quality:
         editor.preferences.grid = coarser[-1]
         editor.preferences.save()
         editor.messages.say(
-            f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {coarser[-1]} cells instead of {now}. "
-            "Quality in the inspector changes it."
+            f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {coarser[-1]} cells instead "
+            f"of {now}. Quality in the inspector changes it."
         )

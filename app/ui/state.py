@@ -50,7 +50,7 @@ class State:
     """
 
     tool_name: str = "push"
-    brush: BrushSettings = BrushSettings()
+    brush: BrushSettings = field(default_factory=BrushSettings)
     opposite: dict[str, bool] = field(default_factory=dict)
     overlays: dict[str, Overlay] = field(default_factory=_overlays)
     inspector: bool = True

@@ -65,7 +65,9 @@ class Ui:
             imgui.end()
 
     @contextmanager
-    def floating(self, name: str, x: float, y: float, pivot: tuple[float, float], alpha: float = 0.94) -> Iterator[None]:
+    def floating(
+        self, name: str, x: float, y: float, pivot: tuple[float, float], alpha: float = 0.94
+    ) -> Iterator[None]:
         """A small panel that lies on the canvas and is as large as what is in it."""
         imgui.set_next_window_pos(ImVec2(x, y), imgui.Cond_.always, ImVec2(*pivot))
         imgui.set_next_window_bg_alpha(alpha)
@@ -168,7 +170,9 @@ class Ui:
         corner = imgui.get_cursor_screen_pos()
         clicked = imgui.invisible_button(label, size)
         hovered, held, focused = imgui.is_item_hovered(), imgui.is_item_active(), imgui.is_item_focused()
-        ground = palette.accent if primary else palette.pressed if held else palette.hover if hovered else palette.raised
+        ground = (
+            palette.accent if primary else palette.pressed if held else palette.hover if hovered else palette.raised
+        )
         draw = imgui.get_window_draw_list()
         alpha = imgui.get_style().alpha * (0.85 if primary and (hovered or held) else 1.0)
         draw.add_rect_filled(corner, corner + size, packed(ground, alpha), self.px(6))
@@ -269,7 +273,7 @@ class Ui:
         key: str = "",
         more: str = "",
     ) -> Slid:
-        """A slider with its label and value inside; Ctrl+click types a number, a double click goes back to `default`."""
+        """A slider with its label and value inside; Ctrl+click types a number, a double click takes the default."""
         palette = self.palette
         across = imgui.get_content_region_avail().x if width < 0 else self.px(width)
         corner = imgui.get_cursor_screen_pos()
@@ -319,7 +323,10 @@ class Ui:
         if not lit:
             return
         at = min(max(x, corner.x + self.px(2)), corner.x + size.x - self.px(2))
-        low, high = ImVec2(at - self.px(1), corner.y + self.px(5)), ImVec2(at + self.px(1), corner.y + size.y - self.px(5))
+        low, high = (
+            ImVec2(at - self.px(1), corner.y + self.px(5)),
+            ImVec2(at + self.px(1), corner.y + size.y - self.px(5)),
+        )
         draw.add_rect_filled(low, high, packed(palette.accent), self.px(1))
 
     # -- parts of the inspector -------------------------------------------------------------------------------------

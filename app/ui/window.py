@@ -38,7 +38,7 @@ _CURSORS = {
 class _Loader:
     """How moderngl finds the functions of the GL that glfw has made current."""
 
-    def load_opengl_function(self, name: str) -> int:
+    def load_opengl_function(self, name: str) -> Any:
         return glfw.get_proc_address(name) or 0
 
     def __enter__(self) -> None:
@@ -82,7 +82,8 @@ class Window:
         self._cursors: dict[str, Any] = {}
         self._must_draw = True
         self._listen()
-        self.device = Device(moderngl.create_context(require=330, context=_Loader()))
+        loader: Any = _Loader()
+        self.device = Device(moderngl.create_context(require=330, context=loader))
 
     # -- what the editor is given -----------------------------------------------------------------------------------
 
@@ -151,7 +152,8 @@ class Window:
         glfw.set_scroll_callback(handle, lambda _, dx, dy: self._add(Wheel(dx, dy, self._held)))
         glfw.set_key_callback(handle, self._key)
         glfw.set_char_callback(handle, lambda _, code: self._add(Text(chr(code))))
-        glfw.set_drop_callback(handle, lambda _, paths: self._add(Drop(tuple(paths))))
+        on_drop: Any = lambda _, paths: self._add(Drop(tuple(paths)))  # noqa: E731
+        glfw.set_drop_callback(handle, on_drop)
         glfw.set_window_focus_callback(handle, lambda _, focused: self._add(Focus(bool(focused))))
         glfw.set_window_close_callback(handle, self._close_wish)
         glfw.set_framebuffer_size_callback(handle, lambda *_: self._redraw())
@@ -258,7 +260,7 @@ def _fitting(size: tuple[int, int]) -> tuple[int, int]:
 
 def _why() -> str:
     """Why there is no window, and what to do instead."""
-    code, words = glfw.get_error()
+    _, words = glfw.get_error()
     text = words.decode("utf-8", "replace") if isinstance(words, bytes) else str(words or "no reason given")
     text = text.removeprefix("X11: ").removeprefix("GLX: ").removeprefix("Wayland: ")
     return (

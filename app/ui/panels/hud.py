@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import hypot
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
@@ -48,7 +48,7 @@ def draw(ui: Ui, editor: Editor) -> None:
 
 
 def _ring(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
-    """A faint ring as far as the brush reaches, a bright one where it is half as strong: apart when soft, one when hard."""
+    """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard."""
     hand, brush = editor.hand, editor.state.brush
     x, y = hand._start if hand.drag == "brush" else (hand.x, hand.y)
     reach = brush.radius * editor.view.longer
@@ -75,7 +75,7 @@ def _path(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
     session = editor.session
     if session.stroke is not None or len(session.path) < 2:
         return
-    points = [ImVec2(*editor.view.to_screen(*place)) for place in session.path]
+    points: list[Any] = [ImVec2(*editor.view.to_screen(*place)) for place in session.path]
     lines.add_polyline(points, packed(BLACK, 0.45), ui.px(5), 0)
     lines.add_polyline(points, packed(ui.palette.accent), ui.px(2.4), 0)
     _arrow_head(lines, points[max(len(points) - 6, 0)], points[-1], ui.px(10), ui.palette.accent)
@@ -101,7 +101,7 @@ def _forces(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
             continue
         step = max(len(stroke.samples) // 40, 1)
         places = [sample[1:3] for sample in stroke.samples[::step]]
-        points = [ImVec2(*editor.view.to_screen(*place)) for place in places]
+        points: list[Any] = [ImVec2(*editor.view.to_screen(*place)) for place in places]
         active = stroke.last_tick >= session.tick - 1
         alpha = overlay.opacity * (1.0 if active else 0.6)
         lines.add_polyline(points, packed(BLACK, 0.5 * alpha), ui.px(4.5), 0)

@@ -159,5 +159,3 @@ def _numbers(ui: Ui, editor: Editor) -> None:
     for name, value in editor.clock.milliseconds.items():
         ui.dim(f"{name.capitalize()}: {value:.1f} ms")
     ui.dim(f"{editor.device.limits.renderer.split('(')[0]}")
-
-

@@ -1,0 +1,124 @@
+"""A hand for the tests: drives the editor without a window, by the same events that a window would send."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from app.pictures import Picture
+from app.project import Project, from_picture
+from app.ui.editor import Editor
+from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
+from app.ui.files import fresh_recipe
+from app.ui.preferences import Preferences
+from solver.context import Device
+
+SIZE = (1280, 800)
+TICK = 1 / 30
+
+
+def pattern(width: int = 240, height: int = 180) -> Picture:
+    """A picture on which every shift shows: a checkerboard in colours that change all over it."""
+    y, x = np.mgrid[0:height, 0:width]
+    board = ((x // 12 + y // 12) % 2)[..., None]
+    colours = np.stack([x * 255 // width, y * 255 // height, 128 + 0 * x], axis=-1)
+    return Picture(np.where(board, colours, 255 - colours).astype(np.uint8))
+
+
+def small_project(folder: Path, grid: int = 48) -> Project:
+    """The pattern as a new project, on a coarse grid."""
+    from app.pictures import write_picture
+
+    write_picture(folder / "pattern.png", pattern())
+    recipe = fresh_recipe()
+    return from_picture(folder / "pattern.png", recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": grid})))
+
+
+class Robot:
+    """An editor with a framebuffer, and a pointer and keys to use it with."""
+
+    def __init__(self, device: Device, project: Project, size: tuple[int, int] = SIZE, scale: float = 1.0) -> None:
+        self.device, self.size, self.scale = device, size, scale
+        self.texture = device.ctx.texture(size, 4)
+        self.target = device.ctx.framebuffer([self.texture])
+        self.editor = Editor(device, project, Preferences(auto_quality=False))
+        self.mods = Mods()
+        self.frame()
+        self.frame()
+
+    def frame(self, *events: Event, count: int = 1, dt: float = TICK) -> None:
+        for number in range(count):
+            self.editor.frame(self.target, self.size, dt, events if number == 0 else (), 1.0, self.scale)
+
+    def pixels(self) -> np.ndarray:
+        """What is seen, (h, w, 3) uint8, top row first."""
+        data = np.frombuffer(self.target.read(components=3, alignment=1), np.uint8)
+        return data.reshape(self.size[1], self.size[0], 3)[::-1].copy()
+
+    def canvas(self) -> np.ndarray:
+        """The pixels of the picture alone, without what lies on the canvas's lower edge."""
+        rect = self.editor.view.rect
+        x0, y0 = round(rect.x), round(rect.y)
+        return self.pixels()[y0 : y0 + round(rect.height) - 60, x0 : x0 + round(rect.width)]
+
+    def at(self, x: float, y: float) -> tuple[float, float]:
+        """The point of the screen over a place of the picture."""
+        return self.editor.view.to_screen(x, y)
+
+    def move(self, x: float, y: float, pressure: float = 1.0) -> None:
+        self.frame(Move(x, y, pressure, self.mods))
+
+    def press(self, button: int = LEFT) -> None:
+        self.frame(Button(button, True, self.mods))
+
+    def release(self, button: int = LEFT) -> None:
+        self.frame(Button(button, False, self.mods))
+
+    def click(self, x: float, y: float, button: int = LEFT) -> None:
+        self.move(x, y)
+        self.press(button)
+        self.release(button)
+        self.frame()
+
+    def drag(
+        self, start: tuple[float, float], end: tuple[float, float], steps: int = 8, button: int = LEFT, hold: int = 0
+    ) -> None:
+        """Drag between two places of the picture."""
+        (x0, y0), (x1, y1) = self.at(*start), self.at(*end)
+        self.move(x0, y0)
+        self.press(button)
+        for step in range(1, steps + 1):
+            self.move(x0 + (x1 - x0) * step / steps, y0 + (y1 - y0) * step / steps)
+        self.frame(count=hold) if hold else None
+        self.release(button)
+
+    def key(self, chord: str) -> None:
+        """Press and let go of a key with its modifiers, written as in the table of actions."""
+        *held, key = chord.split("+") if chord not in ("+", "ctrl++") else [*chord.split("+")[:-2], "+"]
+        mods = Mods("ctrl" in held, "shift" in held, "alt" in held)
+        self.frame(Key(key, True, mods))
+        self.frame(Key(key, False, Mods()))
+
+    def hold(self, key: str, down: bool) -> None:
+        self.frame(Key(key, down, self.mods))
+
+    def type(self, text: str) -> None:
+        self.frame(Text(text))
+
+    def wheel(self, notches: float) -> None:
+        self.frame(Wheel(0, notches, self.mods))
+
+    def rest(self) -> None:
+        """Let everything come to rest."""
+        self.editor.session.settle()
+        self.frame(count=2)
+
+    def warp(self) -> np.ndarray:
+        """The displacement, (h, w, 2), longer sides."""
+        return self.editor.session.replay.warp.read()
+
+    def close(self) -> None:
+        self.editor.release()
+        self.target.release()
+        self.texture.release()

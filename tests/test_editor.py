@@ -1,0 +1,660 @@
+"""The editor without a window: every tool, key, panel and dialog, by the pixels and by what is recorded."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import project as projects
+from app.export import Job, run
+from app.pictures import read_picture
+from app.progress import Progress
+from app.recipe import Recipe
+from app.tools import TOOLS
+from app.ui.actions import ACTIONS, BY_KEY
+from app.ui.browser import Browser
+from app.ui.dialogs import Preferring, Shortcuts, Unsaved
+from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
+from app.ui.exporting import ExportDialog
+from editing import Robot, small_project
+from solver.context import Device
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    robot = Robot(device, small_project(tmp_path))
+    yield robot
+    robot.close()
+
+
+def names(robot: Robot) -> list[str]:
+    return [entry.name for entry in robot.editor.session.document.history.entries]
+
+
+# Tools --------------------------------------------------------------------------------------------------------------
+
+
+def test_push_carries_the_picture_along(robot: Robot) -> None:
+    before = robot.canvas()
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    assert names(robot) == ["Open", "Push"]
+    stroke = robot.editor.session.recipe.stroke[0]
+    assert stroke.tool == "push"
+    assert len(stroke.samples) >= 9
+    assert stroke.samples[0][1:3] == pytest.approx((0.4, 0.5), abs=1e-3)
+    assert stroke.samples[-1][1:3] == pytest.approx((0.55, 0.5), abs=1e-3)
+    warp = robot.warp()
+    height, width = warp.shape[:2]
+    # What is now under the pointer came from about where the stroke began.
+    assert warp[height // 2, round(0.54 * width)][0] == pytest.approx(-0.15, abs=0.04)
+    assert np.abs(robot.canvas().astype(int) - before).mean() > 1
+
+
+def test_alt_pushes_against_the_drag(robot: Robot) -> None:
+    robot.mods = Mods(alt=True)
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    assert robot.editor.session.recipe.stroke[0].reverse
+    warp = robot.warp()
+    assert warp[warp.shape[0] // 2, round(0.45 * warp.shape[1])][0] > 0.02
+
+
+def test_shift_keeps_a_stroke_on_its_axis(robot: Robot) -> None:
+    x0, y0 = robot.at(0.3, 0.5)
+    robot.move(x0, y0)
+    robot.press()
+    robot.mods = Mods(shift=True)
+    for step in range(1, 6):
+        robot.move(x0 + 20 * step, y0 + 7 * step)
+    robot.release()
+    ys = {sample[2] for sample in robot.editor.session.recipe.stroke[0].samples}
+    assert len(ys) == 1
+
+
+def test_shift_click_draws_a_straight_stroke(robot: Robot) -> None:
+    robot.drag((0.3, 0.4), (0.35, 0.4), steps=2)
+    robot.rest()
+    robot.mods = Mods(shift=True)
+    robot.click(*robot.at(0.6, 0.6))
+    robot.rest()
+    stroke = robot.editor.session.recipe.stroke[1]
+    assert stroke.samples[0][1:3] == pytest.approx((0.35, 0.4), abs=1e-3)
+    assert stroke.samples[-1][1:3] == pytest.approx((0.6, 0.6), abs=1e-3)
+    assert np.abs(robot.warp()).max() > 0.1
+
+
+def test_a_curve_acts_once_it_is_let_go(robot: Robot) -> None:
+    robot.key("c")
+    x, y = robot.at(0.3, 0.5)
+    robot.move(x, y)
+    robot.press()
+    for step in range(12):
+        robot.move(x + 15 * step, y + 6 * step)
+    assert np.abs(robot.warp()).max() == 0
+    robot.release()
+    robot.rest()
+    assert robot.editor.session.recipe.stroke[0].tool == "curve"
+    assert np.abs(robot.warp()).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("key", "tool"),
+    [("t", "twirl"), ("b", "bloat"), ("shift+b", "pinch")],
+)
+def test_tools_that_work_while_held(robot: Robot, key: str, tool: str) -> None:
+    robot.key(key)
+    robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=10)
+    robot.rest()
+    assert robot.editor.session.recipe.stroke[0].tool == tool
+    warp = robot.warp()
+    height, width = warp.shape[:2]
+    right = warp[height // 2, round(0.56 * width)]
+    if tool == "twirl":
+        # Turned clockwise: what is to the right of the middle came from above.
+        assert right[1] < -0.005
+    else:
+        assert (right[0] < -0.004) == (tool == "bloat")
+
+
+@pytest.mark.parametrize(("key", "low", "high"), [("v", 2.0, 1e9), ("shift+v", 0.0, 0.5)])
+def test_thicken_and_thin_act_in_the_very_next_frame(robot: Robot, key: str, low: float, high: float) -> None:
+    robot.key(key)
+    robot.frame(count=2)
+    before = robot.canvas()
+    robot.move(*robot.at(0.5, 0.5))
+    still = robot.canvas()
+    robot.press()
+    robot.frame()
+    fluid = robot.editor.session.replay.fluid.viscosity.get()
+    assert fluid[fluid.shape[0] // 2, fluid.shape[1] // 2] != pytest.approx(0.03)
+    assert np.abs(robot.canvas().astype(int) - still).max() > 3
+    robot.frame(count=8)
+    robot.release()
+    ratio = robot.editor.session.replay.fluid.viscosity.get() / 0.03
+    assert low < ratio[ratio.shape[0] // 2, ratio.shape[1] // 2] < high
+    assert before.shape == still.shape
+
+
+def test_what_is_frozen_stays(robot: Robot) -> None:
+    robot.key("f")
+    robot.drag((0.7, 0.5), (0.7, 0.55), steps=3)
+    robot.rest()
+    solid = robot.editor.session.replay.fluid.solid.get() > 127
+    assert 5 < solid.sum() < solid.size / 3
+    robot.key("p")
+    robot.drag((0.35, 0.5), (0.6, 0.5))
+    robot.rest()
+    from scipy import ndimage
+
+    inside = np.asarray(ndimage.binary_erosion(solid, iterations=2))
+    assert np.abs(robot.warp()[inside]).max() < 1e-3
+    robot.key("d")
+    assert robot.editor.state.opposite["freeze"]
+    robot.drag((0.7, 0.5), (0.7, 0.55), steps=3)
+    assert (robot.editor.session.replay.fluid.solid.get() > 127).sum() < solid.sum() / 2
+
+
+def test_smoothing_softens_a_mask(robot: Robot) -> None:
+    robot.key("v")
+    robot.key("]")
+    robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=6)
+    peak = robot.editor.session.replay.masks.thickness.read.get().max()
+    robot.key("s")
+    robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=10)
+    assert robot.editor.session.replay.masks.thickness.read.get().max() < peak
+
+
+def test_restore_brings_the_picture_back(robot: Robot) -> None:
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    before = np.abs(robot.warp()).max()
+    robot.key("r")
+    robot.key("]")
+    robot.drag((0.55, 0.5), (0.45, 0.5), steps=4, hold=20)
+    robot.rest()
+    assert np.abs(robot.warp()).max() < 0.4 * before
+
+
+def test_a_gesture_can_be_given_up(robot: Robot) -> None:
+    robot.move(*robot.at(0.4, 0.5))
+    robot.press()
+    robot.move(*robot.at(0.5, 0.5))
+    robot.key("escape")
+    robot.release()
+    assert names(robot) == ["Open"]
+    assert np.abs(robot.warp()).max() == 0
+
+
+def test_honey_comes_to_rest_by_itself_and_putty_stops_with_the_brush(robot: Robot) -> None:
+    moved = {}
+    for feel, (viscosity, drag) in {"honey": (0.03, 2.0), "putty": (0.3, 0.0)}.items():
+        robot.editor.change(feel, viscosity=viscosity, drag=drag)
+        robot.drag((0.4, 0.4), (0.5, 0.4), steps=6)
+        released = robot.warp()
+        ticks = 0
+        while robot.editor.session.coasting:
+            robot.frame()
+            ticks += 1
+            assert ticks < 300
+        moved[feel] = np.abs(robot.warp() - released).max()
+    assert moved["putty"] < 0.01
+    assert moved["honey"] > moved["putty"]
+    assert not robot.editor.wants_frame() or robot.editor.clock.settling
+
+
+# The brush and the view ---------------------------------------------------------------------------------------------
+
+
+def test_the_brush_is_set_by_keys_and_by_dragging(robot: Robot) -> None:
+    state = robot.editor.state
+    size = state.brush.radius
+    robot.key("]")
+    assert state.brush.radius > size
+    robot.key("[")
+    assert state.brush.radius == pytest.approx(size)
+    robot.key("}")
+    assert state.brush.hardness == pytest.approx(0.1)
+    robot.key("shift+[")
+    assert state.brush.hardness == 0
+    robot.key(";")
+    assert state.brush.strength == pytest.approx(0.9)
+    robot.drag((0.5, 0.5), (0.6, 0.3), button=RIGHT)
+    assert state.brush.radius > size
+    assert state.brush.hardness > 0.1
+    assert robot.editor.session.recipe.stroke == ()
+
+
+def test_the_wheel_zooms_at_the_pointer(robot: Robot) -> None:
+    place = (0.3, 0.4)
+    point = robot.at(*place)
+    robot.move(*point)
+    robot.wheel(4)
+    assert robot.editor.view.to_picture(*point) == pytest.approx(place, abs=1e-6)
+    zoom = robot.editor.view.zoom
+    assert zoom is not None
+    assert zoom > robot.editor.view.fit_zoom * 1.5
+    robot.key("0")
+    assert robot.editor.view.zoom is None
+    robot.key("ctrl+1")
+    assert robot.editor.view.percent == pytest.approx(100)
+
+
+def test_panning_while_a_tool_is_in_hand(robot: Robot) -> None:
+    robot.key("ctrl+1")
+    for button, space in ((MIDDLE, False), (0, True)):
+        centre = robot.editor.view.centre
+        if space:
+            robot.hold("space", True)
+        robot.drag((0.5, 0.5), (0.6, 0.5), button=button)
+        if space:
+            robot.hold("space", False)
+        assert robot.editor.view.centre != centre
+    assert not robot.editor.session.playing
+    assert robot.editor.session.recipe.stroke == ()
+
+
+def test_before_and_split(robot: Robot) -> None:
+    clean = robot.canvas()
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.move(900, 20)
+    robot.frame(count=2)
+    warped = robot.canvas()
+    robot.hold("\\", True)
+    robot.frame()
+    same = np.abs(robot.canvas().astype(int) - clean).mean()
+    assert same < 1 < np.abs(warped.astype(int) - clean).mean()
+    robot.hold("\\", False)
+    robot.key("y")
+    robot.drag((0.5, 0.3), (0.8, 0.3))
+    assert robot.editor.state.split == pytest.approx(0.8, abs=0.02)
+    assert names(robot) == ["Open", "Push"]
+
+
+@pytest.mark.parametrize("key", ["1", "2", "3", "4", "5"])
+def test_overlays_show_something(robot: Robot, key: str) -> None:
+    robot.key("f")
+    robot.drag((0.7, 0.5), (0.7, 0.55), steps=2)
+    robot.key("v")
+    robot.drag((0.3, 0.6), (0.3, 0.6), steps=2, hold=6)
+    robot.key("p")
+    robot.drag((0.4, 0.3), (0.55, 0.3))
+    robot.editor.session.pause()
+    robot.move(900, 20)
+    robot.frame(count=2)
+    without = robot.canvas().astype(int)
+    robot.key(key)
+    robot.frame()
+    assert np.abs(robot.canvas() - without).max() > 20
+    robot.key(key)
+    robot.frame()
+    assert np.abs(robot.canvas() - without).max() <= 1
+
+
+# Time ---------------------------------------------------------------------------------------------------------------
+
+
+def test_scrubbing_both_ways_is_exact(robot: Robot) -> None:
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    session = robot.editor.session
+    end, last = session.end, robot.warp()
+    robot.key("home")
+    robot.rest()
+    assert session.tick == 0
+    assert np.abs(robot.warp()).max() == 0
+    robot.key(".")
+    assert session.tick == 1
+    robot.key("end")
+    robot.rest()
+    assert session.tick == end
+    assert np.array_equal(robot.warp(), last)
+    robot.key(",")
+    robot.rest()
+    assert session.tick == end - 1
+
+
+def test_space_plays_the_recording(robot: Robot) -> None:
+    robot.drag((0.4, 0.5), (0.5, 0.5))
+    robot.rest()
+    end = robot.editor.session.end
+    robot.key("space")
+    assert robot.editor.session.playing
+    for _ in range(3 * end):
+        robot.frame()
+    assert robot.editor.session.tick == end
+    assert not robot.editor.session.playing
+
+
+def test_painting_goes_on_from_anywhere(robot: Robot) -> None:
+    robot.drag((0.3, 0.5), (0.45, 0.5))
+    robot.rest()
+    robot.drag((0.6, 0.5), (0.75, 0.5))
+    robot.rest()
+    session = robot.editor.session
+    whole = session.recipe
+    session.seek(whole.stroke[0].last_tick + 2)
+    robot.rest()
+    robot.drag((0.3, 0.3), (0.4, 0.3))
+    robot.rest()
+    assert len(session.recipe.stroke) == 2
+    assert robot.editor.messages.shown
+    robot.key("ctrl+z")
+    assert session.recipe == whole
+
+
+def test_the_amount_slider_follows_the_way_the_picture_came(robot: Robot) -> None:
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    rect = robot.editor.layout.timebar
+    x, y = rect.right - 90, rect.y + 28
+    robot.move(x, y)
+    robot.press()
+    robot.move(x - 2, y)
+    robot.release()
+    robot.rest()
+    assert 0.3 < robot.editor.session.tick / robot.editor.session.end < 0.7
+
+
+# Undo ---------------------------------------------------------------------------------------------------------------
+
+
+def test_undo_and_redo_give_the_same_bytes(robot: Robot) -> None:
+    states = []
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    states.append((robot.editor.session.recipe, robot.warp()))
+    robot.key("f")
+    robot.drag((0.7, 0.5), (0.7, 0.6), steps=3)
+    robot.rest()
+    states.append((robot.editor.session.recipe, robot.warp()))
+    robot.key("t")
+    robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=8)
+    robot.rest()
+    states.append((robot.editor.session.recipe, robot.warp()))
+    robot.key("ctrl+z")
+    robot.key("ctrl+z")
+    robot.rest()
+    for recipe, warp in states:
+        assert robot.editor.session.recipe == recipe
+        assert np.array_equal(robot.warp(), warp)
+        robot.key("ctrl+shift+z")
+        robot.rest()
+
+
+def test_settings_are_undone_too(robot: Robot) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot.editor.change("Putty", viscosity=0.3, drag=0.0)
+    assert robot.editor.session.recipe.fluid_at(robot.editor.session.tick).viscosity == 0.3
+    robot.key("ctrl+z")
+    assert robot.editor.session.recipe.fluid_at(robot.editor.session.tick).viscosity == pytest.approx(0.03)
+    robot.key("ctrl+y")
+    assert robot.editor.session.recipe.fluid_at(robot.editor.session.tick).viscosity == 0.3
+
+
+def test_clearing_and_resetting(robot: Robot) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.key("x")
+    robot.rest()
+    assert robot.editor.session.replay.fluid.motion().largest_speed < 0.01
+    warped = robot.warp()
+    robot.key("ctrl+r")
+    robot.rest()
+    assert np.abs(robot.warp()).max() < 1e-3
+    robot.key("ctrl+z")
+    robot.rest()
+    assert np.array_equal(robot.warp(), warped)
+
+
+def test_opening_a_picture_can_be_undone(robot: Robot, tmp_path: Path) -> None:
+    from app.pictures import write_picture
+    from editing import pattern
+
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    robot.frame(Drop((str(tmp_path / "other.png"),)))
+    robot.frame()
+    assert robot.editor.canvas.size == (100, 60)
+    robot.key("ctrl+z")
+    assert robot.editor.canvas.size == (240, 180)
+    robot.key("ctrl+shift+z")
+    assert robot.editor.canvas.size == (100, 60)
+
+
+# Files --------------------------------------------------------------------------------------------------------------
+
+
+def test_a_session_saved_and_rendered_is_the_same_picture(device: Device, robot: Robot, tmp_path: Path) -> None:
+    dice = random.Random(1)
+    for _ in range(12):
+        robot.key(dice.choice(["p", "t", "b", "f", "v", "r"]))
+        start = dice.uniform(0.2, 0.8), dice.uniform(0.2, 0.8)
+        robot.drag(start, (start[0] + dice.uniform(-0.1, 0.1), start[1] + dice.uniform(-0.1, 0.1)), steps=3)
+        if dice.random() < 0.5:
+            robot.rest()
+    robot.rest()
+    warp = robot.warp()
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    assert not robot.editor.is_dirty
+    loaded = projects.load(tmp_path / "work.fluidwarp")
+    assert loaded.recipe == robot.editor.session.recipe
+    robot.editor.open(loaded)
+    robot.rest()
+    assert np.array_equal(robot.warp(), warp)
+    out = tmp_path / "out.png"
+    run(device, Job(loaded.recipe, loaded.picture, loaded.folder, out), Progress())
+    seen = robot.editor.exports
+    job = ExportDialog(robot.editor.session, str(tmp_path)).job()
+    run(device, job, Progress())
+    assert not seen.is_running
+    assert job.output is not None
+    assert np.array_equal(read_picture(job.output).pixels, read_picture(out).pixels)
+
+
+def test_files_that_are_no_pictures_leave_the_work_alone(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    assert robot.editor.files.save_as(tmp_path / "kept.fluidwarp")
+    recipe = robot.editor.session.recipe
+    whole = (tmp_path / "kept.fluidwarp").read_bytes()
+    cases = {
+        "junk.png": b"not a picture",
+        "empty.jpg": b"",
+        "cut.fluidwarp": whole[: len(whole) // 2],
+        "text.toml": b"viscosity = ",
+    }
+    for name, data in cases.items():
+        (tmp_path / name).write_bytes(data)
+        robot.editor.messages.shown.clear()
+        robot.frame(Drop((str(tmp_path / name),)))
+        robot.frame()
+        assert name in robot.editor.messages.shown[-1].text, name
+        assert robot.editor.session.recipe is recipe
+    assert (tmp_path / "kept.fluidwarp").read_bytes() == whole
+
+
+def test_saving_where_it_cannot_be_says_so(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    assert not robot.editor.files.save_as(tmp_path / "nowhere" / "work.fluidwarp")
+    assert "nowhere" in robot.editor.messages.shown[-1].text
+    assert robot.editor.is_dirty
+
+
+def test_a_picture_that_is_gone_is_still_saved(robot: Robot, tmp_path: Path) -> None:
+    (tmp_path / "pattern.png").unlink()
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    assert projects.load(tmp_path / "work.fluidwarp").picture.width == 240
+
+
+def test_the_recipe_can_be_copied(robot: Robot) -> None:
+    copied: list[str] = []
+    robot.editor.clipboard = copied.append
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot.key("ctrl+shift+c")
+    assert Recipe.parse(copied[0]) == robot.editor.session.recipe
+
+
+# Dialogs ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "dialog"),
+    [("f1", Shortcuts), ("ctrl+,", Preferring), ("ctrl+e", ExportDialog), ("ctrl+o", Browser), ("ctrl+s", Browser)],
+)
+def test_dialogs_open_and_close(robot: Robot, key: str, dialog: type) -> None:
+    plain = robot.pixels().astype(int)
+    robot.key(key)
+    robot.frame(count=3)
+    assert isinstance(robot.editor.dialogs[-1], dialog)
+    assert np.abs(robot.pixels() - plain).mean() > 5
+    # Nothing under a dialog hears the pointer or the keys.
+    robot.drag((0.05, 0.05), (0.1, 0.05), steps=2)
+    assert robot.editor.session.recipe.stroke == ()
+    robot.key("escape")
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+
+
+def test_unsaved_work_is_asked_about(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot.frame(CloseWish())
+    robot.frame(count=2)
+    assert isinstance(robot.editor.dialogs[-1], Unsaved)
+    assert not robot.editor.closed
+    robot.key("escape")
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    robot.key("ctrl+q")
+    assert robot.editor.closed
+
+
+def test_the_browser_saves_and_opens(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot.editor.preferences.folder = str(tmp_path)
+    robot.key("ctrl+s")
+    robot.frame(count=2)
+    browser = robot.editor.dialogs[-1]
+    assert isinstance(browser, Browser)
+    browser.go(tmp_path)
+    browser.name = "saved"
+    width, height = robot.size
+    robot.click(width / 2 + 640 / 2 - 24 - 44 - 8, height / 2 + 460 / 2 - 36)
+    robot.frame(count=2)
+    assert (tmp_path / "saved.fluidwarp").exists()
+    assert not robot.editor.dialogs
+    assert robot.editor.preferences.recent[0].endswith("saved.fluidwarp")
+
+
+def test_export_runs_beside_the_window(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    robot.editor.exports.start(dialog.job())
+    frames = 0
+    while robot.editor.exports.is_running and frames < 6000:
+        robot.frame(dt=0.01)
+        frames += 1
+    assert frames > 2
+    assert dialog.output.exists(), [message.text for message in robot.editor.messages.shown]
+    assert read_picture(dialog.output).width == 240
+
+
+def test_an_export_can_be_cancelled(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog.animation = True
+    robot.editor.exports.start(dialog.job())
+    robot.frame(count=2)
+    robot.editor.exports.cancel()
+    robot.frame()
+    assert not robot.editor.exports.is_running
+    assert [path.name for path in tmp_path.iterdir()] == ["pattern.png"]
+
+
+# The rest -----------------------------------------------------------------------------------------------------------
+
+
+def test_no_two_actions_share_a_key() -> None:
+    keys = [key for action in ACTIONS.values() for key in action.keys]
+    assert len(keys) == len(set(keys))
+    assert set(BY_KEY) == set(keys)
+    assert {tool.key for tool in TOOLS} <= set(keys)
+
+
+@pytest.mark.parametrize("name", sorted(ACTIONS))
+def test_every_action_can_be_done_at_any_time(robot: Robot, name: str) -> None:
+    robot.drag((0.4, 0.4), (0.5, 0.4), steps=2)
+    robot.editor.do(name)
+    robot.frame(count=3)
+    robot.move(*robot.at(0.4, 0.6))
+    robot.frame(count=2)
+
+
+@pytest.mark.parametrize("tool", [tool.name for tool in TOOLS])
+def test_the_strip_chooses_tools(robot: Robot, tool: str) -> None:
+    ends = ("pinch", "bloat", "smooth", "restore")
+    y = robot.editor.layout.strip.y + 8.0
+    for other in TOOLS:
+        if other.name == tool:
+            break
+        y += 44 + (10 if other.name in ends else 0)
+    robot.click(24, y + 20)
+    assert robot.editor.state.tool_name == tool
+
+
+def test_the_theme_and_the_scale(robot: Robot) -> None:
+    dark = robot.pixels().mean()
+    robot.key("ctrl+l")
+    robot.frame()
+    assert robot.pixels().mean() > dark + 30
+    robot.editor.preferences.scale = 1.5
+    robot.frame(count=2)
+    assert robot.editor.layout.bar.height == 72
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_doings_never_break_anything(robot: Robot, seed: int) -> None:
+    dice = random.Random(seed)
+    chords = [key for key in BY_KEY if key not in ("ctrl+q", "space")]
+    for _ in range(120):
+        match dice.randrange(6):
+            case 0:
+                robot.key(dice.choice(chords))
+            case 1:
+                robot.move(dice.uniform(-50, 1350), dice.uniform(-50, 850))
+            case 2:
+                button, down = dice.choice((0, 0, 0, RIGHT, MIDDLE)), dice.random() < 0.5
+                robot.frame(Button(button, down, Mods(alt=dice.random() < 0.2)))
+            case 3:
+                robot.frame(*(Move(dice.uniform(100, 900), dice.uniform(80, 700)) for _ in range(5)))
+            case 4:
+                robot.wheel(dice.choice((-2, 1, 3)))
+            case 5:
+                robot.frame(Key("space", dice.random() < 0.5))
+        if robot.editor.dialogs and dice.random() < 0.5:
+            robot.key("escape")
+    robot.editor.dialogs.clear()
+    session = robot.editor.session
+    session.release()
+    session.pause()
+    session.settle()
+    robot.frame(count=2)
+    # Whatever was done, the recipe is a recipe, and replaying it gives what is seen.
+    assert Recipe.parse(session.recipe.text()) == session.recipe
+    seen, tick = robot.warp(), session.tick
+    session.replay.checkpoints.clear()
+    session.replay.seek(0)
+    session.replay.seek(tick)
+    assert np.array_equal(robot.warp(), seen)
