@@ -29,6 +29,9 @@ LINGER = 24  # frames that the last one stands still
 FINER = 3  # places a pixel, along each side, of the reference that sharpness is measured against
 COMPARED = 512  # pixels along the longer side, in which displacements are told
 
+PAPER, INK, FORCE = (250, 249, 246), (38, 38, 44), (214, 40, 40)
+PANEL, MARGIN = 420, 28
+
 Numbers = dict[str, str]
 
 
@@ -80,9 +83,7 @@ class Studio:
     ) -> Played:
         """Play the recipe `name`, changed by `parts`, and write its result and animation; `measured` reads `fine`."""
         recipe = load(name).edited(**parts)
-        assert recipe.picture is not None
-        picture = read_picture(recipes_folder() / recipe.picture)
-        source = rgb(picture.pixels)
+        source = source_of(recipe)
         pictures = Pictures(Picture(source), recipes_folder())
         replay = Replay(self.device, recipe, pictures, budget=0)
         ticks = {round(time / recipe.fluid.dt): time for time in stills}
@@ -119,15 +120,27 @@ class Studio:
         finally:
             replay.release()
 
+    def still(self, recipe: Recipe) -> np.ndarray:
+        """The result of a recipe of the gallery, (h, w, 3) uint8; nothing is written."""
+        source = source_of(recipe)
+        replay = Replay(self.device, recipe, Pictures(Picture(source), recipes_folder()), budget=0)
+        try:
+            for _ in range(recipe.ticks):
+                replay.advance()
+                self.progress.advance()
+            return self._frame(replay, source)
+        finally:
+            replay.release()
+
     def _frame(self, replay: Replay, source: np.ndarray) -> np.ndarray:
         if replay.density is not None:
             return (np.clip(replay.density.get()[..., :3], 0, 1) * 255 + 0.5).astype(np.uint8)
         how = Sampling(edges=replay.recipe.edges)
         return self.sampler.apply(replay.warp, source, how=how)
 
-    def sheet(self, name: str, title: str, panels: list[tuple[str, np.ndarray]]) -> None:
-        """Write a contact sheet: panels side by side, with their captions."""
-        write_picture(self.folder / f"{name}-sheet.png", Picture(contact_sheet(title, panels)))
+    def sheet(self, name: str, title: str, panels: list[tuple[str, np.ndarray]], height: int = PANEL) -> None:
+        """Write a contact sheet: panels of one height side by side, with their captions."""
+        write_picture(self.folder / f"{name}-sheet.png", Picture(contact_sheet(title, panels, height)))
 
 
 def recipes_folder() -> Path:
@@ -138,6 +151,12 @@ def recipes_folder() -> Path:
 def load(name: str) -> Recipe:
     """A recipe of the gallery."""
     return Recipe.load(recipes_folder() / f"{name}.toml")
+
+
+def source_of(recipe: Recipe) -> np.ndarray:
+    """The picture that a recipe of the gallery warps, (h, w, 3) uint8."""
+    assert recipe.picture is not None
+    return rgb(read_picture(recipes_folder() / recipe.picture).pixels)
 
 
 def rgb(pixels: np.ndarray) -> np.ndarray:
@@ -217,14 +236,41 @@ def figure_6(studio: Studio) -> Numbers:
     return _portrait(studio, "figure-6", "raising a brow")
 
 
+def guide_forces(studio: Studio) -> Numbers:
+    """One force of each kind, on the same picture."""
+    recipe = load("guide-forces")
+    panels = [("the picture", source_of(recipe))]
+    panels += [(force.name, studio.still(recipe.edited(force=(force,)))) for force in recipe.force]
+    studio.sheet("guide-forces", "Kinds of force", panels, 220)
+    return {}
+
+
+def guide_viscosity(studio: Studio) -> Numbers:
+    """One push through fluids of different viscosity."""
+    recipe = load("guide-viscosity")
+    alone = [(layer.name, recipe.edited(viscosity=(layer,), freeze=())) for layer in recipe.viscosity]
+    alone += [(layer.name, recipe.edited(viscosity=recipe.viscosity[:1], freeze=(layer,))) for layer in recipe.freeze]
+    panels = [("the picture", source_of(recipe)), *((name, studio.still(one)) for name, one in alone)]
+    studio.sheet("guide-viscosity", "One push, different viscosities", panels, 220)
+    return {}
+
+
 FIGURES: dict[str, Callable[[Studio], Numbers]] = {
     "figure-1": figure_1,
     "figure-3": figure_3,
     "figure-4": figure_4,
     "figure-5": figure_5,
     "figure-6": figure_6,
+    "guide-forces": guide_forces,
+    "guide-viscosity": guide_viscosity,
 }
 RECIPES = ("figure-1", "figure-1", "figure-3", "figure-4", "figure-5", "figure-5-freeze", "figure-6", "figure-6-freeze")
+GUIDE = ("guide-forces", "guide-viscosity")
+
+
+def _panels(recipe: Recipe) -> int:
+    """The ticks of a page of the guide: each force, or each layer, is played by itself."""
+    return recipe.ticks * max(len(recipe.force), len(recipe.viscosity) + len(recipe.freeze))
 
 
 def _portrait(studio: Studio, name: str, what: str) -> Numbers:
@@ -285,10 +331,11 @@ def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]
     except OSError as error:
         reason = MENDS.get(error.errno or 0, error.strerror or str(error))
         raise UserError(f"Cannot write to {folder}: {reason}.") from None
-    progress.total = sum(load(name).ticks for name in RECIPES)
+    progress.total = sum(load(name).ticks for name in RECIPES) + sum(_panels(load(name)) for name in GUIDE)
     studio = Studio(device, folder, progress)
     try:
-        return {name: figure(studio) for name, figure in FIGURES.items()}
+        numbers = {name: figure(studio) for name, figure in FIGURES.items()}
+        return {name: found for name, found in numbers.items() if found}
     finally:
         studio.release()
 
@@ -302,7 +349,7 @@ def light(pixels: np.ndarray) -> np.ndarray:
 
 
 def sharpness(luminance: np.ndarray, where: np.ndarray | bool = True) -> float:
-    """Gradient energy as the eye sees it: the squared gradient, summed over the pixels `where`, but for the outermost."""
+    """Gradient energy as the eye sees it: the squared gradient summed over the pixels `where`, but the outermost."""
     rows, columns = np.gradient(linear_to_srgb(np.clip(luminance, 0, 1)))
     return float(((rows**2 + columns**2) * where)[2:-2, 2:-2].sum())
 
@@ -340,9 +387,6 @@ def _mirrored(index: np.ndarray, n: int) -> np.ndarray:
 
 
 # What is shown ------------------------------------------------------------------------------------------------------
-
-PAPER, INK, FORCE = (250, 249, 246), (38, 38, 44), (214, 40, 40)
-PANEL, MARGIN = 420, 28
 
 
 def force_field(recipe: Recipe, grid: Grid, pictures: Pictures) -> np.ndarray:
@@ -392,19 +436,19 @@ def shades(viscosity: np.ndarray, like: np.ndarray) -> np.ndarray:
     return rgb(np.asarray(image)[..., None])
 
 
-def contact_sheet(title: str, panels: list[tuple[str, np.ndarray]]) -> np.ndarray:
-    """Panels of one height side by side, captions below and the title above, (h, w, 3) uint8."""
+def contact_sheet(title: str, panels: list[tuple[str, np.ndarray]], panel: int = PANEL) -> np.ndarray:
+    """Panels of height `panel` side by side, captions below and the title above, (h, w, 3) uint8."""
     images = []
     for _, pixels in panels:
         height, width = pixels.shape[:2]
-        images.append(Image.fromarray(pixels).resize((round(width * PANEL / height), PANEL), Image.Resampling.LANCZOS))
+        images.append(Image.fromarray(pixels).resize((round(width * panel / height), panel), Image.Resampling.LANCZOS))
     sheet_width = sum(image.width for image in images) + MARGIN * (len(images) + 1)
-    sheet = Image.new("RGB", (sheet_width, PANEL + 4 * MARGIN), PAPER)
+    sheet = Image.new("RGB", (sheet_width, panel + 4 * MARGIN), PAPER)
     pen = ImageDraw.Draw(sheet)
     pen.text((MARGIN, 0.9 * MARGIN), title, INK, ImageFont.load_default(24), anchor="lm")
     left = MARGIN
     for (caption, _), image in zip(panels, images, strict=True):
         sheet.paste(image, (left, 2 * MARGIN))
-        pen.text((left, PANEL + 2.7 * MARGIN), caption, INK, ImageFont.load_default(19), anchor="lm")
+        pen.text((left, panel + 2.7 * MARGIN), caption, INK, ImageFont.load_default(19), anchor="lm")
         left += image.width + MARGIN
     return np.asarray(sheet)

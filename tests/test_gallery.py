@@ -56,7 +56,7 @@ def test_the_parts_of_a_sheet() -> None:
     assert sheet.shape == (gallery.PANEL + 4 * gallery.MARGIN, 4 * gallery.PANEL + 3 * gallery.MARGIN, 3)
 
 
-@pytest.mark.parametrize("name", sorted(set(gallery.RECIPES)))
+@pytest.mark.parametrize("name", sorted({*gallery.RECIPES, *gallery.GUIDE}))
 def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str) -> None:
     from app.forces import build
 
