@@ -34,7 +34,7 @@ class Action:
     label: str
     group: str
     keys: tuple[str, ...]
-    run: Callable[[Editor], None]
+    run: Callable[[Editor], object]
     enabled: Callable[[Editor], bool] = _always
     repeats: bool = False
 
@@ -46,7 +46,7 @@ class Action:
 def _table() -> list[Action]:
     made: list[Action] = []
 
-    def add(group: str, name: str, label: str, keys: str, run: Callable[[Editor], None], **more: object) -> None:
+    def add(group: str, name: str, label: str, keys: str, run: Callable[[Editor], object], **more: object) -> None:
         made.append(Action(name, label, group, tuple(keys.split()), run, **more))  # pyright: ignore[reportArgumentType]
 
     add("File", "open", "Open ...", "ctrl+o", lambda e: e.files.ask_open())

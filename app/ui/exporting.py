@@ -113,7 +113,8 @@ class ExportDialog(Dialog):
             return False
         imgui.same_line()
         with ui.enabled(bool(self.name.strip()) and not editor.exports.is_running):
-            if ui.button("Export", primary=True, width=96):
+            entered = imgui.is_key_pressed(imgui.Key.enter) and not imgui.is_any_item_active()
+            if ui.button("Export", primary=True, width=96) or entered:
                 return not self._start(editor)
         return True
 

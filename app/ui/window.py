@@ -128,6 +128,8 @@ class Window:
                 time.sleep(spare)
 
     def close(self) -> None:
+        """Close the window; its GL goes with it, and what Python still holds of that must not be touched any more."""
+        self.device.ctx.gc_mode = None
         glfw.destroy_window(self.handle)
         glfw.terminate()
 

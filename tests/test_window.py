@@ -1,0 +1,178 @@
+"""The real window under a virtual X server, used with a real pointer and real keys."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import project as projects
+from app.pictures import read_picture, write_picture
+from app.recipe import Recipe
+from editing import pattern
+
+NEEDED = ("Xvfb", "xdotool")
+PATIENCE = 90.0
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or (not all(map(shutil.which, NEEDED)) and "CI" not in os.environ),
+    reason=f"needs {' and '.join(NEEDED)}; tests/run installs them",
+)
+
+
+class Desk:
+    """A virtual screen with the editor on it."""
+
+    def __init__(self, folder: Path, number: int) -> None:
+        self.folder = folder
+        self.env = {
+            **os.environ,
+            "DISPLAY": f":{number}",
+            "XDG_CONFIG_HOME": str(folder / "config"),
+            "HOME": str(folder),
+            "PATH": os.environ["PATH"],
+        }
+        self.env.pop("WAYLAND_DISPLAY", None)
+        command = ["Xvfb", f":{number}", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"]
+        self.screen = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.editor: subprocess.Popen[str] | None = None
+        self.window = ""
+
+    def open(self, *arguments: str) -> None:
+        """Start the editor and wait for its window."""
+        self.editor = subprocess.Popen(
+            [sys.executable, "-m", "app", "edit", *arguments],
+            env=self.env,
+            cwd=Path(__file__).parent.parent,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.until(lambda: bool(self._find()), "a window")
+        self.window = self._find()[0]
+        # Its first frame is drawn once its title is that of the picture.
+        self.until(lambda: " - fluidwarp" in self.title(), "the first frame")
+        time.sleep(0.5)
+
+    def _find(self) -> list[str]:
+        return self.do("search", "--onlyvisible", "--name", "fluidwarp").split()
+
+    def title(self) -> str:
+        return self.do("getwindowname", self.window or (self._find() or ["0"])[0]).strip()
+
+    def do(self, *words: str) -> str:
+        return subprocess.run(["xdotool", *words], env=self.env, capture_output=True, text=True).stdout
+
+    def drag(self, *points: tuple[int, int]) -> None:
+        self.do("mousemove", *map(str, points[0]), "sleep", "0.1", "mousedown", "1", "sleep", "0.1")
+        for start, end in zip(points, points[1:], strict=False):
+            for step in range(1, 11):
+                x, y = (round(a + (b - a) * step / 10) for a, b in zip(start, end, strict=True))
+                self.do("mousemove", str(x), str(y), "sleep", "0.03")
+        self.do("sleep", "0.1", "mouseup", "1", "sleep", "0.2")
+
+    def key(self, chord: str) -> None:
+        self.do("key", "--delay", "60", chord)
+        time.sleep(0.3)
+
+    def type(self, text: str) -> None:
+        self.do("type", "--delay", "60", text)
+        time.sleep(0.3)
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            if self.editor is not None and self.editor.poll() is not None:
+                said = self.editor.stdout.read() if self.editor.stdout else ""
+                raise AssertionError(f"the editor ended while waiting for {what}: {said}")
+            assert time.monotonic() < deadline, f"waited in vain for {what}"
+            time.sleep(0.1)
+
+    def until_gone(self) -> None:
+        """Wait until the editor has ended by itself, and well."""
+        assert self.editor is not None
+        assert self.editor.wait(PATIENCE) == 0, self.editor.stdout.read() if self.editor.stdout else ""
+
+    def close(self) -> None:
+        if self.editor is not None and self.editor.poll() is None:
+            self.editor.kill()
+        self.screen.terminate()
+        self.screen.wait(10)
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    # Another number for each process that tests in parallel.
+    number = 90 + int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:] or 0)
+    desk = Desk(tmp_path, number)
+    time.sleep(0.5)
+    yield desk
+    desk.close()
+
+
+def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
+    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
+    write_picture(picture, pattern())
+    desk.open(str(picture))
+    assert desk.title() == "pattern - fluidwarp"
+
+    desk.drag((400, 400), (520, 400))
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
+    desk.key("f")
+    desk.drag((700, 300), (720, 360))
+    desk.key("ctrl+z")
+    desk.key("ctrl+z")
+    desk.until(lambda: desk.title() == "pattern - fluidwarp", "everything to be undone")
+    desk.key("ctrl+shift+z")
+    desk.key("ctrl+y")
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "everything to be redone")
+
+    desk.key("ctrl+s")
+    time.sleep(1)
+    # In the dialog: the name's field, then Enter.
+    desk.do("mousemove", "640", "540", "click", "1", "sleep", "0.3")
+    desk.key("ctrl+a")
+    desk.type("work")
+    desk.key("Return")
+    desk.until(work.exists, "the project to be saved")
+    desk.until(lambda: desk.title() == "work - fluidwarp", "the title to say so")
+    saved = projects.load(work)
+    assert [stroke.tool for stroke in saved.recipe.stroke] == ["push", "freeze"]
+    assert np.array_equal(saved.picture.pixels, pattern().pixels)
+
+    desk.key("ctrl+e")
+    time.sleep(1)
+    desk.do("mousemove", "864", "568", "sleep", "0.3")
+    desk.key("Return")
+    exported = tmp_path / "work warped.png"
+    desk.until(exported.exists, "the export")
+    desk.key("ctrl+q")
+    desk.until_gone()
+
+    desk.open(str(work))
+    assert desk.title() == "work - fluidwarp"
+    desk.key("ctrl+q")
+    desk.until_gone()
+    rendered = tmp_path / "rendered.png"
+    command = [sys.executable, "-m", "app", "render", str(work), "-o", str(rendered)]
+    subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
+    assert np.array_equal(read_picture(exported).pixels, read_picture(rendered).pixels)
+    assert isinstance(saved.recipe, Recipe)
+
+
+def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
+    env = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "edit"], env=env, capture_output=True, text=True, cwd=Path(__file__).parent.parent
+    )
+    assert done.returncode == 2
+    assert "fluidwarp render" in done.stderr
+    assert "fluidwarp doctor" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
