@@ -54,31 +54,27 @@ def test_taylor_green_hardly_fades_without_viscosity(device: Device) -> None:
     assert energies["mac"] > energies["paper"]
 
 
-@pytest.mark.parametrize(
-    ("reynolds", "u_min", "v_max", "v_min"),
-    [(100, -0.21404, 0.1795728, -0.2538030), (1000, -0.3885698, 0.3769447, -0.5270771)],
-)
-def test_lid_driven_cavity(device: Device, reynolds: int, u_min: float, v_max: float, v_min: float) -> None:
-    """Extrema of the velocity on the centre lines: Botella and Peyret, Computers & Fluids 27 (1998)."""
+def test_lid_driven_cavity(device: Device) -> None:
+    """Extrema on the centre lines at Re 100: Botella and Peyret, Computers & Fluids 27 (1998).
+
+    Re 1000 takes minutes and is in benchmarks/bench_accuracy.py.
+    """
     faces = None
     # A coarse cavity first: its steady state is what the fine one starts from.
-    slow = reynolds == 1000
-    for cells, seconds in ((32, 40.0), (64, 20.0), (128, 12.0)) if slow else ((32, 10.0), (64, 6.0), (128, 3.0)):
+    for cells, seconds in ((32, 10.0), (64, 6.0)):
         grid = Grid(cells, cells)
-        fluid = Fluid(device, grid, FluidParams(walls=Walls("none", (0.0, 0.0, 1.0, 0.0)), pressure_cycles=1))
-        fluid.set_viscosity(1 / reynolds)
+        fluid = Fluid(device, grid, FluidParams(walls=Walls("none", (0.0, 0.0, 1.0, 0.0))))
+        fluid.set_viscosity(1 / 100)
         if faces is not None:
             fluid.set_velocity(faces.repeat(2, axis=0).repeat(2, axis=1))
-        dt = 1.0 / cells
-        for _ in range(round(seconds / dt)):
-            fluid.step(dt)
+        for _ in range(round(seconds * cells)):
+            fluid.step(grid.h)
         faces = fluid.velocity.read.get()
         fluid.release()
-    middle = faces.shape[0] // 2
-    # The lid is on top and y points down: a vertical velocity changes its sign against the publication.
-    u, v = faces[:, middle, 0], -faces[middle, :, 1]
-    got = np.array([u.min(), v.max(), v.min()])
-    np.testing.assert_allclose(got, [u_min, v_max, v_min], rtol=1e-2)
+    assert faces is not None
+    # The lid is on top and y points down: the published v has the other sign.
+    u, v = faces[:, 32, 0], -faces[32, :, 1]
+    np.testing.assert_allclose([u.min(), v.max(), v.min()], [-0.21404, 0.1795728, -0.2538030], rtol=1e-2)
 
 
 @pytest.mark.parametrize("size", [(8, 8), (9, 31), (64, 40)])
