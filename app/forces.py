@@ -331,7 +331,8 @@ def build(forces: Sequence[Force], grid: Grid, pictures: Pictures, duration: flo
     for index, force in enumerate(forces):
         label = f'force[{index + 1}] "{force.name}"' if force.name else f"force[{index + 1}]"
         try:
-            force.law.check(duration)
+            if remark := force.law.check(duration):
+                pictures.notice(f"{label} {remark}")
             built.append(BuiltForce(label, force.law, force.faces(grid, pictures), force.divergence(grid, pictures)))
         except (ValueError, UserError) as error:
             raise UserError(f"{label}: {error}") from None

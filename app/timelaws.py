@@ -30,8 +30,8 @@ class Law(Protocol):
         """Its integral over [t0, t1) seconds; `state` is what a feedback law looks at."""
         ...
 
-    def check(self, duration: float) -> None:
-        """Raises ValueError where the law cannot be evaluated between 0 and `duration`."""
+    def check(self, duration: float) -> str | None:
+        """What the user should hear of, if between 0 and `duration` it never acts; raises ValueError where it fails."""
         ...
 
 
@@ -47,11 +47,10 @@ class Instants:
         slack = 1e-6 * (t1 - t0)
         return float(sum(t0 - slack <= t < t1 - slack for t in self.times))
 
-    def check(self, duration: float) -> None:
-        """Raises ValueError if an instant comes after the end, where it would never act."""
-        late = [t for t in self.times if t >= duration]
-        if late:
-            raise ValueError(f"it would act at {late[0]:g} s, but the simulation lasts from 0 to {duration:g} s")
+    def check(self, duration: float) -> str | None:
+        """A remark if all instants come after the end."""
+        first = min(self.times)
+        return _too_late(first, duration) if first >= duration else None
 
 
 @dataclass(frozen=True)
@@ -65,10 +64,9 @@ class Interval:
         """The length of the overlap with the tick."""
         return max(0.0, min(t1, self.end) - max(t0, self.start))
 
-    def check(self, duration: float) -> None:
-        """Raises ValueError if the interval starts after the end."""
-        if self.start >= duration:
-            raise ValueError(f"it would start at {self.start:g} s, but the simulation ends at {duration:g} s")
+    def check(self, duration: float) -> str | None:
+        """A remark if the interval starts after the end."""
+        return _too_late(self.start, duration) if self.start >= duration else None
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ class Keyframes:
         """The exact integral over the tick."""
         return self._integral(t1) - self._integral(t0)
 
-    def check(self, duration: float) -> None:
+    def check(self, duration: float) -> str | None:
         """Keyframes can be evaluated anywhere."""
 
     @cached_property
@@ -140,7 +138,7 @@ class Formula:
             total += sum(weight * self(middle + node * panel) for node, weight in _GAUSS)
         return total * panel
 
-    def check(self, duration: float) -> None:
+    def check(self, duration: float) -> str | None:
         """Raises FormulaError where the formula fails between 0 and `duration`."""
         for k in range(257):
             self(duration * k / 256)
@@ -166,8 +164,12 @@ class Feedback:
             raise UserError(f"a feedback function returned {value} at t = {t0:.6g}; it must return a finite number")
         return value * (t1 - t0)
 
-    def check(self, duration: float) -> None:
+    def check(self, duration: float) -> str | None:
         """What a function of the state will return is not known beforehand."""
+
+
+def _too_late(start: float, duration: float) -> str:
+    return f"never acts: it starts at {start:g} s, and the simulation ends at {duration:g} s"
 
 
 class FormulaError(UserError, ValueError):

@@ -249,6 +249,11 @@ def test_building_a_recipes_forces(pictures: Pictures) -> None:
     assert all(one.faces is not None and one.divergence is None for one in made)
 
 
+def test_a_force_that_never_acts_is_told(pictures: Pictures) -> None:
+    build([force(kind="vortex", point=[0.5, 0.5], at=5, name="late")], WIDE, pictures, 1.0)
+    assert pictures.notices == ['force[1] "late" never acts: it starts at 5 s, and the simulation ends at 1 s']
+
+
 @pytest.mark.parametrize(
     ("keys", "part"),
     [
@@ -288,7 +293,6 @@ def test_bad_forces_are_refused(keys: dict[str, Any], part: str) -> None:
         ({"kind": "field", "picture": "missing.png"}, "missing.png"),
         ({"kind": "gradient", "picture": "grey.png"}, "same everywhere"),
         ({"kind": "vortex", "point": [0.5, 0.5], "formula": "1/t"}, "divides by zero at t = 0"),
-        ({"kind": "vortex", "point": [0.5, 0.5], "at": 5}, "lasts from 0 to 1"),
     ],
 )
 def test_what_cannot_be_built_names_the_force(keys: dict[str, Any], part: str, pictures: Pictures) -> None:
