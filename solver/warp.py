@@ -73,7 +73,7 @@ class WarpMap:
         fold_every: most steps between two folds.
     """
 
-    def __init__(self, device: Device, grid: Grid, base_scale: int = 2, fold_every: int = 32) -> None:
+    def __init__(self, device: Device, grid: Grid, base_scale: int = 2, fold_every: int = 64) -> None:
         self.device = device
         self.grid = grid
         self.base_scale = base_scale
@@ -84,8 +84,12 @@ class WarpMap:
         self._trace = device.field(grid.size, 2, "warp map, trace")
         self._largest = device.field(grid.size, 4, "warp map, largest distortion")
         self._total = device.field(grid.size, 4, "warp map, total distortion")
+        self._steepness = device.field(grid.size, 1, "warp map, steepness")
+        self._find_steepest = Reduction(device, grid.size, 1, "max")
         self._find_largest = Reduction(device, grid.size, 4, "max")
         self._find_total = Reduction(device, grid.size, 4, "sum")
+        self._scratch = self._trace, self._steepness, self._largest, self._total
+        self._reductions = self._find_steepest, self._find_largest, self._find_total
         self._composed: dict[int, Field] = {}
         self._fresh: set[int] = set()  # the scales at which `_composed` holds the present map
         self._steps = 0  # since the last fold
@@ -106,8 +110,7 @@ class WarpMap:
         self._steps += 1
         self._changed()
         # The look waits for the GPU, so not at every step; at fixed steps, so that a replay folds at the same ones.
-        look = self._steps % CHECK_EVERY == 0
-        if self._steps >= self.fold_every or (look and self._distortion(self._near.read)[3] > STEEPEST):
+        if self._steps >= self.fold_every or (self._steps % CHECK_EVERY == 0 and self._is_steep()):
             self.fold()
 
     def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
@@ -204,17 +207,16 @@ class WarpMap:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory, as long as nothing is read at other sizes."""
-        own = [self._near.read, self._near.write, self._base.read, self._base.write]
-        own += [self._trace, self._largest, self._total, *self._composed.values()]
-        return sum(field.nbytes for field in own) + self._find_largest.nbytes + self._find_total.nbytes
+        own = [self._near.read, self._near.write, self._base.read, self._base.write, *self._composed.values()]
+        return sum(thing.nbytes for thing in (*own, *self._scratch, *self._reductions))
 
     def release(self) -> None:
         """Free the textures."""
         self.forward.release()
-        for thing in (self._near, self._base, self._trace, self._largest, self._total, *self._composed.values()):
+        for thing in (self._near, self._base, *self._composed.values(), *self._scratch, *self._reductions):
             thing.release()
-        self._find_largest.release()
-        self._find_total.release()
+        if "forward" in self.__dict__:
+            self.forward.release()
 
     # -- reading it -------------------------------------------------------------------------------------------------
 
@@ -254,8 +256,9 @@ class WarpMap:
 
     def statistics(self) -> MapStatistics:
         """How the whole map distorts; waits for the GPU."""
-        largest = self._distortion(self.composed(1))
-        total = self._find_total(self._total).tolist()
+        targets = self._largest, self._total
+        self.device.pass_("warp/distortion.frag")(targets, displacement=self.composed(1), h=self.grid.h)
+        largest, total = self._find_largest(self._largest).tolist(), self._find_total(self._total).tolist()
         cells = self.grid.nx * self.grid.ny
         return MapStatistics(
             det_min=-largest[0],
@@ -275,11 +278,10 @@ class WarpMap:
         """What `compose.frag` puts together."""
         return {"near": self._near.read, "base": self._base.read, "extent": self.grid.extent}
 
-    def _distortion(self, displacement: Field) -> list[float]:
-        """The largest of what `distortion.frag` finds; the totals are left in `_total`."""
-        targets = self._largest, self._total
-        self.device.pass_("warp/distortion.frag")(targets, displacement=displacement, h=self.grid.h)
-        return self._find_largest(self._largest).tolist()
+    def _is_steep(self) -> bool:
+        """True if the map is bent too far since the last fold; waits for the GPU."""
+        self.device.pass_("warp/steepness.frag")(self._steepness, displacement=self._near.read, h=self.grid.h)
+        return self._find_steepest(self._steepness)[0] > STEEPEST**2
 
     def _resample(self, source: Field, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
         self.device.pass_("warp/resample.frag")(target, displacement=source, origin=origin, step=step)

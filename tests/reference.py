@@ -163,26 +163,33 @@ def paper_diffuse_sweep(
 # -- the warp map ---------------------------------------------------------------------------------------------------
 
 
-def lagrange(field: np.ndarray, x: np.ndarray, y: np.ndarray, points: int) -> np.ndarray:
-    """`field` (ny, nx, c) at positions x, y by Lagrange polynomials through `points` x `points` texels.
+def _nodes(position: np.ndarray, count: int, points: int, support: int) -> tuple[np.ndarray, np.ndarray]:
+    """Indices and weights of the Lagrange polynomial on the middle `points` of the `support` texels around a position.
 
-    At the edges the outermost texels are taken.
+    At the edges the outermost `support` texels are taken.
     """
+    first = np.clip(np.floor(position - 0.5).astype(int) - (support // 2 - 1), 0, count - support)
+    first += (support - points) // 2
+    f = position - 0.5 - first
+    value = np.ones((*position.shape, points))
+    for i in range(points):
+        for j in set(range(points)) - {i}:
+            value[..., i] *= (f - j) / (i - j)
+    return first[..., None] + np.arange(points), value
 
-    def weights(position: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        first = np.clip(np.floor(position - 0.5).astype(int) - (points // 2 - 1), 0, count - points)
-        nodes = np.arange(points)
-        f = (position - 0.5 - first)[..., None]
-        value = np.ones((*position.shape, points))
-        for i in nodes:
-            for j in nodes[nodes != i]:
-                value[..., i] *= (f[..., 0] - j) / (i - j)
-        return first[..., None] + nodes, value
 
-    columns, wx = weights(np.asarray(x, float), field.shape[1])
-    rows, wy = weights(np.asarray(y, float), field.shape[0])
+def lagrange(field: np.ndarray, x: np.ndarray, y: np.ndarray, points: tuple[int, int], support: int) -> np.ndarray:
+    """`field` (ny, nx, c) at positions x, y by Lagrange polynomials through `points` texels along x and y."""
+    columns, wx = _nodes(np.asarray(x, float), field.shape[1], points[0], support)
+    rows, wy = _nodes(np.asarray(y, float), field.shape[0], points[1], support)
     values = field.astype(float)[rows[..., :, None], columns[..., None, :]]
     return np.einsum("...j,...i,...jic->...c", wy, wx, values)
+
+
+def cubic_displacement(field: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The Boolean sum of the cubic along x and the cubic along y."""
+    along_x, along_y, linear = (lagrange(field, x, y, points, 4) for points in ((4, 2), (2, 4), (2, 2)))
+    return along_x + along_y - linear
 
 
 def texel_centres(size: tuple[int, int], texels: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -195,17 +202,17 @@ def texel_centres(size: tuple[int, int], texels: tuple[int, int]) -> tuple[np.nd
 def advance_map(near: np.ndarray, trace: np.ndarray, h: float) -> np.ndarray:
     """near'(x) = (x_d - x) + near(x_d), with x_d - x = `trace` in cells."""
     x, y = texel_centres(near.shape[1::-1], near.shape[1::-1])
-    return trace * h + lagrange(near, x + trace[..., 0], y + trace[..., 1], 4)
+    return trace * h + cubic_displacement(near, x + trace[..., 0], y + trace[..., 1])
 
 
 def compose_map(near: np.ndarray, base: np.ndarray, extent: tuple[float, float], size: tuple[int, int]) -> np.ndarray:
     """near(x) + base(x + near(x)) at the centres of a `size` lattice."""
-    moved = lagrange(near, *texel_centres(size, near.shape[1::-1]), 4)
+    moved = cubic_displacement(near, *texel_centres(size, near.shape[1::-1]))
     width, height = base.shape[1::-1]
     x, y = texel_centres(size, (width, height))
     x = np.clip(x + moved[..., 0] / extent[0] * width, 0, width)
     y = np.clip(y + moved[..., 1] / extent[1] * height, 0, height)
-    return moved + lagrange(base, x, y, 6)
+    return moved + lagrange(base, x, y, (6, 6), 6)
 
 
 def follow(

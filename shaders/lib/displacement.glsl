@@ -4,20 +4,23 @@
 #include "lib/cubic.glsl"
 #include "lib/quintic.glsl"
 
-// Four-point cubic both ways. 16 reads.
+// Four-point cubic along x blended with one along y (the Boolean sum CL + LC - LL of the cubic C and the linear L), which
+// needs no corners: fourth order like the product of both, and on a map as exact. 12 reads.
 vec2 cubic_displacement(sampler2D displacement, vec2 p) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
-    vec4 wx = cubic_lagrange(f.x), wy = cubic_lagrange(f.y);
+    vec4 cx = cubic_lagrange(f.x), cy = cubic_lagrange(f.y);
+    vec2 lx = vec2(1.0 - f.x, f.x), ly = vec2(1.0 - f.y, f.y), bend = cx.yz - lx;
     vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
-    vec2 sum = vec2(0.0);
-    for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i)
-            sum += wx[i] * wy[j] * texture(displacement, vec2(x[i], y[j])).rg;
-    return sum;
+#define AT(i, j) texture(displacement, vec2(x[i], y[j])).rg
+    return (cy.y * lx.x + ly.x * bend.x) * AT(1, 1) + (cy.y * lx.y + ly.x * bend.y) * AT(2, 1)
+         + (cy.z * lx.x + ly.y * bend.x) * AT(1, 2) + (cy.z * lx.y + ly.y * bend.y) * AT(2, 2)
+         + ly.x * (cx.x * AT(0, 1) + cx.w * AT(3, 1)) + ly.y * (cx.x * AT(0, 2) + cx.w * AT(3, 2))
+         + cy.x * (lx.x * AT(1, 0) + lx.y * AT(2, 0)) + cy.w * (lx.x * AT(1, 3) + lx.y * AT(2, 3));
+#undef AT
 }
 
-// The same, and its derivatives along x (first column) and y, to a texel. 16 reads.
+// Four-point cubic both ways, and its derivatives along x (first column) and y, to a texel. 16 reads.
 vec2 cubic_displacement(sampler2D displacement, vec2 p, out mat2 slope) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;

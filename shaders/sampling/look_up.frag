@@ -90,7 +90,7 @@ COLOR picture(vec2 whole, vec2 part) {
 float even_noise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
 
 vec2 displacement(int i, int j) {
-    return texelFetch(u_displacement, ivec2(gl_FragCoord.xy) + ivec2(i, j), 0).rg * u_longer;
+    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) / vec2(textureSize(u_displacement, 0))).rg * u_longer;
 }
 
 void main() {

@@ -1,7 +1,7 @@
 // Advance: D'(x) = (x_d - x) + D(x_d), the map's displacement carried one step by the fluid (numerics: characteristic
 // mapping method; paper section 4.1, eq. (5) without diffusion).
 // u_displacement: cell centres, longer sides; u_trace: x_d - x, cells; u_h: side of a cell, longer sides.
-// reads: 17
+// reads: 13
 #include "lib/displacement.glsl"
 uniform sampler2D u_displacement;
 uniform sampler2D u_trace;

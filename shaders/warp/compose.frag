@@ -2,7 +2,7 @@
 // base.
 // u_near (D), u_base (B): displacements, longer sides, over the same domain, each of any number of texels;
 // u_extent: width and height of the domain, longer sides; x: see lib/place.glsl.
-// reads: 52
+// reads: 48
 #include "lib/displacement.glsl"
 #include "lib/place.glsl"
 uniform sampler2D u_near;

@@ -1,6 +1,6 @@
 // Distortion: how the map x + D(x) stretches and folds at every cell, by central differences, one-sided at the edges.
 // u_displacement (D): cell centres, longer sides; u_h: distance of the centres, longer sides.
-// largest: (-det J, det J, |D|, |grad D|) with J = I + grad D, to be reduced to the largest of each;
+// largest: (-det J, det J, |D|) with J = I + grad D, to be reduced to the largest of each;
 // total: (1 where det J <= 0, |D|, |det J - 1|), to be reduced to their sums.
 // reads: 5
 uniform sampler2D u_displacement;
@@ -17,6 +17,6 @@ void main() {
     vec2 dx = (read(ivec2(after.x, here.y)) - read(ivec2(before.x, here.y))) / apart.x;
     vec2 dy = (read(ivec2(here.x, after.y)) - read(ivec2(here.x, before.y))) / apart.y;
     float determinant = (1.0 + dx.x) * (1.0 + dy.y) - dx.y * dy.x, far = length(read(here));
-    out_largest = vec4(-determinant, determinant, far, sqrt(dot(dx, dx) + dot(dy, dy)));
+    out_largest = vec4(-determinant, determinant, far, 0.0);
     out_total = vec4(determinant <= 0.0 ? 1.0 : 0.0, far, abs(determinant - 1.0), 0.0);
 }
