@@ -137,8 +137,11 @@ def animation_writer(
     fps: float | Fraction = 30,
     *,
     crf: int | None = None,
+    quality: int = 95,
+    bits: int | None = None,
     loops: int = 0,
     sound: str | os.PathLike[str] | None = None,
+    sound_from: float = 0.0,
     frames: int | None = None,
     first: int = 0,
     like: Picture | None = None,
@@ -148,7 +151,8 @@ def animation_writer(
 
     path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on.
     crf: H.264's (18) or VP9's (24) constant rate factor. loops: GIF, APNG, WebP; 0 is for ever.
-    sound: a file whose sound is carried over, cut to the length of `frames`.
+    quality, bits: of a sequence's pictures; see `write_picture`.
+    sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
     like: the picture whose profile and metadata the pictures of a sequence get.
     cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
@@ -158,7 +162,7 @@ def animation_writer(
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
         def write_one(file: Path, frame: np.ndarray) -> None:
-            write_picture(file, template.with_pixels(frame))
+            write_picture(file, template.with_pixels(frame), bits=bits, quality=quality)
 
         with sequence_writer(path, write_one, first, cancel) as write:
             yield write
@@ -170,7 +174,7 @@ def animation_writer(
             with _gif_writer(temporary, str(path), rate, loops, cancel) as write:
                 yield write
             return
-        sound_in, sound_out = _sound(container, sound, rate, frames)
+        sound_in, sound_out = _sound(container, sound, rate, frames, sound_from)
         with _Video(temporary, str(path), container, rate, crf, loops, sound_in, sound_out, cancel) as video:
             yield video.write
             video.finish()
@@ -245,7 +249,7 @@ class _Video:
 
 
 def _sound(
-    container: Container, sound: str | os.PathLike[str] | None, rate: Fraction, frames: int | None
+    container: Container, sound: str | os.PathLike[str] | None, rate: Fraction, frames: int | None, start: float = 0.0
 ) -> tuple[list[str], list[str]]:
     """ffmpeg's input and output options that carry the sound of a file over."""
     if sound is None or not container.sound:
@@ -253,9 +257,10 @@ def _sound(
     codec = sound_codec(sound)
     if codec is None:
         return [], []
+    begin = ["-ss", f"{start:.6f}"] if start else []
     length = [] if frames is None else ["-t", f"{float(frames / rate):.6f}"]
     chosen = ("copy",) if codec in container.sound else container.encoder
-    return [*length, "-i", f"file:{sound}"], ["-map", "1:a:0", "-c:a", *chosen]
+    return [*begin, *length, "-i", f"file:{sound}"], ["-map", "1:a:0", "-c:a", *chosen]
 
 
 @contextmanager

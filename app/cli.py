@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
 from app.errors import Cancelled, UserError
 
 if TYPE_CHECKING:
+    from app.applying import MapSource
+    from app.batch import Task
     from app.opening import Opened
-    from app.recipe import Recipe
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
@@ -89,16 +90,42 @@ def edit(
     run(file)
 
 
+MaxPixels = Annotated[int, typer.Option(help="Refuse larger pictures, clips and maps.")]
+Bits = Annotated[Optional[int], typer.Option(help="8, 16 or 32 bits a channel, instead of the picture's own.")]  # noqa: UP045
+Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
+MapKind = Annotated[Optional[str], typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]  # noqa: UP045
+StGrid = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--grid", help="Where MAP's 0 and 1 lie, if it does not say: centres, corners or pixels."),
+]
+MapOverscan = Annotated[Optional[int], typer.Option("--overscan", help="MAP's pixels beyond each side.")]  # noqa: UP045
+
+
 @cli.command()
 def render(
     recipe: Annotated[
         str, typer.Argument(help="A recipe (.toml) or project, or the name of a recipe that comes with fluidwarp.")
     ],
-    pictures: Annotated[Optional[list[Path]], typer.Argument(help="Pictures instead of the recipe's own.")] = None,  # noqa: UP045
-    output: Output = Path("out.png"),
-    image: Annotated[Optional[Path], typer.Option("--image", "-i", help="The picture to warp.")] = None,  # noqa: UP045
+    pictures: Annotated[
+        Optional[list[Path]],  # noqa: UP045
+        typer.Argument(help="Pictures or clips instead of the recipe's own."),
+    ] = None,
+    output: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--output", "-o", metavar="OUT", help="What to write; its ending says how. Default: out.png"),
+    ] = None,
+    image: Annotated[Optional[Path], typer.Option("--image", "-i", help="The picture or clip to warp.")] = None,  # noqa: UP045
     stats: Annotated[Optional[Path], typer.Option(help="Write numbers about every frame, as JSON.")] = None,  # noqa: UP045
-    map_: Annotated[Optional[Path], typer.Option("--map", help="Write the last frame's warp map (.exr ...).")] = None,  # noqa: UP045
+    map_: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--map", help="Write the last frame's warp map (.exr .tif .flo .npy); m.%04d.exr: every frame's."),
+    ] = None,
+    forward: Annotated[
+        bool, typer.Option("--forward", help="The map tells where points of the original go, not where they come from.")
+    ] = False,
+    offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in the map, instead of an ST map.")] = False,
+    overscan: Annotated[int, typer.Option(min=0, help="Pixels of the map beyond each side.")] = 0,
+    map_size: Annotated[Optional[int], typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,  # noqa: UP045
     size: Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")] = None,  # noqa: UP045
     grid: Annotated[Optional[int], typer.Option(help="Cells along the longer side.")] = None,  # noqa: UP045
     solver: Annotated[Optional[str], typer.Option(help="mac or paper.")] = None,  # noqa: UP045
@@ -107,88 +134,182 @@ def render(
     quality: Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")] = None,  # noqa: UP045
     start: Annotated[Optional[float], typer.Option("--from", help="First second of an animation.")] = None,  # noqa: UP045
     end: Annotated[Optional[float], typer.Option("--to", help="Last second.")] = None,  # noqa: UP045
+    frames: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(metavar="A-B", help="Only these frames of an animation, counted from 0."),
+    ] = None,
+    animated: Annotated[bool, typer.Option("--animated", help="OUT.webp is the animation.")] = False,
+    bits: Bits = None,
+    strip: Strip = False,
+    max_pixels: MaxPixels = 400_000_000,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes for several pictures.")] = 1,
+    cluster: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(metavar="ADDRESS", help="The Dask scheduler that gets several pictures, as tcp://host:8786."),
+    ] = None,
 ) -> None:
     """Warp a picture by a recipe: OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its
-    frames.
+    frames. A clip is warped frame by frame, and keeps its sound.
 
-    With several pictures, write {name} where OUT shall have the name of each.
+    Several pictures go into the folder OUT under their own names, or to OUT with {name} in it for the name of each.
     """
+    from app import batch
+    from app.export import MapOutput
     from app.opening import open_recipe
 
-    loaded = open_recipe(recipe)
-    changed = {
+    opened = open_recipe(recipe)
+    tables = {
         "fluid": {"grid": grid, "solver": solver},
         "output": {"size": size, "fps": fps, "quality": quality},
         "time": {"start": start, "end": end},
     }
-    asked = _with_options(loaded.recipe, changed, {"duration": duration})
-    wanted = [*([image] if image else []), *(pictures or [])] or [None]
-    if len(wanted) > 1 and "{name}" not in str(output):
-        raise UserError(f"{len(wanted)} pictures cannot all become {output}; write for example out/{{name}}.png")
-    for picture in wanted:
-        target = Path(str(output).replace("{name}", picture.stem)) if picture else output
-        _render_one(asked, loaded, picture, target, stats, map_)
+    edits = batch.Edits.of(tables, {"duration": duration})
+    edits.applied(opened.recipe)
+    if output is None and map_ is None:
+        output = Path("out.png")
+    maps = MapOutput(map_, "offsets" if offsets else "st", forward, overscan, map_size) if map_ else None
+    given = [*([image] if image else []), *(pictures or [])]
+    task = batch.Task(
+        recipe,
+        edits,
+        given[0] if given else None,
+        output,
+        stats,
+        maps,
+        _part(frames),
+        animated,
+        bits,
+        strip,
+        max_pixels,
+    )
+    if len(given) < 2 and cluster is None and not (given and output and _is_folder(output)):
+        _render_one(task.named(), opened)
+        return
+    if not given:
+        raise UserError("a cluster is for many pictures: name them after the recipe")
+    _render_many(batch.spread(task, given), jobs, cluster)
 
 
-def _render_one(
-    recipe: Recipe, loaded: Opened, picture: Path | None, target: Path, stats: Path | None, map_: Path | None
-) -> None:
-    from app.export import Job, run
+def _is_folder(output: Path) -> bool:
+    return output.is_dir() or output.suffix == ""
+
+
+def _part(frames: str | None) -> tuple[int, int | None]:
+    """The first and the last frame of "A-B", "A-" or "A"."""
+    if frames is None:
+        return 0, None
+    first, dash, last = frames.partition("-")
+    if not first.isdecimal() or (last and not last.isdecimal()) or (last and int(last) < int(first)):
+        raise UserError(f"--frames must be like 0-99, 100- or 7, not {frames}")
+    return int(first), (int(last) if last else None if dash else int(first))
+
+
+def _render_one(task: Task, opened: Opened) -> None:
+    from app.export import run
     from app.progress import on_terminal
     from solver.context import Device
 
-    job = Job(recipe, loaded.picture(picture), loaded.folder, target, stats, map_)
+    job = task.job(opened)
     job.check()
-    with on_terminal(target.name, recipe.ticks) as progress, Device.headless() as device:
+    with on_terminal(job.target.name, job.recipe.ticks) as progress, Device.headless() as device:
         report = run(device, job, progress)
     for notice in (*report.notices, *([report.verdict] if report.verdict else [])):
         print(f"fluidwarp: {notice}", file=sys.stderr)
 
 
-def _with_options(recipe: Recipe, changed: dict[str, dict[str, Any]], single: dict[str, Any]) -> Recipe:
-    """The recipe with the options that were given instead of its own; `changed` are keys of its tables."""
-    parts = {name: value for name, value in single.items() if value is not None}
-    for key, options in changed.items():
-        given = {name: value for name, value in options.items() if value is not None}
-        if given:
-            parts[key] = getattr(recipe, key).model_copy(update=given)
-    return recipe.edited(**parts).checked("the command line") if parts else recipe
+def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
+    """Render all, with a line about each that fails."""
+    from app.batch import Outcome, run_batch
+    from app.progress import on_terminal
+
+    def tell(outcome: Outcome) -> None:
+        named = outcome.error.startswith(f"Cannot read {outcome.label}") or not outcome.error
+        line = outcome.error if named else f"{outcome.label}: {outcome.error}"
+        for text in (line, *(f"{outcome.label}: {notice}" for notice in outcome.notices)):
+            if text:
+                print(f"fluidwarp: {' '.join(text.split())}", file=sys.stderr)
+
+    with on_terminal(f"{len(tasks)} pictures", len(tasks)) as progress:
+        failures = run_batch(tasks, tell, progress, jobs, cluster)
+    if failures:
+        raise UserError(f"{failures} of {len(tasks)} pictures failed; all others are written")
 
 
 @cli.command()
 def apply(
-    map_: Annotated[Path, typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy.")],
-    picture: Annotated[Path, typer.Argument(help="The picture to warp by it.")],
+    map_: Annotated[
+        Path,
+        typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: one for each frame."),
+    ],
+    picture: Annotated[Path, typer.Argument(help="The picture or clip to warp by it.")],
     output: Output,
+    kind: MapKind = None,
+    grid: StGrid = None,
+    overscan: MapOverscan = None,
     edges: Annotated[str, typer.Option(help="transparent, black, clamp, mirror or wrap.")] = "transparent",
     size: Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")] = None,  # noqa: UP045
+    fps: Annotated[Optional[float], typer.Option(help="Frames per second of a picture's animation.")] = None,  # noqa: UP045
+    quality: Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")] = None,  # noqa: UP045
+    bits: Bits = None,
+    strip: Strip = False,
+    max_pixels: MaxPixels = 400_000_000,
 ) -> None:
-    """Warp a picture by a map that was made before, or elsewhere."""
-    from app.export import apply_map
-    from app.files import writable
-    from app.maps import read_map
-    from app.pictures import picture_format, read_picture, write_picture
+    """Warp a picture or a clip by a map that was made before, or elsewhere."""
+    from app.applying import Application
+    from app.batch import Edits
+    from app.progress import on_terminal
     from app.recipe import Recipe
     from solver.context import Device
 
-    picture_format(output)
-    writable(output)
-    wanted = _with_options(Recipe(), {"output": {"size": size}}, {"edges": edges})
-    given, source = read_map(map_), read_picture(picture)
-    with Device.headless() as device:
-        write_picture(output, apply_map(device, given, source, wanted))
+    asked = Edits.of({"output": {"size": size, "fps": fps, "quality": quality}}, {"edges": edges}).applied(Recipe())
+    job = Application(
+        _map_source(map_, kind, grid, overscan, max_pixels),
+        picture,
+        output,
+        edges=asked.edges,
+        size=asked.output.size,
+        quality=asked.output.quality,
+        fps=asked.output.fps,
+        bits=bits,
+        strip=strip,
+    )
+    job.check()
+    with on_terminal(output.name, None) as progress, Device.headless() as device:
+        job.run(device, progress)
+
+
+def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:
+    from app.applying import MapSource
+
+    if kind not in (None, "st", "offsets"):
+        raise UserError(f"--kind must be st or offsets, not {kind}")
+    if grid not in (None, "centres", "corners", "pixels"):
+        raise UserError(f"--grid must be centres, corners or pixels, not {grid}")
+    return MapSource(path, kind, grid, overscan, max_pixels)
 
 
 @cli.command()
 def convert(
-    map_: Annotated[Path, typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy.")],
+    map_: Annotated[
+        Path, typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: a sequence.")
+    ],
     output: Output,
-    offsets: Annotated[bool, typer.Option(help="Pixel offsets in an EXR or TIFF, instead of an ST map.")] = False,
+    offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in OUT, instead of an ST map.")] = False,
+    invert: Annotated[
+        bool, typer.Option("--invert", help="Turn it round: where points go, from where they come from.")
+    ] = False,
+    kind: MapKind = None,
+    grid: StGrid = None,
+    overscan: MapOverscan = None,
+    max_pixels: MaxPixels = 400_000_000,
 ) -> None:
     """Write a warp map in another format."""
-    from app.maps import read_map, write_map
+    from app.applying import converted
+    from app.progress import on_terminal
 
-    write_map(output, read_map(map_), "offsets" if offsets else "st")
+    source = _map_source(map_, kind, grid, overscan, max_pixels)
+    with on_terminal(output.name, None) as progress:
+        converted(source, output, "offsets" if offsets else "st", invert, progress)
 
 
 @cli.command()

@@ -1,31 +1,68 @@
-"""A recipe made into files: a picture, an animation or a sequence, streamed frame by frame."""
+"""A recipe made into files: a picture, an animation, a clip warped, maps; streamed frame by frame."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict, dataclass
 from fractions import Fraction
-from itertools import groupby
+from itertools import chain, count, groupby, islice, pairwise, repeat
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from app.animation import animation_writer, check_animation, frame_order, is_animation, reordered
+from app.animation import (
+    FrameWriter,
+    animation_writer,
+    check_animation,
+    frame_order,
+    is_animation,
+    is_sequence,
+    reordered,
+)
+from app.checkpoints import DEFAULT_BUDGET
 from app.errors import UserError
 from app.files import replacing, writable
-from app.maps import Displacement, check_map, cropped, write_map
+from app.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.opening import check_picture
-from app.pictures import Picture, picture_format, write_picture
+from app.pictures import Picture, check_picture_output, picture_format, write_picture
 from app.progress import Progress
 from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
+from app.threads import ahead, behind
 from app.timeline import Sentinel, Timeline, frame_positions
+from app.video import Clip
 from solver.context import Device
-from solver.sampling import GivenMap, Sampler, Sampling
+from solver.sampling import Edges, GivenMap, Sampler, Sampling
+from solver.warp import WarpMap
+
+POINTS_AT_ONCE = 1_000_000  # of a map
+
+
+@dataclass(frozen=True)
+class MapOutput:
+    """What is written of the warp map.
+
+    Attributes:
+        path: a file for the last frame's map, or the pattern of a sequence for every frame's; see `app.maps`.
+        kind: what an EXR or TIFF holds.
+        forward: where the points of the original go, instead of where those of the result come from.
+        overscan: pixels more on every side.
+        size: longer side in pixels; None is the result's.
+    """
+
+    path: Path
+    kind: Kind = "st"
+    forward: bool = False
+    overscan: int = 0
+    size: int | None = None
+
+    @property
+    def is_sequence(self) -> bool:
+        return is_sequence(self.path)
 
 
 @dataclass(frozen=True)
@@ -34,23 +71,50 @@ class Job:
 
     Attributes:
         recipe: all settings; its [output] says the size and the rate.
-        picture: the source.
+        picture: the source; of a clip, its first frame.
         folder: where the names of auxiliary pictures in the recipe start from.
-        output: the file, or the pattern of a sequence's files.
+        output: the file, or the pattern of a sequence's files; None for maps alone.
         stats: a JSON file for numbers about every frame.
-        map: a file for the last frame's warp map; see `app.maps`.
+        maps: what is written of the warp map.
+        clip: the source, where it moves: its frames are warped by W_t at its own rate, its sound is carried over.
+        part: the first and the last frame of the animation that are written, from 0; None is to the end.
+        animated: for endings that stand for both, as .webp does: an animation is wanted.
+        bits: a channel, of pictures; None keeps the source's.
+        strip: leave out the source's metadata.
     """
 
     recipe: Recipe
     picture: Picture
     folder: Path
-    output: Path
+    output: Path | None
     stats: Path | None = None
-    map: Path | None = None
+    maps: MapOutput | None = None
+    clip: Clip | None = None
+    part: tuple[int, int | None] = (0, None)
+    animated: bool = False
+    bits: int | None = None
+    strip: bool = False
+
+    @property
+    def target(self) -> Path:
+        """The file that it is all about."""
+        path = self.output or (self.maps and self.maps.path)
+        assert path is not None
+        return path
 
     @property
     def is_animation(self) -> bool:
-        return is_animation(self.output)
+        return self.output is not None and (self.animated or is_animation(self.output))
+
+    @property
+    def has_frames(self) -> bool:
+        """True if more than the end is written."""
+        return self.is_animation or (self.output is None and self.maps is not None and self.maps.is_sequence)
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames per second."""
+        return self.clip.fps if self.clip else Fraction(self.recipe.output.fps).limit_denominator(1001)
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written.
@@ -58,13 +122,22 @@ class Job:
         Raises:
             UserError: naming the file and the mend.
         """
-        if self.is_animation:
-            check_animation(self.output, self.recipe.output.fps)
-        else:
-            picture_format(self.output)
-        if self.map is not None:
-            check_map(self.map)
-        for path in (self.output, self.stats, self.map):
+        if self.output is not None and self.is_animation:
+            check_animation(self.output, self.rate)
+        elif self.output is not None:
+            check_picture_output(self.output, self.bits)
+        if self.maps is not None:
+            check_map(self.maps.path)
+            if self.maps.is_sequence and not self.has_frames:
+                raise UserError(
+                    f"{self.maps.path} numbers the maps of an animation and {self.output} is a picture; "
+                    f"give one map's name, or leave out --output to write the maps alone"
+                )
+        if self.part != (0, None) and not self.has_frames:
+            raise UserError(f"only an animation has --frames, and {self.output} is a picture; write f.%04d.png or .mp4")
+        if self.clip is not None and self.recipe.mode == "density":
+            raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
+        for path in (self.output, self.stats, self.maps and self.maps.path):
             if path is not None:
                 writable(path)
 
@@ -109,12 +182,16 @@ class _Export:
         self.progress = progress
         self.device = device
         self.pictures = Pictures(job.picture, job.folder)
-        # Nothing goes back in time here, so that no checkpoint is needed.
-        self.replay = Replay(device, job.recipe, self.pictures, budget=0)
+        playback = job.recipe.time
+        # A moving source has no frame that is shown twice: what goes back does so in the simulation.
+        self.is_spooled = job.clip is None and not (job.maps and job.maps.is_sequence)
+        goes_back = (playback.reverse or playback.ping_pong) and not self.is_spooled
+        self.replay = Replay(device, job.recipe, self.pictures, budget=DEFAULT_BUDGET if goes_back else 0)
         self.sampler = Sampler(device)
         self.size = result_size(job.recipe, job.picture)
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.numbers: list[dict[str, Any]] = []
+        self._position: Fraction | None = None
         device.timings.enabled = self.replay.fluid.measuring = job.stats is not None
 
     def release(self) -> None:
@@ -125,18 +202,22 @@ class _Export:
     def run(self) -> Report:
         recipe, job = self.recipe, self.job
         watched = not self.sentinel.is_idle
-        self.progress.total = recipe.ticks * (2 if watched and job.is_animation else 1)
+        self.progress.total = recipe.ticks * (2 if watched and job.has_frames else 1)
         verdict = self._run_until_stopped() if watched else None
         end = self.replay.tick if watched else recipe.ticks
-        if job.is_animation:
-            positions = frame_positions(Timeline(end, recipe.fluid.dt), recipe.time, recipe.output.fps)
-            count = self._write_animation(positions)
+        if job.has_frames:
+            count = self._write_frames(shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate)))
         else:
-            picture = next(self._frames([Fraction(end)]))
-            write_picture(job.output, job.picture.with_pixels(picture), quality=recipe.output.quality)
+            self._go_to(Fraction(end))
+            if job.output is not None:
+                frame = self._frame(job.picture.pixels)
+                picture = job.picture.with_pixels(frame)
+                self.progress.check()
+                write_picture(job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip)
+            self._note(0, Fraction(end))
             count = 1
-        if job.map is not None:
-            write_map(job.map, displacement(self.replay, self.size))
+        if job.maps is not None and not job.maps.is_sequence:
+            write_map(job.maps.path, self._map(job.maps), job.maps.kind)
         if job.stats is not None:
             with replacing(job.stats) as temporary:
                 temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
@@ -150,62 +231,117 @@ class _Export:
                 return verdict
         return None
 
-    def _write_animation(self, positions: list[Fraction]) -> int:
-        playback, output = self.recipe.time, self.recipe.output
-        order = list(
-            frame_order(
-                len(positions),
-                ping_pong=playback.ping_pong,
-                hold_first=round(playback.hold_first * output.fps),
-                hold_last=round(playback.hold_last * output.fps),
-            )
-        )
-        if playback.reverse:
-            order = [len(positions) - 1 - index for index in order]
-        with ExitStack() as stack:
-            write = stack.enter_context(
-                animation_writer(
-                    self.job.output,
-                    Fraction(output.fps).limit_denominator(1001),
-                    crf=round(45 - 0.3 * output.quality),
-                    frames=len(order),
-                    like=self.job.picture,
-                    cancel=self.progress.cancel,
-                )
-            )
-            frames = self._frames(positions)
-            # Only what goes back needs frames that are past, which are kept on the disk.
-            goes_back = playback.reverse or playback.ping_pong
-            for frame in reordered(frames, order, self.job.output.parent) if goes_back else held(frames, order):
-                write(frame)
-        return len(order)
+    # -- frames -----------------------------------------------------------------------------------------------------
 
-    def _frames(self, positions: list[Fraction]) -> Iterator[np.ndarray]:
-        """The warped picture at each position, (h, w, c) like the source."""
-        for position in positions:
-            if position < self.replay.tick:
-                self.replay.seek(0)
-            while self.replay.tick < position // 1:
-                self._advance()
-            self.replay.seek(position)
-            with self.device.stage("sample picture"):
-                frame = self._frame()
-            if self.job.stats is not None:
-                self.numbers.append(self._numbers(position))
+    def _write_frames(self, shown: list[Fraction]) -> int:
+        """Write the frames, each warped by the map at its position in `shown`; says how many there were."""
+        job, (first, last) = self.job, self.job.part
+        if job.clip is None and first >= len(shown):
+            raise UserError(f"the animation has the frames 0-{len(shown) - 1}, and none from {first} on")
+        until = None if last is None else last + 1
+        wanted = shown[first:until]
+        with ExitStack() as stack:
+            take_map = None
+            if job.maps is not None and job.maps.is_sequence:
+                writer = map_writer(job.maps.path, job.maps.kind, first=first, cancel=self.progress.cancel)
+                take_map = stack.enter_context(behind(stack.enter_context(writer)))
+            if job.clip is not None:
+                source = stack.enter_context(ahead(islice(job.clip.read_frames(self.progress.cancel), first, until)))
+                self._expect(len(range(job.clip.frames or len(shown))[first:until]))
+                # Once the fluid has come to its end, the clip goes on with the last warp.
+                positions = islice(chain(shown, repeat(shown[-1])), first, None)
+                frames = self._frames(zip(count(first), positions, strict=False), source, take_map)
+            else:
+                self._expect(len(wanted))
+                frames = self._frames_of_picture(wanted, take_map)
+            write = None
+            if job.output is not None:
+                write = stack.enter_context(behind(stack.enter_context(self._writer())))
+            written = 0
+            for frame in frames:
+                if write is not None:
+                    write(frame)
+                written += 1
+                self.progress.advance()
+        if job.maps is not None and not job.maps.is_sequence:
+            self._go_to(max(wanted, default=shown[-1]))
+        return written
+
+    def _frames_of_picture(
+        self, wanted: list[Fraction], take_map: Callable[[Displacement], None] | None
+    ) -> Iterator[np.ndarray]:
+        """The picture warped by the maps at these positions; one that is shown again is not made again."""
+        first, source = self.job.part[0], repeat(self.job.picture.pixels)
+        if not self.is_spooled or self.job.output is None:
+            return self._frames(zip(count(first), wanted, strict=False), source, take_map)
+        numbers: dict[Fraction, int] = {}
+        for number, position in enumerate(wanted, first):
+            numbers.setdefault(position, number)
+        distinct = sorted(numbers)
+        places = {position: place for place, position in enumerate(distinct)}
+        order = [places[position] for position in wanted]
+        frames = self._frames(((numbers[position], position) for position in distinct), source, take_map)
+        goes_back = any(later < earlier for earlier, later in pairwise(order))
+        return reordered(frames, order, self.job.output.parent) if goes_back else held(frames, order)
+
+    def _expect(self, frames: int) -> None:
+        """Count the frames as work too, now that their number is known."""
+        if self.progress.total is not None:
+            self.progress.total += frames
+
+    def _writer(self) -> AbstractContextManager[FrameWriter]:
+        job, output, first = self.job, self.recipe.output, self.job.part[0]
+        assert job.output is not None
+        return animation_writer(
+            job.output,
+            job.rate,
+            crf=round(45 - 0.3 * output.quality),
+            quality=output.quality,
+            bits=job.bits,
+            sound=job.clip.path if job.clip and job.clip.sound else None,
+            sound_from=float(first / job.rate),
+            first=first,
+            like=job.picture.stripped() if job.strip else job.picture,
+            cancel=self.progress.cancel,
+        )
+
+    def _frames(
+        self,
+        positions: Iterable[tuple[int, Fraction]],
+        source: Iterator[np.ndarray],
+        take_map: Callable[[Displacement], None] | None,
+    ) -> Iterator[np.ndarray]:
+        """The frames of the source, (h, w, c) each, warped by the maps at the numbered positions."""
+        nothing = np.empty((0, 0, 1), np.uint8)
+        for (number, position), pixels in zip(positions, source, strict=False):
+            self._go_to(position)
+            if take_map is not None and self.job.maps is not None:
+                take_map(self._map(self.job.maps))
+            frame = self._frame(pixels) if self.job.output is not None else nothing
+            self._note(number, position)
             yield frame
 
-    def _frame(self) -> np.ndarray:
+    def _go_to(self, position: Fraction) -> None:
+        if position == self._position:
+            return
+        whole = position // 1
+        if whole < self.replay.tick:
+            nearest = self.replay.checkpoints.nearest(self.recipe, whole)
+            self.replay.seek(nearest.tick if nearest else 0)
+        while self.replay.tick < whole:
+            self._advance()
+        self.replay.seek(position)
+        self._position = position
+
+    def _frame(self, pixels: np.ndarray) -> np.ndarray:
         if self.replay.density is not None:
             return self._density_frame(self.replay.density.get())
-        how = Sampling(edges=self.recipe.edges)
-        pixels = self.job.picture.pixels
-        if self.job.is_animation or self.recipe.edges != "transparent" or not picture_format(self.job.output).alpha:
-            return self.sampler.apply(self.replay.warp, pixels, self.size, how)
-        # What lies beyond the edge is to be transparent, if anything does.
-        warped = self.sampler.apply(self.replay.warp, with_alpha(pixels), self.size, how)
-        if self.job.picture.has_alpha or (warped[..., -1] < opaque_value(warped)).any():
-            return warped
-        return np.ascontiguousarray(warped[..., :-1])
+        # The frames of an animation are all of one kind, and most of its formats have no alpha.
+        alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
+        with self.device.stage("sample picture"):
+            return looked_up(
+                self.sampler, self.replay.warp, pixels, self.size, self.recipe.edges, alpha, self.progress.check
+            )
 
     def _density_frame(self, values: np.ndarray) -> np.ndarray:
         """The densities as 8-bit colours, in the result's size."""
@@ -213,7 +349,15 @@ class _Export:
         pixels = (np.clip(values[..., :channels], 0, 1) * 255 + 0.5).astype(np.uint8)
         if self.size == pixels.shape[1::-1]:
             return pixels
-        return self.sampler.apply(GivenMap(self.device, np.zeros((8, 8, 2))), pixels, self.size)
+        still = GivenMap(self.device, np.zeros((8, 8, 2), np.float32))
+        try:
+            return self.sampler.apply(still, pixels, self.size)
+        finally:
+            still.release()
+
+    def _map(self, wanted: MapOutput) -> Displacement:
+        size = self.size if wanted.size is None else longer_side(self.size, wanted.size)
+        return displacement(self.replay, size, wanted.overscan, wanted.forward, self.progress.check)
 
     def _advance(self) -> None:
         self.replay.advance()
@@ -221,10 +365,13 @@ class _Export:
 
     # -- numbers ----------------------------------------------------------------------------------------------------
 
-    def _numbers(self, position: Fraction) -> dict[str, Any]:
+    def _note(self, number: int, position: Fraction) -> None:
+        """Keep the numbers about a frame, if they are asked for."""
+        if self.job.stats is None:
+            return
         replay, residuals = self.replay, self.replay.fluid.residuals
-        return {
-            "frame": len(self.numbers),
+        told = {
+            "frame": number,
             "tick": float(position),
             "time": float(position) * self.recipe.fluid.dt,
             **asdict(residuals),
@@ -233,6 +380,7 @@ class _Export:
             **asdict(replay.warp.statistics()),
             "milliseconds": {stage: round(spent, 3) for stage, spent in self.device.timings.take().items()},
         }
+        self.numbers.append(told)
 
     def _document(self, verdict: str | None) -> dict[str, Any]:
         return {
@@ -255,38 +403,88 @@ def held(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]
             yield frame
 
 
-def displacement(replay: Replay, size: tuple[int, int]) -> Displacement:
-    """The warp map at this moment, for a picture of `size`."""
+def shown_positions(timeline: Timeline, recipe: Recipe, fps: float) -> list[Fraction]:
+    """The position in ticks of every frame of an animation in the order they are shown."""
+    playback = recipe.time
+    positions = frame_positions(timeline, playback, fps)
+    if playback.reverse:
+        positions.reverse()
+    order = frame_order(
+        len(positions),
+        ping_pong=playback.ping_pong,
+        hold_first=round(playback.hold_first * fps),
+        hold_last=round(playback.hold_last * fps),
+    )
+    return [positions[index] for index in order]
+
+
+def displacement(
+    replay: Replay,
+    size: tuple[int, int],
+    overscan: int = 0,
+    forward: bool = False,
+    check: Callable[[], None] = lambda: None,
+) -> Displacement:
+    """The warp map at this moment, for a picture of `size` with `overscan` pixels more on every side.
+
+    Nothing flows beyond the picture's edge: the displacement there is that of the nearest point on it.
+    forward: where the points of the original go. check: called now and then; may raise, as `Progress.check` does.
+    """
     # The grid's cells are square, and its sides whole cells: the picture is fitted to it by less than half a cell.
     fit = np.divide(size, max(size)) / replay.grid.extent
-    return Displacement((replay.warp.read(size) * fit).astype(np.float32))
+    warp = replay.warp.forward if forward else replay.warp
+    if not overscan and max(size) <= replay.device.limits.max_texture_size:
+        return Displacement((warp.read(size) * fit).astype(np.float32), 0, forward)
+    (width, height), (right, bottom) = size, replay.grid.extent
+    x = np.clip((np.arange(-overscan, width + overscan) + 0.5) / width, 0, 1) * right
+    y = np.clip((np.arange(-overscan, height + overscan) + 0.5) / height, 0, 1) * bottom
+    values = np.empty((len(y), len(x), 2), np.float32)
+    rows = max(1, POINTS_AT_ONCE // len(x))
+    for top in range(0, len(y), rows):
+        check()
+        points = np.stack(np.meshgrid(x, y[top : top + rows]), axis=-1).reshape(-1, 2)
+        values[top : top + rows] = (warp.at(points) * fit).reshape(-1, len(x), 2)
+    return Displacement(values, overscan, forward)
 
 
-def apply_map(device: Device, given: Displacement, picture: Picture, recipe: Recipe) -> Picture:
-    """The picture looked up through a map that was made before; edges and size as the recipe says.
+def looked_up(
+    sampler: Sampler,
+    warp: WarpMap | GivenMap,
+    pixels: np.ndarray,
+    size: tuple[int, int],
+    edges: Edges,
+    alpha: bool,
+    check: Callable[[], None],
+) -> np.ndarray:
+    """The pixels (h, w, c) looked up through a map, in bands, so that little more than the result is in memory.
 
-    Raises:
-        UserError: if the map has other proportions than the picture.
+    alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `edges` wants that to be seen.
+    check: called with every band; may raise, as `Progress.check` does.
     """
-    if given.forward:
-        raise UserError("this map tells where each point goes; to warp a picture, one of where it comes from is needed")
-    values = cropped(given.fitted(picture.width, picture.height)).values
-    sampler = Sampler(device)
-    try:
-        size, how = result_size(recipe, picture), Sampling(edges=recipe.edges)
-        pixels = sampler.apply(GivenMap(device, values), picture.pixels, size, how)
-    finally:
-        sampler.release()
-    return picture.with_pixels(pixels)
+    how = Sampling(edges=edges)
+    opaque = pixels.shape[2] in (1, 3)
+    given = with_alpha(pixels) if alpha and opaque and edges == "transparent" else pixels
+    result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)
+    top = 0
+    for band in sampler.bands(warp, given, size, how):
+        check()
+        if given is not pixels and result.shape[2] == pixels.shape[2] and (band[..., -1] < opaque_value(band)).any():
+            result = with_alpha(result)
+        result[top : top + len(band)] = band[..., : result.shape[2]]
+        top += len(band)
+    return result
+
+
+def longer_side(size: tuple[int, int], longest: int) -> tuple[int, int]:
+    """A size of the same proportions, its longer side `longest` pixels."""
+    width, height = (max(1, round(side * longest / max(size))) for side in size)
+    return width, height
 
 
 def result_size(recipe: Recipe, picture: Picture) -> tuple[int, int]:
     """(width, height) of the result in pixels: the recipe's size, or the picture's own."""
-    if recipe.output.size is None:
-        return picture.width, picture.height
-    longer = max(picture.width, picture.height)
-    width, height = (max(1, round(side * recipe.output.size / longer)) for side in (picture.width, picture.height))
-    return width, height
+    own = picture.width, picture.height
+    return own if recipe.output.size is None else longer_side(own, recipe.output.size)
 
 
 def with_alpha(pixels: np.ndarray) -> np.ndarray:

@@ -3,18 +3,45 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 from app.errors import UserError
-from app.pictures import Picture, read_picture
+from app.pictures import MAX_PIXELS, Picture, read_picture
 from app.project import Project, is_project, load
 from app.recipe import Recipe
+from app.video import Clip, read_clip
 from solver.grid import SMALLEST_GRID
 
 SMALLEST_SIDE = 8  # pixels
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr", ".avif", ".gif", ".bmp")
+CLIP_ENDINGS = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".ogv", ".wmv")
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is warped: a picture, or a clip and its first frame."""
+
+    picture: Picture
+    clip: Clip | None = None
+
+
+def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
+    """The picture or, by its ending, the clip in a file.
+
+    Raises:
+        UserError: if it cannot be read.
+    """
+    if path.suffix.lower() not in CLIP_ENDINGS:
+        return Source(read_picture(path, max_pixels))
+    clip = read_clip(path, max_pixels)
+    with closing(clip.read_frames()) as frames:
+        first = next(frames, None)
+    if first is None:
+        raise UserError(f"Cannot read {path}: it has no frame that can be decoded; get it again.")
+    return Source(Picture(first), clip)
 
 
 def check_picture(picture: Picture, cells: int) -> None:
@@ -41,19 +68,19 @@ class Opened:
     label: str
     project: Project | None = None
 
-    def picture(self, other: Path | None = None) -> Picture:
-        """The picture `other`, or else the recipe's own.
+    def source(self, other: Path | None = None, max_pixels: int = MAX_PIXELS) -> Source:
+        """The picture or clip `other`, or else the recipe's own.
 
         Raises:
             UserError: if there is none, or it cannot be read.
         """
         if other is not None:
-            return read_picture(other)
+            return open_source(other, max_pixels)
         if self.project is not None:
-            return self.project.picture
+            return Source(self.project.picture)
         if self.recipe.picture is None:
             raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
-        return read_picture(self.folder / self.recipe.picture)
+        return open_source(self.folder / self.recipe.picture, max_pixels)
 
 
 def shipped_recipes() -> dict[str, Path]:

@@ -110,6 +110,15 @@ def picture_format(path: str | os.PathLike[str]) -> Format:
     return known
 
 
+def check_picture_output(path: str | os.PathLike[str], bits: int | None = None) -> None:
+    """Raise `UserError` if `path` has no ending of a picture we write, or its format not these bits a channel."""
+    chosen = picture_format(path)
+    if bits is not None and bits not in chosen.bits:
+        raise UserError(
+            f"Cannot write {path}: {chosen.name} holds {' or '.join(map(str, chosen.bits))} bits a channel, not {bits}."
+        )
+
+
 # Depth and alpha ----------------------------------------------------------------------------------------------------
 
 
@@ -487,14 +496,11 @@ def write_picture(
     background: what shows through where the format has no alpha.
     Raises `UserError`.
     """
+    check_picture_output(path, bits)
     chosen = picture_format(path)
     if max(picture.width, picture.height) > chosen.longest:
         raise UserError(
             f"Cannot write {path}: {chosen.name} holds no side longer than {chosen.longest} pixels; use PNG or TIFF."
-        )
-    if bits is not None and bits not in chosen.bits:
-        raise UserError(
-            f"Cannot write {path}: {chosen.name} holds {' or '.join(map(str, chosen.bits))} bits a channel, not {bits}."
         )
     if strip:
         picture = picture.stripped()
@@ -551,9 +557,9 @@ def _encode_pillow(picture: Picture, chosen: Format, quality: int) -> bytes:
     if picture.xmp:
         options["xmp"] = picture.xmp
     if chosen is JPEG:
-        # optimizing gains a few per cent, and needs the whole file in memory once more
-        small = picture.width * picture.height < 2**24
-        options |= {"subsampling": 0, "optimize": small, "comment": picture.texts.get("Comment", "")}
+        # Not optimized: that gains a few per cent, holds the file in memory once more, and fails where noise makes the
+        # file larger than the buffer Pillow guesses.
+        options |= {"subsampling": 0, "comment": picture.texts.get("Comment", "")}
         if picture.dpi:
             options["dpi"] = tuple(round(value) for value in picture.dpi)
     elif chosen is WEBP:

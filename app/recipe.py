@@ -151,6 +151,7 @@ class Recipe(Model):
         version: of this format.
         name: a title.
         picture: the source, relative to the recipe's own folder.
+        map: a warp map to begin with instead of the picture as it is, in any format of `app.maps`.
         duration: T, in simulated seconds.
         edges: what lies beyond the picture's edge.
         mode: "coordinates" warps the picture's coordinates, "density" moves its values (see `Density`).
@@ -160,6 +161,7 @@ class Recipe(Model):
     version: Literal[1] = VERSION
     name: str = ""
     picture: Annotated[str, Field(min_length=1)] | None = None
+    map: Annotated[str, Field(min_length=1)] | None = None
     duration: Annotated[float, Field(gt=0, le=1_000_000)] = 1.0
     edges: Literal["transparent", "black", "clamp", "mirror", "wrap"] = "transparent"
     mode: Literal["coordinates", "density"] = "coordinates"
@@ -178,6 +180,8 @@ class Recipe(Model):
     def _affordable(self) -> Self:
         if self.duration / self.fluid.dt > MOST_TICKS:
             raise ValueError(f"'duration' / 'fluid.dt' is more than {MOST_TICKS} ticks; make dt larger")
+        if self.map is not None and self.mode == "density":
+            raise ValueError("a 'map' warps coordinates, and mode \"density\" has none; remove one of them")
         ticks = [change.tick for change in self.change]
         if any(later < earlier for earlier, later in pairwise(ticks)):
             raise ValueError("the ticks of [[change]] must not go backwards")
@@ -315,7 +319,7 @@ class Recipe(Model):
 
     def _set_up(self) -> tuple[object, ...]:
         """What is in force from the first tick on."""
-        return self.picture, self.mode, self.density, self.fluid, self.viscosity, self.freeze, self.force
+        return self.picture, self.map, self.mode, self.density, self.fluid, self.viscosity, self.freeze, self.force
 
 
 def _inline(value: Any) -> Any:

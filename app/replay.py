@@ -21,7 +21,7 @@ from app.timeline import Observation, Sentinel
 from solver.brush import Brush, Push, Tip, Twirl
 from solver.context import Device
 from solver.density import Density
-from solver.field import Field
+from solver.field import Field, FieldError
 from solver.fluid import Fluid
 from solver.grid import Grid
 from solver.masks import Masks
@@ -328,6 +328,8 @@ class Replay:
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.fluid = fluid(self.device, self.grid)
         self.warp = warp(self.device, self.grid)
+        if recipe.map is not None:
+            self._begin_with(recipe.map)
         self.masks = Masks(self.device, self.grid)
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
@@ -336,6 +338,15 @@ class Replay:
         self._forces_built = [LoadedForce.of(self.device, force) for force in built]
         self._viscosity = cache(self._viscosity_over)
         self._set_parameters()
+
+    def _begin_with(self, name: str) -> None:
+        source = self.pictures.source
+        # The picture is fitted to whole cells, and its lengths with it.
+        fit = np.divide(self.grid.extent, np.divide((source.width, source.height), max(source.width, source.height)))
+        try:
+            self.warp.set(self.pictures.load_map(name) * fit)
+        except FieldError as error:
+            raise UserError(f"{name} cannot be the map to begin with: {error}") from None
 
     def _new_density(self) -> Density:
         values, settings = self._density_values(), self.recipe.density

@@ -13,6 +13,8 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from app.errors import UserError
+from app.maps import cropped, read_map
 from app.pictures import Picture, linear_to_srgb, read_picture
 from app.schema import Fraction01, Model, Place, Radius
 from solver.grid import Grid
@@ -40,6 +42,7 @@ class Pictures:
         self.folder = Path(folder)
         self.notices: list[str] = []
         self._read: dict[str, Picture] = {}
+        self._maps: dict[str, np.ndarray] = {}
 
     def load(self, name: str) -> Picture:
         """The picture called `name`, or the source itself.
@@ -58,6 +61,18 @@ class Pictures:
                     f"{name} is {mine[0]} x {mine[1]} and the picture {wanted[0]} x {wanted[1]}: {how} to fit it"
                 )
         return self._read[name]
+
+    def load_map(self, name: str) -> np.ndarray:
+        """The displacement (h, w, 2) of the warp map called `name`, in the longer sides of the source.
+
+        Raises UserError if it cannot be read, or has other proportions than the source.
+        """
+        if name not in self._maps:
+            given = read_map(self.folder / name)
+            if given.forward:
+                raise UserError(f"{name} tells where each point goes; turn it round with: fluidwarp convert --invert")
+            self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
+        return self._maps[name]
 
     def notice(self, text: str) -> None:
         """Note something the user should hear of, once."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -38,7 +38,7 @@ class Clip:
     decoder: tuple[str, ...]
     filters: str
 
-    def read_frames(self, cancel: Callable[[], bool] = never) -> Iterator[np.ndarray]:
+    def read_frames(self, cancel: Callable[[], bool] = never) -> Generator[np.ndarray, None, None]:
         """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time."""
         channels = 4 if self.alpha else 3
         kind = {(False, 8): "rgb24", (True, 8): "rgba", (False, 16): "rgb48le", (True, 16): "rgba64le"}

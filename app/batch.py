@@ -1,0 +1,341 @@
+"""Many pictures by one recipe: one after the other, in several processes, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import queue
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from app.animation import ANIMATIONS
+from app.errors import Cancelled, UserError
+from app.export import Job, MapOutput, run
+from app.files import cannot_write
+from app.opening import CLIP_ENDINGS, Opened, open_recipe
+from app.pictures import FORMATS, MAX_PIXELS
+from app.progress import Progress, never
+from app.recipe import Recipe
+from solver.context import Device
+
+NAME = "{name}"
+"""What stands for the name of each picture in the name of an output."""
+
+ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
+LOOK = 0.1  # seconds between two looks at the wish to stop
+
+
+@dataclass(frozen=True)
+class Edits:
+    """What is asked for instead of what the recipe says: keys of its tables, and keys of its own."""
+
+    tables: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = ()
+    keys: tuple[tuple[str, Any], ...] = ()
+
+    @classmethod
+    def of(cls, tables: dict[str, dict[str, Any]], keys: dict[str, Any]) -> Edits:
+        """Those that were given: not None."""
+        given = {name: tuple((k, v) for k, v in table.items() if v is not None) for name, table in tables.items()}
+        return cls(
+            tuple((name, table) for name, table in given.items() if table),
+            tuple((name, value) for name, value in keys.items() if value is not None),
+        )
+
+    def applied(self, recipe: Recipe) -> Recipe:
+        """The recipe with them. Raises `UserError` where they are no values for it."""
+        parts = dict(self.keys)
+        for name, table in self.tables:
+            parts[name] = getattr(recipe, name).model_copy(update=dict(table))
+        return recipe.edited(**parts).checked("the command line") if parts else recipe
+
+
+@dataclass(frozen=True)
+class Task:
+    """One picture of a batch, in names only, so that any process that sees the same files can do it.
+
+    Attributes:
+        recipe: its file, or the name of one that comes with fluidwarp.
+        edits: to the recipe.
+        picture: the picture or clip; None is the recipe's own.
+        output, stats, maps, part, animated, bits, strip: as in `Job`.
+        max_pixels: larger pictures are refused.
+    """
+
+    recipe: str
+    edits: Edits
+    picture: Path | None
+    output: Path | None
+    stats: Path | None = None
+    maps: MapOutput | None = None
+    part: tuple[int, int | None] = (0, None)
+    animated: bool = False
+    bits: int | None = None
+    strip: bool = False
+    max_pixels: int = MAX_PIXELS
+
+    @property
+    def label(self) -> str:
+        """What the user calls it."""
+        return str(self.picture or self.recipe)
+
+    def named(self) -> Task:
+        """The task with the picture's name where "{name}" stands in the names of what it writes."""
+        if self.picture is None:
+            return self
+        maps = self.maps and replace(self.maps, path=named(self.maps.path, self.picture))
+        output, stats = (path and named(path, self.picture) for path in (self.output, self.stats))
+        return replace(self, output=output, stats=stats, maps=maps)
+
+    def job(self, opened: Opened | None = None) -> Job:
+        """The job, with its picture read. Raises `UserError`."""
+        opened = opened or _opened(self.recipe)
+        source = opened.source(self.picture, self.max_pixels)
+        return Job(
+            self.edits.applied(opened.recipe),
+            source.picture,
+            opened.folder,
+            self.output,
+            self.stats,
+            self.maps,
+            source.clip,
+            self.part,
+            self.animated,
+            self.bits,
+            self.strip,
+        )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a task went: `error` is "" if well."""
+
+    label: str
+    error: str = ""
+    notices: tuple[str, ...] = ()
+
+
+def spread(task: Task, pictures: Sequence[Path]) -> list[Task]:
+    """The task for each of the pictures: its output is a folder, which is made, or a name with "{name}" in it.
+
+    In a folder they keep their names and endings, or get .png where theirs cannot be written.
+
+    Raises:
+        UserError: if two would be written to the same file, or one to where it is read from.
+    """
+    recipe = str(Path(task.recipe).absolute()) if Path(task.recipe).exists() else task.recipe
+    output = task.output
+    if output is not None and NAME not in str(output):
+        if output.suffix and not output.is_dir():
+            raise UserError(f"{len(pictures)} pictures cannot all become {output}; write a folder, or out/{NAME}.png")
+        try:
+            output.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(output, error) from None
+    for path in (task.stats, task.maps and task.maps.path):
+        if path is not None and NAME not in str(path) and len(pictures) > 1:
+            raise UserError(f"{len(pictures)} pictures cannot all write {path}; put {NAME} into its name")
+    tasks = []
+    for picture in pictures:
+        into = output and (output if NAME in str(output) else output / (picture.stem + _ending(picture)))
+        one = replace(task, recipe=recipe, picture=picture, output=into).named()
+        tasks.append(replace(one, output=one.output and one.output.absolute()))
+    _check_apart(tasks)
+    # A cluster's workers do not start from this folder.
+    return [replace(one, picture=one.picture and one.picture.absolute()) for one in tasks]
+
+
+def _ending(picture: Path) -> str:
+    suffix = picture.suffix.lower()
+    if suffix in CLIP_ENDINGS:
+        return picture.suffix if suffix in ANIMATIONS else ".mp4"
+    return picture.suffix if suffix in FORMATS else ".png"
+
+
+def _check_apart(tasks: Sequence[Task]) -> None:
+    seen: dict[Path, Path | None] = {}
+    for task in tasks:
+        if task.output is None:
+            continue
+        if task.output in seen:
+            raise UserError(f"{seen[task.output]} and {task.picture} would both become {task.output}; rename one")
+        if task.picture is not None and task.output.resolve() == task.picture.resolve():
+            raise UserError(f"{task.picture} would be replaced by its own result; choose another --output")
+        seen[task.output] = task.picture
+
+
+def named(path: Path, picture: Path) -> Path:
+    """`path` with the picture's name in place of "{name}"."""
+    return Path(str(path).replace(NAME, picture.stem))
+
+
+# Doing them ---------------------------------------------------------------------------------------------------------
+
+Report = Callable[[Outcome], None]
+
+
+def run_batch(
+    tasks: Sequence[Task], report: Report, progress: Progress, jobs: int = 1, cluster: str | None = None
+) -> int:
+    """Do all tasks, whatever becomes of any; `report` hears of each as it ends. Says how many failed.
+
+    jobs: processes on this machine. cluster: the address of a Dask scheduler, which decides instead.
+
+    Raises:
+        Cancelled: if `progress` says so; what is finished stays, nothing is half-written.
+    """
+    failures = 0
+    progress.total = len(tasks)
+
+    def heard(outcome: Outcome) -> None:
+        nonlocal failures
+        failures += bool(outcome.error)
+        report(outcome)
+        progress.advance()
+
+    if cluster is not None:
+        _run_on_cluster(tasks, cluster, heard, progress)
+    elif min(jobs, len(tasks)) > 1:
+        _run_in_processes(tasks, min(jobs, len(tasks)), heard, progress)
+    else:
+        for task in tasks:
+            heard(perform(task, progress.cancel))
+    return failures
+
+
+_here = threading.local()
+
+
+def perform(task: Task, cancel: Callable[[], bool] = never) -> Outcome:
+    """Do a task in this thread, on a device that is kept for the next one. Raises nothing but `Cancelled`."""
+    try:
+        job = task.job()
+        job.check()
+        if not hasattr(_here, "device"):  # a GL context belongs to one thread
+            _here.device = Device.headless()
+        told = run(_here.device, job, Progress(cancel=cancel))
+    except Cancelled:
+        raise
+    except UserError as error:
+        return Outcome(task.label, str(error))
+    except MemoryError:
+        return Outcome(task.label, "there is not enough memory for it; use fewer --jobs or a smaller --size")
+    except Exception as error:
+        return Outcome(task.label, f"{type(error).__name__}: {str(error).strip() or 'no reason given'}")
+    return Outcome(task.label, notices=(*told.notices, *([told.verdict] if told.verdict else [])))
+
+
+@lru_cache(maxsize=4)
+def _opened(name: str) -> Opened:
+    return open_recipe(name)
+
+
+# Processes ----------------------------------------------------------------------------------------------------------
+
+_wish: Any = None
+
+
+def _begin(wish: Any) -> None:
+    """In a new worker: Ctrl+C reaches every process of a terminal, and what it means is for the first to say."""
+    global _wish
+    _wish = wish
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _perform_here(task: Task) -> Outcome:
+    return perform(task, _wish.is_set)
+
+
+def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress: Progress) -> None:
+    # A forked process would share this one's GL, which no driver survives.
+    context = multiprocessing.get_context("spawn")
+    wish = context.Event()
+    waiting = deque((task, 1) for task in tasks)
+    while waiting:
+        pool = ProcessPoolExecutor(jobs, context, _begin, (wish,))
+        running: dict[Future[Outcome], tuple[Task, int]] = {}
+        try:
+            while waiting or running:
+                # No more than are at work, so that few are suspected when a worker dies.
+                while waiting and len(running) < jobs:
+                    task, attempt = waiting.popleft()
+                    running[pool.submit(_perform_here, task)] = task, attempt
+                done, _ = wait(running, LOOK, FIRST_COMPLETED)
+                progress.check()
+                for future in done:
+                    outcome = future.result()
+                    del running[future]
+                    report(outcome)
+        except BrokenProcessPool:
+            for task, attempt in running.values():
+                if attempt < ATTEMPTS:
+                    waiting.append((task, attempt + 1))
+                else:
+                    report(Outcome(task.label, "its process died, perhaps for want of memory; use fewer --jobs"))
+        except BaseException:
+            wish.set()
+            raise
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+# A cluster ----------------------------------------------------------------------------------------------------------
+
+
+def _perform_on_worker(task: Task) -> Outcome:
+    """In a thread of a Dask worker, which forgets a task that its client has cancelled."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def forgotten() -> bool:
+        known = worker.state.tasks.get(key)
+        return known is None or known.state in ("cancelled", "released", "forgotten")
+
+    return perform(task, forgotten)
+
+
+def _run_on_cluster(tasks: Sequence[Task], address: str, report: Report, progress: Progress) -> None:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise UserError("a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'", 2) from None
+    try:
+        client = Client(address, timeout=10, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
+        raise UserError(f"no Dask scheduler answers at {address} ({error}); give for example tcp://host:8786") from None
+    ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    with client:
+        # Dask gives the tasks of a worker that dies to the others, as often as its allowed-failures says.
+        futures = {client.submit(_perform_on_worker, task, pure=False): task for task in tasks}
+        for future in futures:
+            future.add_done_callback(ended.put)
+        try:
+            left = len(futures)
+            while left:
+                progress.check()
+                try:
+                    future = ended.get(timeout=LOOK)
+                except queue.Empty:
+                    continue
+                left -= 1
+                report(_outcome(future, futures[future]))
+        except BaseException:
+            client.cancel(list(futures), force=True)
+            raise
+
+
+def _outcome(future: Any, task: Task) -> Outcome:
+    if future.status == "finished":
+        return future.result()
+    error = future.exception() if future.status == "error" else None
+    if type(error).__name__ == "KilledWorker":
+        return Outcome(task.label, "every worker that tried it died, perhaps for want of memory")
+    return Outcome(task.label, f"it failed on the cluster ({error or future.status})")

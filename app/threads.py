@@ -1,0 +1,110 @@
+"""Two ends of a stream in threads of their own, so that decoding, rendering and encoding go on at the same time."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+DEPTH = 2  # items that wait: enough to even out a slow one, and the memory stays bounded
+_END = object()
+
+
+@contextmanager
+def behind(write: Callable[[T], None], depth: int = DEPTH) -> Iterator[Callable[[T], None]]:
+    """Yield a function that hands an item to `write` in another thread, and waits once `depth` items lie there.
+
+    What `write` raises is raised by the next call, or when the block ends; all has been written once it has ended well.
+    What is handed over must not be changed afterwards.
+    """
+    waiting: queue.Queue[object] = queue.Queue(depth)
+    failed: list[BaseException] = []
+    stopped = threading.Event()
+
+    def work() -> None:
+        while (item := waiting.get()) is not _END:
+            if failed or stopped.is_set():
+                continue  # the other side must not be left waiting for room
+            try:
+                write(item)  # type: ignore[arg-type]
+            except BaseException as error:
+                failed.append(error)
+
+    def put(item: T) -> None:
+        if failed:
+            raise failed[0]
+        waiting.put(item)
+
+    thread = threading.Thread(target=work, name="writer", daemon=True)
+    thread.start()
+    try:
+        yield put
+    except BaseException:
+        stopped.set()
+        raise
+    finally:
+        waiting.put(_END)
+        thread.join()
+    if failed:
+        raise failed[0]
+
+
+@contextmanager
+def ahead(items: Iterator[T], depth: int = DEPTH) -> Iterator[Iterator[T]]:
+    """Yield an iterator over `items`, which are made in another thread, `depth` of them in advance.
+
+    When the block ends before the items do, `items` is closed if it is a generator.
+    """
+    reader = _Ahead(items, depth)
+    try:
+        yield reader
+    finally:
+        reader.close()
+
+
+class _Ahead(Generic[T]):
+    def __init__(self, items: Iterator[T], depth: int) -> None:
+        self._items = items
+        self._ready: queue.Queue[object] = queue.Queue(depth)
+        self._stopped = threading.Event()
+        self._failed: BaseException | None = None
+        self._thread = threading.Thread(target=self._work, name="reader", daemon=True)
+        self._thread.start()
+
+    def __iter__(self) -> Iterator[T]:
+        return self
+
+    def __next__(self) -> T:
+        item = self._ready.get()
+        if item is _END:
+            self._ready.put(_END)
+            if self._failed is not None:
+                raise self._failed
+            raise StopIteration
+        return item  # type: ignore[return-value]
+
+    def close(self) -> None:
+        """Let the thread come to its end."""
+        self._stopped.set()
+        while self._thread.is_alive():
+            try:
+                self._ready.get(timeout=0.01)
+            except queue.Empty:
+                continue
+
+    def _work(self) -> None:
+        try:
+            for item in self._items:
+                self._ready.put(item)
+                if self._stopped.is_set():
+                    break
+        except BaseException as error:
+            self._failed = error
+        finally:
+            if (close := getattr(self._items, "close", None)) is not None:
+                close()
+            self._ready.put(_END)
