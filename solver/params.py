@@ -26,11 +26,11 @@ class FluidParams:
     Attributes:
         walls: see `Walls`.
         drag: rate at which all motion dies away, per second; 0 is the paper's fluid.
-        pressure_cycles: multigrid cycles of the projection.
+        pressure_cycles: multigrid cycles of the projection; None leaves it to the projection, see `Pressure.cycles`.
         sweeps: Jacobi sweeps of the paper's own scheme (solver "paper"), for viscosity and for pressure each.
     """
 
     walls: Walls = Walls()
     drag: float = 0.0
-    pressure_cycles: int = 3
+    pressure_cycles: int | None = None
     sweeps: int = 40

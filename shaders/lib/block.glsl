@@ -1,6 +1,8 @@
 // The pressure's grids. A texel holds a block of 2 x 2 cells: x upper left, y upper right, z lower left, w lower right.
-// A block of one level is one cell of the next. How open the faces of a block's cells are, 0 (wall) to 1, is kept in
-// three 8-bit textures, so that walls, solids and the padding of odd sizes are all just closed faces:
+// A block of one level is one cell of the next. How open the faces of a block's cells are is kept in three textures, so
+// that walls, solids and the padding of odd sizes are all just closed faces. It is 0 (wall) or 1 on the finest level; on
+// coarser ones the open length of the face over the distance between the two centres, in cells of the level. The last
+// cell of a row or column is narrower where the grid's size does not halve evenly, and its neighbour's centre nearer.
 //   left  the four cells' left faces,   up  their upper faces,
 //   far   the block's right faces (x upper, y lower) and its lower faces (z left, w right).
 struct Faces {

@@ -1,21 +1,27 @@
 // The faces of this fragment's block, and the Laplacian over them. For passes whose target is a level's grid of blocks.
-// With OPEN there are no solids, and the faces follow from u_cells, the level's size in cells; else they are read.
+// With OPEN there are no solids: the faces follow from u_span, the grid's size in cells of the level; else they are read.
 #include "lib/block.glsl"
 
 uniform sampler2D u_left;
 uniform sampler2D u_up;
 uniform sampler2D u_far;
-uniform vec2 u_cells;
+uniform vec2 u_span;
 
 in vec2 v_uv;
+
+// One over the distance from the centre of a cell of side 1 to that of the next, of the given side.
+vec2 link(vec2 side) { return 2.0 / (1.0 + side); }
 
 // 3 reads; none with OPEN.
 Faces faces() {
 #ifdef OPEN
+    // The sides of this block's cells and of the next, and how strong the links before, in and behind the block are.
     vec2 first = 2.0 * floor(gl_FragCoord.xy);
-    vec2 near = vec2(greaterThan(first, vec2(0.5)));
-    vec2 inner = vec2(lessThan(first + 1.0, u_cells)), far = vec2(lessThan(first + 2.0, u_cells));
-    vec4 columns = vec2(1.0, inner.x).xyxy, rows = vec2(1.0, inner.y).xxyy;
+    vec2 side = min(u_span - first, 1.0), second = clamp(u_span - first - 1.0, 0.0, 1.0);
+    vec2 third = clamp(u_span - first - 2.0, 0.0, 1.0);
+    vec2 near = vec2(greaterThan(first, vec2(0.5))) * link(side), inner = sign(second) * link(second);
+    vec2 far = sign(third) * link(third);
+    vec4 columns = vec2(side.x, second.x).xyxy, rows = vec2(side.y, second.y).xxyy;
     return Faces(rows * vec2(near.x, inner.x).xyxy, rows * vec2(inner.x, far.x).xyxy,
                  columns * vec2(near.y, inner.y).xxyy, columns * vec2(inner.y, far.y).xxyy);
 #else

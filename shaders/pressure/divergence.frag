@@ -1,7 +1,7 @@
 // Right-hand side of the pressure equation: what flows out of each cell, per face length; h times the divergence.
 //   r = u_right - u_left + v_down - v_up  [- (s - mean)]          sum over open faces of (p' - p) = r
 // in:  u_velocity   MAC velocity, lengths / s
-//      u_left, u_up, u_far, u_cells   faces
+//      u_left, u_up, u_far, u_span   faces
 // With WITH_SOURCE: u_source, h s at blocks, lengths / s; u_sums, whose quotient is its mean over the fluid.
 // out: r at blocks, lengths / s
 // reads: 11

@@ -1,6 +1,6 @@
 // The wanted divergence of the fluid, gathered into blocks, and the fluid itself, to take the mean over.
 // in:  u_source   wanted divergence at cells, 1 / s;  u_scale   h, lengths
-//      u_left, u_up, u_far, u_cells   faces
+//      u_left, u_up, u_far, u_span   faces
 // out: h s at blocks, lengths / s; 1 where there is fluid that can flow
 // reads: 7
 #include "lib/block_faces.glsl"

@@ -1,6 +1,6 @@
 // What a correction leaves of the right-hand side:  r - A p;  with ONLY_LAPLACIAN:  A p.
 // in:  u_pressure   the correction, pressure / h at blocks, lengths / s;  u_residual   r, lengths / s
-//      u_left, u_up, u_far, u_cells   faces
+//      u_left, u_up, u_far, u_span   faces
 // out: lengths / s
 // reads: 9
 #include "lib/block_faces.glsl"

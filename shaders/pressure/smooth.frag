@@ -1,6 +1,6 @@
 // One sweep of weighted Jacobi:  p += weight (A p - r) / (sum of the openness of the cell's faces).
 // in:  u_pressure   pressure / h at blocks, lengths / s;  u_residual   right-hand side r, lengths / s
-//      u_left, u_up, u_far, u_cells   faces;  u_weight   of this sweep, from the roots of a Chebyshev polynomial
+//      u_left, u_up, u_far, u_span   faces;  u_weight   of this sweep, from the roots of a Chebyshev polynomial
 // out: pressure / h
 // reads: 9
 #include "lib/block_faces.glsl"

@@ -2,7 +2,7 @@
 // The pressure comes as a sum that is taken only after the differences, which keeps the digits of the smaller part.
 // in:  u_velocity         MAC velocity, lengths / s
 //      u_base, u_change   the two parts of pressure / h at blocks, lengths / s
-//      u_left, u_up, u_far, u_cells   faces
+//      u_left, u_up, u_far, u_span   faces
 // out: u and v of the blocks' four cells, lengths / s
 // reads: 13
 #include "lib/block_faces.glsl"
