@@ -30,7 +30,7 @@ FINER = 3  # places a pixel, along each side, of the reference that sharpness is
 COMPARED = 512  # pixels along the longer side, in which displacements are told
 
 PAPER, INK, FORCE = (250, 249, 246), (38, 38, 44), (214, 40, 40)
-PANEL, MARGIN = 420, 28
+PANEL, MARGIN, PER_ROW = 420, 28, 4
 
 Numbers = dict[str, str]
 
@@ -241,7 +241,7 @@ def guide_forces(studio: Studio) -> Numbers:
     recipe = load("guide-forces")
     panels = [("the picture", source_of(recipe))]
     panels += [(force.name, studio.still(recipe.edited(force=(force,)))) for force in recipe.force]
-    studio.sheet("guide-forces", "Kinds of force", panels, 220)
+    studio.sheet("guide-forces", "Kinds of force", panels, 260)
     return {}
 
 
@@ -251,7 +251,7 @@ def guide_viscosity(studio: Studio) -> Numbers:
     alone = [(layer.name, recipe.edited(viscosity=(layer,), freeze=())) for layer in recipe.viscosity]
     alone += [(layer.name, recipe.edited(viscosity=recipe.viscosity[:1], freeze=(layer,))) for layer in recipe.freeze]
     panels = [("the picture", source_of(recipe)), *((name, studio.still(one)) for name, one in alone)]
-    studio.sheet("guide-viscosity", "One push, different viscosities", panels, 220)
+    studio.sheet("guide-viscosity", "One push, different viscosities", panels, 260)
     return {}
 
 
@@ -289,7 +289,9 @@ def _portrait(studio: Studio, name: str, what: str) -> Numbers:
                 arrows(rgb(pictures.load(lift.picture).pixels), thick.field, 60, pale=0.0),
             ),
             ("d  result", thick.result),
-            ("e  the same, frozen outside", frozen.result),
+            ("e  source, near", _near(thick.source, lift)),
+            ("f  result, near", _near(thick.result, lift)),
+            ("g  frozen outside, near", _near(frozen.result, lift)),
         ],
     )
     outside = thick.viscosity > 0.98 * thick.viscosity.max()
@@ -302,6 +304,15 @@ def _portrait(studio: Studio, name: str, what: str) -> Numbers:
         "frozen: px inside, most": f"{moved_frozen.max():.1f}",
         "det J": f"{thick.statistics.det_min:.2f} to {thick.statistics.det_max:.2f}",
     }
+
+
+def _near(pixels: np.ndarray, force: GradientForce, around: float = 0.11) -> np.ndarray:
+    """The part of a picture about the window a force acts in."""
+    assert force.within is not None
+    left, top, right, bottom = force.within.box
+    height, width = pixels.shape[:2]
+    rows = slice(int((top - around) * height), int((bottom + around) * height))
+    return pixels[rows, int((left - around) * width) : int((right + around) * width)]
 
 
 def _deep(frozen: np.ndarray, cells: int = 3) -> np.ndarray:
@@ -437,18 +448,26 @@ def shades(viscosity: np.ndarray, like: np.ndarray) -> np.ndarray:
 
 
 def contact_sheet(title: str, panels: list[tuple[str, np.ndarray]], panel: int = PANEL) -> np.ndarray:
-    """Panels of height `panel` side by side, captions below and the title above, (h, w, 3) uint8."""
-    images = []
-    for _, pixels in panels:
-        height, width = pixels.shape[:2]
-        images.append(Image.fromarray(pixels).resize((round(width * panel / height), panel), Image.Resampling.LANCZOS))
-    sheet_width = sum(image.width for image in images) + MARGIN * (len(images) + 1)
-    sheet = Image.new("RGB", (sheet_width, panel + 4 * MARGIN), PAPER)
+    """Panels of height `panel` in rows, captions below and the title above, (h, w, 3) uint8."""
+    shown = [
+        (
+            caption,
+            Image.fromarray(pixels).resize(
+                (round(len(pixels[0]) * panel / len(pixels)), panel), Image.Resampling.LANCZOS
+            ),
+        )
+        for caption, pixels in panels
+    ]
+    rows = [shown[first : first + PER_ROW] for first in range(0, len(shown), PER_ROW)]
+    width = max(sum(image.width + MARGIN for _, image in row) for row in rows) + MARGIN
+    row_height = panel + 2 * MARGIN
+    sheet = Image.new("RGB", (width, 2 * MARGIN + len(rows) * row_height), PAPER)
     pen = ImageDraw.Draw(sheet)
     pen.text((MARGIN, 0.9 * MARGIN), title, INK, ImageFont.load_default(24), anchor="lm")
-    left = MARGIN
-    for (caption, _), image in zip(panels, images, strict=True):
-        sheet.paste(image, (left, 2 * MARGIN))
-        pen.text((left, panel + 2.7 * MARGIN), caption, INK, ImageFont.load_default(19), anchor="lm")
-        left += image.width + MARGIN
+    for number, row in enumerate(rows):
+        left, top = MARGIN, 2 * MARGIN + number * row_height
+        for caption, image in row:
+            sheet.paste(image, (left, top))
+            pen.text((left, top + panel + 0.7 * MARGIN), caption, INK, ImageFont.load_default(19), anchor="lm")
+            left += image.width + MARGIN
     return np.asarray(sheet)
