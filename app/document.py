@@ -46,6 +46,11 @@ class Document:
         """Replace parts of the recipe, as one entry of the history."""
         self.history.commit(name, self.recipe.edited(**parts))
 
+    def begin_with(self, recipe: Recipe) -> None:
+        """Begin anew with another recipe, for which there is nothing to save or to undo."""
+        self.history = History(recipe, budget=self.history.budget)
+        self._saved = recipe
+
     def saved(self, path: Path) -> None:
         """Take note that the work, as it is now, has been written to `path`."""
         self.path = path

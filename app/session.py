@@ -42,6 +42,7 @@ class Session:
         coasting: time goes on because the fluid still moves.
         path: where the gesture that is under way has been, as fractions of the picture.
         stroke: the stroke that is open.
+        is_rebuilding: all is made again on another grid; what is seen in between is of no interest.
         notice: something the person should hear of, for the window to take.
         changes: grows with everything that changes what is seen.
     """
@@ -58,6 +59,7 @@ class Session:
         self.stroke: Stroke | None = None
         self.notice: str | None = None
         self.changes = 0
+        self.is_rebuilding = False
         self.last_place: tuple[float, float] | None = None
         self._gesture: Gesture | None = None
         self._tool: Tool | None = None
@@ -309,7 +311,7 @@ class Session:
                 break
         self.changes += 1
         if replay.tick == target:
-            self._target = None
+            self._target, self.is_rebuilding = None, False
 
     def _arrive(self) -> None:
         while self.is_behind:
@@ -365,6 +367,17 @@ class Session:
         if cells != self._live.fluid.grid:
             self.edit(name, fluid=self._live.fluid.model_copy(update={"grid": cells}))
 
+    def begin_with(self, **fluid: Any) -> None:
+        """Other settings of the fluid for work that has not begun yet: no edit, and nothing to save."""
+        if self.end:
+            return
+        recipe = self._live.edited(fluid=self._live.fluid.model_copy(update=fluid))
+        recipe = recipe.edited(duration=recipe.fluid.dt)
+        self.document.begin_with(recipe)
+        self._base = recipe
+        self._use(recipe)
+        self._target = None
+
     def undo(self) -> str | None:
         """Take back the last edit; its name."""
         self.release()
@@ -407,6 +420,7 @@ class Session:
             return
         tick = self.target
         if not recipe.is_set_up_as(before):
+            self.is_rebuilding = tick > 0
             replay.seek(0)
         else:
             common = recipe.agrees_until(before)

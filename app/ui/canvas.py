@@ -11,6 +11,7 @@ from app.ui.state import State
 from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport
 from solver.context import Device
+from solver.field import Field
 
 LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
@@ -36,6 +37,9 @@ class Canvas:
         self._texture.repeat_x = self._texture.repeat_y = False
         self._texture.build_mipmaps()
         self._still = device.field((1, 1), 2, "no displacement")
+        # The warp as it was last seen at rest, shown while it is made again on another grid.
+        self._kept: Field | None = None
+        self._kept_at = -1
 
     def draw(
         self,
@@ -58,7 +62,7 @@ class Canvas:
             texture = replay.density.state()[0].texture
         elif not state.before:
             # The fine map is dearer than the rest of the frame; while things move, nobody sees the difference.
-            displacement = replay.warp.composed(1 if session.is_moving else None)
+            displacement = self._seen(session)
         self._filter(viewport)
         defines: dict[str, object] = {}
         inputs: dict[str, object] = {
@@ -87,6 +91,22 @@ class Canvas:
     def release(self) -> None:
         self._texture.release()
         self._still.release()
+        if self._kept is not None:
+            self._kept.release()
+
+    def _seen(self, session: Session) -> Field:
+        """The displacement to show."""
+        if session.is_rebuilding and self._kept is not None:
+            return self._kept
+        displacement = session.replay.warp.composed(1 if session.is_moving else None)
+        if not session.is_moving and session.changes != self._kept_at:
+            self._kept_at = session.changes
+            if self._kept is None or self._kept.size != displacement.size:
+                if self._kept is not None:
+                    self._kept.release()
+                self._kept = self.device.field(displacement.size, 2, "warp last seen")
+            self._kept.copy_from(displacement)
+        return displacement
 
     def _filter(self, viewport: Viewport) -> None:
         zoom = viewport.scale * viewport.density / self._shrunk

@@ -99,7 +99,7 @@ class Unsaved(Dialog):
 class Shortcuts(Dialog):
     """The sheet of all keys."""
 
-    width, height = 860, 620
+    width, height = 880, 672
 
     def __init__(self) -> None:
         super().__init__("Keyboard and mouse")

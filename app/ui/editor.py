@@ -176,9 +176,13 @@ class Editor:
             self.quality.look(dt)
             self._draw(target, size, dt, events)
         self.clock.frame_done()
+        if self.quality.is_measuring:
+            self.quality.warm_up()
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
+        if self.quality.is_measuring:
+            return True
         return self.session.is_moving or self.exports.is_running or self.files.is_waiting or self.clock.settling > 0
 
     def wait(self) -> float:

@@ -29,7 +29,6 @@ class Preferences:
     hint: bool = True
     recent: list[str] = field(default_factory=list)
     folder: str = ""
-    grid: int = 0
     path: Path | None = field(default=None, compare=False)
 
     @classmethod

@@ -5,12 +5,18 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from app.replay import Replay
+from app.strokes import Stroke
+
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-GRIDS = (96, 128, 192, 256, 384, 512)
+GRIDS = (96, 128, 192, 256, 384)
 PATIENCE = 1.5  # seconds below the wanted rate before something is done about it
 WANTED = 30.0  # frames a second while painting
+ROOM = 10.0  # milliseconds of a frame that are not the simulation's
+TRIALS = 6  # ticks
+FIRST = 256  # cells, of the grid that the machine is measured on
 
 
 class Quality:
@@ -19,17 +25,56 @@ class Quality:
     def __init__(self, editor: Editor) -> None:
         self.editor = editor
         self._slow_for = 0.0
-        self._frames = 0
         self._last = 0.0
         self._pending = False
+        self._limit = GRIDS[-1]
+        self._frames = 0
+        self._measured: float | None = None
+        self._trial: Replay | None = None
+        self._spent: list[float] = []
 
     def opened(self) -> None:
-        """Something new is open; an untouched picture is given the grid that did well last time."""
+        """Something new is open; an untouched picture is given the grid that this machine does well on."""
         self._slow_for, self._pending = 0.0, False
-        known, session = self.editor.preferences.grid, self.editor.session
-        if self.editor.state.auto_quality and known in GRIDS and not session.end and known < session.recipe.fluid.grid:
-            session.set_grid(known)
-            session.settle()
+        session = self.editor.session
+        if self._measured is None or not self.editor.state.auto_quality or session.end:
+            return
+        grid = self.best_grid(self._measured)
+        grid = min(grid, self._limit)
+        fast = self._measured * (grid / FIRST) ** 2 < 4
+        session.begin_with(grid=grid, dt=1 / 60 if fast else 1 / 30)
+
+    @staticmethod
+    def best_grid(milliseconds: float) -> int:
+        """The finest grid that leaves `ROOM` in a frame, where a tick on `FIRST` takes `milliseconds`."""
+        good = [grid for grid in GRIDS if milliseconds * (grid / FIRST) ** 2 <= 1e3 / WANTED - ROOM]
+        return max(good, default=GRIDS[0])
+
+    @property
+    def is_measuring(self) -> bool:
+        return self.editor.state.auto_quality and self._measured is None
+
+    def warm_up(self) -> None:
+        """After the first frames, a tick a frame: compile what the first stroke needs, and measure this machine."""
+        self._frames += 1
+        session = self.editor.session
+        if self._frames < 2 or session.is_moving:
+            return
+        if self._trial is None:
+            stroke = Stroke(tool="push", radius=0.15, samples=((0, 0.4, 0.5, 1.0), (TRIALS, 0.5, 0.5, 1.0)))
+            fluid = session.recipe.fluid.model_copy(update={"grid": FIRST})
+            recipe = session.recipe.edited(stroke=(stroke,), change=(), fluid=fluid)
+            self._trial = Replay(self.editor.device, recipe, session.pictures, budget=0)
+        start = time.perf_counter()
+        self._trial.advance()
+        self.editor.device.ctx.finish()
+        self._spent.append((time.perf_counter() - start) * 1e3)
+        if len(self._spent) == TRIALS:
+            self._trial.release()
+            self._trial = None
+            # The first ones compile; the quickest is the one that nobody else's work has slowed down.
+            self._measured = min(self._spent[2:])
+            self.opened()
 
     def look(self, dt: float) -> None:
         """Watch the rate while the person paints; a coarser grid is taken when the stroke is finished."""
@@ -55,8 +100,7 @@ class Quality:
         if not coarser:
             return
         editor.session.set_grid(coarser[-1], f"Grid of {coarser[-1]}")
-        editor.preferences.grid = coarser[-1]
-        editor.preferences.save()
+        self._limit = coarser[-1]
         editor.messages.say(
             f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {coarser[-1]} cells instead "
             f"of {now}. Quality in the inspector changes it."
