@@ -149,7 +149,7 @@ class _Job:
             "SINGLE": self.is_single,
             "PREPARED": self.is_prepared,
             "LINEAR_LIGHT": self.is_curved and self.is_prepared,
-            "CLAMPED": levels > 0,
+            "CLAMPED": levels > 0 and self.how.quality == "catmull-rom",  # the only one that overshoots
             "DITHER": dither and kind == "f1" and self.how.quality != "nearest",
             "OPAQUE": not self.has_alpha,
             "GREY_ALPHA": self.channels == 2,

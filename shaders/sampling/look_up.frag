@@ -1,5 +1,5 @@
 // Look up: the picture at x + D(x), the mean of places spread evenly over each pixel of the result.
-// Along x and along y there are clamp(ceil(2 s), 2, 8) of them, s the stretch of the map in that direction over the
+// Along x and along y there are clamp(ceil(1.5 s), 2, 8) of them, s the stretch of the map in that direction over the
 // pixel, or one at the centre where the map only shifts.
 //
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels; premultiplied
@@ -8,8 +8,9 @@
 // u_pixel: the result's pixel of the first fragment; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_inside: left, top, right, bottom bounds, pixels, beyond which
 // there is u_outside.
-// Defines: WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_SAMPLES, MOST_SAMPLES; SINGLE; PREPARED;
-// OPAQUE if the picture has no alpha; LINEAR_LIGHT to encode; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA.
+// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_SAMPLES, MOST_SAMPLES; SINGLE; PREPARED;
+// WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; OPAQUE if there is
+// no alpha; LINEAR_LIGHT to encode; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA.
 // reads: 69
 #ifndef TAPS
 #define TAPS 4
@@ -47,37 +48,33 @@ layout(location = 0) out vec4 out_color;
 #define WITHIN(place, count) min(max(place, 0.5), (count) - 0.5)
 #endif
 
-// Weights and whole parts of the taps around f in [0, 1].
-#if TAPS == 4
-#define EACH vec4
-const vec4 OFFSETS = vec4(-0.5, 0.5, 1.5, 2.5);
-vec4 tap_weights(float f) {
+vec4 catmull_rom(float f) {
     return vec4(f * (-0.5 + f * (1.0 - 0.5 * f)), 1.0 + f * f * (-2.5 + 1.5 * f), f * (0.5 + f * (2.0 - 1.5 * f)),
                 f * f * (-0.5 + 0.5 * f));
 }
-#elif TAPS == 2
-#define EACH vec2
-const vec2 OFFSETS = vec2(0.5, 1.5);
-vec2 tap_weights(float f) { return vec2(1.0 - f, f); }
-#endif
 
 // The picture at `part` pixels from the corner of the pixel `whole`, two parts so that large pictures lose no precision.
 COLOR picture(vec2 whole, vec2 part) {
     vec2 texel = 1.0 / vec2(textureSize(u_source, 0));
+#define AT(x, y) texture(u_source, vec2(x, y)).PARTS
 #if TAPS == 1
-    COLOR sum = texture(u_source, WITHIN(whole - CORNER + floor(part) + 0.5, u_extent) * texel).PARTS;
+    vec2 only = WITHIN(whole - CORNER + floor(part) + 0.5, u_extent) * texel;
+    COLOR sum = AT(only.x, only.y);
 #else
     vec2 cell = floor(part - 0.5), f = part - 0.5 - cell, first = whole - CORNER + cell;
-    EACH wx = tap_weights(f.x), wy = tap_weights(f.y);
-    EACH x = WITHIN(first.x + OFFSETS, u_extent.x) * texel.x, y = WITHIN(first.y + OFFSETS, u_extent.y) * texel.y;
+#if TAPS == 2
+    vec2 a = WITHIN(first + 0.5, u_extent) * texel, b = WITHIN(first + 1.5, u_extent) * texel;
+    COLOR sum = mix(mix(AT(a.x, a.y), AT(b.x, a.y), f.x), mix(AT(a.x, b.y), AT(b.x, b.y), f.x), f.y);
+#else
+    const vec4 OFFSETS = vec4(-0.5, 0.5, 1.5, 2.5);
+    vec4 x = WITHIN(first.x + OFFSETS, u_extent.x) * texel.x, y = WITHIN(first.y + OFFSETS, u_extent.y) * texel.y;
+    vec4 wx = catmull_rom(f.x), wy = catmull_rom(f.y);
     COLOR sum = COLOR(0.0);
-    for (int j = 0; j < TAPS; ++j) {
-        COLOR row = COLOR(0.0);
-        for (int i = 0; i < TAPS; ++i)
-            row += wx[i] * texture(u_source, vec2(x[i], y[j])).PARTS;
-        sum += wy[j] * row;
-    }
+    for (int j = 0; j < 4; ++j)
+        sum += wy[j] * (wx.x * AT(x.x, y[j]) + wx.y * AT(x.y, y[j]) + wx.z * AT(x.z, y[j]) + wx.w * AT(x.w, y[j]));
 #endif
+#endif
+#undef AT
 #ifdef BOUNDED
     vec2 place = whole + part;
     bool inside = all(greaterThanEqual(vec4(place, u_inside.zw), vec4(u_inside.xy, place)));
