@@ -3,8 +3,8 @@
     python tests/benchmarks/bench_sampling.py
 
 Ours are from an array to an array: upload, samples, read back. The places of a map that stands still are kept, as over
-a film; OpenCV is given them ready made. The processor's time is of all threads together; ratios are of that, which other
-programs running beside disturb least.
+a film; OpenCV is given them ready made. The time of the processor is of all threads together; ratios are of that, which
+other programs running beside disturb least.
 """
 
 from __future__ import annotations
