@@ -15,7 +15,7 @@ from solver.field import Field
 
 LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
-ARROW = 26.0  # points between two arrows
+ARROW = 30.0  # points between two arrows
 GRID_LINES = 24.0
 
 
@@ -133,7 +133,7 @@ class Canvas:
             inputs |= {"solid": replay.fluid.solid, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
         if shown["velocity"].shown:
             defines["ARROWS"] = 1
-            inputs |= {"velocity": replay.fluid.faces(), "arrow": ARROW * scale, "speed": 0.6}
+            inputs |= {"velocity": replay.fluid.faces(), "arrow": ARROW * scale, "speed": 0.4}
             inputs |= {"arrows_opacity": shown["velocity"].opacity, "arrow_colour": (1.0, 1.0, 1.0)}
 
 

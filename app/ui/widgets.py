@@ -281,7 +281,7 @@ class Ui:
         typing = internal.temp_input_is_active(imgui.get_id(ident))
         clear = (0.0, 0.0, 0.0, 0.0)
         imgui.set_next_item_width(across)
-        imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(self.px(9), self.px(6)))
+        imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(self.px(9), self.px(7)))
         imgui.push_style_color(imgui.Col_.slider_grab, clear)
         imgui.push_style_color(imgui.Col_.slider_grab_active, clear)
         imgui.push_style_color(imgui.Col_.text, palette.text if typing else clear)

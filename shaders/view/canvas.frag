@@ -58,7 +58,7 @@ vec4 look_up(vec2 place) {
 // Coverage of an arrow along v (of length 0-1) in a square from -1 to 1, whose pixel is `soft` wide.
 float arrow(vec2 p, vec2 v, float soft) {
     float size = length(v);
-    if (size < 0.04) return 0.0;
+    if (size < 0.1) return 0.0;
     vec2 along = v / size;
     vec2 q = vec2(dot(p, along), abs(p.y * along.x - p.x * along.y));
     float reach = 0.9 * min(size, 1.0), head = min(0.5, reach);
@@ -109,7 +109,8 @@ void main() {
         if (inside(middle) > 0.5) {
             vec2 v = texture(u_velocity, middle).rg / u_speed;
             float size = length(v);
-            if (size > 0.0) v *= sqrt(min(size, 1.0)) / size;
+            // Slow places are drawn longer than in proportion, or nothing but the fastest would be seen.
+            if (size > 0.0) v *= pow(min(size, 1.0), 0.4) / size;
             vec2 p = (pixel - tile) / (0.5 * u_arrow);
             float soft = 2.0 / u_arrow;
             seen = mix(seen, vec3(0.0), u_arrows_opacity * 0.6 * arrow(p * 0.9, v * 1.12, 2.0 * soft));

@@ -166,14 +166,16 @@ def _zoom(ui: Ui, editor: Editor) -> None:
 def _hint(ui: Ui, editor: Editor) -> None:
     canvas = editor.layout.canvas
     with ui.floating("hint", canvas.x + canvas.width / 2, canvas.bottom - ui.px(14), (0.5, 1), 0.9):
+        top = imgui.get_cursor_pos_y()
         imgui.dummy(ImVec2(ui.px(4), ui.px(24)))
         imgui.same_line(0, 0)
-        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(4))
+        imgui.set_cursor_pos_y(top + ui.px(4))
         ui.text("Drag on the picture to push it.", size=14, bold=True)
         imgui.same_line(0, ui.px(8))
+        imgui.set_cursor_pos_y(top + ui.px(4))
         ui.dim("Drop your own picture here, or press Ctrl+O.", 14)
         imgui.same_line(0, ui.px(6))
-        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() - ui.px(4))
+        imgui.set_cursor_pos_y(top)
         if ui.icon_button("no hint", "close", size=24, icon_size=12):
             editor.state.hint = False
         _remember()

@@ -1,0 +1,149 @@
+"""The pictures of the window in the README: `python -m app.ui.screenshots FOLDER`, made without a window."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from math import cos, pi, sin
+from pathlib import Path
+
+import numpy as np
+
+from app.pictures import Picture, write_picture
+from app.ui.editor import Editor
+from app.ui.events import LEFT, Button, Event, Key, Mods, Move
+from app.ui.files import load_any
+from app.ui.preferences import Preferences
+from app.ui.window import sample
+from solver.context import Device
+
+SIZE = (1280, 800)
+TICK = 1 / 30
+Place = tuple[float, float]
+
+
+class Studio:
+    """An editor without a window that is photographed.
+
+    Args:
+        device: where it is drawn.
+        density: pixels a point.
+        grid: of the simulation.
+    """
+
+    def __init__(self, device: Device, density: float = 1.0, grid: int = 256) -> None:
+        self.density = density
+        self.size = round(SIZE[0] * density), round(SIZE[1] * density)
+        self.target = device.ctx.framebuffer([device.ctx.texture(self.size, 4)])
+        self.editor = Editor(device, load_any(sample()), Preferences(auto_quality=False))
+        self.editor.session.begin_with(grid=grid)
+        self.frame()
+        self.frame()
+
+    def frame(self, *events: Event) -> None:
+        self.editor.frame(self.target, self.size, TICK, events, self.density)
+
+    def key(self, key: str, mods: Mods | None = None) -> None:
+        self.frame(Key(key, True, mods or Mods()))
+        self.frame(Key(key, False))
+
+    def stroke(self, path: Callable[[float], Place], steps: int, finish: bool = True) -> None:
+        """Drag along a path over the picture, from 0 to 1."""
+        for step in range(steps + 1):
+            self.frame(Move(*self.editor.view.to_screen(*path(step / steps))))
+            if step == 0:
+                self.frame(Button(LEFT, True))
+        if finish:
+            self.frame(Button(LEFT, False))
+            self.editor.session.settle()
+
+    def picture(self) -> np.ndarray:
+        """What is seen, (h, w, 3) uint8, top row first."""
+        self.frame()
+        data = np.frombuffer(self.target.read(components=3, alignment=1), np.uint8)
+        return data.reshape(self.size[1], self.size[0], 3)[::-1].copy()
+
+    def close(self) -> None:
+        self.editor.release()
+
+
+def line(start: Place, end: Place, bow: float = 0.0) -> Callable[[float], Place]:
+    """A path between two places, bent to one side by `bow`."""
+
+    def path(part: float) -> Place:
+        bent = bow * sin(pi * part)
+        return start[0] + (end[0] - start[0]) * part, start[1] + (end[1] - start[1]) * part + bent
+
+    return path
+
+
+def paint(studio: Studio) -> None:
+    """What the pictures show: the billiard table and the lamps, drawn out like honey."""
+    editor = studio.editor
+    studio.stroke(line((0.52, 0.52), (0.64, 0.46), -0.03), 16)
+    editor.state.brush = replace(editor.state.brush, radius=0.11)
+    studio.stroke(line((0.53, 0.19), (0.47, 0.31), 0.0), 12)
+    studio.stroke(line((0.86, 0.15), (0.80, 0.25), 0.0), 12)
+    editor.choose_tool("twirl", False)
+    studio.stroke(lambda part: (0.19 + 0.002 * cos(part), 0.15), 20)
+    editor.choose_tool("push", False)
+    editor.state.brush = replace(editor.state.brush, radius=0.15)
+    studio.stroke(line((0.30, 0.82), (0.42, 0.78), 0.04), 16)
+
+
+def editor(studio: Studio) -> np.ndarray:
+    """The window after a few strokes."""
+    paint(studio)
+    studio.frame(Move(*studio.editor.view.to_screen(0.64, 0.46)))
+    return studio.picture()
+
+
+def overlays(studio: Studio) -> np.ndarray:
+    """A frozen figure, the grid and the velocity while a stroke goes past it."""
+    studio.editor.state.brush = replace(studio.editor.state.brush, radius=0.07, hardness=0.6)
+    studio.key("f")
+    studio.stroke(line((0.67, 0.37), (0.675, 0.50)), 8)
+    studio.editor.state.brush = replace(studio.editor.state.brush, radius=0.15, hardness=0.0)
+    studio.key("p")
+    for key in ("1", "3", "4"):
+        studio.key(key)
+    studio.stroke(line((0.42, 0.62), (0.58, 0.50), -0.03), 12, finish=False)
+    return studio.picture()
+
+
+def compare(studio: Studio) -> np.ndarray:
+    """Before and after in the light theme."""
+    paint(studio)
+    studio.editor.preferences.theme = "light"
+    studio.key("y")
+    studio.frame(Move(640, 20))
+    return studio.picture()
+
+
+def export(studio: Studio) -> np.ndarray:
+    """The export dialog."""
+    paint(studio)
+    studio.editor.preferences.folder = ""
+    studio.key("e", Mods(ctrl=True))
+    studio.editor.dialogs[-1].folder = Path("pictures")  # pyright: ignore[reportAttributeAccessIssue]
+    studio.frame()
+    studio.frame()
+    return studio.picture()
+
+
+SCENES = {"editor": editor, "overlays": overlays, "compare": compare, "export": export}
+
+
+def main(folder: Path) -> None:
+    """Write all pictures into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with Device.headless() as device:
+        for name, scene in SCENES.items():
+            studio = Studio(device)
+            write_picture(folder / f"{name}.webp", Picture(scene(studio)))
+            studio.close()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "assets/screenshots"))
