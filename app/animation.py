@@ -16,7 +16,7 @@ import numpy as np
 
 from app import ffmpeg
 from app.errors import Cancelled, UserError
-from app.files import cannot_write, replacing, replacing_many, temporary_beside
+from app.files import cannot_write, replacing, replacing_many, temporary_beside, temporary_file
 from app.pictures import Picture, picture_format, to_bits, write_picture
 from app.progress import never
 from app.video import sound_codec
@@ -268,10 +268,9 @@ def _gif_writer(
     temporary: Path, label: str, rate: Fraction, loops: int, cancel: Callable[[], bool]
 ) -> Iterator[FrameWriter]:
     """Frames into a lossless file first: a palette of all colours needs all frames, which may not fit in memory."""
-    spool = temporary_beside(temporary.with_suffix(".mkv"))
-    palette = spool.with_suffix(".png")
     alpha = False
-    try:
+    name = temporary_beside(temporary.with_suffix(".mkv"))
+    with temporary_file(name) as spool, temporary_file(name.with_suffix(".png")) as palette:
         with _Video(spool, label, ANIMATIONS[".mkv"], rate, cancel=cancel) as video:
 
             def write(frame: np.ndarray) -> None:
@@ -288,9 +287,6 @@ def _gif_writer(
         # ffmpeg counts repetitions, and -1 means none
         repeat = ["-loop", str(loops - 1 if loops > 1 else -1 if loops == 1 else 0)]
         ffmpeg.run([*source, "-i", f"file:{palette}", *use, *repeat, f"file:{temporary}"], label, cancel=cancel)
-    finally:
-        spool.unlink(missing_ok=True)
-        palette.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import queue
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -18,10 +20,10 @@ from typing import Any
 from app.animation import ANIMATIONS
 from app.errors import Cancelled, UserError
 from app.export import Job, MapOutput, run
-from app.files import cannot_write
+from app.files import abandon, cannot_write
 from app.opening import CLIP_ENDINGS, Opened, open_recipe
 from app.pictures import FORMATS, MAX_PIXELS
-from app.progress import Progress, never
+from app.progress import GRACE, INTERRUPTED, Progress, never
 from app.recipe import Recipe
 from solver.context import Device
 
@@ -29,6 +31,7 @@ NAME = "{name}"
 """What stands for the name of each picture in the name of an output."""
 
 ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
+CONNECTING = 10  # seconds that a scheduler has to answer
 LOOK = 0.1  # seconds between two looks at the wish to stop
 
 
@@ -246,6 +249,17 @@ def _begin(wish: Any) -> None:
     global _wish
     _wish = wish
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(wish, os.getppid()), daemon=True).start()
+
+
+def _end_with(wish: Any, parent: int) -> None:
+    """End this worker in the middle of its work, if it is to stop and does not, or if nobody is left to tell it."""
+    while not wish.wait(LOOK):
+        if os.getppid() != parent:
+            break
+    time.sleep(GRACE)
+    abandon()
+    os._exit(INTERRUPTED)
 
 
 def _perform_here(task: Task) -> Outcome:
@@ -308,7 +322,7 @@ def _run_on_cluster(tasks: Sequence[Task], address: str, report: Report, progres
     except ImportError:
         raise UserError("a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'", 2) from None
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        client = Client(address, timeout=CONNECTING, set_as_default=False)
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise UserError(f"no Dask scheduler answers at {address} ({error}); give for example tcp://host:8786") from None
     ended: queue.SimpleQueue[Any] = queue.SimpleQueue()

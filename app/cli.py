@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
 
 import typer
 
 from app.errors import Cancelled, UserError
+from app.progress import INTERRUPTED
 
 if TYPE_CHECKING:
     from app.applying import MapSource
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
-INTERRUPTED = 130
 cli = typer.Typer(
     name="fluidwarp",
     help="Warp pictures by pushing them about as a fluid of varying viscosity.",
@@ -36,7 +36,7 @@ def main() -> None:
     except UserError as error:
         _fail(str(error), error.status)
     except Cancelled:
-        _fail("cancelled; nothing was written", INTERRUPTED)
+        _fail("cancelled; nothing half-written is left", INTERRUPTED)
     except KeyboardInterrupt:
         _fail("interrupted", INTERRUPTED)
     except BrokenPipeError:
@@ -55,7 +55,7 @@ def main() -> None:
         _fail(f"this is a mistake in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)
 
 
-def _fail(message: str, status: int) -> None:
+def _fail(message: str, status: int) -> NoReturn:
     print(f"fluidwarp: {message}", file=sys.stderr)
     sys.exit(status)
 
@@ -220,7 +220,7 @@ def _render_one(task: Task, opened: Opened) -> None:
 def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     """Render all, with a line about each that fails."""
     from app.batch import Outcome, run_batch
-    from app.progress import on_terminal
+    from app.progress import leave, on_terminal
 
     def tell(outcome: Outcome) -> None:
         named = outcome.error.startswith(f"Cannot read {outcome.label}") or not outcome.error
@@ -229,8 +229,19 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
             if text:
                 print(f"fluidwarp: {' '.join(text.split())}", file=sys.stderr)
 
-    with on_terminal(f"{len(tasks)} pictures", len(tasks)) as progress:
-        failures = run_batch(tasks, tell, progress, jobs, cluster)
+    written = 0
+
+    def hear(outcome: Outcome) -> None:
+        nonlocal written
+        written += not outcome.error
+        tell(outcome)
+
+    here = jobs == 1 and cluster is None
+    try:
+        with on_terminal(f"{len(tasks)} pictures", len(tasks), leave if here else None) as progress:
+            failures = run_batch(tasks, hear, progress, jobs, cluster)
+    except Cancelled:
+        _fail(f"cancelled; {written} of {len(tasks)} pictures are written, nothing is half-written", INTERRUPTED)
     if failures:
         raise UserError(f"{failures} of {len(tasks)} pictures failed; all others are written")
 

@@ -10,9 +10,10 @@ import select
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 
 from app.errors import Cancelled, UserError
-from app.files import cannot_write
+from app.files import cannot_write, if_abandoned
 from app.progress import never
 
 EMPTY_WORDS = (
@@ -61,6 +62,8 @@ class Ffmpeg:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._stdin, self._stdout = self._process.stdin, self._process.stdout
+        self._ending = ExitStack()
+        self._ending.enter_context(if_abandoned(self._process.kill))
         os.set_blocking(self._stdin.fileno(), False)
         os.set_blocking(self._stdout.fileno(), False)
 
@@ -68,6 +71,7 @@ class Ffmpeg:
         return self
 
     def __exit__(self, *exception: object) -> None:
+        self._ending.close()
         self._process.kill()
         self._process.wait()
         self._stdin.close()

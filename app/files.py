@@ -6,8 +6,10 @@ import errno
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 from app.errors import UserError
@@ -21,6 +23,39 @@ MENDS = {
     errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
     errno.EFBIG: "the file grows larger than this disk allows; choose another folder or a smaller size",
 }
+
+
+_undoing: list[Callable[[], object]] = []
+_moving = threading.Lock()
+
+
+def abandon() -> None:
+    """Undo everything that is half done, for a process that is about to end at once."""
+    with _moving:  # a sequence that is appearing appears as a whole
+        for undo in reversed(_undoing):
+            with suppress(OSError):
+                undo()
+
+
+@contextmanager
+def if_abandoned(undo: Callable[[], object]) -> Iterator[None]:
+    """While the block runs, `abandon` calls `undo`."""
+    _undoing.append(undo)
+    try:
+        yield
+    finally:
+        _undoing.remove(undo)
+
+
+@contextmanager
+def temporary_file(path: Path) -> Iterator[Path]:
+    """Yield `path`, which is gone when the block ends, unless it has been moved elsewhere."""
+    remove = partial(path.unlink, missing_ok=True)
+    with if_abandoned(remove):
+        try:
+            yield path
+        finally:
+            remove()
 
 
 def temporary_beside(path: Path) -> Path:
@@ -58,14 +93,12 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     When the block raises, the temporary file goes and `path` is as it was. `OSError` becomes `UserError`.
     """
     target = writable(path)
-    temporary = temporary_beside(target)
     try:
-        yield temporary
-        os.replace(temporary, target)
+        with temporary_file(temporary_beside(target)) as temporary:
+            yield temporary
+            os.replace(temporary, target)
     except OSError as error:
         raise cannot_write(path, error) from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -76,12 +109,15 @@ def replacing_many(folder: str | os.PathLike[str], label: str) -> Iterator[Path]
     """
     target = writable(Path(folder) / label).parent
     temporary = temporary_beside(target / "sequence")
-    try:
-        temporary.mkdir()
-        yield temporary
-        for file in sorted(temporary.iterdir()):
-            os.replace(file, target / file.name)
-    except OSError as error:
-        raise cannot_write(Path(folder) / label, error) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    remove = partial(shutil.rmtree, temporary, ignore_errors=True)
+    with if_abandoned(remove):
+        try:
+            temporary.mkdir()
+            yield temporary
+            with _moving:
+                for file in sorted(temporary.iterdir()):
+                    os.replace(file, target / file.name)
+        except OSError as error:
+            raise cannot_write(Path(folder) / label, error) from error
+        finally:
+            remove()

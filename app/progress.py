@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -10,6 +11,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from app.errors import Cancelled
+from app.files import abandon
+
+GRACE = 0.2  # seconds that a job has to notice Ctrl+C between two of its steps
+INTERRUPTED = 130
 
 
 def never() -> bool:
@@ -54,10 +59,18 @@ class Progress:
         return (time.monotonic() - self._started) / self.done * max(0, self.total - self.done)
 
 
+def leave() -> None:
+    """End this process in the middle of whatever it is doing, with nothing half-written left."""
+    abandon()
+    print("fluidwarp: cancelled; nothing half-written is left", file=sys.stderr, flush=True)
+    os._exit(INTERRUPTED)
+
+
 @contextmanager
-def interruptible() -> Iterator[Callable[[], bool]]:
+def interruptible(at_once: Callable[[], None] | None = None) -> Iterator[Callable[[], bool]]:
     """Turn Ctrl+C and SIGTERM into a wish to stop while the block runs; yields the callable that answers it.
 
+    at_once: called in a thread if the block has not ended soon after the wish: some steps cannot be interrupted.
     A second Ctrl+C interrupts at once. Outside the main thread, where signals do not arrive, it does nothing.
     """
     wish = threading.Event()
@@ -69,19 +82,29 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         if wish.is_set():
             raise KeyboardInterrupt
         wish.set()
+        if at_once is not None:
+            watchdog.append(threading.Timer(GRACE, at_once))
+            watchdog[-1].daemon = True
+            watchdog[-1].start()
 
+    watchdog: list[threading.Timer] = []
     before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield wish.is_set
     finally:
+        for timer in watchdog:
+            timer.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
 @contextmanager
-def on_terminal(description: str, total: int | None) -> Iterator[Progress]:
-    """A `Progress` drawn as a bar with the time left on stderr, silent when that is no terminal; Ctrl+C cancels."""
-    with interruptible() as cancel:
+def on_terminal(description: str, total: int | None, at_once: Callable[[], None] | None = leave) -> Iterator[Progress]:
+    """A `Progress` drawn as a bar with the time left on stderr, silent when that is no terminal; Ctrl+C cancels.
+
+    at_once: see `interruptible`.
+    """
+    with interruptible(at_once) as cancel:
         if not sys.stderr.isatty():
             yield Progress(total, cancel=cancel)
             return

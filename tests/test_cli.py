@@ -260,7 +260,7 @@ def test_interrupted_leaves_nothing(folder: Path):
     started.send_signal(signal.SIGINT)
     _, told = started.communicate(timeout=60)
     assert started.returncode == cli.INTERRUPTED
-    assert told == "fluidwarp: cancelled; nothing was written\n"
+    assert told == "fluidwarp: cancelled; nothing half-written is left\n"
     assert here(folder) == before
 
 

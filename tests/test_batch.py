@@ -1,0 +1,229 @@
+"""Many pictures by one recipe: failures, processes that die, a cluster that loses a worker, and parts of animations."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import batch
+from app.batch import Edits, Outcome, Task, perform, run_batch, spread
+from app.errors import Cancelled, UserError
+from app.pictures import Picture, read_picture, write_picture
+from app.progress import Progress
+
+ROOT = Path(__file__).parent.parent
+RECIPE = """
+duration = 0.2
+[fluid]
+grid = 32
+dt = 0.02
+[[force]]
+kind = "vortex"
+point = [0.5, 0.5]
+radius = 0.3
+strength = 5
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "a.toml").write_text(RECIPE)
+    for number in range(6):
+        draw(tmp_path / f"p{number}.png", number)
+    return tmp_path
+
+
+def draw(path: Path, number: int, width: int = 64) -> None:
+    y, x = np.mgrid[0:48, 0:width]
+    write_picture(path, Picture(np.stack([x * 3, y * 4, (x + y + 40 * number) % 256], axis=-1).astype(np.uint8)))
+
+
+def tasks(folder: Path, pictures: list[Path], **options: object) -> list[Task]:
+    task = Task(str(folder / "a.toml"), Edits(), None, folder / "out", **options)  # type: ignore[arg-type]
+    return spread(task, pictures)
+
+
+def alone(folder: Path, pictures: list[Path]) -> dict[str, bytes]:
+    """What each becomes on its own, in this process."""
+    (folder / "alone").mkdir()
+    made = {}
+    for picture in pictures:
+        output = folder / "alone" / picture.name
+        assert perform(Task(str(folder / "a.toml"), Edits(), picture, output)).error == ""
+        made[picture.name] = output.read_bytes()
+    return made
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+# Names --------------------------------------------------------------------------------------------------------------
+
+
+def test_names_of_the_results(tmp_path: Path):
+    task = Task("coffee", Edits(), None, tmp_path / "new/out")
+    pictures = [Path(name) for name in ("a.JPG", "b.bmp", "c.mov", "d.avi")]
+    made = [one.output for one in spread(task, pictures)]
+    assert made == [tmp_path / "new/out" / name for name in ("a.JPG", "b.png", "c.mov", "d.mp4")]
+    assert (tmp_path / "new/out").is_dir()
+
+    pattern = Task("coffee", Edits(), None, tmp_path / "{name} new.tif", stats=tmp_path / "{name}.json")
+    (one,) = spread(pattern, [Path("x/e.png")])
+    assert (one.output, one.stats) == (tmp_path / "e new.tif", tmp_path / "e.json")
+    assert one.picture == Path("x/e.png").absolute()
+
+
+@pytest.mark.parametrize(
+    ("output", "pictures", "message"),
+    [
+        ("out", ["a/x.png", "b/x.png"], "would both become"),
+        (".", ["x.png", "y.png"], "replaced by its own result"),
+        ("x.png", ["a.png", "b.png"], "{name}"),
+    ],
+)
+def test_names_that_cannot_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, output: str, pictures: list[str], message: str
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=message):
+        spread(Task("coffee", Edits(), None, Path(output)), [Path(name) for name in pictures])
+
+
+def test_one_file_of_numbers_for_many_pictures_is_refused(tmp_path: Path):
+    with pytest.raises(UserError, match=r"put \{name\} into its name"):
+        spread(Task("coffee", Edits(), None, tmp_path, stats=tmp_path / "s.json"), [Path("a.png"), Path("b.png")])
+
+
+# One after the other, and in processes ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_one_that_fails_does_not_stop_the_others(folder: Path, jobs: int):
+    """A line for each, and the same bytes as each gets alone."""
+    good = [folder / f"p{number}.png" for number in range(3)]
+    (folder / "cut.png").write_bytes(good[0].read_bytes()[:50])
+    heard: list[Outcome] = []
+    pictures = [good[0], folder / "cut.png", good[1], folder / "gone.png", good[2]]
+    failures = run_batch(tasks(folder, pictures), heard.append, Progress(), jobs)
+    assert failures == 2
+    assert {Path(outcome.label).name: bool(outcome.error) for outcome in heard} == {
+        "p0.png": False, "cut.png": True, "p1.png": False, "gone.png": True, "p2.png": False,
+    }  # fmt: skip
+    assert all(Path(outcome.label).name in outcome.error for outcome in heard if outcome.error)
+    assert contents(folder / "out") == alone(folder, good)
+
+
+def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """Killed as for want of memory: whatever it had is done by another; what kills each of them is told."""
+    monkeypatch.setattr(batch, "_perform_here", _dying)
+    pictures = [folder / f"p{number}.png" for number in range(4)]
+    heard: list[Outcome] = []
+    assert run_batch(tasks(folder, pictures), heard.append, Progress(), 2) == 1
+    told = {Path(outcome.label).name: outcome.error for outcome in heard}
+    assert sorted(told) == [path.name for path in pictures]
+    assert [name for name, error in told.items() if error] == ["p3.png"]
+    assert "its process died" in told["p3.png"]
+
+
+def _dying(task: Task) -> Outcome:
+    """A worker's work that kills it: for p0 the first time, for p3 each time."""
+    assert task.picture is not None
+    mark = task.picture.with_suffix(".tried")
+    if task.picture.stem == "p3" or (task.picture.stem == "p0" and not mark.exists()):
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return Outcome(task.label)
+
+
+def test_cancelling_leaves_what_is_finished(folder: Path):
+    pictures = [folder / f"p{number}.png" for number in range(4)]
+    heard: list[Outcome] = []
+    with pytest.raises(Cancelled):
+        run_batch(tasks(folder, pictures), heard.append, Progress(cancel=lambda: len(heard) >= 2))
+    assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
+
+
+def test_the_command_line(folder: Path):
+    """Two processes, a failure, a line about it, a status; and with nothing wrong, not a word."""
+
+    def fluidwarp(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "app", "render", "a.toml", *words]
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100)
+
+    ran = fluidwarp("p0.png", "gone.png", "p1.png", "-o", "out", "--jobs", "2")
+    assert ran.returncode == 1
+    assert ran.stderr.splitlines() == [
+        f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.",
+        "fluidwarp: 1 of 3 pictures failed; all others are written",
+    ]
+    assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
+    ran = fluidwarp("p2.png", "-o", "out")
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
+    assert (folder / "out/p2.png").is_file()
+
+
+# A cluster ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):
+    """Two worker processes, one of them killed while both are at work: every picture comes out as it does alone."""
+    distributed = pytest.importorskip("distributed")
+    pictures = []
+    for number in range(8):
+        pictures.append(folder / f"q{number}.png")
+        draw(pictures[-1], number, width=80)
+    expected = alone(folder, pictures)
+    (folder / "a.toml").write_text(RECIPE)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        victims = [worker.pid for worker in cluster.workers.values()]
+        heard: list[Outcome] = []
+
+        def hear(outcome: Outcome) -> None:
+            heard.append(outcome)
+            if len(heard) == 2:
+                os.kill(victims[0], signal.SIGKILL)
+
+        failures = run_batch(tasks(folder, pictures), hear, Progress(), cluster=cluster.scheduler_address)
+    assert failures == 0, [outcome.error for outcome in heard if outcome.error]
+    assert sorted(Path(outcome.label).name for outcome in heard) == sorted(expected)
+    written = {name: data for name, data in contents(folder / "out").items() if not name.startswith(".")}
+    assert written == expected  # what was killed in the middle of writing may have left its hidden file
+
+
+def test_no_cluster_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(batch, "CONNECTING", 1)
+    with pytest.raises(UserError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
+        run_batch(tasks(folder, [folder / "p0.png"]), lambda outcome: None, Progress(), cluster="tcp://127.0.0.1:9")
+
+
+# Parts of an animation ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("playback", ["", "[time]\nping_pong = true\nhold_first = 0.1", "[time]\nreverse = true"])
+def test_the_parts_are_the_whole(folder: Path, playback: str):
+    """Bit for bit, and numbered as in the whole: so that a scheduler can split one animation into many jobs."""
+    (folder / "b.toml").write_text(f"{RECIPE}[output]\nfps = 30\n{playback}\n")
+    whole, parts = folder / "whole", folder / "parts"
+    for path in (whole, parts):
+        path.mkdir()
+    recipe, picture = str(folder / "b.toml"), folder / "p0.png"
+    assert perform(Task(recipe, Edits(), picture, whole / "f.%03d.png")).error == ""
+    count = len(contents(whole))
+    for first in range(0, count, 4):
+        outcome = perform(Task(recipe, Edits(), picture, parts / "f.%03d.png", part=(first, first + 3)))
+        assert outcome.error == ""
+    assert contents(parts) == contents(whole)
+    told = perform(Task(recipe, Edits(), picture, parts / "f.%03d.png", part=(count, None)))
+    assert f"the frames 0-{count - 1}, and none from {count} on" in told.error
+    assert read_picture(whole / "f.000.png").pixels.shape == (48, 64, 3)
