@@ -220,7 +220,6 @@ def test_bad_input_is_told_in_a_sentence(
 
 FORCES = {
     "enormous": ("strength = 1e6", 'force[1] "x": at t = 0 s it throws the fluid'),
-    "too late": ("at = [7]", 'force[1] "x": it would act at 7 s'),
     "formula": ('formula = "1/(t-0.1)"', "divides by zero"),
 }
 
@@ -234,6 +233,15 @@ def test_bad_forces_name_the_force(folder: Path):
         assert expected in ran.stderr
         assert len(ran.stderr.splitlines()) <= 2
         assert here(folder) == {"a.toml", "b.toml", "cat.png"}
+
+
+def test_a_force_that_never_acts_is_remarked_on(folder: Path):
+    force = '[[force]]\nname = "x"\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\nat = [7]\n'
+    (folder / "b.toml").write_text(f'picture = "cat.png"\nduration = 0.2\n[fluid]\ngrid = 32\n{force}')
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "x.png")
+    assert ran.returncode == 0
+    assert 'force[1] "x" never acts: it starts at 7 s' in ran.stderr
+    assert (folder / "x.png").exists()
 
 
 def test_interrupted_leaves_nothing(folder: Path):
