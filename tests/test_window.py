@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,7 @@ class Desk:
 
     def drag(self, *points: tuple[int, int]) -> None:
         self.do("mousemove", *map(str, points[0]), "sleep", "0.1", "mousedown", "1", "sleep", "0.1")
-        for start, end in zip(points, points[1:], strict=False):
+        for start, end in pairwise(points):
             for step in range(1, 11):
                 x, y = (round(a + (b - a) * step / 10) for a, b in zip(start, end, strict=True))
                 self.do("mousemove", str(x), str(y), "sleep", "0.03")

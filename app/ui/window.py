@@ -129,7 +129,8 @@ class Window:
 
     def close(self) -> None:
         """Close the window; its GL goes with it, and what Python still holds of that must not be touched any more."""
-        self.device.ctx.gc_mode = None
+        context: Any = self.device.ctx
+        context.gc_mode = None
         glfw.destroy_window(self.handle)
         glfw.terminate()
 

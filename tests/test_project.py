@@ -1,0 +1,101 @@
+"""Projects: whole, self-contained, and never half-written."""
+
+from __future__ import annotations
+
+import errno
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import project as projects
+from app.errors import UserError
+from app.pictures import Picture, write_picture
+from app.project import Project
+from app.recipe import Recipe
+from app.strokes import Stroke
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Project:
+    dice = np.random.default_rng(1)
+    write_picture(tmp_path / "photo.png", Picture(dice.integers(0, 255, (30, 40, 3), np.uint8)))
+    stroke = Stroke(tool="push", samples=((0, 0.5, 0.5, 1.0), (3, 0.6123, 0.5, 0.5)))
+    return projects.from_picture(tmp_path / "photo.png", Recipe(duration=0.25, stroke=(stroke,)))
+
+
+def test_a_project_holds_everything(made: Project, tmp_path: Path) -> None:
+    saved = projects.save(made, tmp_path / "work.fluidwarp")
+    assert (saved.path, saved.name) == (tmp_path / "work.fluidwarp", "work")
+    original = (tmp_path / "photo.png").read_bytes()
+    (tmp_path / "photo.png").unlink()
+    loaded = projects.load(tmp_path / "work.fluidwarp")
+    assert loaded.recipe == made.recipe
+    assert np.array_equal(loaded.picture.pixels, made.picture.pixels)
+    assert loaded.data == original
+    again = projects.save(loaded, tmp_path / "again.fluidwarp")
+    assert projects.load(tmp_path / "again.fluidwarp").recipe == again.recipe
+
+
+def test_a_project_can_refer_to_its_picture(made: Project, tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
+    path = tmp_path / "inner" / "work.fluidwarp"
+    projects.save(made, path, embedded=False)
+    with zipfile.ZipFile(path) as archive:
+        assert "photo.png" not in archive.namelist()
+    loaded = projects.load(path)
+    assert not loaded.embedded
+    assert loaded.recipe.picture == "../photo.png"
+    (tmp_path / "photo.png").unlink()
+    with pytest.raises(UserError, match=r"photo\.png"):
+        projects.load(path)
+
+
+def test_another_picture_gets_the_same_recipe(made: Project, tmp_path: Path) -> None:
+    write_picture(tmp_path / "other.png", Picture(np.zeros((10, 20, 3), np.uint8)))
+    other = projects.from_picture(tmp_path / "other.png", made.recipe)
+    assert other.recipe.stroke == made.recipe.stroke
+    assert other.recipe.picture == "other.png"
+
+
+def test_a_newer_project_says_so(made: Project, tmp_path: Path) -> None:
+    path = tmp_path / "work.fluidwarp"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("format.txt", "fluidwarp project 99\n")
+    with pytest.raises(UserError, match="newer"):
+        projects.load(path)
+
+
+@pytest.mark.parametrize("part", [0, 3, 100, 0.5, 0.99])
+def test_a_project_cut_short_says_so(made: Project, tmp_path: Path, part: float) -> None:
+    path = tmp_path / "work.fluidwarp"
+    projects.save(made, path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(part * len(whole) if part < 1 else part)])
+    with pytest.raises(UserError, match=r"work\.fluidwarp"):
+        projects.load(path)
+
+
+def test_a_full_disk_leaves_the_old_file(made: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "work.fluidwarp"
+    projects.save(made, path)
+    whole = path.read_bytes()
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(zipfile.ZipFile, "writestr", full)
+    with pytest.raises(UserError, match="disk is full"):
+        projects.save(made, path)
+    assert path.read_bytes() == whole
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["photo.png", "work.fluidwarp"]
+
+
+def test_names_that_lead_out_of_the_archive_are_kept_in(made: Project, tmp_path: Path) -> None:
+    outside = made.recipe.edited(picture="../../photo.png")
+    moved = Project(outside, made.picture, made.data, tmp_path)
+    projects.save(moved, tmp_path / "work.fluidwarp")
+    with zipfile.ZipFile(tmp_path / "work.fluidwarp") as archive:
+        assert all(".." not in name for name in archive.namelist())
+    assert np.array_equal(projects.load(tmp_path / "work.fluidwarp").picture.pixels, made.picture.pixels)

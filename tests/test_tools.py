@@ -1,0 +1,96 @@
+"""From the samples of a pointer to strokes."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.strokes import Stroke
+from app.tools import FASTEST, LINE_SPEED, TOOL, BrushSettings, Press, Touch, path_length
+
+EXTENT = (1.0, 0.75)
+DT = 1 / 30
+
+
+def play(name: str, *touches: Touch, opposite: bool = False, last: tuple[float, float] | None = None) -> Stroke | None:
+    """What a tool makes of touches and a release."""
+    tool = TOOL[name]
+    assert tool.gesture is not None
+    gesture = tool.gesture(Press(BrushSettings(0.1, 0.2, 0.8), opposite, EXTENT, DT, last), touches[0])
+    next(gesture)
+    for touch in touches[1:]:
+        gesture.send(touch)
+    try:
+        gesture.send(None)
+    except StopIteration as finished:
+        return finished.value
+    raise AssertionError("a gesture ends when the pointer is let go")
+
+
+def test_every_sample_is_kept() -> None:
+    touches = [Touch(3, 0.5, 0.5), Touch(3, 0.501, 0.5), Touch(4, 0.503, 0.51, 0.5)]
+    stroke = play("push", *touches)
+    assert stroke is not None
+    assert stroke.samples == tuple(touch[:4] for touch in touches)
+    assert (stroke.tool, stroke.radius, stroke.hardness, stroke.strength) == ("push", 0.1, 0.2, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("tool", "forward", "backward"),
+    [("bloat", "bloat", "pinch"), ("thicken", "thicken", "thin"), ("freeze", "freeze", "thaw")],
+)
+def test_the_opposite_of_a_tool(tool: str, forward: str, backward: str) -> None:
+    for opposite, wanted in ((False, forward), (True, backward)):
+        stroke = play(tool, Touch(0, 0.5, 0.5), opposite=opposite)
+        assert stroke is not None
+        assert (stroke.tool, stroke.reverse) == (wanted, False)
+
+
+def test_push_and_twirl_are_reversed() -> None:
+    for tool in ("push", "twirl"):
+        stroke = play(tool, Touch(0, 0.5, 0.5), opposite=True)
+        assert stroke is not None
+        assert stroke.reverse
+
+
+def test_a_pointer_that_is_too_fast_is_followed_at_the_fastest_speed() -> None:
+    stroke = play("push", Touch(0, 0.1, 0.5), Touch(1, 0.9, 0.5))
+    assert stroke is not None
+    assert stroke.samples[-1][1:3] == (0.9, 0.5)
+    for before, after in zip(stroke.samples, stroke.samples[1:], strict=False):
+        assert after[1] - before[1] <= FASTEST * DT + 1e-4
+    assert stroke.last_tick == pytest.approx(0.8 / (FASTEST * DT), abs=1.5)
+
+
+def test_a_fast_pointer_is_followed_along_its_path() -> None:
+    corner = [Touch(0, 0.2, 0.2), Touch(1, 0.8, 0.2), Touch(1, 0.8, 0.8)]
+    stroke = play("push", *corner)
+    assert stroke is not None
+    assert (0.8, 0.2) in {sample[1:3] for sample in stroke.samples}
+    assert path_length(stroke, EXTENT) == pytest.approx(0.6 + 0.6 * 0.75, abs=1e-3)
+
+
+def test_shift_keeps_to_the_axis_it_set_out_on() -> None:
+    touches = [Touch(0, 0.5, 0.5), *(Touch(k, 0.5 + 0.01 * k, 0.5 + 0.03 * k, 1.0, True) for k in range(1, 5))]
+    stroke = play("push", *touches)
+    assert stroke is not None
+    assert {sample[1] for sample in stroke.samples} == {0.5}
+
+
+def test_a_straight_line_from_where_the_last_stroke_ended() -> None:
+    stroke = play("push", Touch(5, 0.6, 0.5, 1.0, True), last=(0.2, 0.5))
+    assert stroke is not None
+    assert stroke.samples[0] == (5, 0.2, 0.5, 1.0)
+    assert stroke.samples[-1][1:3] == pytest.approx((0.6, 0.5))
+    seconds = (stroke.last_tick - stroke.first_tick) * DT
+    assert 0.4 / seconds == pytest.approx(LINE_SPEED, rel=0.1)
+
+
+def test_a_curve_is_one_stroke_in_one_tick() -> None:
+    touches = [Touch(k, 0.2 + 0.05 * k, 0.5) for k in range(8)]
+    stroke = play("curve", *touches)
+    assert stroke is not None
+    assert {sample[0] for sample in stroke.samples} == {7}
+    backward = play("curve", *touches, opposite=True)
+    assert backward is not None
+    assert backward.samples == stroke.samples[::-1]
+    assert play("curve", Touch(0, 0.5, 0.5)) is None
