@@ -9,14 +9,14 @@ from importlib import resources
 from pathlib import Path
 
 from app.errors import UserError
-from app.pictures import MAX_PIXELS, Picture, read_picture
+from app.pictures import FORMATS, MAX_PIXELS, OTHERS, Picture, read_picture
 from app.project import Project, is_project, load
 from app.recipe import Recipe
 from app.video import Clip, read_clip
 from solver.grid import SMALLEST_GRID
 
 SMALLEST_SIDE = 8  # pixels
-PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr", ".avif", ".gif", ".bmp")
+PICTURE_ENDINGS = (*FORMATS, ".gif", ".bmp", *OTHERS)
 CLIP_ENDINGS = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".ogv", ".wmv")
 
 

@@ -100,6 +100,11 @@ SIGNATURES = {
     "PNG": rb"\x89PNG\r\n\x1a\n", "JPEG": rb"\xff\xd8\xff", "WebP": rb"RIFF....WEBP", "AVIF": rb"....ftypavi[fs]",
     "TIFF": rb"II[*+]\0|MM\0[*+]", "OpenEXR": rb"v/1\x01", "GIF": rb"GIF8[79]a", "BMP": rb"BM",
 }  # fmt: skip
+# What imageio reads for us, by the ending: some of these, as TGA, have no signature.
+OTHERS = {
+    ".dds": "DDS", ".ico": "ICO", ".j2k": "JPEG 2000", ".jp2": "JPEG 2000", ".pbm": "PBM", ".pcx": "PCX", ".pgm": "PGM",
+    ".pnm": "PNM", ".ppm": "PPM", ".qoi": "QOI", ".sgi": "SGI", ".tga": "TGA",
+}  # fmt: skip
 
 
 def picture_format(path: str | os.PathLike[str]) -> Format:
@@ -198,9 +203,10 @@ def read_picture(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> 
     file = Path(path)
     head = _head(file)
     name = next((name for name, start in SIGNATURES.items() if re.match(start, head, re.DOTALL)), None)
-    if name is None:
-        raise UserError(f"Cannot read {file}: it is no picture of a known kind ({', '.join(SIGNATURES)}).")
-    reader = {"TIFF": _read_tiff, "OpenEXR": _read_exr}.get(name, _read_pillow)
+    if name is None and (name := OTHERS.get(file.suffix.lower())) is None:
+        known = ", ".join([*SIGNATURES, *sorted(set(OTHERS.values()))])
+        raise UserError(f"Cannot read {file}: it is no picture of a known kind ({known}).")
+    reader = {"TIFF": _read_tiff, "OpenEXR": _read_exr}.get(name, _read_pillow if name in SIGNATURES else _read_other)
     with _decoding(file, name):
         return reader(file, name, max_pixels)
 
@@ -276,6 +282,27 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
             dpi=_positive(image.info.get("dpi")),
             texts={key: text.replace("\0", "") for key, text in texts.items() if key},
         )
+
+
+def _read_other(file: Path, name: str, max_pixels: int) -> Picture:
+    import imageio.v3 as iio
+
+    if (deepest := re.match(rb"P[36]\s+(?:#.*\s+)*\d+\s+\d+\s+(\d+)", _start(file))) and int(deepest[1]) > 255:
+        # it would be read as 8 bits without a word
+        raise UserError(f"Cannot read {file}: a {name} of 16-bit colours is not understood; convert it to PNG or TIFF.")
+    # the plugin is named, or imageio takes whichever it can open the file with
+    with iio.imopen(file, "r", plugin="pillow") as opened:
+        height, width = opened.properties(index=0).shape[:2]
+        check_size(file, width, height, max_pixels)
+        pixels = opened.read(index=0)
+    if pixels.dtype == np.int32:  # Pillow's mode for 16-bit grey
+        pixels = np.clip(pixels, 0, 65535).astype(np.uint16)
+    return Picture(_plain_depth(file, pixels if pixels.ndim == 3 else pixels[..., None]))
+
+
+def _start(file: Path) -> bytes:
+    with file.open("rb") as stream:
+        return stream.read(4096)
 
 
 def _png_bits(file: Path) -> int:

@@ -507,3 +507,36 @@ def test_noise_fits_into_a_jpeg(tmp_path: Path, quality: int) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (400, 400, 3), dtype=np.uint8)
     write_picture(tmp_path / "noise.jpg", Picture(noise), quality=quality)
     assert cv2.imread(str(tmp_path / "noise.jpg")).shape == (400, 400, 3)
+
+
+# Formats we only read -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", [".tga", ".ppm", ".pcx", ".sgi", ".qoi", ".dds", ".jp2"])
+def test_other_programs_formats_are_read(tmp_path: Path, ending: str):
+    """Written by Pillow, read through imageio, exactly."""
+    y, x = np.mgrid[0:48, 0:64]
+    pixels = np.stack([x * 4, y * 5, (x * y) % 256], axis=-1).astype(np.uint8)
+    path = tmp_path / f"a{ending}"
+    Image.fromarray(pixels).save(path)
+    read = read_picture(path)
+    assert np.array_equal(read.pixels, pixels)
+    with pytest.raises(UserError, match=r"--max-pixels 3072"):
+        read_picture(path, max_pixels=100)
+    path.write_bytes(path.read_bytes()[:50])
+    with pytest.raises(UserError, match=r"truncated or damaged"):
+        read_picture(path)
+
+
+def test_other_formats_in_their_depth(tmp_path: Path):
+    ramp = (np.arange(48 * 64).reshape(48, 64) * 21).astype(np.uint16)
+    Image.fromarray(ramp).save(tmp_path / "deep.pgm")
+    assert np.array_equal(read_picture(tmp_path / "deep.pgm").pixels[..., 0], ramp)
+    Image.fromarray(ramp > 9999).save(tmp_path / "line.pbm")
+    assert np.array_equal(read_picture(tmp_path / "line.pbm").pixels[..., 0], (ramp > 9999) * np.uint8(255))
+    clear = np.dstack([np.full((32, 32, 3), 90, np.uint8), np.arange(1024, dtype=np.uint16).reshape(32, 32) // 4 + 0])
+    Image.fromarray(clear.astype(np.uint8)).save(tmp_path / "a.ico", sizes=[(32, 32)])
+    assert np.array_equal(read_picture(tmp_path / "a.ico").pixels, clear)
+    (tmp_path / "deep.ppm").write_bytes(b"P6\n# by hand\n4 4\n65535\n" + bytes(96))
+    with pytest.raises(UserError, match="16-bit colours"):
+        read_picture(tmp_path / "deep.ppm")
