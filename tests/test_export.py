@@ -1,0 +1,302 @@
+"""Clips and maps through the program: what is written, as other programs and other ways to it have it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app import ffmpeg
+from app.applying import Application, MapSource, converted, inverted
+from app.batch import Edits, Task
+from app.errors import Cancelled, UserError
+from app.export import Job, MapOutput, displacement, run
+from app.maps import Displacement, cropped, read_map, to_st, write_map
+from app.opening import open_source
+from app.pictures import Picture, read_picture, write_picture
+from app.progress import Progress
+from app.recipe import Recipe
+from app.replay import Replay
+from app.sampling import Pictures
+from app.threads import ahead, behind
+from app.video import read_clip
+from solver.context import Device
+
+WIDTH, HEIGHT = 96, 64
+WHIRL = """
+duration = 0.4
+edges = "clamp"
+[fluid]
+grid = 48
+dt = 0.02
+[[force]]
+kind = "vortex"
+point = [0.45, 0.5]
+radius = 0.3
+strength = 6
+[output]
+fps = 10
+"""
+
+
+def scene(number: int = 0) -> np.ndarray:
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    light = 128 + 60 * np.sin(x / 7 + number / 3) + 50 * np.cos(y / 9)
+    return np.stack([light, 250 - light, (light + x) / 2], axis=-1).astype(np.uint8)
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    write_picture(tmp_path / "cat.png", Picture(scene()))
+    return tmp_path / "cat.png"
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A lossless clip of 9 frames at 12.5 a second, with a sound."""
+    path = tmp_path_factory.mktemp("clip") / "clip.mkv"
+    frames = b"".join(scene(number).tobytes() for number in range(9))
+    command = [ffmpeg.executable(), "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{WIDTH}x{HEIGHT}"]
+    command += ["-r", "25/2", "-i", "-", "-f", "lavfi", "-i", "sine=d=0.72", "-c:v", "ffv1", "-pix_fmt", "bgr0"]
+    subprocess.run([*command, "-c:a", "flac", str(path)], input=frames, check=True)
+    return path
+
+
+def render(device: Device, recipe: str, source: Path, output: Path | None, **options: object) -> None:
+    task = Task("unused", Edits(), source, output, **options)  # type: ignore[arg-type]
+    opened = open_source(source)
+    job = Job(
+        Recipe.parse(recipe), opened.picture, source.parent, output, maps=task.maps, clip=opened.clip, part=task.part
+    )
+    run(device, job, Progress())
+
+
+def apply(device: Device, maps: Path, source: Path, output: Path, **options: object) -> None:
+    Application(MapSource(maps), source, output, edges="clamp", **options).run(device, Progress())  # type: ignore[arg-type]
+
+
+def files(folder: Path, start: str) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.name.startswith(start))
+
+
+def probe(path: Path) -> dict[str, dict]:
+    command = ["ffprobe", "-v", "error", "-count_frames", "-show_streams", "-of", "json", str(path)]
+    streams = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)["streams"]
+    return {stream["codec_type"]: stream for stream in streams}
+
+
+def replayed(device: Device, recipe: str, picture: Path, ticks: int) -> Replay:
+    replay = Replay(device, Recipe.parse(recipe), Pictures(read_picture(picture), picture.parent), budget=0)
+    replay.seek(ticks)
+    return replay
+
+
+# Clips --------------------------------------------------------------------------------------------------------------
+
+
+def test_a_clip_is_warped_frame_by_frame(device: Device, clip: Path, tmp_path: Path):
+    """Frame k by the warp of frame k at the clip's rate, and by the last warp once the fluid has come to its end."""
+    render(device, WHIRL, clip, tmp_path / "f.%02d.png", maps=MapOutput(tmp_path / "m.%02d.npy"))
+    assert files(tmp_path, "f.") == [f"f.{number:02d}.png" for number in range(9)]
+    for number in (0, 3, 5, 8):
+        write_picture(tmp_path / "still.png", Picture(scene(number)))
+        # 0.4 s are 5 frames after the first
+        at = min(number, 5)
+        expected = scene(0).astype(int)
+        if at:
+            recipe = WHIRL.replace("duration = 0.4", f"duration = {at * 0.08:g}")
+            render(device, recipe, tmp_path / "still.png", tmp_path / "end.png")
+            expected = read_picture(tmp_path / "end.png").pixels.astype(int)
+        made = read_picture(tmp_path / f"f.{number:02d}.png").pixels.astype(int)
+        assert np.abs(made - expected).max() <= 1, number
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".mkv"])
+def test_a_clip_keeps_its_rate_and_its_sound(device: Device, clip: Path, tmp_path: Path, ending: str):
+    render(device, WHIRL, clip, tmp_path / f"out{ending}")
+    found = probe(tmp_path / f"out{ending}")
+    assert found["video"]["nb_read_frames"] == "9"
+    assert Fraction(found["video"]["r_frame_rate"]) == Fraction(25, 2)
+    assert found["audio"]["codec_name"] == {".mp4": "aac", ".mkv": "flac"}[ending]
+    made = read_clip(tmp_path / f"out{ending}")
+    assert (made.width, made.height) == (WIDTH, HEIGHT)
+
+
+def test_a_clip_goes_back_in_time_with_its_warp(device: Device, clip: Path, tmp_path: Path):
+    """The clip itself goes on forwards: its frame 5 by the first warp, which does nothing."""
+    render(device, WHIRL + "[time]\nreverse = true\n", clip, tmp_path / "f.%02d.png")
+    assert np.array_equal(read_picture(tmp_path / "f.05.png").pixels, scene(5))
+    assert (read_picture(tmp_path / "f.00.png").pixels != scene(0)).any()
+
+
+def test_a_part_of_a_clip(device: Device, clip: Path, tmp_path: Path):
+    render(device, WHIRL, clip, tmp_path / "f.%02d.png")
+    render(device, WHIRL, clip, tmp_path / "part.%02d.png", part=(4, 6))
+    assert files(tmp_path, "part") == ["part.04.png", "part.05.png", "part.06.png"]
+    for number in (4, 5, 6):
+        assert (tmp_path / f"part.{number:02d}.png").read_bytes() == (tmp_path / f"f.{number:02d}.png").read_bytes()
+
+
+def test_a_clip_through_a_still_map(device: Device, clip: Path, picture: Path, tmp_path: Path):
+    render(device, WHIRL, picture, None, maps=MapOutput(tmp_path / "m.exr"))
+    apply(device, tmp_path / "m.exr", clip, tmp_path / "f.%02d.png")
+    write_picture(tmp_path / "still.png", Picture(scene(7)))
+    apply(device, tmp_path / "m.exr", tmp_path / "still.png", tmp_path / "one.png")
+    assert np.array_equal(read_picture(tmp_path / "f.07.png").pixels, read_picture(tmp_path / "one.png").pixels)
+    apply(device, tmp_path / "m.exr", clip, tmp_path / "out.mkv")
+    assert {"video", "audio"} == set(probe(tmp_path / "out.mkv"))
+
+
+# Maps ---------------------------------------------------------------------------------------------------------------
+
+
+def test_a_map_for_every_frame(device: Device, picture: Path, tmp_path: Path):
+    """The picture through map k is frame k; converted, they are the same maps."""
+    render(device, WHIRL, picture, tmp_path / "f.%03d.png", maps=MapOutput(tmp_path / "m.%03d.exr", overscan=3))
+    assert len(files(tmp_path, "f.")) == len(files(tmp_path, "m.")) == 5
+    apply(device, tmp_path / "m.%03d.exr", picture, tmp_path / "g.%03d.png", fps=10)
+    for number in range(5):
+        frame, again = (read_picture(tmp_path / f"{name}.{number:03d}.png").pixels.astype(int) for name in "fg")
+        assert np.abs(frame - again).max() <= 1
+    converted(MapSource(tmp_path / "m.%03d.exr"), tmp_path / "n.%02d.flo", "st", False, Progress())
+    first, second = read_map(tmp_path / "m.004.exr"), read_map(tmp_path / "n.04.flo")
+    assert first.overscan == 3
+    assert np.abs(cropped(first).values - second.values).max() < 1e-6
+
+
+@pytest.mark.parametrize("size", [48, 300])
+def test_a_map_at_any_size_with_overscan(device: Device, picture: Path, tmp_path: Path, size: int):
+    """Inside it is the map without overscan; beyond the edge it goes on as on the edge."""
+    for name, overscan in (("plain.npy", 0), ("more.exr", 7)):
+        render(device, WHIRL, picture, None, maps=MapOutput(tmp_path / name, overscan=overscan, size=size))
+    plain, more = read_map(tmp_path / "plain.npy"), read_map(tmp_path / "more.exr")
+    assert (more.width, more.height, more.overscan) == (size, size * HEIGHT // WIDTH, 7)
+    assert np.abs(cropped(more).values - plain.values).max() < 2e-6
+    assert np.abs(more.values[:, 0] - more.values[:, 6]).max() < 1e-6
+
+
+def test_forward_after_inverse_is_nothing(device: Device, picture: Path, tmp_path: Path):
+    """Within a hundredth of a pixel in the mean: where a point goes, it is looked up from where it was."""
+    for name, forward in (("back.exr", False), ("forth.exr", True)):
+        render(device, WHIRL, picture, None, maps=MapOutput(tmp_path / name, forward=forward, size=384))
+    back, forth = read_map(tmp_path / "back.exr"), read_map(tmp_path / "forth.exr")
+    assert (back.forward, forth.forward) == (False, True)
+    assert misfit(back, forth) < 0.01
+    assert misfit(back, inverted(device, back)) < 0.05
+    again = inverted(device, forth)
+    assert not again.forward
+    assert np.abs(again.values - back.values)[20:-20, 20:-20].max() * 384 < 0.1
+
+
+def misfit(back: Displacement, forth: Displacement) -> float:
+    """Mean of |F(y) + D(y + F(y))| in pixels, away from the border, D between its pixels by OpenCV."""
+    y, x = np.mgrid[0 : forth.height, 0 : forth.width].astype(np.float32)
+    at_x, at_y = (c + forth.longest * forth.values[..., axis] for axis, c in enumerate((x, y)))
+    looked_up = cv2.remap(back.values.astype(np.float32), at_x.astype("f4"), at_y.astype("f4"), cv2.INTER_LINEAR)
+    return float(np.hypot(*np.moveaxis(looked_up + forth.values, -1, 0))[8:-8, 8:-8].mean() * forth.longest)
+
+
+def test_opencv_warps_by_the_map_as_we_do(device: Device, picture: Path, tmp_path: Path):
+    render(device, WHIRL, picture, tmp_path / "ours.png", maps=MapOutput(tmp_path / "m.exr"))
+    st = to_st(read_map(tmp_path / "m.exr"))
+    x, y = st[..., 0] * WIDTH - 0.5, (1 - st[..., 1]) * HEIGHT - 0.5
+    theirs = cv2.remap(scene(), x.astype("f4"), y.astype("f4"), cv2.INTER_CUBIC)
+    ours = read_picture(tmp_path / "ours.png").pixels.astype(int)
+    assert np.abs(ours - theirs)[4:-4, 4:-4].max() <= 2
+
+
+def test_the_size_of_the_gpu_does_not_bound_a_map(device: Device, picture: Path):
+    """Found in pieces, it is the same."""
+    replay = replayed(device, WHIRL, picture, 12)
+    whole = displacement(replay, (WIDTH, HEIGHT)).values
+    pieces = displacement(replay, (WIDTH, HEIGHT), overscan=1).values[1:-1, 1:-1]
+    replay.release()
+    assert np.abs(whole - pieces).max() < 1e-7
+
+
+def test_a_recipe_begins_with_a_map(device: Device, picture: Path, tmp_path: Path):
+    """Nothing flows: the end is the map's own warp. And what flows then, flows on from there."""
+    render(device, WHIRL, picture, tmp_path / "one.png", maps=MapOutput(tmp_path / "start.exr"))
+    still = 'map = "start.exr"\nduration = 0.1\nedges = "clamp"\n[fluid]\ngrid = 48\n'
+    render(device, still, picture, tmp_path / "two.png")
+    one, two = (read_picture(tmp_path / name).pixels.astype(int) for name in ("one.png", "two.png"))
+    assert np.abs(one - two).max() <= 2
+    assert np.abs(one - scene()).max() > 50
+    render(device, f'map = "start.exr"\n{WHIRL}', picture, tmp_path / "three.png")
+    assert np.abs(read_picture(tmp_path / "three.png").pixels.astype(int) - two).max() > 20
+    assert Recipe.parse(Recipe.parse(still).text()) == Recipe.parse(still)
+
+
+# What cannot be -----------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_path: Path):
+    before = files(tmp_path, "")
+    sequence = MapOutput(tmp_path / "m.%02d.exr")
+    with pytest.raises(UserError, match=r"numbers the maps of an animation and .*out\.png is a picture"):
+        render(device, WHIRL, picture, tmp_path / "out.png", maps=sequence)
+    with pytest.raises(UserError, match="only an animation has --frames"):
+        render(device, WHIRL, picture, tmp_path / "out.png", part=(1, 2))
+    with pytest.raises(UserError, match=r"clip\.mkv is a clip"):
+        render(device, 'mode = "density"\n' + WHIRL, clip, tmp_path / "out.mp4")
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    with pytest.raises(UserError, match="do not make a still"):
+        apply(device, tmp_path / "m.npy", clip, tmp_path / "out.png")
+    with pytest.raises(UserError, match="do not make an animation"):
+        apply(device, tmp_path / "m.npy", picture, tmp_path / "out.gif")
+    with pytest.raises(UserError, match="there is no such file"):
+        apply(device, tmp_path / "n.%03d.exr", picture, tmp_path / "out.gif")
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((64, 64, 2), np.float32)))
+    with pytest.raises(UserError, match="must have the same proportions"):
+        apply(device, tmp_path / "m.npy", picture, tmp_path / "out.png")
+    with pytest.raises(UserError, match="must have the same proportions"):
+        render(device, 'map = "m.npy"\n' + WHIRL, picture, tmp_path / "out.png")
+    with pytest.raises(UserError, match="'map' warps coordinates"):
+        Recipe.parse('map = "m.npy"\nmode = "density"')
+    (tmp_path / "m.npy").unlink()
+    assert files(tmp_path, "") == before
+
+
+# Two ends of a stream -----------------------------------------------------------------------------------------------
+
+
+def test_what_is_handed_over_arrives_in_order():
+    came: list[int] = []
+    with behind(came.append) as put:
+        for number in range(100):
+            put(number)
+    assert came == list(range(100))
+    with ahead(iter(range(100))) as items:
+        assert list(items) == list(range(100))
+
+
+def test_what_goes_wrong_at_one_end_is_heard_at_the_other():
+    def refuse(number: int) -> None:
+        if number == 3:
+            raise Cancelled
+
+    def broken():
+        yield 1
+        raise UserError("the clip ends here")
+
+    with pytest.raises(Cancelled), behind(refuse) as put:
+        all(put(number) is None for number in range(1000))
+    with pytest.raises(UserError, match="ends here"), ahead(broken()) as items:
+        list(items)
+    closed: list[bool] = []
+
+    def endless():
+        try:
+            while True:
+                yield 0
+        finally:
+            closed.append(True)
+
+    with ahead(endless()) as items:
+        next(items)
+    assert closed == [True]
