@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from solver.context import Device
 from solver.fluid import Fluid
@@ -28,7 +29,7 @@ class Tip:
     radius: float
     hardness: float = 0.0
 
-    def inputs(self, grid: Grid) -> dict[str, object]:
+    def inputs(self, grid: Grid) -> dict[str, Any]:
         """The uniforms of `lib/brush.glsl`."""
         return {
             "segment": (*self.start, *self.end),
@@ -56,7 +57,7 @@ class Push:
     def shader(self) -> str:
         return "brush/push.frag"
 
-    def inputs(self) -> dict[str, object]:
+    def inputs(self) -> dict[str, Any]:
         (x0, y0), (x1, y1) = self.tip.start, self.tip.end
         # Against the drag at the whole speed, and no stronger than along it.
         speed = (1.0 if self.strength > 0 else -1.0) / self.dt
@@ -74,15 +75,15 @@ class Twirl:
     def shader(self) -> str:
         return "brush/twirl.frag"
 
-    def inputs(self) -> dict[str, object]:
+    def inputs(self) -> dict[str, Any]:
         return {"rate": self.rate}
 
 
 class Brush:
     """Draws tips into a fluid.
 
-    Push and twirl are closed loops: they add what the fluid lacks of the wanted motion at the brush, so that the picture
-    follows the pointer at its own speed however thick the fluid is, and a resting brush holds it still.
+    Push and twirl are closed loops: they add what the fluid lacks of the wanted motion at the brush, so that the
+    picture follows the pointer at its own speed however thick the fluid is, and a resting brush holds it still.
     """
 
     def __init__(self, device: Device) -> None:

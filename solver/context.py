@@ -6,7 +6,7 @@ import ctypes.util
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
@@ -76,14 +76,14 @@ class Device:
         Raises:
             ContextError: if EGL or an OpenGL 3.3 driver is missing; the message says what to install.
         """
-        attempts: list[dict[str, str]] = [{}]
+        attempts: list[dict[str, Any]] = [{}]
         if ctypes.util.find_library("EGL"):
             # Without the -dev packages only the versioned names exist.
             attempts.append({"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
         reason = ""
         for libraries in attempts:
             try:
-                ctx = moderngl.create_context(standalone=True, backend="egl", require=330, **libraries)
+                ctx = moderngl.create_context(require=330, standalone=True, **{"backend": "egl", **libraries})
             except Exception as error:  # glcontext raises plain Exception
                 reason = str(error)
             else:

@@ -67,7 +67,8 @@ class Field:
 
     def clear(self, *values: float) -> None:
         """Fill with `values`, by default zero."""
-        self.framebuffer.clear(*(values or (0.0,) * 4))
+        red, green, blue, alpha = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
+        self.framebuffer.clear(red, green, blue, alpha)
 
     def set(self, array: np.ndarray) -> None:
         """Write an array of shape (height, width) or (height, width, components), row 0 on top.

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -284,8 +285,8 @@ class Fluid:
                 self._solids_of = solid
             self._solids_changed = False
 
-    def _wall_defines(self) -> dict[str, object]:
+    def _wall_defines(self) -> dict[str, Any]:
         return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
 
-    def _wall_inputs(self) -> dict[str, object]:
+    def _wall_inputs(self) -> dict[str, Any]:
         return {"wall_speed": self.params.walls.speed} if self.params.walls.slip == "none" else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,7 @@ class Masks:
         for item in (self.base_viscosity, self.base_frozen, self.thickness, self.frozen):
             item.release()
 
-    def _paint(self, mask: DoubleField, tip: Tip, **inputs: object) -> None:
+    def _paint(self, mask: DoubleField, tip: Tip, **inputs: Any) -> None:
         inputs = {"more": 0.0, "mix": 0.0, "towards": 0.0, "limits": (-1.0, 1.0), **inputs, **tip.inputs(self.grid)}
         self.device.pass_("brush/paint.frag")(mask.write, mask=mask.read, **inputs)
         mask.swap()

@@ -13,6 +13,8 @@ from solver.program import ShaderError, assemble, compile_program, declared_read
 if TYPE_CHECKING:
     from solver.context import Device
 
+GL_SAMPLER_2D = 0x8B5E
+
 Target = Field | Sequence[Field]
 Region = tuple[int, int, int, int]
 
@@ -41,7 +43,7 @@ class Pass:
             member = self.program[name]
             if isinstance(member, moderngl.Uniform):
                 self._uniforms[name] = member
-                if member.gl_type == 0x8B5E:  # GL_SAMPLER_2D
+                if member.gl_type == GL_SAMPLER_2D:  # pyright: ignore[reportAttributeAccessIssue]
                     self._units[name] = member.value = len(self._units)
 
     def __call__(
@@ -72,7 +74,7 @@ class Pass:
             width, height = min(region[0] + region[2], width) - x, min(region[1] + region[3], height) - y
             if width <= 0 or height <= 0:
                 return
-            framebuffer.scissor = (x, y, width, height)
+            framebuffer.scissor = (x, y, width, height)  # pyright: ignore[reportAttributeAccessIssue]
         ctx = self.device.ctx
         if add:
             ctx.enable_only(moderngl.BLEND)

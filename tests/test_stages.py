@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ def relative(got: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.abs(got - wanted).max() / np.abs(wanted).max())
 
 
-def wall_inputs(no_slip: bool, speed: tuple[float, ...]) -> tuple[dict[str, object], dict[str, object]]:
+def wall_inputs(no_slip: bool, speed: tuple[float, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
     return ({"NO_SLIP": 1}, {"wall_speed": speed}) if no_slip else ({}, {})
 
 

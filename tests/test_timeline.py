@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import pairwise
 
 import pytest
 
@@ -28,7 +29,7 @@ def test_frame_rate_is_independent_of_the_tick():
     assert len(positions) == 25
     assert positions[0] == 0
     assert positions[-1] == 10
-    assert {b - a for a, b in zip(positions, positions[1:], strict=False)} == {Fraction(10, 24)}
+    assert {b - a for a, b in pairwise(positions)} == {Fraction(10, 24)}
 
 
 def test_slow_motion_has_more_frames():
