@@ -74,7 +74,7 @@ class Pass:
             width, height = min(region[0] + region[2], width) - x, min(region[1] + region[3], height) - y
             if width <= 0 or height <= 0:
                 return
-            framebuffer.scissor = (x, y, width, height)  # pyright: ignore[reportAttributeAccessIssue]
+            framebuffer.scissor = (x, y, width, height)
         ctx = self.device.ctx
         if add:
             ctx.enable_only(moderngl.BLEND)
@@ -84,7 +84,7 @@ class Pass:
         if add:
             ctx.enable_only(moderngl.NOTHING)
         if region is not None:
-            framebuffer.scissor = None
+            framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]
         self.device.timings.count(width * height, self.reads)
 
     def draw_into(self, framebuffer: moderngl.Framebuffer, smooth: Sequence[str] = (), **inputs: object) -> None:
