@@ -1,0 +1,153 @@
+"""Working live: what is recorded is what was seen."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import project as projects
+from app.export import Job, run
+from app.pictures import read_picture
+from app.progress import Progress
+from app.session import REST, Session
+from app.tools import TOOL, TOOLS, BrushSettings, Press
+from editing import small_project
+from solver.context import Device
+
+PAINTING = [tool for tool in TOOLS if tool.gesture is not None]
+
+
+@pytest.fixture
+def session(device: Device, tmp_path: Path) -> Iterator[Session]:
+    session = Session(device, small_project(tmp_path, grid=32))
+    yield session
+    session.release_gpu()
+
+
+def paint(
+    session: Session, tool: str, start: tuple[float, float], end: tuple[float, float], ticks: int = 4, back: bool = False
+) -> None:
+    """A stroke, with the time that it takes."""
+    press = Press(BrushSettings(0.12, 0.2), back, session.extent, session.dt)
+    session.press(TOOL[tool], press, *start)
+    for k in range(1, ticks + 1):
+        session.move(*(a + (b - a) * k / ticks for a, b in zip(start, end, strict=True)))
+        session.advance(1)
+    session.release()
+
+
+def test_two_hundred_strokes_saved_and_rendered_are_the_same_picture(
+    device: Device, session: Session, tmp_path: Path
+) -> None:
+    dice = random.Random(2)
+    for _ in range(200):
+        start = dice.uniform(0.1, 0.9), dice.uniform(0.1, 0.9)
+        end = start[0] + dice.uniform(-0.08, 0.08), start[1] + dice.uniform(-0.08, 0.08)
+        paint(session, dice.choice(PAINTING).name, start, end, 2, dice.random() < 0.3)
+        session.advance(dice.randrange(3))
+    session.settle()
+    seen = session.replay.warp.read()
+    project = projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "w.fluidwarp")
+    loaded = projects.load(tmp_path / "w.fluidwarp")
+    assert loaded.recipe == session.recipe
+    assert len(loaded.recipe.stroke) > 180
+    again = Session(device, loaded)
+    again.settle()
+    assert np.array_equal(again.replay.warp.read(), seen)
+    again.release_gpu()
+    files = [tmp_path / "one.png", tmp_path / "two.png"]
+    for source, file in ((project, files[0]), (loaded, files[1])):
+        run(device, Job(source.recipe, source.picture, source.folder, file), Progress())
+    assert np.array_equal(read_picture(files[0]).pixels, read_picture(files[1]).pixels)
+
+
+def test_the_history_is_exact_wherever_one_goes(session: Session) -> None:
+    dice = random.Random(3)
+    seen = [session.replay.warp.read()]
+    for tool in ("push", "freeze", "push", "twirl", "thicken", "push", "restore"):
+        paint(session, tool, (dice.uniform(0.3, 0.7), 0.5), (dice.uniform(0.3, 0.7), 0.6))
+        session.settle()
+        seen.append(session.replay.warp.read())
+    for _ in range(20):
+        index = dice.randrange(len(seen))
+        session.go_to(index)
+        session.settle()
+        assert np.array_equal(session.replay.warp.read(), seen[index])
+
+
+def test_the_fluid_comes_to_rest_and_stays_so(session: Session) -> None:
+    paint(session, "push", (0.3, 0.5), (0.5, 0.5))
+    assert session.coasting
+    session.settle()
+    assert not session.coasting
+    assert session.replay.fluid.motion().largest_speed <= REST
+    tick = session.tick
+    session.advance(10)
+    assert session.tick == tick == session.end == session.document.recipe.ticks
+
+
+def test_a_slider_that_is_dragged_is_one_edit(session: Session) -> None:
+    paint(session, "push", (0.3, 0.5), (0.5, 0.5))
+    session.settle()
+    for value in (0.01, 0.02, 0.05):
+        session.preview_change(viscosity=value)
+    session.commit("Viscosity")
+    assert [entry.name for entry in session.document.history.entries] == ["Open", "Push", "Viscosity"]
+    assert session.recipe.fluid_at(session.tick).viscosity == 0.05
+    assert len(session.recipe.change) == 1
+
+
+def test_settings_before_the_first_stroke_are_the_recipe_s_own(session: Session) -> None:
+    session.change("Water", viscosity=0.0006, drag=0.5)
+    assert session.recipe.change == ()
+    assert session.recipe.fluid.viscosity == 0.0006
+    session.undo()
+    assert session.recipe.fluid.viscosity == pytest.approx(0.03)
+
+
+def test_another_grid_replays_everything(session: Session) -> None:
+    paint(session, "push", (0.3, 0.5), (0.5, 0.5))
+    session.settle()
+    coarse = session.replay.warp.read((32, 24))
+    session.set_grid(64)
+    session.settle()
+    assert session.replay.grid.nx == 64
+    assert np.abs(session.replay.warp.read((32, 24)) - coarse).max() < 0.05
+    session.undo()
+    session.settle()
+    assert np.array_equal(session.replay.warp.read((32, 24)), coarse)
+
+
+def test_pixels_follow_the_pointer_at_its_speed_in_putty(session: Session) -> None:
+    session.change("Putty", viscosity=0.3, drag=0.0)
+    session.set_grid(96)
+    x, y = 0.35, 0.5
+    session.press(TOOL["push"], Press(BrushSettings(0.15), False, session.extent, session.dt), x, y)
+    session.advance(1)
+    for k in range(1, 13):
+        session.move(x + 0.012 * k, y)
+        session.advance(1)
+    warp = session.replay.warp.read()
+    session.release()
+    height, width = warp.shape[:2]
+    carried = -warp[round(y * height), round((x + 0.144) * width) - 1][0]
+    assert carried == pytest.approx(0.144, rel=0.08)
+
+
+def test_the_first_stroke_does_not_fold(session: Session) -> None:
+    session.set_grid(128)
+    press = Press(BrushSettings(), False, session.extent, session.dt)
+    session.press(TOOL["push"], press, 0.4, 0.5)
+    for k in range(1, 16):
+        session.move(0.4 + 0.012 * k, 0.5)
+        session.advance(1)
+    session.release()
+    session.settle()
+    statistics = session.replay.warp.statistics()
+    assert statistics.displacement_max > 0.15
+    assert statistics.folds == 0
