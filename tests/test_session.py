@@ -30,7 +30,12 @@ def session(device: Device, tmp_path: Path) -> Iterator[Session]:
 
 
 def paint(
-    session: Session, tool: str, start: tuple[float, float], end: tuple[float, float], ticks: int = 4, back: bool = False
+    session: Session,
+    tool: str,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    ticks: int = 4,
+    back: bool = False,
 ) -> None:
     """A stroke, with the time that it takes."""
     press = Press(BrushSettings(0.12, 0.2), back, session.extent, session.dt)

@@ -24,6 +24,11 @@ class Dialog:
         self.title = title
         self._open = True
 
+    @property
+    def is_busy(self) -> bool:
+        """Something is going on in it, so that frames have to be drawn."""
+        return False
+
     def close(self) -> None:
         self._open = False
 

@@ -181,7 +181,7 @@ class Editor:
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
-        if self.quality.is_measuring:
+        if self.quality.is_measuring or any(dialog.is_busy for dialog in self.dialogs):
             return True
         return self.session.is_moving or self.exports.is_running or self.files.is_waiting or self.clock.settling > 0
 

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import moderngl
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError
 from app.export import Job
 from app.export_process import ExportProcess
+from app.pictures import read_picture
 from app.session import Session
+from app.ui.canvas import shown_pixels
 from app.ui.dialogs import Dialog
 from app.ui.messages import Messages
 from app.ui.theme import packed
@@ -24,6 +28,7 @@ if TYPE_CHECKING:
 
 PICTURES = (("PNG", ".png"), ("JPEG", ".jpg"), ("TIFF", ".tif"))
 ANIMATIONS = (("MP4", ".mp4"), ("GIF", ".gif"), ("PNG sequence", ".%04d.png"))
+PREVIEW = 640  # pixels along the longer side
 FINER = (("As seen", 1), ("2 x", 2))
 
 
@@ -46,6 +51,13 @@ class ExportDialog(Dialog):
         self.finer = 0
         self.folder = Path(folder) if folder and Path(folder).is_dir() else Path.home()
         self.name = f"{session.project.name} warped"
+        self._preview: ExportProcess | None = None
+        self._image: moderngl.Texture | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    @property
+    def is_busy(self) -> bool:
+        return self._preview is not None
 
     @property
     def ending(self) -> str:
@@ -99,6 +111,7 @@ class ExportDialog(Dialog):
         self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
         if self.finer:
             ui.dim("Finer detail, longer work; it may look a little different from what you see.")
+            self._show_preview(ui, editor)
         imgui.dummy(ImVec2(0, ui.px(2)))
         ui.dim("File")
         imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
@@ -118,6 +131,31 @@ class ExportDialog(Dialog):
                 return not self._start(editor)
         return True
 
+    def _show_preview(self, ui: Ui, editor: Editor) -> None:
+        """What the finer grid makes of it, small, beside what is seen; made in a process of its own."""
+        process = self._preview
+        if process is None:
+            if self._image is None and ui.button("Preview", width=96, height=30):
+                job, folder = self.job(), tempfile.TemporaryDirectory(prefix="fluidwarp-")
+                small = job.recipe.output.model_copy(update={"size": min(PREVIEW, self.size)})
+                recipe = job.recipe.edited(output=small)
+                self._folder = folder
+                self._preview = ExportProcess(Job(recipe, job.picture, job.folder, Path(folder.name) / "preview.png"))
+        else:
+            process.poll()
+            ui.dim(f"Making a preview: {process.part:.0%}")
+            if process.is_done:
+                self._preview = None
+                if process.error:
+                    editor.messages.warn(process.error)
+                else:
+                    self._image = _texture(editor, process.job.target)
+        if self._image is not None:
+            width = imgui.get_content_region_avail().x
+            height = min(width * self._image.height / self._image.width, ui.px(240))
+            across = height * self._image.width / self._image.height
+            imgui.image(imgui.ImTextureRef(self._image.glo), ImVec2(across, height))
+
     def _start(self, editor: Editor) -> bool:
         try:
             editor.exports.start(self.job())
@@ -131,6 +169,13 @@ class ExportDialog(Dialog):
         name = path.name
         self.folder = path.parent
         self.name = name[: -len(self.ending)] if name.endswith(self.ending) else path.stem
+
+
+def _texture(editor: Editor, path: Path) -> moderngl.Texture:
+    pixels = shown_pixels(read_picture(path), PREVIEW)
+    texture = editor.device.ctx.texture((pixels.shape[1], pixels.shape[0]), 4, pixels.tobytes())
+    texture.filter = moderngl.LINEAR, moderngl.LINEAR
+    return texture
 
 
 class Exports:

@@ -22,7 +22,7 @@ class Layout:
     @classmethod
     def of(cls, width: float, height: float, scale: float, inspector: bool) -> Layout:
         bar, strip, time = BAR * scale, STRIP * scale, TIMEBAR * scale
-        side = INSPECTOR * scale if inspector and width > 640 * scale else 0.0
+        side = INSPECTOR * scale if inspector and width > 860 * scale else 0.0
         middle = max(height - bar - time, 1.0)
         return cls(
             bar=Rect(0, 0, width, bar),

@@ -19,7 +19,7 @@ from solver.context import Device
 
 TITLE = "fluidwarp"
 SIZE = (1280, 800)
-SMALLEST = (720, 480)
+SMALLEST = (800, 520)
 FASTEST = 1 / 120  # seconds between two frames where the screen does not set the pace
 NO_DISPLAY = 2
 

@@ -71,22 +71,25 @@ def _brush(ui: Ui, editor: Editor) -> None:
     )  # fmt: skip
     if slid.changed:
         brush = replace(brush, radius=slid.value)
-    imgui.same_line()
-    imgui.set_cursor_pos_y(ui.px(10))
-    slid = ui.slider(
-        "hardness", "Hardness", brush.hardness, 0, 1, f"{brush.hardness:.0%}", default=0.0, width=width,
-        title="Hardness", key="{", more="} makes it harder. A soft brush bends the picture gently.",
-    )  # fmt: skip
-    if slid.changed:
-        brush = replace(brush, hardness=slid.value)
-    imgui.same_line()
-    imgui.set_cursor_pos_y(ui.px(10))
-    slid = ui.slider(
-        "strength", "Strength", brush.strength, 0.05, 1, f"{brush.strength:.0%}", default=1.0, width=width,
-        title="Strength", key=";", more="' makes it stronger. Full strength moves the picture as fast as the pointer.",
-    )  # fmt: skip
-    if slid.changed:
-        brush = replace(brush, strength=slid.value)
+    room = imgui.get_window_width() / ui.scale
+    if room > 820:
+        imgui.same_line()
+        imgui.set_cursor_pos_y(ui.px(10))
+        slid = ui.slider(
+            "hardness", "Hardness", brush.hardness, 0, 1, f"{brush.hardness:.0%}", default=0.0, width=width,
+            title="Hardness", key="{", more="} makes it harder. A soft brush bends the picture gently.",
+        )  # fmt: skip
+        if slid.changed:
+            brush = replace(brush, hardness=slid.value)
+    if room > 920:
+        imgui.same_line()
+        imgui.set_cursor_pos_y(ui.px(10))
+        slid = ui.slider(
+            "strength", "Strength", brush.strength, 0.05, 1, f"{brush.strength:.0%}", default=1.0, width=width,
+            title="Strength", key=";", more="' makes it stronger. Full strength moves the picture with the pointer.",
+        )  # fmt: skip
+        if slid.changed:
+            brush = replace(brush, strength=slid.value)
     state.brush = brush
     if imgui.get_window_width() > ui.px(1180) and not editor.state.inspector:
         imgui.same_line(0, ui.px(16))

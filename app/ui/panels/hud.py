@@ -171,9 +171,10 @@ def _hint(ui: Ui, editor: Editor) -> None:
         imgui.same_line(0, 0)
         imgui.set_cursor_pos_y(top + ui.px(4))
         ui.text("Drag on the picture to push it.", size=14, bold=True)
-        imgui.same_line(0, ui.px(8))
-        imgui.set_cursor_pos_y(top + ui.px(4))
-        ui.dim("Drop your own picture here, or press Ctrl+O.", 14)
+        if canvas.width > ui.px(860):
+            imgui.same_line(0, ui.px(8))
+            imgui.set_cursor_pos_y(top + ui.px(4))
+            ui.dim("Drop your own picture here, or press Ctrl+O.", 14)
         imgui.same_line(0, ui.px(6))
         imgui.set_cursor_pos_y(top)
         if ui.icon_button("no hint", "close", size=24, icon_size=12):
