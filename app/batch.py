@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import queue
+import select
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections import deque
@@ -31,6 +35,7 @@ NAME = "{name}"
 """What stands for the name of each picture in the name of an output."""
 
 ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
+DIED = "its process died each time, perhaps for want of memory; use fewer --jobs or a smaller --size"
 CONNECTING = 10  # seconds that a scheduler has to answer
 LOOK = 0.1  # seconds between two looks at the wish to stop
 
@@ -258,6 +263,10 @@ def _end_with(wish: Any, parent: int) -> None:
         if os.getppid() != parent:
             break
     time.sleep(GRACE)
+    _end_now()
+
+
+def _end_now() -> None:
     abandon()
     os._exit(INTERRUPTED)
 
@@ -291,7 +300,7 @@ def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress
                 if attempt < ATTEMPTS:
                     waiting.append((task, attempt + 1))
                 else:
-                    report(Outcome(task.label, "its process died, perhaps for want of memory; use fewer --jobs"))
+                    report(Outcome(task.label, DIED))
         except BaseException:
             wish.set()
             raise
@@ -300,6 +309,61 @@ def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress
 
 
 # A cluster ----------------------------------------------------------------------------------------------------------
+
+
+class _Child:
+    """A process that does one task after the other, for a thread of a Dask worker.
+
+    A GL context wants a process whose other threads leave its objects alone; Dask's collect garbage at any time. And a
+    driver that crashes does not take the worker with it.
+    """
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", "from app.batch import serve; serve()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
+
+    def perform(self, task: Task, cancel: Callable[[], bool]) -> Outcome:
+        """Have a task done. Raises `Cancelled`, or `EOFError` if the process dies."""
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        try:
+            stdin.write(pickle.dumps(task))
+            stdin.flush()
+            while not select.select([stdout], [], [], LOOK)[0]:
+                if cancel():
+                    raise Cancelled
+            return pickle.load(stdout)
+        except BrokenPipeError:
+            raise EOFError from None
+
+    def end(self) -> None:
+        """End it in the middle of whatever it does, with nothing half-written left."""
+        self._process.terminate()
+        try:
+            self._process.wait(10 * GRACE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+
+
+def serve() -> None:
+    """Do the tasks that come by standard input, until there are no more or nobody is left to hear of them."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # nothing else may get among the answers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: _end_now())
+    threading.Thread(target=_end_with, args=(threading.Event(), os.getppid()), daemon=True).start()
+    while True:
+        try:
+            task = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        pickle.dump(perform(task), answers)
+        answers.flush()
 
 
 def _perform_on_worker(task: Task) -> Outcome:
@@ -313,7 +377,18 @@ def _perform_on_worker(task: Task) -> Outcome:
         known = worker.state.tasks.get(key)
         return known is None or known.state in ("cancelled", "released", "forgotten")
 
-    return perform(task, forgotten)
+    for _ in range(ATTEMPTS):
+        if not hasattr(_here, "child"):
+            _here.child = _Child()
+        try:
+            return _here.child.perform(task, forgotten)
+        except EOFError:
+            del _here.child
+        except Cancelled:
+            _here.child.end()
+            del _here.child
+            raise
+    return Outcome(task.label, DIED)
 
 
 def _run_on_cluster(tasks: Sequence[Task], address: str, report: Report, progress: Progress) -> None:

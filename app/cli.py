@@ -236,9 +236,9 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
         written += not outcome.error
         tell(outcome)
 
-    here = jobs == 1 and cluster is None
+    alone = jobs == 1 or cluster is not None  # no processes of ours, which would have to be waited for
     try:
-        with on_terminal(f"{len(tasks)} pictures", len(tasks), leave if here else None) as progress:
+        with on_terminal(f"{len(tasks)} pictures", len(tasks), leave if alone else None) as progress:
             failures = run_batch(tasks, hear, progress, jobs, cluster)
     except Cancelled:
         _fail(f"cancelled; {written} of {len(tasks)} pictures are written, nothing is half-written", INTERRUPTED)
