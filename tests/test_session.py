@@ -41,7 +41,8 @@ def paint(
     press = Press(BrushSettings(0.12, 0.2), back, session.extent, session.dt)
     session.press(TOOL[tool], press, *start)
     for k in range(1, ticks + 1):
-        session.move(*(a + (b - a) * k / ticks for a, b in zip(start, end, strict=True)))
+        part = k / ticks
+        session.move(start[0] + (end[0] - start[0]) * part, start[1] + (end[1] - start[1]) * part)
         session.advance(1)
     session.release()
 

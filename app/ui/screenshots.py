@@ -135,6 +135,29 @@ def export(studio: Studio) -> np.ndarray:
 SCENES = {"editor": editor, "overlays": overlays, "compare": compare, "export": export}
 
 
+def film(studio: Studio, path: Path) -> None:
+    """A stroke as it is made, at half the size."""
+    from PIL import Image
+
+    frames = []
+
+    def take() -> None:
+        picture = Image.fromarray(studio.picture())
+        frames.append(picture.resize((SIZE[0] // 2, SIZE[1] // 2), Image.Resampling.LANCZOS))
+
+    editor, way = studio.editor, line((0.50, 0.52), (0.64, 0.44), -0.03)
+    for step in range(21):
+        studio.frame(Move(*editor.view.to_screen(*way(step / 20))))
+        if step == 0:
+            take()
+            studio.frame(Button(LEFT, True))
+        take()
+    studio.frame(Button(LEFT, False))
+    for _ in range(18):
+        take()
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=50, loop=0, quality=80, method=4)
+
+
 def main(folder: Path) -> None:
     """Write all pictures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -143,6 +166,9 @@ def main(folder: Path) -> None:
             studio = Studio(device)
             write_picture(folder / f"{name}.webp", Picture(scene(studio)))
             studio.close()
+        studio = Studio(device)
+        film(studio, folder / "stroke.webp")
+        studio.close()
 
 
 if __name__ == "__main__":
