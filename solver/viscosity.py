@@ -18,6 +18,8 @@ from solver.stiff_parts import StiffParts
 
 # Texels (of 2 x 2 cells) of the coarsest grid, on which the inverse matrix is at hand.
 COARSEST = 64
+# dt mu / h^2 on the coarsest grid that is worth a visit.
+LEAST_VISITED = 0.3
 # Eigenvalues of D^-1 A that a smoothing sweep is for: none found is above 8/3, at any contrast; the lower end is about
 # where the next grid takes over.
 SMOOTHED = (0.7, 8 / 3)
@@ -28,15 +30,16 @@ class Plan:
     """How much is solved: chosen once for each viscosity and time step, see `plan_for`.
 
     Attributes:
-        grids: correct v* on nested grids; without them, and without all that follows, it is only smoothed.
-        nested: multigrid cycles on each coarser grid while that correction is carried up through them.
-        steps: conjugate gradient steps after v* and that correction, each with one multigrid cycle.
+        grids: coarser grids that are visited, at most; without any, and so without all that follows, v* is smoothed.
+        nested: of these, the finest so many get a multigrid cycle while the correction is carried up through them.
+        steps: conjugate gradient steps after v* and that correction, each with one multigrid cycle; with 0 there are no
+            conjugate gradients: v* is corrected once and then smoothed.
         sweeps: smoothing sweeps before and after the coarser grids: (on the finest, on the others).
         stiff: dt mu / h^2 above which patches of fluid are moved as rigid pieces too; 0: none are.
     """
 
-    grids: bool = True
-    nested: int = 1
+    grids: int = 99
+    nested: int = 99
     steps: int = 2
     sweeps: tuple[int, int] = (2, 2)
     stiff: float = 0.0
@@ -45,15 +48,16 @@ class Plan:
 def plan_for(least: float, largest: float) -> Plan:
     """The plan for dt mu / h^2 between `least` and `largest`; the errors are for velocities smooth on the grid's scale.
 
-    Barely viscous: two sweeps, below 0.1 %. Uniform: nested grids, below 1 %. Varying: two steps as well, 1 % where the
-    viscosity varies a hundredfold and 5 % where it varies 1e5-fold (lines of a few cells: 3 and 12 %).
+    Barely viscous: two sweeps, below 0.1 %. Uniform: one correction, below 1 %. Varying: conjugate gradients, 1 % where
+    the viscosity varies a hundredfold and 5 % where it varies 1e5-fold (lines of a few cells: 3 and 12 %).
     """
     if largest <= 0.05:
-        return Plan(grids=False)
+        return Plan(grids=0, steps=0, sweeps=(2, 0))
     if largest <= 3.0 * least:
-        if largest <= 10.0:
-            return Plan(nested=0, steps=0, sweeps=(2, 1))
-        return Plan(nested=1 if largest <= 50.0 else 2, steps=0, sweeps=(2, 1))
+        grids = max(1, math.ceil(math.log(largest / LEAST_VISITED, 4.0)))
+        if largest <= 5.0:
+            return Plan(grids=grids, nested=0, steps=0, sweeps=(2, 4))
+        return Plan(grids=grids, nested=2, steps=0, sweeps=(2, 2))
     # Rigid pieces pay only where they are far stiffer than what is around them.
     return Plan(stiff=max(100.0, math.sqrt(least * largest)) if largest > 300.0 * least else 0.0)
 
@@ -96,7 +100,7 @@ class DoublePair:
 class Level:
     """One grid of the hierarchy: its matrix, its right-hand side and its iterate."""
 
-    def __init__(self, device: Device, size: tuple[int, int], depth: int) -> None:
+    def __init__(self, device: Device, size: tuple[int, int], depth: int, finest: tuple[int, int]) -> None:
         self.size = size
         self.depth = depth
         self.texels = -(-size[0] // 2), -(-size[1] // 2)
@@ -111,17 +115,19 @@ class Level:
         }
         self.right = Pair(device, ringed, f"{label} right-hand side")
         self.faces = DoublePair(device, ringed, f"{label} faces")
-        self.defines: dict[str, Any] = {"FINEST": 1} if depth == 0 else {}
+        # Without solids, what walls leave of a grid whose last column or row is only half in it.
+        self.box = finest[0] >> depth, finest[1] >> depth
+        self.use(None, {})
 
-    @property
-    def matrix(self) -> dict[str, Any]:
-        """The inputs of shaders/viscosity/block.glsl."""
-        return {name: field for name, field in self.packed.items() if name != "open"}
-
-    @property
-    def inverse(self) -> dict[str, Any]:
-        """1 / diagonal, as inputs."""
-        return {name: self.packed[name] for name in ("inverse_u", "inverse_v")}
+    def use(self, stiffness: float | None, slip: dict[str, Any]) -> None:
+        """Take the matrix from the packed fields, or from one `stiffness`, dt mu / h^2 of this grid, in a box."""
+        self.matrix: dict[str, Any] = {name: field for name, field in self.packed.items() if name != "open"}
+        self.open: dict[str, Any] = {"open": self.packed["open"]}
+        self.defines: dict[str, Any] = {"FINEST": 1, **slip} if self.depth == 0 else slip
+        if stiffness is not None:
+            self.open = {"box": self.box}
+            self.matrix = {"stiffness": stiffness, **self.open}
+            self.defines = {"UNIFORM": 1, **slip}
 
     @property
     def is_coarsest(self) -> bool:
@@ -151,7 +157,7 @@ class Viscosity:
         self._walls: dict[str, Any] = {}
         self.levels: list[Level] = []
         while not self.levels or not self.levels[-1].is_coarsest:
-            self.levels.append(Level(device, size, len(self.levels)))
+            self.levels.append(Level(device, size, len(self.levels), self.size))
             size = -(-size[0] // 2), -(-size[1] // 2)
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
@@ -166,6 +172,9 @@ class Viscosity:
         self._factors = device.double_field((1, 1), 4, "viscous step")
         self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
+        coarser = self.levels[min(1, len(self.levels) - 1)].right.u.size
+        self._weighed = device.field(coarser, 4, "viscous weights")
+        self._weights_sum = Reduction(device, coarser, 4, "sum")
 
     # -- what is solved ---------------------------------------------------------------------------------------------
 
@@ -174,20 +183,36 @@ class Viscosity:
         self._slip = {"NO_SLIP": 1} if walls.slip == "none" else {}
         self._walls = {"wall_speed": walls.speed} if any(walls.speed) and self._slip else self._resting_walls
         dt_over_h2 = dt * max(self.size) ** 2
-        inputs: dict[str, Any] = {"viscosity": viscosity, "solid": solid, "dt_over_h2": dt_over_h2}
+        frozen, scaled = solid.get() > 0, viscosity.get() * np.float32(dt_over_h2)
+        some_frozen = bool(frozen.any())
+        fluid = scaled[~frozen] if some_frozen else scaled
+        least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
+        self._largest = largest
+        self.plan = plan_for(least, largest)
+        is_uniform = least == largest and not some_frozen
+        for level in self.levels:
+            level.use(least / 4.0**level.depth if is_uniform else None, self._slip)
+        if not is_uniform:
+            self._draw_coefficients({"viscosity": viscosity, "solid": solid, "dt_over_h2": dt_over_h2})
+        if self._last is self.levels[-1]:
+            entries = box_entries if is_uniform else packed_entries
+            self._inverse.set(inverse_matrix(*entries(self._last)))
+        self._stiff_parts.count = 0
+        if self.plan.stiff:
+            self._stiff_parts.find(scaled > self.plan.stiff, frozen, self._apply_matrix)
+
+    def _draw_coefficients(self, inputs: dict[str, Any]) -> None:
         stage = "viscosity/coefficients.frag"
         for level in self.levels:
             self.device.pass_(stage)(level.cells, **inputs)
             pack = self.device.pass_("viscosity/pack.frag", **self._slip)
             pack(list(level.packed.values()), region=level.region, cells=level.cells)
             inputs, stage = {"cells": level.cells}, "viscosity/coarsen.frag"
-        self._inverse.set(inverse_matrix(self.levels[-1]))
-        frozen = solid.get() > 0
-        scaled = np.where(frozen, np.nan, viscosity.get() * dt_over_h2)
-        least, largest = (0.0, 0.0) if frozen.all() else (float(np.nanmin(scaled)), float(np.nanmax(scaled)))
-        self.plan = plan_for(least, largest)
-        stiff = scaled > self.plan.stiff if self.plan.stiff else np.zeros_like(frozen)
-        self._stiff_parts.find(stiff, frozen, self._apply_matrix)
+
+    @property
+    def _last(self) -> Level:
+        """The coarsest grid that is visited."""
+        return self.levels[min(self.plan.grids, len(self.levels) - 1)]
 
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution.
@@ -201,18 +226,20 @@ class Viscosity:
         if self._walls != self._resting_walls:
             v_star = finest.faces.read
             self._load(velocity.read, v_star, self._resting_walls)
-        if self.plan.grids:
+        if not self.plan.grids:
+            self._smooth(finest, self._residual.read, self._weights(finest), start=v_star)
+            solution = finest.faces.read
+        elif self.plan.steps or len(self.levels) == 1:
             self._conjugate_gradients(v_star)
             solution = self._solution.read
         else:
-            self._smooth(finest, self._residual.read, self._weights(finest), start=v_star)
-            solution = finest.faces.read
+            solution = self._corrected(v_star, self._residual.read)
         self.device.pass_("viscosity/store.frag")(velocity.write, **solution.inputs())
         velocity.swap()
 
     def _load(self, velocity: Field, target: Pair, walls: dict[str, Any]) -> None:
         finest = self.levels[0]
-        load = self.device.pass_("viscosity/load.frag", **self._slip, **finest.defines)
+        load = self.device.pass_("viscosity/load.frag", **finest.defines)
         load(target.fields, region=finest.region, velocity=velocity, **finest.matrix, **walls)
 
     # -- conjugate gradients ----------------------------------------------------------------------------------------
@@ -226,7 +253,7 @@ class Viscosity:
     def _directions(self, v_star: Pair) -> Iterator[Callable[[], Pair]]:
         """Where to go next, each asked for when the residual of the step before is there."""
         yield lambda: v_star
-        yield self._nested_grids
+        yield lambda: self._nested_grids(0, self._residual.read)
         if self._stiff_parts.count:
             yield self._rigid_motions
         # With one grid the solution is exact by now.
@@ -285,61 +312,110 @@ class Viscosity:
 
     # -- multigrid --------------------------------------------------------------------------------------------------
 
-    def _nested_grids(self) -> Pair:
-        """A first correction: exact on the coarsest grid, then carried up and improved grid by grid."""
-        rights = [self._residual.read, *(level.right for level in self.levels[1:])]
-        for fine, coarser in zip(rights, self.levels[1:], strict=False):
-            self._restrict(fine, coarser)
-        self._solve_exactly(rights[-1])
-        for depth in range(len(self.levels) - 2, -1, -1):
-            finer, coarser, right = self.levels[depth], self.levels[depth + 1], rights[depth]
-            prolong = self.device.pass_("viscosity/prolong.frag", START=1, **self._slip)
+    def _corrected(self, v_star: Pair, right: Pair) -> Pair:
+        """A part of v*, corrected once: on the coarser grids, and face by face for what these do not carry."""
+        finest, coarser = self.levels[:2]
+        residual, weights = finest.right, self._weights(finest, 1 + self.plan.sweeps[0])
+        self._residual_of(finest, v_star, right, residual)
+        self._restrict(residual, coarser, coarser.right)
+        part = self._part_of(right, coarser)
+        self._nested_grids(1, coarser.right)
+        # The part of it that the coarser grid does carry is not to be added face by face once more.
+        k = self._largest
+        carried = weights[0] * (1.0 + 1.5 * k) / (1.0 + 6.0 * k)
+        self._start(coarser, coarser.right, coarser.faces.read, -carried, add=True)
+        finish = self.device.pass_("viscosity/prolong.frag", CORRECT=1, **finest.defines)
+        finish(
+            finest.faces.write.fields,
+            region=finest.region,
+            weight=weights[0],
+            **coarser.faces.read.inputs("coarse_"),
+            **v_star.inputs(),
+            **residual.inputs("r_"),
+            part=part,
+            **right.inputs("right_"),
+            **finest.matrix,
+        )
+        finest.faces.swap()
+        self._smooth(finest, right, weights[1:])
+        return finest.faces.read
+
+    def _part_of(self, right: Pair, coarser: Level) -> Field:
+        """Make the coarser grid's residual that of the part of v* that is of least energy; that part, one texel."""
+        wanted, damped = coarser.faces.write, coarser.faces.read
+        self._restrict(right, coarser, wanted)
+        inputs = {**wanted.inputs(), **coarser.right.inputs("r_")}
+        self.device.pass_("viscosity/weigh.frag")(self._weighed, region=coarser.region, **inputs)
+        factors = self.device.pass_("viscosity/gradients.frag", FIRST=1)
+        factors(self._factors.write, products=self._weights_sum.shrink(self._weighed))
+        self._factors.swap()
+        damp = self.device.pass_("viscosity/damp.frag")
+        damp(damped.fields, region=coarser.region, part=self._factors.read, **inputs)
+        coarser.right, coarser.faces.read = damped, coarser.right
+        return self._factors.read
+
+    def _nested_grids(self, first: int, right: Pair) -> Pair:
+        """A correction from a depth on: solved on the coarsest grid, then carried up and improved grid by grid."""
+        last = self._last
+        levels = self.levels[first : last.depth + 1]
+        rights = [right, *(level.right for level in levels[1:])]
+        for fine, coarser in zip(rights, levels[1:], strict=False):
+            self._restrict(fine, coarser, coarser.right)
+        self._cycle(last, rights[-1])
+        for finer, coarser, right in reversed(list(zip(levels, levels[1:], rights, strict=False))):
+            prolong = self.device.pass_("viscosity/prolong.frag", START=1, **finer.defines)
             prolong(
                 finer.faces.write.fields,
                 region=finer.region,
                 **coarser.faces.read.inputs("coarse_"),
                 **coarser.right.inputs("coarse_right_"),
                 **right.inputs(),
-                **finer.inverse,
+                **finer.matrix,
             )
             finer.faces.swap()
             self._smooth(finer, right, self._weights(finer)[::-1])
             # A cycle overwrites the right-hand sides of coarser grids only, and those are used up by now.
-            for _ in range(self.plan.nested if depth else 0):
+            if 0 < finer.depth <= self.plan.nested:
                 self._cycle(finer, right, warm=True)
-        return self.levels[0].faces.read
+        return levels[0].faces.read
 
     def _cycle(self, level: Level, right: Pair, warm: bool = False) -> None:
         """One multigrid cycle for A faces = right, from rest or (`warm`) from the level's iterate."""
         if level is self.levels[-1]:
             self._solve_exactly(right)
             return
+        is_last = level is self._last
         weights = self._weights(level)
         if not warm:
-            start = self.device.pass_("viscosity/start.frag", **level.defines)
-            start(
-                level.faces.write.fields,
-                region=level.region,
-                weight=weights[0],
-                **right.inputs("right_"),
-                **level.matrix,
-            )
+            self._start(level, right, level.faces.write, weights[0])
             level.faces.swap()
         self._smooth(level, right, weights if warm else weights[1:])
+        if is_last:
+            return
         # The write side is free until the correction is added.
         self._residual_of(level, level.faces.read, right, level.faces.write)
         coarser = self.levels[level.depth + 1]
-        self._restrict(level.faces.write, coarser)
+        self._restrict(level.faces.write, coarser, coarser.right)
         self._cycle(coarser, coarser.right)
         self._prolong(coarser, level)
         self._smooth(level, right, weights[::-1])
 
-    def _weights(self, level: Level) -> list[float]:
+    def _weights(self, level: Level, count: int = 0) -> list[float]:
         """Chebyshev weights of the smoothing sweeps."""
-        count = self.plan.sweeps[0 if level.depth == 0 else 1]
+        count = count or self.plan.sweeps[0 if level.depth == 0 else 1]
         least, largest = SMOOTHED
+        if not self.plan.steps:
+            # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient, D is
+            # 1 + 6 k, and the coarser grid takes over about where |q|^2 is 1.
+            k = self._largest / 4.0**level.depth
+            taken_over = 0.0 if level is self._last else 1.0
+            least, largest = (1.0 + taken_over * k) / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k)
         middle, half = 0.5 * (largest + least), 0.5 * (largest - least)
         return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
+
+    def _start(self, level: Level, right: Pair, target: Pair, weight: float, add: bool = False) -> None:
+        start = self.device.pass_("viscosity/start.frag", **level.defines)
+        start(target.fields, add=add, region=level.region, weight=weight, **right.inputs("right_"), **level.matrix)
 
     def _smooth(self, level: Level, right: Pair, weights: list[float], start: Pair | None = None) -> None:
         """One sweep for each weight, on from the level's iterate or from `start`."""
@@ -370,18 +446,18 @@ class Viscosity:
         self._residual_of(finest, finest.faces.read, finest.right, self._residual.read)
         return self._residual.read.fields
 
-    def _restrict(self, residual: Pair, coarser: Level) -> None:
-        restrict = self.device.pass_("viscosity/restrict.frag", **self._slip)
-        restrict(coarser.right.fields, region=coarser.region, open=coarser.packed["open"], **residual.inputs())
+    def _restrict(self, residual: Pair, coarser: Level, target: Pair) -> None:
+        restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
+        restrict(target.fields, region=coarser.region, **residual.inputs(), **coarser.open)
 
     def _prolong(self, coarser: Level, finer: Level) -> None:
-        prolong = self.device.pass_("viscosity/prolong.frag", **self._slip)
+        prolong = self.device.pass_("viscosity/prolong.frag", **finer.defines)
         prolong(
             finer.faces.write.fields,
             region=finer.region,
             **coarser.faces.read.inputs("coarse_"),
             **finer.faces.read.inputs(),
-            **finer.inverse,
+            **finer.matrix,
         )
         finer.faces.swap()
 
@@ -429,27 +505,62 @@ class Viscosity:
         """Free the textures."""
         for item in (*self.levels, self._inverse, self._solution, self._residual, self._direction, self._stress):
             item.release()
-        for item in (self._factors, self._products, self._az, self._sum, self._stiff_parts):
+        for item in (
+            self._factors,
+            self._products,
+            self._az,
+            self._sum,
+            self._weighed,
+            self._weights_sum,
+            self._stiff_parts,
+        ):
             item.release()
 
 
-def inverse_matrix(level: Level) -> np.ndarray:
-    """The inverse of a level's matrix for `shaders/viscosity/exact.frag`, (unknowns, unknowns / 4, 4) float32."""
+Entries = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def packed_entries(level: Level) -> Entries:
+    """A level's K in cells (of u_x and of v_y) and at nodes, and which faces of u and of v are open."""
     width, height = level.texels
     packed = {name: field.get()[1:-1, 1:-1] for name, field in level.packed.items()}
-
-    def unpacked(texels: np.ndarray) -> np.ndarray:
-        return texels.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)
-
-    cells_x, cells_y = (unpacked(packed[name]).astype(np.float64) for name in ("cells_x", "cells_y"))
+    cells_x, cells_y, inverse_u, inverse_v = (
+        unpacked(packed[name]) for name in ("cells_x", "cells_y", "inverse_u", "inverse_v")
+    )
     nodes = np.zeros((2 * height + 1, 2 * width + 1))
     nodes[:-1, :-1] = unpacked(packed["nodes"])
     nodes[:-1, -1] = packed["node_halo"][:, -1, :2].ravel()
     nodes[-1, :-1] = packed["node_halo"][-1, :, 2:].ravel()
+    return cells_x, cells_y, nodes, inverse_u > 0, inverse_v > 0
+
+
+def box_entries(level: Level) -> Entries:
+    """The same for a level of one stiffness."""
+    (width, height), (across, down) = level.texels, level.box
+    x, y = np.arange(2 * width + 1), np.arange(2 * height + 1)[:, None]
+    wall = 2.0 if "NO_SLIP" in level.defines else 0.0
+    at_walls = np.where((x == 0) | (x == across), wall, 1.0) * np.where((y == 0) | (y == down), wall, 1.0)
+    cells = np.full((2 * height, 2 * width), 2.0 * level.matrix["stiffness"])
+    inside = (x < across) & (y < down)
+    open_u, open_v = (inside & (x > 0))[:-1, :-1], (inside & (y > 0))[:-1, :-1]
+    return cells, cells, level.matrix["stiffness"] * at_walls, open_u, open_v
+
+
+def unpacked(texels: np.ndarray) -> np.ndarray:
+    """Cells in their places, from the texels of 2 x 2 of them."""
+    height, width = texels.shape[:2]
+    return texels.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)
+
+
+def inverse_matrix(
+    cells_x: np.ndarray, cells_y: np.ndarray, nodes: np.ndarray, open_u: np.ndarray, open_v: np.ndarray
+) -> np.ndarray:
+    """The inverse of the matrix of these entries for `shaders/viscosity/exact.frag`, (unknowns, unknowns / 4, 4)."""
+    height, width = cells_x.shape[0] // 2, cells_x.shape[1] // 2
     # Numbers of the unknowns in the order of the texels, -1 where a face is pinned, with a frame of pinned faces.
     texel = np.arange(width * height).reshape(height, width, 1) * 4 + np.arange(4)
-    u = np.pad(np.where(unpacked(packed["inverse_u"]) > 0, unpacked(texel), -1), 1, constant_values=-1)
-    v = np.pad(np.where(unpacked(packed["inverse_v"]) > 0, unpacked(texel) + texel.size, -1), 1, constant_values=-1)
+    u = np.pad(np.where(open_u, unpacked(texel), -1), 1, constant_values=-1)
+    v = np.pad(np.where(open_v, unpacked(texel) + texel.size, -1), 1, constant_values=-1)
     count = 2 * texel.size
     matrix = np.eye(count).ravel()
     strains = (

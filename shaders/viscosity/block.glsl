@@ -3,6 +3,11 @@
 // what lies beyond a wall is at rest.
 // Matrix: A v = v - B^T K B v with the strains B: u_x and v_y in cells (K = 2 dt mu / h^2), u_y + v_x at nodes
 // (K = dt mu_node / h^2). Pinned faces (walls, solid cells) hold exactly zero and are no unknowns.
+// UNIFORM: of one viscosity in a box without solids; nothing is read, all follows from the place.
+#ifdef UNIFORM
+#include "viscosity/box.glsl"
+uniform float u_stiffness;      // dt mu / h^2
+#else
 uniform sampler2D u_cells_x;    // K of u_x in the cells
 uniform sampler2D u_cells_y;    // K of v_y in the cells (the same as cells_x on the finest grid)
 uniform sampler2D u_nodes;      // K of the cells' upper left nodes
@@ -10,12 +15,42 @@ uniform sampler2D u_cell_halo;  // xy: cells_x left of the texel, zw: cells_y ab
 uniform sampler2D u_node_halo;  // xy: nodes right of the texel, zw: nodes below it
 uniform sampler2D u_inverse_u;  // 1 / diagonal of A for u and for v; 0 for pinned faces
 uniform sampler2D u_inverse_v;
+#endif
 
 struct Faces { vec4 u, v; };
 struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below; };
 
-Faces inverse_diagonal(vec2 at) { return Faces(texture(u_inverse_u, at), texture(u_inverse_v, at)); }
 vec4 open(vec4 inverse) { return vec4(greaterThan(inverse, vec4(0.0))); }
+
+#ifdef UNIFORM
+// K of the nodes in a column (or row) over that of the inner ones; see pack.frag.
+vec4 at_walls(vec4 place, float far) {
+#ifdef NO_SLIP
+    const float wall = 2.0;
+#else
+    const float wall = 0.0;
+#endif
+    return mix(vec4(1.0), vec4(wall), vec4(equal(place, vec4(0.0))) + vec4(equal(place, vec4(far))));
+}
+
+Faces inverse_diagonal(vec2 at) {
+    vec4 i = columns(own_texel()), j = rows(own_texel());
+    vec4 x = at_walls(i, u_box.x) + at_walls(i + 1.0, u_box.x), y = at_walls(j, u_box.y) + at_walls(j + 1.0, u_box.y);
+    return Faces(open_u(own_texel()) / (1.0 + u_stiffness * (4.0 + y)), open_v(own_texel()) / (1.0 + u_stiffness * (4.0 + x)));
+}
+
+Stiffness read_stiffness(vec2 at) {
+    vec4 i = columns(own_texel()), j = rows(own_texel());
+    vec4 x = at_walls(i, u_box.x), y = at_walls(j, u_box.y);
+    Stiffness k;
+    k.left = k.here_x = k.above = k.here_y = vec4(2.0 * u_stiffness);
+    k.node = u_stiffness * x * y;
+    k.node_right = u_stiffness * at_walls(i + 1.0, u_box.x) * y;
+    k.node_below = u_stiffness * x * at_walls(j + 1.0, u_box.y);
+    return k;
+}
+#else
+Faces inverse_diagonal(vec2 at) { return Faces(texture(u_inverse_u, at), texture(u_inverse_v, at)); }
 
 Stiffness read_stiffness(vec2 at) {
     vec4 x = texture(u_cells_x, at), n = texture(u_nodes, at);
@@ -35,6 +70,7 @@ Stiffness read_stiffness(vec2 at) {
     k.node_below = vec4(n.zw, nodes.zw);
     return k;
 }
+#endif
 
 // A f for the texel at `at` of the faces in textures fu, fv; `here` becomes their own values. 12 reads.
 Faces apply_matrix(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {

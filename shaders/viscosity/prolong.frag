@@ -2,19 +2,27 @@
 // solution, and for what the coarse grid cannot carry of the right-hand side, each face by itself:
 // f = P e + D^-1 (b - P b_coarse).
 // u_coarse_u, u_coarse_v: coarse faces e; u_u, u_v: the iterate, or b; u_coarse_right_u, u_coarse_right_v: b_coarse;
-// u_inverse_u, u_inverse_v: 1 / D, which is 0 for pinned faces.
+// With CORRECT, u_u, u_v are v*, of which only the part u_part is taken (at most 1), and a damped Jacobi sweep is made on
+// it: u_r_u, u_r_v: the residual of all of v*; u_right_u, u_right_v: the right-hand side b; u_weight: of the sweep.
 // Linear along the face's normal; 3/4 and 1/4 of the two nearest across it. A coarse face that is exactly zero is
 // pinned (or at rest, which makes no difference): at free-slip walls the other one then counts whole.
 // reads: 12
+#include "viscosity/block.glsl"
 uniform sampler2D u_coarse_u;
 uniform sampler2D u_coarse_v;
 uniform sampler2D u_u;
 uniform sampler2D u_v;
-uniform sampler2D u_inverse_u;
-uniform sampler2D u_inverse_v;
 #ifdef START
 uniform sampler2D u_coarse_right_u;
 uniform sampler2D u_coarse_right_v;
+#endif
+#ifdef CORRECT
+uniform float u_weight;
+uniform sampler2D u_r_u;
+uniform sampler2D u_r_v;
+uniform sampler2D u_part;
+uniform sampler2D u_right_u;
+uniform sampler2D u_right_v;
 #endif
 in vec2 v_uv;
 layout(location = 0) out vec4 out_u;
@@ -50,13 +58,22 @@ void main() {
     bvec2 odd = equal(place & 1, ivec2(1));
     vec2 texel = 1.0 / vec2(textureSize(u_coarse_u, 0)), p = (vec2(place >> 1) + 1.5) * texel;
     vec2 x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
-    vec4 inverse_u = texture(u_inverse_u, v_uv), inverse_v = texture(u_inverse_v, v_uv);
-    vec4 open_u = vec4(greaterThan(inverse_u, vec4(0.0))), open_v = vec4(greaterThan(inverse_v, vec4(0.0)));
+    Faces inverse = inverse_diagonal(v_uv);
     vec4 u = texture(u_u, v_uv), v = texture(u_v, v_uv);
 #ifdef START
-    u = inverse_u * (u - spread(u_coarse_right_u, p, x, y, false, odd.x, odd.y));
-    v = inverse_v * (v - spread(u_coarse_right_v, p, y, x, true, odd.y, odd.x).xzyw);
+    u = inverse.u * (u - spread(u_coarse_right_u, p, x, y, false, odd.x, odd.y));
+    v = inverse.v * (v - spread(u_coarse_right_v, p, y, x, true, odd.y, odd.x).xzyw);
 #endif
-    out_u = u + open_u * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
-    out_v = v + open_v * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
+#ifdef CORRECT
+    vec4 r_u = texture(u_r_u, v_uv), r_v = texture(u_r_v, v_uv);
+    float part = min(texelFetch(u_part, ivec2(0), 0).x, 1.0);
+    u *= part;
+    v *= part;
+    r_u = mix(texture(u_right_u, v_uv), r_u, part);
+    r_v = mix(texture(u_right_v, v_uv), r_v, part);
+    u += u_weight * inverse.u * r_u;
+    v += u_weight * inverse.v * r_v;
+#endif
+    out_u = u + open(inverse.u) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
+    out_v = v + open(inverse.v) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
 }

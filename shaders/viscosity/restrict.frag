@@ -1,12 +1,20 @@
 // Restrict: the residual on the next coarser grid, a quarter of the transpose of prolong.frag.
-// u_u, u_v: the fine residual, zero on pinned faces; u_open: which coarse faces are open (1 for u, plus 2 for v).
+// u_u, u_v: the fine residual, zero on pinned faces; u_open: which coarse faces are open (1 for u, plus 2 for v);
+// with UNIFORM those of a box, see box.glsl.
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a pinned neighbour.
 // reads: 29
 uniform sampler2D u_u;
 uniform sampler2D u_v;
+#ifdef UNIFORM
+#include "viscosity/box.glsl"
+#else
 uniform sampler2D u_open;
-in vec2 v_uv;
+vec2 own_texel() { return floor(gl_FragCoord.xy) - 1.0; }
+vec4 openness(vec2 texel) { return texture(u_open, (texel + 1.5) / vec2(textureSize(u_open, 0))); }
+vec4 open_u(vec2 texel) { return mod(openness(texel), 2.0); }
+vec4 open_v(vec2 texel) { return step(1.5, openness(texel)); }
+#endif
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
 
@@ -34,12 +42,10 @@ vec4 gather(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, v
 }
 
 void main() {
-    vec2 fine_texel = 1.0 / vec2(textureSize(u_u, 0)), texel = 1.0 / vec2(textureSize(u_open, 0));
+    vec2 fine_texel = 1.0 / vec2(textureSize(u_u, 0)), here = own_texel();
+    const vec2 x = vec2(1.0, 0.0), y = vec2(0.0, 1.0);
     // The first of this texel's fine texels, past the ring.
-    vec2 p = (2.0 * (floor(gl_FragCoord.xy) - 1.0) + 1.5) * fine_texel;
-    vec2 fx = vec2(fine_texel.x, 0.0), fy = vec2(0.0, fine_texel.y), x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
-    vec4 here = texture(u_open, v_uv), up = texture(u_open, v_uv - y), down = texture(u_open, v_uv + y);
-    vec4 left = texture(u_open, v_uv - x), right = texture(u_open, v_uv + x);
-    out_u = gather(u_u, p, fx, fy, false, mod(up, 2.0), mod(here, 2.0), mod(down, 2.0));
-    out_v = gather(u_v, p, fy, fx, true, step(1.5, left.xzyw), step(1.5, here.xzyw), step(1.5, right.xzyw)).xzyw;
+    vec2 p = (2.0 * here + 1.5) * fine_texel, fx = x * fine_texel, fy = y * fine_texel;
+    out_u = gather(u_u, p, fx, fy, false, open_u(here - y), open_u(here), open_u(here + y));
+    out_v = gather(u_v, p, fy, fx, true, open_v(here - x).xzyw, open_v(here).xzyw, open_v(here + x).xzyw).xzyw;
 }
