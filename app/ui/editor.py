@@ -251,7 +251,8 @@ class Editor:
         target.clear(*self.ui.palette.ground)
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
-        self.host.begin((size[0] / self.ui.density, size[1] / self.ui.density), self.ui.density, dt, events)
+        points, by_keys = (size[0] / self.ui.density, size[1] / self.ui.density), bool(self.dialogs) or self._popup_open
+        self.host.begin(points, self.ui.density, dt, events, by_keys)
         try:
             with self.clock.measure("panels"):
                 panels.draw(self.ui, self)

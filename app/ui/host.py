@@ -39,14 +39,18 @@ class Host:
         io.config_error_recovery_enable_tooltip = False
         # Events are taken as they come: spread over frames by imgui, a fast drag would lag behind the pointer.
         io.config_input_trickle_event_queue = True
-        io.config_flags |= imgui.ConfigFlags_.nav_enable_keyboard.value
         io.config_nav_cursor_visible_auto = True
         self.fonts = theme.load_fonts()
         imgui.backends.opengl3_init("#version 330")
 
-    def begin(self, size: tuple[float, float], density: float, dt: float, events: Iterable[Event]) -> None:
-        """Start a frame of `size` points with `density` pixels each."""
+    def begin(
+        self, size: tuple[float, float], density: float, dt: float, events: Iterable[Event], by_keys: bool = False
+    ) -> None:
+        """Start a frame of `size` points with `density` pixels each; `by_keys`: Tab and arrows go through widgets."""
         io = imgui.get_io()
+        # Only in dialogs and menus: elsewhere Space, Tab and the arrows are the editor's.
+        through = imgui.ConfigFlags_.nav_enable_keyboard.value
+        io.config_flags = io.config_flags | through if by_keys else io.config_flags & ~through
         io.display_size = imgui.ImVec2(*size)
         io.display_framebuffer_scale = imgui.ImVec2(density, density)
         io.delta_time = max(dt, 1e-4)

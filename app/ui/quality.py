@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from app.replay import Replay
 from app.strokes import Stroke
+from app.ui.files import fresh_recipe
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
@@ -37,7 +38,8 @@ class Quality:
         """Something new is open; an untouched picture is given the grid that this machine does well on."""
         self._slow_for, self._pending = 0.0, False
         session = self.editor.session
-        if self._measured is None or not self.editor.state.auto_quality or session.end:
+        fresh = session.recipe.edited(picture=None) == fresh_recipe()
+        if self._measured is None or not self.editor.state.auto_quality or not fresh:
             return
         grid = self.best_grid(self._measured)
         grid = min(grid, self._limit)

@@ -183,7 +183,9 @@ class Window:
             self._add(Button(button, action == glfw.PRESS, self._held))
 
     def _key(self, handle: Any, key: int, code: int, action: int, mods: int) -> None:
-        name = _NAMED.get(key) or glfw.get_key_name(key, code)
+        # Digits are where they are, whatever the layout prints on them; all other keys are what they print.
+        digit = chr(key) if glfw.KEY_0 <= key <= glfw.KEY_9 else None
+        name = _NAMED.get(key) or digit or glfw.get_key_name(key, code)
         # A modifier's own event does not yet, or does still, have it among the modifiers.
         self._held = _with_own(_mods(mods), key, action)
         if name:
