@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import json
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import chain, count, groupby, islice, pairwise, repeat
@@ -122,6 +123,7 @@ class Job:
         Raises:
             UserError: naming the file and the mend.
         """
+        check_picture(self.picture, self.recipe.fluid.grid)
         if self.output is not None and self.is_animation:
             check_animation(self.output, self.rate)
         elif self.output is not None:
@@ -167,16 +169,29 @@ def run(device: Device, job: Job, progress: Progress) -> Report:
         Cancelled: if `progress` says so.
     """
     job.check()
-    export = _Export(device, job, progress)
+    with _garbage_kept():
+        export = _Export(device, job, progress)
+        try:
+            return export.run()
+        finally:
+            export.release()
+
+
+@contextmanager
+def _garbage_kept() -> Iterator[None]:
+    """Collect no garbage but where we say, in this thread: in the writer's there is no GL to release textures with."""
+    was_enabled = gc.isenabled()
+    gc.disable()
     try:
-        return export.run()
+        yield
     finally:
-        export.release()
+        gc.collect()
+        if was_enabled:
+            gc.enable()
 
 
 class _Export:
     def __init__(self, device: Device, job: Job, progress: Progress) -> None:
-        check_picture(job.picture, job.recipe.fluid.grid)
         self.job = job
         self.recipe = job.recipe
         self.progress = progress
@@ -319,6 +334,7 @@ class _Export:
                 take_map(self._map(self.job.maps))
             frame = self._frame(pixels) if self.job.output is not None else nothing
             self._note(number, position)
+            gc.collect(1)
             yield frame
 
     def _go_to(self, position: Fraction) -> None:

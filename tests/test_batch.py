@@ -16,6 +16,7 @@ from app.batch import Edits, Outcome, Task, perform, run_batch, spread
 from app.errors import Cancelled, UserError
 from app.pictures import Picture, read_picture, write_picture
 from app.progress import Progress
+from solver.context import Device
 
 ROOT = Path(__file__).parent.parent
 RECIPE = """
@@ -37,6 +38,12 @@ def folder(tmp_path: Path) -> Path:
     for number in range(6):
         draw(tmp_path / f"p{number}.png", number)
     return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def _shared(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One GL context for the whole test process: a second one would take the other tests' place."""
+    monkeypatch.setattr(batch._here, "device", device, raising=False)
 
 
 def draw(path: Path, number: int, width: int = 64) -> None:
