@@ -18,7 +18,7 @@ from solver.context import Device
 
 GOLDEN = Path(__file__).parent / "golden"
 SIZE = (960, 600)
-SQUARE = 12
+SQUARE = 24
 
 
 @pytest.fixture
