@@ -145,7 +145,7 @@ class Fluid:
         with self.device.stage("project"):
             self._take_up_solids()
             source = self.source if self._has_source else None
-            self._pressure_solver.project(self.velocity, self.params.pressure_cycles, source)
+            self._pressure_solver.project(self.velocity, self._pressure_cycles(), source)
             self.device.pass_("stages/carry_pressure.frag")(
                 self._carried.write,
                 before_projection=self.velocity.write,
@@ -275,6 +275,14 @@ class Fluid:
             item.release()
         self._viscosity_solver.release()
         self._pressure_solver.release()
+
+    def _pressure_cycles(self) -> int:
+        """As many as are asked for, or as leave about a thousandth of the divergence."""
+        if self.params.pressure_cycles is not None:
+            return self.params.pressure_cycles
+        # Where viscosity varies, its edges leave a rough divergence, of which two cycles would leave a hundredth.
+        varies = self._viscosity_solver.plan.steps > 0
+        return max(self._pressure_solver.cycles, 3 if varies else 0)
 
     def _take_up_solids(self) -> None:
         """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""
