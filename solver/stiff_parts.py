@@ -65,7 +65,6 @@ class StiffParts:
         self._parts = device.field((MOST_PARTS + 1, 1), 4, "stiff parts")
         self._response = device.field((MOST_PARTS + 1, 3), 4, "stiff parts' response")
         self._motions = device.field((MOST_PARTS + 1, 1), 4, "stiff parts' motions")
-        self._rest = device.field((1, 1), 4, "rest"), device.field((1, 1), 4, "rest")
         self._part_of = tuple(device.field(ringed, 4, f"stiff part of {name}") for name in "uv")
 
     def find(
@@ -76,7 +75,7 @@ class StiffParts:
     ) -> None:
         """Take up the stiff cells and the solid ones, (ny, nx) each.
 
-        `apply_matrix(draw)` lets `draw` fill packed faces, zero before, and returns minus A times them.
+        `apply_matrix(draw)` lets `draw` fill packed faces and returns minus A times them.
         """
         part = connected_parts(stiff & ~solid)
         self.count = int(part.max())
@@ -103,7 +102,7 @@ class StiffParts:
             if mode == 2:
                 motions[1:, 0], motions[1:, 1] = parts[1:, 3], -parts[1:, 2]
             self._motions.set(motions[None])
-            self._gather(apply_matrix(self._move_onto))
+            self._gather(apply_matrix(self._move))
             loads = self._loads.get().reshape(-1, 4)[: len(of_entry)]
             for row in range(3):
                 matrix[:, row, mode] = -np.bincount(of_entry, loads[:, row], self.count + 1)[1:]
@@ -111,19 +110,17 @@ class StiffParts:
         response[:, 1 : self.count + 1, :3] = np.moveaxis(_inverses(matrix), 1, 0)
         self._response.set(response)
 
-    def fit(
-        self, residual: tuple[Field, Field], target: tuple[Field, Field], faces: tuple[Field, Field] | None = None
-    ) -> None:
-        """Write to `target` the motions that the residual asks for, added to `faces`."""
+    def fit(self, residual: tuple[Field, Field], target: tuple[Field, Field]) -> None:
+        """Write to `target` the motions that the residual asks for."""
         self._gather(residual)
         motions = self.device.pass_("viscosity/part_motions.frag")
         motions(self._motions, loads=self._loads, parts=self._parts, response=self._response)
-        self._move(faces or self._rest, target)
+        self._move(target)
 
     @property
     def _fields(self) -> tuple[Field, ...]:
         maps = self._entries, self._loads, self._parts, self._response, self._motions
-        return *maps, *self._rest, *self._part_of
+        return *maps, *self._part_of
 
     @property
     def nbytes(self) -> int:
@@ -148,19 +145,14 @@ class StiffParts:
             part_v=self._part_of[1],
         )
 
-    def _move(self, faces: tuple[Field, Field], target: tuple[Field, Field]) -> None:
+    def _move(self, target: tuple[Field, Field]) -> None:
         self.device.pass_("viscosity/move_parts.frag")(
             target,
             region=self._region,
             motions=self._motions,
-            u=faces[0],
-            v=faces[1],
             part_u=self._part_of[0],
             part_v=self._part_of[1],
         )
-
-    def _move_onto(self, target: tuple[Field, Field]) -> None:
-        self._move(self._rest, target)
 
     def _packed(self, faces: np.ndarray) -> np.ndarray:
         width, height = self.texels

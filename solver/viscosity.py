@@ -58,8 +58,10 @@ def plan_for(least: float, largest: float) -> Plan:
         if largest <= 5.0:
             return Plan(grids=grids, nested=0, steps=0, sweeps=(2, 4))
         return Plan(grids=grids, nested=2, steps=0, sweeps=(2, 2))
+    if largest <= 300.0 * least:
+        return Plan(steps=2, nested=2, sweeps=(2, 2))
     # Rigid pieces pay only where they are far stiffer than what is around them.
-    return Plan(stiff=max(100.0, math.sqrt(least * largest)) if largest > 300.0 * least else 0.0)
+    return Plan(steps=2, nested=2, sweeps=(1, 2), stiff=max(100.0, math.sqrt(least * largest)))
 
 
 class Pair:
@@ -258,20 +260,16 @@ class Viscosity:
             yield self._rigid_motions
         # With one grid the solution is exact by now.
         for _ in range(self.plan.steps if len(self.levels) > 1 else 0):
-            yield self._cycle_and_motions
+            yield self._cycle_from_rest
 
     def _rigid_motions(self) -> Pair:
         faces = self.levels[0].faces.write
         self._stiff_parts.fit(self._residual.read.fields, faces.fields)
         return faces
 
-    def _cycle_and_motions(self) -> Pair:
+    def _cycle_from_rest(self) -> Pair:
         finest = self.levels[0]
         self._cycle(finest, self._residual.read)
-        if self._stiff_parts.count:
-            faces = finest.faces
-            self._stiff_parts.fit(self._residual.read.fields, faces.write.fields, faces.read.fields)
-            faces.swap()
         return finest.faces.read
 
     def _step_along(self, z: Pair, first: bool, last: bool) -> None:
@@ -440,7 +438,7 @@ class Viscosity:
     def _apply_matrix(self, draw: Callable[[tuple[Field, Field]], None]) -> tuple[Field, Field]:
         """Minus the finest grid's matrix times the faces that `draw` fills, for `StiffParts.find`."""
         finest = self.levels[0]
-        for field in (*finest.right.fields, *finest.faces.read.fields):
+        for field in finest.right.fields:
             field.clear()
         draw(finest.faces.read.fields)
         self._residual_of(finest, finest.faces.read, finest.right, self._residual.read)
@@ -562,7 +560,7 @@ def inverse_matrix(
     u = np.pad(np.where(open_u, unpacked(texel), -1), 1, constant_values=-1)
     v = np.pad(np.where(open_v, unpacked(texel) + texel.size, -1), 1, constant_values=-1)
     count = 2 * texel.size
-    matrix = np.eye(count).ravel()
+    matrix = np.eye(count)
     strains = (
         (cells_x, ((u[1:-1, 2:], 1), (u[1:-1, 1:-1], -1))),
         (cells_y, ((v[2:, 1:-1], 1), (v[1:-1, 1:-1], -1))),
@@ -572,7 +570,34 @@ def inverse_matrix(
         for row, row_sign in ends:
             for column, column_sign in ends:
                 moves = (row >= 0) & (column >= 0)
-                places = row[moves] * count + column[moves]
-                matrix += np.bincount(places, row_sign * column_sign * stiffness[moves], count * count)
-    inverse = np.linalg.inv(matrix.reshape(count, count))
-    return inverse.reshape(count, count // 4, 4).astype(np.float32)
+                # No two strains of a kind share both faces.
+                matrix[row[moves], column[moves]] += row_sign * column_sign * stiffness[moves]
+    # Texels in lines along the shorter side, u and v together: each line meets its neighbours only.
+    order = np.arange(count).reshape(2, height, width, 4)
+    order = np.moveaxis(order, 0, 2) if height >= width else order.transpose(2, 1, 0, 3)
+    order = order.ravel()
+    inverse = np.empty((count, count), np.float32)
+    inverse[np.ix_(order, order)] = inverse_of_blocks(matrix[np.ix_(order, order)], max(height, width))
+    return inverse.reshape(count, count // 4, 4)
+
+
+def inverse_of_blocks(matrix: np.ndarray, count: int) -> np.ndarray:
+    """The inverse of a symmetric positive matrix of so many blocks a side, each of which meets its neighbours only.
+
+    A product of small blocks is left to one thread by the libraries: two wait for each other longer than they work.
+    """
+    size = len(matrix) // count
+    blocks = matrix.reshape(count, size, count, size).swapaxes(1, 2)
+    # Block elimination from the first to the last, then back.
+    pivots = [np.linalg.inv(blocks[0, 0])]
+    for i in range(1, count):
+        beside = blocks[i - 1, i]
+        pivots.append(np.linalg.inv(blocks[i, i] - beside.T @ pivots[-1] @ beside))
+    inverse = np.empty_like(blocks)
+    inverse[-1, -1] = pivots[-1]
+    for i in range(count - 2, -1, -1):
+        taken = pivots[i] @ blocks[i, i + 1]
+        inverse[i, i + 1 :] = -taken @ inverse[i + 1, i + 1 :]
+        inverse[i + 1 :, i] = inverse[i, i + 1 :].swapaxes(1, 2)
+        inverse[i, i] = pivots[i] - inverse[i, i + 1] @ taken.T
+    return inverse.swapaxes(1, 2).reshape(matrix.shape)

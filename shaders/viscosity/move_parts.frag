@@ -1,10 +1,8 @@
-// Move: add the motion of its stiff part to every face.
+// Move: every face with its stiff part.
 // u_motions: (a, b, w) by part, the velocity (a - w y, b + w x) with x, y in cells; part 0 does not move.
-// u_u, u_v: the faces; u_part_u, u_part_v: the part each belongs to.
-// reads: 12
+// u_part_u, u_part_v: the part each belongs to.
+// reads: 10
 uniform sampler2D u_motions;
-uniform sampler2D u_u;
-uniform sampler2D u_v;
 uniform sampler2D u_part_u;
 uniform sampler2D u_part_v;
 in vec2 v_uv;
@@ -17,11 +15,9 @@ void main() {
     vec4 part_u = texture(u_part_u, v_uv), part_v = texture(u_part_v, v_uv);
     vec2 corner = 2.0 * (floor(gl_FragCoord.xy) - 1.0);
     vec4 y = corner.y + vec4(0.5, 0.5, 1.5, 1.5), x = corner.x + vec4(0.5, 1.5, 0.5, 1.5);
-    out_u = texture(u_u, v_uv);
-    out_v = texture(u_v, v_uv);
     for (int q = 0; q < 4; ++q) {
         vec3 of_u = motion(part_u[q]), of_v = motion(part_v[q]);
-        out_u[q] += of_u.x - of_u.z * y[q];
-        out_v[q] += of_v.y + of_v.z * x[q];
+        out_u[q] = of_u.x - of_u.z * y[q];
+        out_v[q] = of_v.y + of_v.z * x[q];
     }
 }
