@@ -57,7 +57,9 @@ def plan_for(least: float, largest: float) -> Plan:
         grids = max(1, math.ceil(math.log(largest / LEAST_VISITED, 4.0)))
         if largest <= 5.0:
             return Plan(grids=grids, nested=0, steps=0, sweeps=(2, 4))
-        return Plan(grids=grids, nested=2, steps=0, sweeps=(2, 2))
+        if largest <= 50.0:
+            return Plan(grids=grids, nested=1, steps=0, sweeps=(2, 2))
+        return Plan(grids=grids, nested=2, steps=0, sweeps=(1, 2))
     if largest <= 300.0 * least:
         return Plan(steps=2, nested=2, sweeps=(2, 2))
     # Rigid pieces pay only where they are far stiffer than what is around them.
