@@ -143,9 +143,10 @@ class Level:
 
 
 class Viscosity:
-    """Solves the viscous step by multigrid-preconditioned conjugate gradients, started on nested grids.
+    """Solves the viscous step on nested grids, and where it varies by multigrid-preconditioned conjugate gradients.
 
-    Everything stays on the GPU but the inverse on the coarsest grid, which is made anew when the viscosity changes.
+    Everything stays on the GPU but the inverse on the coarsest grid, which is made anew when the viscosity changes. One
+    viscosity without solids needs no coefficients in textures: they follow from the place.
     Conservative stress form; error against the exact solution and cost: see `tests/test_viscosity.py` and `plan_for`.
 
     Args:
@@ -221,8 +222,9 @@ class Viscosity:
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution.
 
-        Conjugate gradients from rest, the first direction being v* itself: where little changes the rest of the work
-        goes into the change, so that a steady state stays one, and where v* is damped away nothing is left of it.
+        By conjugate gradients from rest, the first direction being v* itself, or by one correction to a part of v*: where
+        little changes the rest of the work goes into the change, so that a steady state stays one, and where v* is
+        damped away nothing is left of it.
         """
         finest = self.levels[0]
         self._load(velocity.read, self._residual.read, self._walls)
@@ -498,8 +500,8 @@ class Viscosity:
         fields = [field for pair in pairs for side in (pair.read, pair.write) for field in side.fields]
         for level in self.levels:
             fields += [level.cells, *level.packed.values(), *level.right.fields]
-        own = sum(field.nbytes for field in (*fields, *self._az.fields, self._inverse, self._products))
-        return own + self._sum.nbytes + self._stiff_parts.nbytes
+        own = sum(field.nbytes for field in (*fields, *self._az.fields, self._inverse, self._products, self._weighed))
+        return own + self._sum.nbytes + self._weights_sum.nbytes + self._stiff_parts.nbytes
 
     def release(self) -> None:
         """Free the textures."""
