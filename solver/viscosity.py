@@ -222,9 +222,9 @@ class Viscosity:
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution.
 
-        By conjugate gradients from rest, the first direction being v* itself, or by one correction to a part of v*: where
-        little changes the rest of the work goes into the change, so that a steady state stays one, and where v* is
-        damped away nothing is left of it.
+        By conjugate gradients from rest, the first direction being v* itself, or by one correction to a part of v*:
+        where little changes the rest of the work goes into the change, so that a steady state stays one, and where v*
+        is damped away nothing is left of it.
         """
         finest = self.levels[0]
         self._load(velocity.read, self._residual.read, self._walls)
