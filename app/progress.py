@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from app.errors import Cancelled
 from app.files import abandon
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE = 0.2  # seconds that a job has to notice Ctrl+C between two of its steps
 INTERRUPTED = 130
 
@@ -78,24 +80,50 @@ def interruptible(at_once: Callable[[], None] | None = None) -> Iterator[Callabl
         yield wish.is_set
         return
 
-    def ask(number: int, frame: object) -> None:
-        if wish.is_set():
-            raise KeyboardInterrupt
-        wish.set()
-        if at_once is not None:
-            watchdog.append(threading.Timer(GRACE, at_once))
-            watchdog[-1].daemon = True
-            watchdog[-1].start()
+    asked = threading.Event()
 
-    watchdog: list[threading.Timer] = []
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    def ask(number: int, frame: object) -> None:
+        wish.set()
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+
+    with ExitStack() as stack:
+        if at_once is not None:
+            stack.enter_context(_watchdog(wish, at_once))
+        for number in SIGNALS:
+            stack.callback(signal.signal, number, signal.signal(number, ask))
         yield wish.is_set
+
+
+@contextmanager
+def _watchdog(wish: threading.Event, at_once: Callable[[], None]) -> Iterator[None]:
+    """Call `at_once` in a thread if the block goes on after a signal has come.
+
+    A handler in Python waits until the main thread is back from C; the byte in the wakeup descriptor does not wait.
+    """
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    ended = threading.Event()
+
+    def watch() -> None:
+        while told := ours.recv(1):
+            if told[0] in SIGNALS:
+                wish.set()
+                if not ended.wait(GRACE):
+                    at_once()
+
+    before = signal.set_wakeup_fd(theirs.fileno(), warn_on_full_buffer=False)
+    thread = threading.Thread(target=watch, name="watchdog", daemon=True)
+    thread.start()
+    try:
+        yield
     finally:
-        for timer in watchdog:
-            timer.cancel()
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        ended.set()
+        signal.set_wakeup_fd(before)
+        theirs.close()
+        thread.join()
+        ours.close()
 
 
 @contextmanager
