@@ -412,18 +412,35 @@ def test_clearing_and_resetting(robot: Robot) -> None:
     assert np.array_equal(robot.warp(), warped)
 
 
-def test_opening_a_picture_can_be_undone(robot: Robot, tmp_path: Path) -> None:
+def test_opening_pictures_can_be_undone(robot: Robot, tmp_path: Path) -> None:
+    """All the way back to the first, what was done to it included."""
     from app.pictures import write_picture
     from editing import pattern
 
-    write_picture(tmp_path / "other.png", pattern(100, 60))
-    robot.frame(Drop((str(tmp_path / "other.png"),)))
-    robot.frame()
-    assert robot.editor.canvas.size == (100, 60)
+    robot.drag((0.4, 0.5), (0.5, 0.5))
+    robot.rest()
+    warp = robot.warp()
+    sizes = [(240, 180), (100, 60), (90, 70), (64, 64)]
+    for number, size in enumerate(sizes[1:]):
+        write_picture(tmp_path / f"{number}.png", pattern(*size))
+        if robot.editor.is_dirty:
+            assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+        robot.frame(Drop((str(tmp_path / f"{number}.png"),)))
+        robot.frame()
+        assert robot.editor.canvas.size == size
+    for size in sizes[-2::-1]:
+        robot.key("ctrl+z")
+        assert robot.editor.canvas.size == size
+    assert np.array_equal(robot.warp(), warp)
     robot.key("ctrl+z")
-    assert robot.editor.canvas.size == (240, 180)
+    robot.rest()
+    assert np.abs(robot.warp()).max() == 0
     robot.key("ctrl+shift+z")
-    assert robot.editor.canvas.size == (100, 60)
+    robot.rest()
+    assert np.array_equal(robot.warp(), warp)
+    for size in sizes[1:]:
+        robot.key("ctrl+shift+z")
+        assert robot.editor.canvas.size == size
 
 
 # Files --------------------------------------------------------------------------------------------------------------

@@ -33,6 +33,9 @@ from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
 from solver.context import Device
 
+# Bytes of pixels of the pictures that were open before, to which Undo comes back.
+OPENED_BUDGET = 2**30
+
 
 class Editor:
     """The whole window but for the window itself.
@@ -104,10 +107,12 @@ class Editor:
             raise
         for old in self._sessions[self._index + 1 :]:
             self._close(*old)
-        # One step back is enough, and its checkpoints are dear.
-        kept = self._sessions[: self._index + 1][-1:]
-        for old in self._sessions[: max(self._index, 0)]:
-            self._close(*old)
+        kept = self._sessions[: self._index + 1]
+        # Those further back keep what makes them, and replay it when they are wanted.
+        for old, _ in kept[:-1]:
+            old.replay.checkpoints.clear()
+        while len(kept) > 1 and sum(old.project.picture.pixels.nbytes for old, _ in kept) > OPENED_BUDGET:
+            self._close(*kept.pop(0))
         self._sessions = [*kept, (session, canvas)]
         self._turn_to(len(self._sessions) - 1)
         self.quality.opened()

@@ -106,7 +106,7 @@ def numpy_jacobi(sweeps: int, rhs: np.ndarray) -> None:
 def numba_jacobi(rhs: np.ndarray) -> Callable[[int], None] | None:
     """Forty compiled sweeps, where Numba is installed."""
     try:
-        import numba
+        import numba  # pyright: ignore[reportMissingImports]
     except ImportError:
         return None
 
