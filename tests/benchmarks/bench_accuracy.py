@@ -7,6 +7,8 @@ extrema of the lid-driven cavity at Re 1000 on 256 x 256 (several minutes on a p
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
 import numpy as np
 from bench_step import brushes
@@ -14,9 +16,13 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from solver import Device, Fluid, FluidParams, Grid, PaperWarpMap, Walls, WarpMap
+
+# The references lie with the tests.
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 import reference
 from flows import VORTEX_TIME, vortex
-from solver import Device, Fluid, FluidParams, Grid, PaperWarpMap, Walls, WarpMap
 
 # Of u on the vertical centre line, and v on the horizontal: Botella and Peyret, Computers & Fluids 27 (1998).
 CAVITY_1000 = np.array([-0.3885698, 0.3769447, -0.5270771])
