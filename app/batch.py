@@ -285,8 +285,11 @@ def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress
         running: dict[Future[Outcome], tuple[Task, int]] = {}
         try:
             while waiting or running:
-                # No more than are at work, so that few are suspected when a worker dies.
-                while waiting and len(running) < jobs:
+                # No more than are at work, so that few are suspected when a worker dies; a suspect is tried alone, so
+                # that what stood beside the culprit is not blamed for it again.
+                while waiting and len(running) < (jobs if waiting[0][1] == 1 else 1):
+                    if any(attempt > 1 for _, attempt in running.values()):
+                        break
                     task, attempt = waiting.popleft()
                     running[pool.submit(_perform_here, task)] = task, attempt
                 done, _ = wait(running, LOOK, FIRST_COMPLETED)
