@@ -66,7 +66,8 @@ class Device:
         self._rest = ctx.simple_framebuffer((1, 1))
         # Reads a field between its texels, where a look is enough.
         self.linear = ctx.sampler(repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR))
-        ctx.gc_mode = "auto"
+        # Python may collect garbage on any thread, and while another context is current: see `collect`.
+        ctx.gc_mode = "context_gc"
         ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
 
     @classmethod
@@ -133,6 +134,16 @@ class Device:
         self._rest.use()
         for key in [key for key in self._targets if field.texture.glo in key]:
             self._targets.pop(key).release()
+
+    def collect(self) -> None:
+        """Free the GL objects that Python has dropped; the context must be current, as for any drawing."""
+        objects = self.ctx.objects
+        if objects:
+            self._rest.use()
+        while objects:
+            item = objects.popleft()
+            if not isinstance(item, moderngl.InvalidObject):  # released before
+                item.release()
 
     # -- its life ---------------------------------------------------------------------------------------------------
 

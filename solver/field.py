@@ -34,6 +34,7 @@ class Field:
         # A texture that is too large, or empty, is returned without an error and fails much later.
         if not (1 <= width <= limit and 1 <= height <= limit):
             raise FieldError(f"{label}: {width} x {height} is outside 1 x 1 to {limit} x {limit} of this GL")
+        device.collect()
         self.device = device
         self.size = (width, height)
         self.components = components

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -84,3 +86,30 @@ def test_paper_diffusion_sweep_is_appendix_a(device: Device, nx: int, ny: int) -
         dt_over_h2=0.7,
     )
     assert relative(out.get(), reference.paper_diffuse_sweep(velocity, before, viscosity, 0.7)) < 1e-4
+
+
+TWO_DEVICES = """
+import gc
+import numpy as np
+from solver import Device, Fluid, Grid
+
+gc.disable()
+first = Device.headless()
+for _ in range(3):
+    fluid = Fluid(first, Grid(32, 24))
+    fluid.itself = fluid
+    del fluid
+second = Device.headless()
+kept = [second.upload(np.full((5, 7), float(i), np.float32)) for i in range(300)]
+gc.collect()
+assert all((field.get() == i).all() for i, field in enumerate(kept))
+fluid = Fluid(second, Grid(32, 24))
+fluid.step(0.01, [])
+assert all((field.get() == i).all() for i, field in enumerate(kept))
+"""
+
+
+def test_garbage_is_freed_in_its_own_context_only() -> None:
+    """Names of textures are numbers: freed under another context they would take that one's textures away."""
+    result = subprocess.run([sys.executable, "-c", TWO_DEVICES], capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
