@@ -110,12 +110,12 @@ class StiffParts:
         response[:, 1 : self.count + 1, :3] = np.moveaxis(_inverses(matrix), 1, 0)
         self._response.set(response)
 
-    def fit(self, residual: tuple[Field, Field], target: tuple[Field, Field]) -> None:
-        """Write to `target` the motions that the residual asks for."""
+    def add_fit(self, residual: tuple[Field, Field], target: tuple[Field, Field]) -> None:
+        """Add to `target` the motions that the residual asks for."""
         self._gather(residual)
         motions = self.device.pass_("viscosity/part_motions.frag")
         motions(self._motions, loads=self._loads, parts=self._parts, response=self._response)
-        self._move(target)
+        self._move(target, add=True)
 
     @property
     def _fields(self) -> tuple[Field, ...]:
@@ -145,9 +145,10 @@ class StiffParts:
             part_v=self._part_of[1],
         )
 
-    def _move(self, target: tuple[Field, Field]) -> None:
+    def _move(self, target: tuple[Field, Field], add: bool = False) -> None:
         self.device.pass_("viscosity/move_parts.frag")(
             target,
+            add=add,
             region=self._region,
             motions=self._motions,
             part_u=self._part_of[0],

@@ -20,6 +20,8 @@ from solver.stiff_parts import StiffParts
 COARSEST = 64
 # dt mu / h^2 on the coarsest grid that is worth a visit.
 LEAST_VISITED = 0.3
+# Conjugate gradient steps, each of which keeps its way in memory.
+MOST_STEPS = 5
 # Eigenvalues of D^-1 A that a smoothing sweep is for: none found is above 8/3, at any contrast; the lower end is about
 # where the next grid takes over.
 SMOOTHED = (0.7, 8 / 3)
@@ -31,16 +33,18 @@ class Plan:
 
     Attributes:
         grids: coarser grids that are visited, at most; without any, and so without all that follows, v* is smoothed.
-        nested: of these, the finest so many get a multigrid cycle while the correction is carried up through them.
-        steps: conjugate gradient steps after v* and that correction, each with one multigrid cycle; with 0 there are no
-            conjugate gradients: v* is corrected once and then smoothed.
+        nested: of these, the finest so many get a multigrid cycle while one correction is carried up through them.
+        steps: conjugate gradient steps after v*, at most, each with one multigrid cycle; with 0 there are no conjugate
+            gradients: v* is corrected once and then smoothed.
+        tolerance: steps end after one that has brought less than this part of the energy norm.
         sweeps: smoothing sweeps before and after the coarser grids: (on the finest, on the others).
         stiff: dt mu / h^2 above which patches of fluid are moved as rigid pieces too; 0: none are.
     """
 
     grids: int = 99
     nested: int = 99
-    steps: int = 2
+    steps: int = 5
+    tolerance: float = 0.0
     sweeps: tuple[int, int] = (2, 2)
     stiff: float = 0.0
 
@@ -61,9 +65,9 @@ def plan_for(least: float, largest: float) -> Plan:
             return Plan(grids=grids, nested=1, steps=0, sweeps=(2, 2))
         return Plan(grids=grids, nested=2, steps=0, sweeps=(1, 2))
     if largest <= 300.0 * least:
-        return Plan(steps=2, nested=2, sweeps=(2, 2))
+        return Plan(tolerance=0.03)
     # Rigid pieces pay only where they are far stiffer than what is around them.
-    return Plan(steps=2, nested=2, sweeps=(1, 2), stiff=max(100.0, math.sqrt(least * largest)))
+    return Plan(tolerance=0.12, sweeps=(1, 1), stiff=max(100.0, math.sqrt(least * largest)))
 
 
 class Pair:
@@ -168,13 +172,12 @@ class Viscosity:
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
         finest = self.levels[0]
         ringed = finest.right.u.size
-        self._solution = DoublePair(device, ringed, "viscous solution")
+        self._ways = [Pair(device, ringed, f"viscous way {step}") for step in range(1, MOST_STEPS + 1)]
         self._residual = DoublePair(device, ringed, "viscous residual")
-        self._direction = DoublePair(device, ringed, "viscous direction")
-        self._stress = DoublePair(device, ringed, "viscous direction's stress")
+        self._stress = DoublePair(device, ringed, "viscous way's stress")
         self._stiff_parts = StiffParts(device, finest.texels)
         self._az = Pair(device, ringed, "viscous stress of z")
-        self._factors = device.double_field((1, 1), 4, "viscous step")
+        self._factors = device.double_field((MOST_STEPS + 1, 1), 4, "viscous steps")
         self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
         coarser = self.levels[min(1, len(self.levels) - 1)].right.u.size
@@ -226,20 +229,15 @@ class Viscosity:
         where little changes the rest of the work goes into the change, so that a steady state stays one, and where v*
         is damped away nothing is left of it.
         """
-        finest = self.levels[0]
-        self._load(velocity.read, self._residual.read, self._walls)
-        v_star = self._residual.read
-        if self._walls != self._resting_walls:
-            v_star = finest.faces.read
+        right = v_star = self.levels[0].right
+        if self.plan.steps:
             self._load(velocity.read, v_star, self._resting_walls)
-        if not self.plan.grids:
-            self._smooth(finest, self._residual.read, self._weights(finest), start=v_star)
-            solution = finest.faces.read
-        elif self.plan.steps or len(self.levels) == 1:
-            self._conjugate_gradients(v_star)
-            solution = self._solution.read
+            if self._walls != self._resting_walls:
+                right = self._residual.read
+                self._load(velocity.read, right, self._walls)
+            solution = self._conjugate_gradients(v_star, right)
         else:
-            solution = self._corrected(v_star, self._residual.read)
+            solution = self._smoothed(velocity.read)
         self.device.pass_("viscosity/store.frag")(velocity.write, **solution.inputs())
         velocity.swap()
 
@@ -248,69 +246,103 @@ class Viscosity:
         load = self.device.pass_("viscosity/load.frag", **finest.defines)
         load(target.fields, region=finest.region, velocity=velocity, **finest.matrix, **walls)
 
-    # -- conjugate gradients ----------------------------------------------------------------------------------------
-
-    def _conjugate_gradients(self, v_star: Pair) -> None:
-        """Solve A solution = residual, from rest; uses the residual up."""
-        directions = list(self._directions(v_star))
-        for step, direction in enumerate(directions):
-            self._step_along(direction(), first=step == 0, last=step == len(directions) - 1)
-
-    def _directions(self, v_star: Pair) -> Iterator[Callable[[], Pair]]:
-        """Where to go next, each asked for when the residual of the step before is there."""
-        yield lambda: v_star
-        yield lambda: self._nested_grids(0, self._residual.read)
-        if self._stiff_parts.count:
-            yield self._rigid_motions
-        # With one grid the solution is exact by now.
-        for _ in range(self.plan.steps if len(self.levels) > 1 else 0):
-            yield self._cycle_from_rest
-
-    def _rigid_motions(self) -> Pair:
-        faces = self.levels[0].faces.write
-        self._stiff_parts.fit(self._residual.read.fields, faces.fields)
-        return faces
-
-    def _cycle_from_rest(self) -> Pair:
+    def _smoothed(self, velocity: Field) -> Pair:
+        """v* after sweeps alone, or after one correction on the coarser grids."""
         finest = self.levels[0]
-        self._cycle(finest, self._residual.read)
+        right = v_star = self._residual.read
+        self._load(velocity, right, self._walls)
+        if self._walls != self._resting_walls:
+            v_star = finest.faces.read
+            self._load(velocity, v_star, self._resting_walls)
+        if self.plan.grids:
+            return self._corrected(v_star, right)
+        self._smooth(finest, right, self._weights(finest), start=v_star)
         return finest.faces.read
 
-    def _step_along(self, z: Pair, first: bool, last: bool) -> None:
-        """Go along z, made conjugate to the direction before, as far as the energy falls."""
+    # -- conjugate gradients ----------------------------------------------------------------------------------------
+
+    def _conjugate_gradients(self, v_star: Pair, right: Pair) -> Pair:
+        """Solve A x = right along v*, then along multigrid cycles of what is left, until a cycle brings little more.
+
+        The ways z are kept as they are, and only their factors are made conjugate; they are added up once, at the end.
+        """
+        finest, ways = self.levels[0], [v_star]
+        for step in range(self.plan.steps + 1):
+            self._measure(ways[-1], right, step)
+            if step == self.plan.steps or self._is_enough(step):
+                break
+            self._advance(right, step)
+            right = self._residual.read
+            self._finest_cycle(right)
+            finest.faces.read, self._ways[step] = self._ways[step], finest.faces.read
+            ways.append(self._ways[step])
+        combine = self.device.pass_("viscosity/combine.frag", WAYS=len(ways))
+        inputs = {name: field for step, way in enumerate(ways) for name, field in way.inputs(f"z{step}_").items()}
+        combine(finest.faces.write.fields, region=finest.region, factors=self._factors.read, **inputs)
+        return finest.faces.write
+
+    def _measure(self, z: Pair, right: Pair, step: int) -> None:
+        """A z, and from the residual `right` how far to go along z once it is made conjugate to the way before."""
         finest = self.levels[0]
-        solution, residual, direction, stress = self._solution, self._residual, self._direction, self._stress
-        defines: dict[str, Any] = {"FIRST": 1} if first else {}
+        defines: dict[str, Any] = {} if step else {"FIRST": 1}
         measure = self.device.pass_("viscosity/measure.frag", **finest.defines, **defines)
         measure(
             (*self._az.fields, self._products),
             region=finest.region,
             **z.inputs(),
-            **residual.read.inputs("right_"),
-            **stress.read.inputs("stress_"),
+            **right.inputs("right_"),
+            **self._stress.read.inputs("stress_"),
             **finest.matrix,
         )
-        factors = self.device.pass_("viscosity/gradients.frag", **defines)
-        factors(self._factors.write, products=self._sum.shrink(self._products), before=self._factors.read)
+        factors = self.device.pass_("viscosity/gradients.frag")
+        products = self._sum.shrink(self._products)
+        factors(self._factors.write, products=products, before=self._factors.read, step=step)
         self._factors.swap()
-        targets = solution.write.fields
-        if last:
-            defines = {"LAST": 1, **defines}
-        else:
-            targets += residual.write.fields + direction.write.fields + stress.write.fields
-        self.device.pass_("viscosity/advance.frag", **defines)(
+
+    def _is_enough(self, step: int) -> bool:
+        """Whether the last step has found so little energy that the next ones are not worth their time."""
+        alpha, _, curvature, _ = self._factors.read.get()[0, : step + 1].T.astype(np.float64)
+        gains = alpha**2 * curvature
+        return not gains.any() or (step > 0 and gains[step] <= self.plan.tolerance**2 * gains.sum())
+
+    def _advance(self, right: Pair, step: int) -> None:
+        """The residual after the step, and on it the first sweep of a cycle from rest."""
+        finest, stress = self.levels[0], self._stress
+        targets = self._residual.write.fields + finest.faces.write.fields
+        defines: dict[str, Any] = {} if step else {"FIRST": 1}
+        if step:
+            targets += stress.write.fields
+        self.device.pass_("viscosity/advance.frag", **finest.defines, **defines)(
             targets,
             region=finest.region,
             factors=self._factors.read,
-            **solution.read.inputs(),
-            **residual.read.inputs("r_"),
-            **direction.read.inputs("p_"),
-            **stress.read.inputs("s_"),
-            **z.inputs("z_"),
-            **self._az.inputs("az_"),
+            step=step,
+            weight=self._weights(finest)[0],
+            **right.inputs("right_"),
+            **self._az.inputs(),
+            **stress.read.inputs("stress_"),
+            **finest.matrix,
         )
-        for vector in (solution, residual, direction, stress):
-            vector.swap()
+        self._residual.swap()
+        finest.faces.swap()
+        if step:
+            stress.swap()
+        else:
+            # The first way's stress is A v* itself.
+            stress.read, self._az = self._az, stress.read
+
+    def _finest_cycle(self, right: Pair) -> None:
+        """The rest of a multigrid cycle on the finest grid, from the first sweep on; stiff parts move as pieces."""
+        finest = self.levels[0]
+        if len(self.levels) == 1:
+            self._solve_exactly(right)
+            return
+        if self._stiff_parts.count:
+            self._stiff_parts.add_fit(right.fields, finest.faces.read.fields)
+        weights = self._weights(finest)
+        self._smooth(finest, right, weights[1:])
+        self._correct(finest, right)
+        self._smooth(finest, right, weights[::-1])
 
     # -- multigrid --------------------------------------------------------------------------------------------------
 
@@ -348,8 +380,9 @@ class Viscosity:
         self._restrict(right, coarser, wanted)
         inputs = {**wanted.inputs(), **coarser.right.inputs("r_")}
         self.device.pass_("viscosity/weigh.frag")(self._weighed, region=coarser.region, **inputs)
-        factors = self.device.pass_("viscosity/gradients.frag", FIRST=1)
-        factors(self._factors.write, products=self._weights_sum.shrink(self._weighed))
+        factors = self.device.pass_("viscosity/gradients.frag")
+        products = self._weights_sum.shrink(self._weighed)
+        factors(self._factors.write, products=products, before=self._factors.read, step=0)
         self._factors.swap()
         damp = self.device.pass_("viscosity/damp.frag")
         damp(damped.fields, region=coarser.region, part=self._factors.read, **inputs)
@@ -394,13 +427,17 @@ class Viscosity:
         self._smooth(level, right, weights if warm else weights[1:])
         if is_last:
             return
+        self._correct(level, right)
+        self._smooth(level, right, weights[::-1])
+
+    def _correct(self, level: Level, right: Pair) -> None:
+        """Add what a cycle on the coarser grids makes of the residual."""
         # The write side is free until the correction is added.
         self._residual_of(level, level.faces.read, right, level.faces.write)
         coarser = self.levels[level.depth + 1]
         self._restrict(level.faces.write, coarser, coarser.right)
         self._cycle(coarser, coarser.right)
         self._prolong(coarser, level)
-        self._smooth(level, right, weights[::-1])
 
     def _weights(self, level: Level, count: int = 0) -> list[float]:
         """Chebyshev weights of the smoothing sweeps."""
@@ -480,8 +517,8 @@ class Viscosity:
         """|v* - A v| / |v*|, both velocities on MAC faces: v* before and v after the step; waits for the GPU."""
         finest = self.levels[0]
         self._load(before, finest.right, self._walls)
-        self._load(after, self._solution.read, self._resting_walls)
-        self._residual_of(finest, self._solution.read, finest.right, self._residual.read)
+        self._load(after, finest.faces.read, self._resting_walls)
+        self._residual_of(finest, finest.faces.read, finest.right, self._residual.read)
         wanted, left = (
             math.sqrt(sum(float((field.get().astype(np.float64) ** 2).sum()) for field in pair.fields))
             for pair in (finest.right, self._residual.read)
@@ -495,17 +532,17 @@ class Viscosity:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        pairs = [self._solution, self._residual, self._direction, self._stress]
-        pairs += [level.faces for level in self.levels]
-        fields = [field for pair in pairs for side in (pair.read, pair.write) for field in side.fields]
+        pairs = [side for pair in (self._residual, self._stress) for side in (pair.read, pair.write)]
+        pairs += [side for level in self.levels for side in (level.faces.read, level.faces.write)]
+        fields = [field for pair in (*pairs, *self._ways, self._az) for field in pair.fields]
         for level in self.levels:
             fields += [level.cells, *level.packed.values(), *level.right.fields]
-        own = sum(field.nbytes for field in (*fields, *self._az.fields, self._inverse, self._products, self._weighed))
+        own = sum(field.nbytes for field in (*fields, self._inverse, self._products, self._weighed))
         return own + self._sum.nbytes + self._weights_sum.nbytes + self._stiff_parts.nbytes
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self.levels, self._inverse, self._solution, self._residual, self._direction, self._stress):
+        for item in (*self.levels, *self._ways, self._inverse, self._residual, self._stress):
             item.release()
         for item in (
             self._factors,
