@@ -562,7 +562,7 @@ Entries = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 def packed_entries(level: Level) -> Entries:
     """A level's K in cells (of u_x and of v_y) and at nodes, and which faces of u and of v are open."""
     width, height = level.texels
-    packed = {name: field.get()[1:-1, 1:-1] for name, field in level.packed.items()}
+    packed = {name: np.abs(field.get()[1:-1, 1:-1]) for name, field in level.packed.items()}
     cells_x, cells_y, inverse_u, inverse_v = (
         unpacked(packed[name]) for name in ("cells_x", "cells_y", "inverse_u", "inverse_v")
     )

@@ -8,9 +8,9 @@
 #include "viscosity/box.glsl"
 uniform float u_stiffness;      // dt mu / h^2
 #else
-uniform sampler2D u_cells_x;    // K of u_x in the cells
+uniform sampler2D u_cells_x;    // K of u_x in the cells, negative where the cell's left face is pinned
 uniform sampler2D u_cells_y;    // K of v_y in the cells (the same as cells_x on the finest grid)
-uniform sampler2D u_nodes;      // K of the cells' upper left nodes
+uniform sampler2D u_nodes;      // K of the cells' upper left nodes, negative where the cell's upper face is pinned
 uniform sampler2D u_cell_halo;  // xy: cells_x left of the texel, zw: cells_y above it
 uniform sampler2D u_node_halo;  // xy: nodes right of the texel, zw: nodes below it
 uniform sampler2D u_inverse_u;  // 1 / diagonal of A for u and for v; 0 for pinned faces
@@ -18,7 +18,7 @@ uniform sampler2D u_inverse_v;
 #endif
 
 struct Faces { vec4 u, v; };
-struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below; };
+struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below, open_u, open_v; };
 
 vec4 open(vec4 inverse) { return vec4(greaterThan(inverse, vec4(0.0))); }
 
@@ -43,6 +43,8 @@ Stiffness read_stiffness(vec2 at) {
     vec4 i = columns(own_texel()), j = rows(own_texel());
     vec4 x = at_walls(i, u_box.x), y = at_walls(j, u_box.y);
     Stiffness k;
+    k.open_u = open_u(own_texel());
+    k.open_v = open_v(own_texel());
     k.left = k.here_x = k.above = k.here_y = vec4(2.0 * u_stiffness);
     k.node = u_stiffness * x * y;
     k.node_right = u_stiffness * at_walls(i + 1.0, u_box.x) * y;
@@ -56,6 +58,10 @@ Stiffness read_stiffness(vec2 at) {
     vec4 x = texture(u_cells_x, at), n = texture(u_nodes, at);
     vec4 cells = texture(u_cell_halo, at), nodes = texture(u_node_halo, at);
     Stiffness k;
+    k.open_u = vec4(greaterThan(x, vec4(0.0)));
+    k.open_v = vec4(greaterThan(n, vec4(0.0)));
+    x = abs(x);
+    n = abs(n);
 #ifdef FINEST
     vec4 y = x;
 #else
@@ -71,6 +77,12 @@ Stiffness read_stiffness(vec2 at) {
     return k;
 }
 #endif
+
+// 1 / diagonal of A, 0 for pinned faces.
+Faces inverse_diagonal(Stiffness k) {
+    return Faces(k.open_u / (1.0 + k.left + k.here_x + k.node + k.node_below),
+                 k.open_v / (1.0 + k.above + k.here_y + k.node + k.node_right));
+}
 
 // A f for the texel at `at` of the faces in textures fu, fv; `here` becomes their own values. 12 reads.
 Faces apply_matrix(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {

@@ -1,7 +1,7 @@
 // Load: the right-hand side of the viscous step from the velocity on the MAC grid, packed as in block.glsl.
 // u_velocity: lengths / s. With NO_SLIP walls that move along themselves at u_wall_speed (left, right, top, bottom) drag
 // the faces next to them: K_node times their speed.
-// reads: 10
+// reads: 8
 #include "viscosity/block.glsl"
 uniform sampler2D u_velocity;
 #ifdef NO_SLIP
@@ -24,7 +24,6 @@ void main() {
     out_u += u_wall_speed.z * k.node * vec4(equal(j, ivec4(0))) + u_wall_speed.w * k.node_below * vec4(equal(j, ivec4(last.y)));
     out_v += u_wall_speed.x * k.node * vec4(equal(i, ivec4(0))) + u_wall_speed.y * k.node_right * vec4(equal(i, ivec4(last.x)));
 #endif
-    Faces inverse = inverse_diagonal(v_uv);
-    out_u *= open(inverse.u);
-    out_v *= open(inverse.v);
+    out_u *= k.open_u;
+    out_v *= k.open_v;
 }

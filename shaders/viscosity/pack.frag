@@ -39,11 +39,14 @@ void main() {
     }
     vec2 right = vec2(node(2, 0), node(2, 1)), below = vec2(node(0, 2), node(1, 2));
     vec4 cells = vec4(at(-1, 0).r, at(-1, 1).r, at(0, -1).g, at(1, -1).g);
-    out_nodes = n;
     out_node_halo = vec4(right, below);
     out_cell_halo = cells;
     vec4 open_u = mod(out_open, 2.0), open_v = step(1.5, out_open);
+    // A node that resists nothing still tells an open face by its sign.
+    const float least = 1e-30;
+    out_nodes = mix(-n - least, max(n, least), open_v);
     vec4 x = out_cells_x, y = out_cells_y;
+    out_cells_x = mix(-x, x, open_u);
     out_inverse_u = open_u / (1.0 + vec4(cells.x, x.x, cells.y, x.z) + x + n + vec4(n.zw, below));
     out_inverse_v = open_v / (1.0 + vec4(cells.zw, y.xy) + y + n + vec4(n.y, right.x, n.w, right.y));
 }
