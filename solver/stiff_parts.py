@@ -65,7 +65,7 @@ class StiffParts:
         self._parts = device.field((MOST_PARTS + 1, 1), 4, "stiff parts")
         self._response = device.field((MOST_PARTS + 1, 3), 4, "stiff parts' response")
         self._motions = device.field((MOST_PARTS + 1, 1), 4, "stiff parts' motions")
-        self._part_of = tuple(device.field(ringed, 4, f"stiff part of {name}") for name in "uv")
+        self._part_of = tuple(device.field(ringed, 4, f"stiff part of {name}", "f1") for name in "uv")
 
     def find(
         self,
@@ -87,7 +87,10 @@ class StiffParts:
         faces[0][:, 0] = faces[1][0] = 0
         packed = [self._packed(face) for face in faces]
         for field, values in zip(self._part_of, packed, strict=True):
-            field.set(np.pad(values, ((1, 1), (1, 1), (0, 0))))
+            field.set(np.pad(values, ((1, 1), (1, 1), (0, 0))).astype(np.uint8))
+        rows, columns = np.nonzero((packed[0] + packed[1]).any(axis=2))
+        first, last = (int(columns.min()), int(rows.min())), (int(columns.max()), int(rows.max()))
+        self._region = (1 + first[0], 1 + first[1], 1 + last[0] - first[0], 1 + last[1] - first[1])
         of_entry, parts = self._list_entries(packed)
         cells = np.bincount(part.ravel(), minlength=self.count + 1)[1:]
         rows, columns = np.nonzero(part)

@@ -53,7 +53,8 @@ def plan_for(least: float, largest: float) -> Plan:
     """The plan for dt mu / h^2 between `least` and `largest`; the errors are for velocities smooth on the grid's scale.
 
     Barely viscous: two sweeps, below 0.1 %. Uniform: one correction, below 1 %. Varying: conjugate gradients, 1 % where
-    the viscosity varies a hundredfold and 5 % where it varies 1e5-fold (lines of a few cells: 3 and 12 %).
+    the viscosity varies a hundredfold and 5 % where it varies 1e5-fold (lines of a few cells and blobs on thin necks,
+    which bend: 10 %).
     """
     if largest <= 0.05:
         return Plan(grids=0, steps=0, sweeps=(2, 0))
@@ -119,8 +120,9 @@ class Level:
         self.cells = device.field((2 * self.texels[0] + 1, 2 * self.texels[1] + 1), 4, f"{label} cells")
         self.packed = {
             name: device.field(ringed, 4, f"{label} {name}")
-            for name in ("cells_x", "cells_y", "nodes", "cell_halo", "node_halo", "inverse_u", "inverse_v", "open")
+            for name in ("cells_x", "cells_y", "nodes", "inverse_u", "inverse_v")
         }
+        self.packed["open"] = device.field(ringed, 4, f"{label} open", "f1")
         self.right = Pair(device, ringed, f"{label} right-hand side")
         self.faces = DoublePair(device, ringed, f"{label} faces")
         # Without solids, what walls leave of a grid whose last column or row is only half in it.
@@ -129,7 +131,7 @@ class Level:
 
     def use(self, stiffness: float | None, slip: dict[str, Any]) -> None:
         """Take the matrix from the packed fields, or from one `stiffness`, dt mu / h^2 of this grid, in a box."""
-        self.matrix: dict[str, Any] = {name: field for name, field in self.packed.items() if name != "open"}
+        self.matrix: dict[str, Any] = dict(self.packed)
         self.open: dict[str, Any] = {"open": self.packed["open"]}
         self.defines: dict[str, Any] = {"FINEST": 1, **slip} if self.depth == 0 else slip
         if stiffness is not None:
@@ -173,8 +175,9 @@ class Viscosity:
         finest = self.levels[0]
         ringed = finest.right.u.size
         self._ways = [Pair(device, ringed, f"viscous way {step}") for step in range(1, MOST_STEPS + 1)]
-        self._residual = DoublePair(device, ringed, "viscous residual")
-        self._stress = DoublePair(device, ringed, "viscous way's stress")
+        self._solution = Pair(device, ringed, "viscous solution")
+        # Three follow one another; the last holds the right-hand side that moving walls make.
+        self._residuals = [Pair(device, ringed, f"viscous residual {step}") for step in range(4)]
         self._stiff_parts = StiffParts(device, finest.texels)
         self._az = Pair(device, ringed, "viscous stress of z")
         self._factors = device.double_field((MOST_STEPS + 1, 1), 4, "viscous steps")
@@ -214,7 +217,8 @@ class Viscosity:
         for level in self.levels:
             self.device.pass_(stage)(level.cells, **inputs)
             pack = self.device.pass_("viscosity/pack.frag", **self._slip)
-            pack(list(level.packed.values()), region=level.region, cells=level.cells)
+            # One more row and column than the region, for the nodes on the far walls.
+            pack(list(level.packed.values()), region=(1, 1, *level.cells.size), cells=level.cells)
             inputs, stage = {"cells": level.cells}, "viscosity/coarsen.frag"
 
     @property
@@ -233,7 +237,7 @@ class Viscosity:
         if self.plan.steps:
             self._load(velocity.read, v_star, self._resting_walls)
             if self._walls != self._resting_walls:
-                right = self._residual.read
+                right = self._residuals[-1]
                 self._load(velocity.read, right, self._walls)
             solution = self._conjugate_gradients(v_star, right)
         else:
@@ -249,7 +253,7 @@ class Viscosity:
     def _smoothed(self, velocity: Field) -> Pair:
         """v* after sweeps alone, or after one correction on the coarser grids."""
         finest = self.levels[0]
-        right = v_star = self._residual.read
+        right = v_star = self._residuals[0]
         self._load(velocity, right, self._walls)
         if self._walls != self._resting_walls:
             v_star = finest.faces.read
@@ -262,27 +266,40 @@ class Viscosity:
     # -- conjugate gradients ----------------------------------------------------------------------------------------
 
     def _conjugate_gradients(self, v_star: Pair, right: Pair) -> Pair:
-        """Solve A x = right along v*, then along multigrid cycles of what is left, until a cycle brings little more.
+        """Solve A x = right along v*, then along multigrid cycles of what is left, until a cycle brings little more."""
+        solution = v_star
+        for done in range(0, self.plan.steps, MOST_STEPS):
+            is_enough = self._round(solution, right, min(self.plan.steps - done, MOST_STEPS))
+            solution = self._solution
+            if is_enough:
+                break
+        return solution
+
+    def _round(self, first: Pair, right: Pair, count: int) -> bool:
+        """Leave in `_solution` what the way `first` and so many more can do; true if still more would do little.
 
         The ways z are kept as they are, and only their factors are made conjugate; they are added up once, at the end.
         """
-        finest, ways = self.levels[0], [v_star]
-        for step in range(self.plan.steps + 1):
-            self._measure(ways[-1], right, step)
-            if step == self.plan.steps or self._is_enough(step):
+        finest, ways, before = self.levels[0], [first], right
+        for step in range(count + 1):
+            self._measure(ways[-1], right, before, step)
+            is_enough = self._is_enough(step)
+            if step == count or is_enough:
                 break
-            self._advance(right, step)
-            right = self._residual.read
+            left = self._residuals[step % 3]
+            self._advance(right, before, left, step)
+            before, right = right, left
             self._finest_cycle(right)
             finest.faces.read, self._ways[step] = self._ways[step], finest.faces.read
             ways.append(self._ways[step])
         combine = self.device.pass_("viscosity/combine.frag", WAYS=len(ways))
         inputs = {name: field for step, way in enumerate(ways) for name, field in way.inputs(f"z{step}_").items()}
         combine(finest.faces.write.fields, region=finest.region, factors=self._factors.read, **inputs)
-        return finest.faces.write
+        finest.faces.write, self._solution = self._solution, finest.faces.write
+        return is_enough
 
-    def _measure(self, z: Pair, right: Pair, step: int) -> None:
-        """A z, and from the residual `right` how far to go along z once it is made conjugate to the way before."""
+    def _measure(self, z: Pair, right: Pair, before: Pair, step: int) -> None:
+        """A z, and from the residuals now and before how far to go along z once it is conjugate to the last way."""
         finest = self.levels[0]
         defines: dict[str, Any] = {} if step else {"FIRST": 1}
         measure = self.device.pass_("viscosity/measure.frag", **finest.defines, **defines)
@@ -291,7 +308,7 @@ class Viscosity:
             region=finest.region,
             **z.inputs(),
             **right.inputs("right_"),
-            **self._stress.read.inputs("stress_"),
+            **before.inputs("before_"),
             **finest.matrix,
         )
         factors = self.device.pass_("viscosity/gradients.frag")
@@ -303,33 +320,24 @@ class Viscosity:
         """Whether the last step has found so little energy that the next ones are not worth their time."""
         alpha, _, curvature, _ = self._factors.read.get()[0, : step + 1].T.astype(np.float64)
         gains = alpha**2 * curvature
-        return not gains.any() or (step > 0 and gains[step] <= self.plan.tolerance**2 * gains.sum())
+        return step > 0 and bool(gains[step] <= self.plan.tolerance**2 * gains.sum())
 
-    def _advance(self, right: Pair, step: int) -> None:
-        """The residual after the step, and on it the first sweep of a cycle from rest."""
-        finest, stress = self.levels[0], self._stress
-        targets = self._residual.write.fields + finest.faces.write.fields
+    def _advance(self, right: Pair, before: Pair, left: Pair, step: int) -> None:
+        """What the step leaves of the residual, and on it the first sweep of a cycle from rest."""
+        finest = self.levels[0]
         defines: dict[str, Any] = {} if step else {"FIRST": 1}
-        if step:
-            targets += stress.write.fields
         self.device.pass_("viscosity/advance.frag", **finest.defines, **defines)(
-            targets,
+            left.fields + finest.faces.write.fields,
             region=finest.region,
             factors=self._factors.read,
             step=step,
             weight=self._weights(finest)[0],
             **right.inputs("right_"),
             **self._az.inputs(),
-            **stress.read.inputs("stress_"),
+            **before.inputs("before_"),
             **finest.matrix,
         )
-        self._residual.swap()
         finest.faces.swap()
-        if step:
-            stress.swap()
-        else:
-            # The first way's stress is A v* itself.
-            stress.read, self._az = self._az, stress.read
 
     def _finest_cycle(self, right: Pair) -> None:
         """The rest of a multigrid cycle on the finest grid, from the first sweep on; stiff parts move as pieces."""
@@ -479,11 +487,11 @@ class Viscosity:
     def _apply_matrix(self, draw: Callable[[tuple[Field, Field]], None]) -> tuple[Field, Field]:
         """Minus the finest grid's matrix times the faces that `draw` fills, for `StiffParts.find`."""
         finest = self.levels[0]
-        for field in finest.right.fields:
+        for field in (*finest.right.fields, *finest.faces.read.fields):
             field.clear()
         draw(finest.faces.read.fields)
-        self._residual_of(finest, finest.faces.read, finest.right, self._residual.read)
-        return self._residual.read.fields
+        self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0])
+        return self._residuals[0].fields
 
     def _restrict(self, residual: Pair, coarser: Level, target: Pair) -> None:
         restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
@@ -518,10 +526,10 @@ class Viscosity:
         finest = self.levels[0]
         self._load(before, finest.right, self._walls)
         self._load(after, finest.faces.read, self._resting_walls)
-        self._residual_of(finest, finest.faces.read, finest.right, self._residual.read)
+        self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0])
         wanted, left = (
             math.sqrt(sum(float((field.get().astype(np.float64) ** 2).sum()) for field in pair.fields))
-            for pair in (finest.right, self._residual.read)
+            for pair in (finest.right, self._residuals[0])
         )
         return left / wanted if wanted else 0.0
 
@@ -532,9 +540,8 @@ class Viscosity:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        pairs = [side for pair in (self._residual, self._stress) for side in (pair.read, pair.write)]
-        pairs += [side for level in self.levels for side in (level.faces.read, level.faces.write)]
-        fields = [field for pair in (*pairs, *self._ways, self._az) for field in pair.fields]
+        pairs = [side for level in self.levels for side in (level.faces.read, level.faces.write)]
+        fields = [field for pair in (*pairs, *self._residuals, *self._ways, self._solution, self._az) for field in pair.fields]
         for level in self.levels:
             fields += [level.cells, *level.packed.values(), *level.right.fields]
         own = sum(field.nbytes for field in (*fields, self._inverse, self._products, self._weighed))
@@ -542,7 +549,7 @@ class Viscosity:
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self.levels, *self._ways, self._inverse, self._residual, self._stress):
+        for item in (*self.levels, *self._residuals, *self._ways, self._solution, self._inverse):
             item.release()
         for item in (
             self._factors,
@@ -566,10 +573,7 @@ def packed_entries(level: Level) -> Entries:
     cells_x, cells_y, inverse_u, inverse_v = (
         unpacked(packed[name]) for name in ("cells_x", "cells_y", "inverse_u", "inverse_v")
     )
-    nodes = np.zeros((2 * height + 1, 2 * width + 1))
-    nodes[:-1, :-1] = unpacked(packed["nodes"])
-    nodes[:-1, -1] = packed["node_halo"][:, -1, :2].ravel()
-    nodes[-1, :-1] = packed["node_halo"][-1, :, 2:].ravel()
+    nodes = unpacked(np.abs(level.packed["nodes"].get()[1:, 1:]))[: 2 * height + 1, : 2 * width + 1]
     return cells_x, cells_y, nodes, inverse_u > 0, inverse_v > 0
 
 

@@ -128,7 +128,7 @@ def test_converges_to_the_direct_solution(device: Device, nx: int, ny: int, wall
     y, x = np.mgrid[:ny, :nx]
     solid = (np.hypot(x - nx / 3, y - ny / 2) < min(nx, ny) / 6) & with_solid
     viscosity = 10 ** (2 * np.random.default_rng(0).random((ny, nx)))
-    step = Step(device, viscosity, solid=solid, walls=walls).with_plan(steps=25)
+    step = Step(device, viscosity, solid=solid, walls=walls).with_plan(steps=30, tolerance=0.0)
     found, wanted = step(noise(ny, nx)), step.exact(noise(ny, nx))
     assert error(found, wanted) < 2e-6
     still = solid | np.roll(solid, 1, 1)
@@ -142,7 +142,7 @@ def test_painted_masks_as_solved_live(device: Device, kind: str, contrast: float
     size = 90, 100
     step = Step(device, contrast ** mask(kind, *size))
     # The hardest are nearly rigid in pieces and pliant between them: lines of three cells; two blobs on one thin neck.
-    allowed = {1e2: 0.01, 1e5: 0.05} | {"lines": {1e2: 0.04, 1e5: 0.12}, "blobs": {1e5: 0.11}}.get(kind, {})
+    allowed = {1e2: 0.01, 1e5: 0.05} | {"lines": {1e5: 0.12}, "blobs": {1e5: 0.11}}.get(kind, {})
     for faces in (push(*size), vortices(*size)):
         assert error(step(faces), step.exact(faces)) < allowed[contrast]
 
@@ -197,7 +197,7 @@ def test_two_layer_couette(device: Device, thick_on_top: bool) -> None:
     ny, nx, contrast = 8, 160, 1e5
     upper, lower = (contrast, 1.0) if thick_on_top else (1.0, contrast)
     viscosity = np.repeat([upper, lower], ny // 2)[:, None] * np.full(nx, 1e3)
-    step = Step(device, viscosity, walls=Walls("none", (0, 0, 1, 0))).with_plan(steps=12)
+    step = Step(device, viscosity, walls=Walls("none", (0, 0, 1, 0))).with_plan(steps=12, tolerance=0.0)
     faces = np.zeros((ny, nx, 2))
     for _ in range(6):
         faces = step(faces)
@@ -246,7 +246,7 @@ def test_manufactured_step_is_of_second_order(device: Device) -> None:
         v_star = np.stack([right_hand_side(i, j + half, 0), right_hand_side(i + half, j, 1)], axis=-1)
         wanted = np.stack([velocity(i, j + half)[0], velocity(i + half, j)[1]], axis=-1)
         v_star[:, 0, 0] = v_star[0, :, 1] = 0
-        step = Step(device, viscosity(i + half, j + half), dt=1.0, walls=Walls("none")).with_plan(steps=20)
+        step = Step(device, viscosity(i + half, j + half), dt=1.0, walls=Walls("none")).with_plan(steps=20, tolerance=0.0)
         errors.append(error(step(v_star), wanted))
     assert errors[0] / errors[1] > 2**1.9
     assert errors[1] / errors[2] > 2**1.9
@@ -259,7 +259,7 @@ def test_residual_says_how_well_it_was_solved(device: Device) -> None:
     unsolved = step.solver.residual_norm(before, before)
     step(faces)
     live = step.solver.residual_norm(before, step.velocity.read)
-    step.with_plan(steps=20)(faces)
+    step.with_plan(steps=20, tolerance=0.0)(faces)
     assert step.solver.residual_norm(before, step.velocity.read) < 1e-4 < live < unsolved
 
 

@@ -8,19 +8,16 @@
 #include "viscosity/box.glsl"
 uniform float u_stiffness;      // dt mu / h^2
 #else
+#include "viscosity/openness.glsl"
 uniform sampler2D u_cells_x;    // K of u_x in the cells, negative where the cell's left face is pinned
 uniform sampler2D u_cells_y;    // K of v_y in the cells (the same as cells_x on the finest grid)
 uniform sampler2D u_nodes;      // K of the cells' upper left nodes, negative where the cell's upper face is pinned
-uniform sampler2D u_cell_halo;  // xy: cells_x left of the texel, zw: cells_y above it
-uniform sampler2D u_node_halo;  // xy: nodes right of the texel, zw: nodes below it
 uniform sampler2D u_inverse_u;  // 1 / diagonal of A for u and for v; 0 for pinned faces
 uniform sampler2D u_inverse_v;
 #endif
 
 struct Faces { vec4 u, v; };
 struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below, open_u, open_v; };
-
-vec4 open(vec4 inverse) { return vec4(greaterThan(inverse, vec4(0.0))); }
 
 #ifdef UNIFORM
 // K of the nodes in a column (or row) over that of the inner ones; see pack.frag.
@@ -55,25 +52,27 @@ Stiffness read_stiffness(vec2 at) {
 Faces inverse_diagonal(vec2 at) { return Faces(texture(u_inverse_u, at), texture(u_inverse_v, at)); }
 
 Stiffness read_stiffness(vec2 at) {
+    vec2 right = vec2(1.0 / float(textureSize(u_nodes, 0).x), 0.0), below = vec2(0.0, 1.0 / float(textureSize(u_nodes, 0).y));
     vec4 x = texture(u_cells_x, at), n = texture(u_nodes, at);
-    vec4 cells = texture(u_cell_halo, at), nodes = texture(u_node_halo, at);
+    vec4 x_left = abs(texture(u_cells_x, at - right));
+    vec4 n_right = abs(texture(u_nodes, at + right)), n_below = abs(texture(u_nodes, at + below));
     Stiffness k;
     k.open_u = vec4(greaterThan(x, vec4(0.0)));
     k.open_v = vec4(greaterThan(n, vec4(0.0)));
     x = abs(x);
     n = abs(n);
 #ifdef FINEST
-    vec4 y = x;
+    vec4 y = x, y_above = abs(texture(u_cells_x, at - below));
 #else
-    vec4 y = texture(u_cells_y, at);
+    vec4 y = texture(u_cells_y, at), y_above = texture(u_cells_y, at - below);
 #endif
     k.here_x = x;
     k.here_y = y;
-    k.left = vec4(cells.x, x.x, cells.y, x.z);
-    k.above = vec4(cells.zw, y.xy);
+    k.left = vec4(x_left.y, x.x, x_left.w, x.z);
+    k.above = vec4(y_above.zw, y.xy);
     k.node = n;
-    k.node_right = vec4(n.y, nodes.x, n.w, nodes.y);
-    k.node_below = vec4(n.zw, nodes.zw);
+    k.node_right = vec4(n.y, n_right.x, n.w, n_right.z);
+    k.node_below = vec4(n.zw, n_below.xy);
     return k;
 }
 #endif

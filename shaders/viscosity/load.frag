@@ -16,14 +16,14 @@ void main() {
     vec2 a = texelFetch(u_velocity, corner, 0).rg, b = texelFetch(u_velocity, min(corner + ivec2(1, 0), last), 0).rg;
     vec2 c = texelFetch(u_velocity, min(corner + ivec2(0, 1), last), 0).rg;
     vec2 d = texelFetch(u_velocity, min(corner + 1, last), 0).rg;
-    Stiffness k = read_stiffness(v_uv);
     out_u = vec4(a.r, b.r, c.r, d.r);
     out_v = vec4(a.g, b.g, c.g, d.g);
 #ifdef NO_SLIP
+    Stiffness k = read_stiffness(v_uv);
     ivec4 i = corner.x + ivec4(0, 1, 0, 1), j = corner.y + ivec4(0, 0, 1, 1);
     out_u += u_wall_speed.z * k.node * vec4(equal(j, ivec4(0))) + u_wall_speed.w * k.node_below * vec4(equal(j, ivec4(last.y)));
     out_v += u_wall_speed.x * k.node * vec4(equal(i, ivec4(0))) + u_wall_speed.y * k.node_right * vec4(equal(i, ivec4(last.x)));
 #endif
-    out_u *= k.open_u;
-    out_v *= k.open_v;
+    out_u *= open_u(own_texel());
+    out_v *= open_v(own_texel());
 }

@@ -12,7 +12,7 @@ layout(location = 1) out vec4 out_v;
 vec3 motion(float part) { return texelFetch(u_motions, ivec2(part, 0), 0).xyz; }
 
 void main() {
-    vec4 part_u = texture(u_part_u, v_uv), part_v = texture(u_part_v, v_uv);
+    vec4 part_u = floor(255.0 * texture(u_part_u, v_uv) + 0.5), part_v = floor(255.0 * texture(u_part_v, v_uv) + 0.5);
     vec2 corner = 2.0 * (floor(gl_FragCoord.xy) - 1.0);
     vec4 y = corner.y + vec4(0.5, 0.5, 1.5, 1.5), x = corner.x + vec4(0.5, 1.5, 0.5, 1.5);
     for (int q = 0; q < 4; ++q) {

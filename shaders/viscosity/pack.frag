@@ -6,11 +6,9 @@
 layout(location = 0) out vec4 out_cells_x;
 layout(location = 1) out vec4 out_cells_y;
 layout(location = 2) out vec4 out_nodes;
-layout(location = 3) out vec4 out_cell_halo;
-layout(location = 4) out vec4 out_node_halo;
-layout(location = 5) out vec4 out_inverse_u;
-layout(location = 6) out vec4 out_inverse_v;
-layout(location = 7) out vec4 out_open;
+layout(location = 3) out vec4 out_inverse_u;
+layout(location = 4) out vec4 out_inverse_v;
+layout(location = 5) out vec4 out_open;
 
 vec4 around[16]; // cells -1..2 by rows, 0 the upper left one of the texel
 
@@ -28,20 +26,19 @@ float node(int i, int j) {
 void main() {
     ivec2 corner = 2 * (ivec2(gl_FragCoord.xy) - 1);
     for (int q = 0; q < 16; ++q) around[q] = cell(corner + ivec2(q % 4 - 1, q / 4 - 1));
-    vec4 n;
+    vec4 n, open;
     for (int q = 0; q < 4; ++q) {
         int i = q % 2, j = q / 2;
         vec4 here = at(i, j);
         out_cells_x[q] = here.r;
         out_cells_y[q] = here.g;
-        out_open[q] = here.a;
+        open[q] = here.a;
         n[q] = node(i, j);
     }
     vec2 right = vec2(node(2, 0), node(2, 1)), below = vec2(node(0, 2), node(1, 2));
     vec4 cells = vec4(at(-1, 0).r, at(-1, 1).r, at(0, -1).g, at(1, -1).g);
-    out_node_halo = vec4(right, below);
-    out_cell_halo = cells;
-    vec4 open_u = mod(out_open, 2.0), open_v = step(1.5, out_open);
+    out_open = open / 255.0;
+    vec4 open_u = mod(open, 2.0), open_v = step(1.5, open);
     // A node that resists nothing still tells an open face by its sign.
     const float least = 1e-30;
     out_nodes = mix(-n - least, max(n, least), open_v);

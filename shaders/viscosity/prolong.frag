@@ -58,7 +58,9 @@ void main() {
     bvec2 odd = equal(place & 1, ivec2(1));
     vec2 texel = 1.0 / vec2(textureSize(u_coarse_u, 0)), p = (vec2(place >> 1) + 1.5) * texel;
     vec2 x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
+#if defined(START) || defined(CORRECT)
     Faces inverse = inverse_diagonal(v_uv);
+#endif
     vec4 u = texture(u_u, v_uv), v = texture(u_v, v_uv);
 #ifdef START
     u = inverse.u * (u - spread(u_coarse_right_u, p, x, y, false, odd.x, odd.y));
@@ -74,6 +76,6 @@ void main() {
     u += u_weight * inverse.u * r_u;
     v += u_weight * inverse.v * r_v;
 #endif
-    out_u = u + open(inverse.u) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
-    out_v = v + open(inverse.v) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
+    out_u = u + open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
+    out_v = v + open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
 }

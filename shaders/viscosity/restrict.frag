@@ -1,6 +1,6 @@
 // Restrict: the residual on the next coarser grid, a quarter of the transpose of prolong.frag.
-// u_u, u_v: the fine residual, zero on pinned faces; u_open: which coarse faces are open (1 for u, plus 2 for v);
-// with UNIFORM those of a box, see box.glsl.
+// u_u, u_v: the fine residual, zero on pinned faces; which coarse faces are open: see openness.glsl,
+// with UNIFORM box.glsl.
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a pinned neighbour.
 // reads: 29
@@ -9,11 +9,7 @@ uniform sampler2D u_v;
 #ifdef UNIFORM
 #include "viscosity/box.glsl"
 #else
-uniform sampler2D u_open;
-vec2 own_texel() { return floor(gl_FragCoord.xy) - 1.0; }
-vec4 openness(vec2 texel) { return texture(u_open, (texel + 1.5) / vec2(textureSize(u_open, 0))); }
-vec4 open_u(vec2 texel) { return mod(openness(texel), 2.0); }
-vec4 open_v(vec2 texel) { return step(1.5, openness(texel)); }
+#include "viscosity/openness.glsl"
 #endif
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
