@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -541,7 +541,8 @@ class Viscosity:
     def nbytes(self) -> int:
         """Bytes of texture memory."""
         pairs = [side for level in self.levels for side in (level.faces.read, level.faces.write)]
-        fields = [field for pair in (*pairs, *self._residuals, *self._ways, self._solution, self._az) for field in pair.fields]
+        pairs += [*self._residuals, *self._ways, self._solution, self._az]
+        fields = [field for pair in pairs for field in pair.fields]
         for level in self.levels:
             fields += [level.cells, *level.packed.values(), *level.right.fields]
         own = sum(field.nbytes for field in (*fields, self._inverse, self._products, self._weighed))

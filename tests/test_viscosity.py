@@ -246,7 +246,8 @@ def test_manufactured_step_is_of_second_order(device: Device) -> None:
         v_star = np.stack([right_hand_side(i, j + half, 0), right_hand_side(i + half, j, 1)], axis=-1)
         wanted = np.stack([velocity(i, j + half)[0], velocity(i + half, j)[1]], axis=-1)
         v_star[:, 0, 0] = v_star[0, :, 1] = 0
-        step = Step(device, viscosity(i + half, j + half), dt=1.0, walls=Walls("none")).with_plan(steps=20, tolerance=0.0)
+        step = Step(device, viscosity(i + half, j + half), dt=1.0, walls=Walls("none"))
+        step.with_plan(steps=20, tolerance=0.0)
         errors.append(error(step(v_star), wanted))
     assert errors[0] / errors[1] > 2**1.9
     assert errors[1] / errors[2] > 2**1.9

@@ -1,6 +1,9 @@
 // Combine: the solution from the ways of conjugate gradients, x = sum alpha_k p_k with p_k = z_k + beta_k p_(k-1).
 // u_factors: (alpha, beta) of the steps, a texel each; u_z0_u, u_z0_v, ...: the ways z, WAYS of them.
 // reads: 14
+#ifndef WAYS
+#define WAYS 1
+#endif
 uniform sampler2D u_factors;
 uniform sampler2D u_z0_u;
 uniform sampler2D u_z0_v;
