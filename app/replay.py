@@ -220,7 +220,7 @@ class Replay:
             if dabs := stroke.at(self.tick):
                 painted |= self._draw(stroke, dabs, dt, part)
         if painted:
-            self.masks.apply(self.fluid)
+            self._apply_masks()
         self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
         with self.device.stage("warp map"):
             self.warp.advance(self.fluid.velocity.read, dt * part)
@@ -246,8 +246,12 @@ class Replay:
             self.fluid.params = params
         if settings.viscosity != self._viscosity_in_force:
             self.masks.set_base(self._viscosity(settings.viscosity), self._frozen)
-            self.masks.apply(self.fluid)
+            self._apply_masks()
             self._viscosity_in_force = settings.viscosity
+
+    def _apply_masks(self) -> None:
+        self.masks.apply(self.fluid)
+        self.warp.hold(self.fluid.solid)
 
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
         """The force fields and their impulses in this tick; sources go into the fluid's own."""

@@ -61,7 +61,11 @@ class Masks:
         self.frozen.read.clear()
 
     def apply(self, fluid: Fluid) -> None:
-        """Give the fluid its viscosity and solid cells; the next step takes them up."""
+        """Give the fluid its viscosity and solid cells; the next step takes them up.
+
+        Solid are the frozen cells and those within two of them, so that with `WarpMap.hold` no bit of a picture changes
+        in a frozen cell.
+        """
         self.device.pass_("stages/compose_masks.frag")(
             (fluid.viscosity, fluid.solid),
             base_viscosity=self.base_viscosity,

@@ -121,6 +121,9 @@ class PaperWarpMap(WarpMap):
     def __init__(self, device: Device, grid: Grid) -> None:
         super().__init__(device, grid, base_scale=1)
 
+    def hold(self, solid: Field) -> None:
+        """Nothing: the paper's map is what its scheme makes of it."""
+
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity at cell centres, such as `PaperFluid.velocity.read`."""
         advance = self.device.pass_("paper/advance_coordinates.frag")

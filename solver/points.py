@@ -11,7 +11,14 @@ from solver.context import Device
 _ROW = 256  # points in a row of the texture that lists them
 
 
-def draw_at(device: Device, points: np.ndarray, domain: tuple[float, float], shader: str, **inputs: Any) -> np.ndarray:
+def draw_at(
+    device: Device,
+    points: np.ndarray,
+    domain: tuple[float, float],
+    shader: str,
+    defines: dict[str, object] | None = None,
+    **inputs: Any,
+) -> np.ndarray:
     """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, 2)."""
     points = np.asarray(points, np.float64).reshape(-1, 2)
     rows = max(1, -(-len(points) // _ROW))
@@ -19,7 +26,7 @@ def draw_at(device: Device, points: np.ndarray, domain: tuple[float, float], sha
     listed[: len(points)] = points / domain
     places = device.upload(listed.reshape(rows, _ROW, 2).astype(np.float32), "points")
     found = device.field(places.size, 2, "found at points")
-    device.pass_(shader, POINTS=1)(found, points=places, **inputs)
+    device.pass_(shader, POINTS=1, **(defines or {}))(found, points=places, **inputs)
     values = found.get().reshape(-1, 2)[: len(points)]
     places.release()
     found.release()

@@ -47,6 +47,7 @@ class MapState:
 
     fields: tuple[Field, Field]
     steps: int
+    held: np.ndarray | None = None
 
     @property
     def nbytes(self) -> int:
@@ -90,6 +91,8 @@ class WarpMap:
         self._find_total = Reduction(device, grid.size, 4, "sum")
         self._scratch = self._trace, self._steepness, self._largest, self._total
         self._reductions = self._find_steepest, self._find_largest, self._find_total
+        self._held: Field | None = None
+        self._held_cells: np.ndarray | None = None  # what it holds; None if no cell
         self._composed: dict[int, Field] = {}
         self._fresh: set[int] = set()  # the scales at which `_composed` holds the present map
         self._steps = 0  # since the last fold
@@ -140,8 +143,21 @@ class WarpMap:
             self._near.read.clear()
             self._steps = 0
 
+    def hold(self, solid: Field) -> None:
+        """From now on, change nothing inside solids: in the solid cells whose eight neighbours are solid as well.
+
+        The outermost solid cells let the map go over into what moves. Looking a picture up reaches into the next cell,
+        so that pixels whose cells lie two inside a solid stay as they are to the bit, moved before or not.
+        """
+        cells = _inside(solid.get() > 0)
+        given = cells if cells.any() else None
+        if not _same(given, self._held_cells):
+            self.fold()
+            self._set_held(given)
+            self._changed()
+
     def restore(self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0) -> None:
-        """Let the map go back to the identity under a round brush.
+        """Let the map go back to the identity under a round brush, but in held cells.
 
         Args:
             center, radius: longer sides.
@@ -149,7 +165,7 @@ class WarpMap:
             amount: 0-1, the part of the displacement that is taken away at the centre.
         """
         for pair in (self._near, self._base):
-            self.device.pass_("warp/restore.frag")(
+            self.device.pass_("warp/restore.frag", **self._held_defines())(
                 pair.write,
                 displacement=pair.read,
                 extent=self.grid.extent,
@@ -157,6 +173,7 @@ class WarpMap:
                 radius=radius,
                 hardness=min(hardness, 0.99),
                 amount=amount,
+                **self._held_inputs(),
             )
             pair.swap()
         self._changed()
@@ -190,13 +207,15 @@ class WarpMap:
             copy = self.device.field(field.size, 2, f"{field.label}, saved")
             copy.copy_from(field)
             copies.append(copy)
-        return MapState((copies[0], copies[1]), self._steps)
+        return MapState((copies[0], copies[1]), self._steps, self._held_cells)
 
     def load(self, state: MapState) -> None:
         """Go back to a saved state, exactly."""
         self._near.read.copy_from(state.fields[0])
         self._base.read.copy_from(state.fields[1])
         self._steps = state.steps
+        if not _same(state.held, self._held_cells):
+            self._set_held(state.held)
         self._changed()
 
     @property
@@ -212,7 +231,7 @@ class WarpMap:
 
     def release(self) -> None:
         """Free the textures."""
-        self.forward.release()
+        self._set_held(None)
         for thing in (self._near, self._base, *self._composed.values(), *self._scratch, *self._reductions):
             thing.release()
         if "forward" in self.__dict__:
@@ -247,7 +266,9 @@ class WarpMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
-        return draw_at(self.device, points, self.grid.extent, "warp/compose.frag", **self._parts())
+        return draw_at(
+            self.device, points, self.grid.extent, "warp/compose.frag", self._held_defines(), **self._parts()
+        )
 
     @cached_property
     def forward(self) -> ForwardMap:
@@ -272,11 +293,24 @@ class WarpMap:
     # -- its parts --------------------------------------------------------------------------------------------------
 
     def _compose(self, target: Field) -> None:
-        self.device.pass_("warp/compose.frag")(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
+        compose = self.device.pass_("warp/compose.frag", **self._held_defines())
+        compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
 
     def _parts(self) -> dict[str, Any]:
         """What `compose.frag` puts together."""
-        return {"near": self._near.read, "base": self._base.read, "extent": self.grid.extent}
+        return {"near": self._near.read, "base": self._base.read, "extent": self.grid.extent, **self._held_inputs()}
+
+    def _held_defines(self) -> dict[str, object]:
+        return {"HELD": 1} if self._held else {}
+
+    def _held_inputs(self) -> dict[str, Any]:
+        return {"held": self._held} if self._held else {}
+
+    def _set_held(self, cells: np.ndarray | None) -> None:
+        if self._held is not None:
+            self._held.release()
+        self._held = None if cells is None else self.device.upload(cells.astype(np.uint8) * 255, "held cells")
+        self._held_cells = cells
 
     def _is_steep(self) -> bool:
         """True if the map is bent too far since the last fold; waits for the GPU."""
@@ -289,6 +323,19 @@ class WarpMap:
     def _changed(self) -> None:
         self.version += 1
         self._fresh.clear()
+
+
+def _inside(cells: np.ndarray) -> np.ndarray:
+    """The cells whose eight neighbours are chosen too; beyond the edge it goes on as at the edge."""
+    for axis in (0, 1):
+        padded = np.pad(cells, [(1, 1) if axis == k else (0, 0) for k in (0, 1)], mode="edge")
+        n = cells.shape[axis]
+        cells = np.all([np.take(padded, range(shift, shift + n), axis) for shift in (0, 1, 2)], axis=0)
+    return cells
+
+
+def _same(a: np.ndarray | None, b: np.ndarray | None) -> bool:
+    return (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
 
 
 def _runge_kutta(

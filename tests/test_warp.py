@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 import reference
 from flows import VORTEX_TIME, vortex, vortex_faces
 from solver.context import Device
 from solver.field import FieldError
+from solver.fluid import Fluid
 from solver.grid import Grid
+from solver.masks import Masks
+from solver.sampling import Sampler
 from solver.warp import WarpMap
 
 
@@ -216,3 +220,62 @@ def test_forward_map_of_a_folded_one_is_finite(device: Device) -> None:
     x, _ = grid.centres()
     assert np.isfinite(found).all()
     assert (np.abs(x + found[..., 0] - 0.5) <= 0.5 + 1e-6).all()
+
+
+def test_frozen_pixels_keep_every_bit(device: Device) -> None:
+    """Whatever moved there before: frozen at random, thawed and frozen again, under the flow and the restore brush."""
+    grid = Grid(41, 27)
+    rng = np.random.default_rng(9)
+    warp, sampler = WarpMap(device, grid), Sampler(device)
+    masks, fluid = Masks(device, grid), Fluid(device, grid)
+    picture = rng.integers(0, 256, (193, 301, 3), np.uint8)
+    row, column = np.mgrid[0:193, 0:301]
+    row, column = row * grid.ny // 193, column * grid.nx // 301
+    points = rng.random((300, 2)) * grid.extent
+    cell = (points / grid.h).astype(int)
+    fluid.set_velocity(smooth(rng, grid.size, 0.3))
+    for share in (0.005, 0.03, 0.0, 0.02):
+        frozen = rng.random((grid.ny, grid.nx)) < share
+        masks.set_base(1e-4, frozen)
+        masks.apply(fluid)
+        warp.hold(fluid.solid)
+        fluid.step(0.02)
+        flow = fluid.faces().get()
+        before = warp.read((301, 193)), sampler.apply(warp, picture), warp.at(points)
+        for step in range(35):
+            warp.advance_prescribed(flow, 0.02)
+            warp.restore((0.5, 0.3), 0.3, 0.5, 0.02)
+            if step in (0, 20, 34):
+                after = warp.read((301, 193)), sampler.apply(warp, picture), warp.at(points)
+                for now, then, kept in zip(
+                    after, before, (frozen[row, column],) * 2 + (frozen[cell[:, 1], cell[:, 0]],), strict=True
+                ):
+                    np.testing.assert_array_equal(now[kept], then[kept])
+        assert np.abs(after[0] - before[0]).max() > 1e-3
+    assert np.abs(before[0])[frozen[row, column]].max() > 1e-3, "what had moved before it was frozen"
+
+
+def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> None:
+    """A frozen disc in the vortex: the same areas, and the same map two cells away, as if only the fluid knew of it."""
+    grid = Grid(64, 64)
+    x, y = grid.centres()
+    disc = np.hypot(x - 0.55, y - 0.5) < 0.12
+    found = []
+    for held in (False, True):
+        masks, fluid, warp = Masks(device, grid), Fluid(device, grid), WarpMap(device, grid)
+        masks.set_base(1e-2, disc)
+        masks.apply(fluid)
+        if held:
+            warp.hold(fluid.solid)
+        fluid.set_velocity(0.3 * vortex_faces(grid, 0.0))
+        for _ in range(20):
+            fluid.step(1 / 60)
+            warp.advance(fluid.faces(), 1 / 60)
+        found.append((warp.statistics(), warp.read()))
+    (free, free_map), (held, held_map) = found
+    assert held.folds == free.folds == 0
+    assert held.det_error < 1.02 * free.det_error
+    assert held.displacement_max == free.displacement_max > 0.02
+    away = ~np.asarray(ndimage.binary_dilation(disc, np.ones((3, 3)), iterations=4), bool)
+    assert np.abs(held_map - free_map)[away].max() < 0.02 * grid.h
+    assert not held_map[disc].any()
