@@ -25,7 +25,7 @@ from app.threads import ahead, behind
 from solver.context import Device
 from solver.field import FieldError
 from solver.grid import Grid
-from solver.sampling import Edges, GivenMap, Sampler, SamplingError
+from solver.sampling import Edges, GivenMap, Sampler, Sampling, SamplingError
 from solver.warp import WarpMap
 
 MOST_CELLS = 1024  # along the longer side, for turning a map round
@@ -192,7 +192,8 @@ class Applier:
                 inverse = inverted(self._device, given) if given.forward else given
                 values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
                 self._map, self._given = GivenMap(self._device, values), given
-            return looked_up(self._sampler, self._map, pixels, size, self._edges, alpha, self._check)
+            how = Sampling(edges=self._edges)
+            return looked_up(self._sampler, self._map, pixels, size, how, alpha, self._check)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
 

@@ -37,7 +37,7 @@ from app.threads import ahead, behind
 from app.timeline import Sentinel, Timeline, frame_positions
 from app.video import Clip
 from solver.context import Device
-from solver.sampling import Edges, GivenMap, Sampler, Sampling
+from solver.sampling import GivenMap, Sampler, Sampling
 from solver.warp import WarpMap
 
 POINTS_AT_ONCE = 1_000_000  # of a map
@@ -355,9 +355,8 @@ class _Export:
         # The frames of an animation are all of one kind, and most of its formats have no alpha.
         alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
         with self.device.stage("sample picture"):
-            return looked_up(
-                self.sampler, self.replay.warp, pixels, self.size, self.recipe.edges, alpha, self.progress.check
-            )
+            how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
+            return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, self.progress.check)
 
     def _density_frame(self, values: np.ndarray) -> np.ndarray:
         """The densities as 8-bit colours, in the result's size."""
@@ -468,18 +467,17 @@ def looked_up(
     warp: WarpMap | GivenMap,
     pixels: np.ndarray,
     size: tuple[int, int],
-    edges: Edges,
+    how: Sampling,
     alpha: bool,
     check: Callable[[], None],
 ) -> np.ndarray:
     """The pixels (h, w, c) looked up through a map, in bands, so that little more than the result is in memory.
 
-    alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `edges` wants that to be seen.
+    alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
     check: called with every band; may raise, as `Progress.check` does.
     """
-    how = Sampling(edges=edges)
     opaque = pixels.shape[2] in (1, 3)
-    given = with_alpha(pixels) if alpha and opaque and edges == "transparent" else pixels
+    given = with_alpha(pixels) if alpha and opaque and how.edges == "transparent" else pixels
     result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)
     top = 0
     for band in sampler.bands(warp, given, size, how):

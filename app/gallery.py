@@ -12,21 +12,22 @@ from PIL import Image, ImageDraw, ImageFont
 
 from app.animation import animation_writer
 from app.errors import UserError
+from app.export import displacement
 from app.files import MENDS
 from app.forces import GradientForce
-from app.pictures import Picture, linear_to_srgb, read_picture, srgb_to_linear, to_bits, write_picture
+from app.masks import solid
+from app.pictures import Picture, read_picture, srgb_to_linear, to_bits, write_picture
 from app.progress import Progress
 from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
 from solver.context import Device
 from solver.grid import Grid
-from solver.sampling import Sampler, Sampling
+from solver.sampling import GivenMap, Sampler, Sampling
 from solver.warp import MapStatistics
 
 FPS = 30
 LINGER = 24  # frames that the last one stands still
-FINER = 3  # places a pixel, along each side, of the reference that sharpness is measured against
 COMPARED = 512  # pixels along the longer side, in which displacements are told
 
 PAPER, INK, FORCE = (250, 249, 246), (38, 38, 44), (214, 40, 40)
@@ -43,8 +44,8 @@ class Played:
         source, result: (h, w, 3) uint8.
         stills: the results at the times that were asked for.
         field: the sum of the forces at the cells' centres, (ny, nx, 2).
-        viscosity, frozen: of the cells.
-        displacement: the map at the cells' centres, (ny, nx, 2); `fine` the same at FINER x FINER places a pixel.
+        viscosity: of the cells.
+        displacement: the map at the centres of the pixels, (h, w, 2), longer sides.
     """
 
     recipe: Recipe
@@ -54,9 +55,7 @@ class Played:
     stills: Mapping[float, np.ndarray]
     field: np.ndarray
     viscosity: np.ndarray
-    frozen: np.ndarray
     displacement: np.ndarray
-    fine: np.ndarray
     statistics: MapStatistics
 
 
@@ -78,10 +77,9 @@ class Studio:
         name: str,
         stills: Iterable[float] = (),
         save_as: str | None = None,
-        measured: bool = False,
         **parts: object,
     ) -> Played:
-        """Play the recipe `name`, changed by `parts`, and write its result and animation; `measured` reads `fine`."""
+        """Play the recipe `name`, changed by `parts`, and write its result and animation."""
         recipe = load(name).edited(**parts)
         source = source_of(recipe)
         pictures = Pictures(Picture(source), recipes_folder())
@@ -103,7 +101,6 @@ class Studio:
                 for _ in range(LINGER):
                     write(frame)
             write_picture(self.folder / f"{label}.png", Picture(frame))
-            height, width = source.shape[:2]
             return Played(
                 recipe=recipe,
                 grid=replay.grid,
@@ -112,9 +109,7 @@ class Studio:
                 stills=kept,
                 field=force_field(recipe, replay.grid, pictures),
                 viscosity=replay.fluid.viscosity.get(),
-                frozen=replay.fluid.solid.get() > 0,
-                displacement=replay.warp.read(),
-                fine=replay.warp.read((width * FINER, height * FINER)) if measured else np.empty((0, 0, 2)),
+                displacement=displacement(replay, (source.shape[1], source.shape[0])).values,
                 statistics=replay.warp.statistics(),
             )
         finally:
@@ -135,7 +130,7 @@ class Studio:
     def _frame(self, replay: Replay, source: np.ndarray) -> np.ndarray:
         if replay.density is not None:
             return (np.clip(replay.density.get()[..., :3], 0, 1) * 255 + 0.5).astype(np.uint8)
-        how = Sampling(edges=replay.recipe.edges)
+        how = Sampling(edges=replay.recipe.edges, samples=replay.recipe.output.samples)
         return self.sampler.apply(replay.warp, source, how=how)
 
     def sheet(self, name: str, title: str, panels: list[tuple[str, np.ndarray]], height: int = PANEL) -> None:
@@ -170,7 +165,7 @@ def rgb(pixels: np.ndarray) -> np.ndarray:
 def figure_1(studio: Studio) -> Numbers:
     """Density mode, blurred and fading, against coordinate mode, sharp."""
     density = studio.play("figure-1", save_as="figure-1-density", mode="density")
-    moved = studio.play("figure-1", measured=True)
+    moved = studio.play("figure-1")
     studio.sheet(
         "figure-1",
         "Figure 1: moving the values of a picture, and moving its coordinates",
@@ -181,13 +176,14 @@ def figure_1(studio: Studio) -> Numbers:
             ("d  coordinates moved: sharp", moved.result),
         ],
     )
-    # Only where it moved: a pixel that did not is copied, and sharper than the reference's mean over it.
-    height, width = moved.source.shape[:2]
-    where = np.linalg.norm(moved.fine[FINER // 2 :: FINER, FINER // 2 :: FINER], axis=-1) * max(height, width) > 1
-    reference = sharpness(spline_warp(light(moved.source), moved.fine), where)
+    smooth = studio.sampler.apply(
+        GivenMap(studio.device, moved.displacement), moved.source, how=Sampling(edges=moved.recipe.edges)
+    )
+    reference = sharpness(spline_warp(light(moved.source), moved.displacement))
+    shown = {"coordinates": moved.result, "coordinates, as many samples as the map stretches": smooth}
+    shown["density"] = density.result
     return {
-        "sharpness, coordinates": f"{sharpness(light(moved.result), where) / reference:.1%}",
-        "sharpness, density": f"{sharpness(light(density.result), where) / reference:.1%}",
+        **{f"sharpness, {name}": f"{sharpness(light(pixels)) / reference:.1%}" for name, pixels in shown.items()},
         **_shape(moved),
     }
 
@@ -286,7 +282,7 @@ def _portrait(studio: Studio, name: str, what: str) -> Numbers:
             ("b  viscosity: dark flows", shades(thick.viscosity, thick.source)),
             (
                 "c  forces: the gradient of this",
-                arrows(rgb(pictures.load(lift.picture).pixels), thick.field, 60, pale=0.0),
+                arrows(rgb(pictures.load(lift.picture).pixels), thick.field, 40, pale=0.0),
             ),
             ("d  result", thick.result),
             ("e  source, near", _near(thick.source, lift)),
@@ -294,19 +290,30 @@ def _portrait(studio: Studio, name: str, what: str) -> Numbers:
             ("g  frozen outside, near", _near(frozen.result, lift)),
         ],
     )
-    outside = thick.viscosity > 0.98 * thick.viscosity.max()
+    # The window is what the recipe with the freeze leaves free: where the dark window is darker than middle grey.
+    cells = solid(frozen.recipe.freeze, frozen.grid, pictures)
+    outside = _at_pixels(cells, thick.source)
     moved, moved_frozen = (np.linalg.norm(one.displacement, axis=-1) * COMPARED for one in (thick, frozen))
+    changed = (frozen.result != frozen.source).any(axis=-1)
     return {
         "px outside, mean": f"{moved[outside].mean():.3f}",
         "px inside, mean": f"{moved[~outside].mean():.1f}",
         "px inside, most": f"{moved[~outside].max():.1f}",
-        "frozen: px outside, most": f"{moved_frozen[_deep(frozen.frozen)].max():.3g}",
-        "frozen: px inside, most": f"{moved_frozen.max():.1f}",
-        "det J": f"{thick.statistics.det_min:.2f} to {thick.statistics.det_max:.2f}",
+        "frozen: px outside, most": f"{moved_frozen[outside].max():.3g}",
+        "frozen: pixels changed outside": f"{changed[outside].sum()}",
+        "frozen: px inside, mean": f"{moved_frozen[~outside].mean():.1f}",
+        "det J": _range(thick),
+        "frozen: det J": _range(frozen),
     }
 
 
-def _near(pixels: np.ndarray, force: GradientForce, around: float = 0.11) -> np.ndarray:
+def _at_pixels(cells: np.ndarray, picture: np.ndarray) -> np.ndarray:
+    """What is given of the cells, for each pixel that of the cell its centre lies in."""
+    rows, columns = ((np.arange(n) + 0.5) * m / n for n, m in zip(picture.shape, cells.shape, strict=False))
+    return cells[rows.astype(int)[:, None], columns.astype(int)]
+
+
+def _near(pixels: np.ndarray, force: GradientForce, around: float = 0.08) -> np.ndarray:
     """The part of a picture about the window a force acts in."""
     assert force.within is not None
     left, top, right, bottom = force.within.box
@@ -315,19 +322,12 @@ def _near(pixels: np.ndarray, force: GradientForce, around: float = 0.11) -> np.
     return pixels[rows, int((left - around) * width) : int((right + around) * width)]
 
 
-def _deep(frozen: np.ndarray, cells: int = 3) -> np.ndarray:
-    """The frozen cells without those near others, which the map's interpolation (6 x 6) reaches across the border."""
-    for axis in (0, 1):
-        frozen = np.all([np.roll(frozen, shift, axis) for shift in range(-cells, cells + 1)], axis=0)
-    return frozen
-
-
 def _shape(played: Played) -> Numbers:
-    found = played.statistics
-    return {
-        "px, most": f"{found.displacement_max * COMPARED:.1f}",
-        "det J": f"{found.det_min:.2f} to {found.det_max:.2f}",
-    }
+    return {"px, most": f"{played.statistics.displacement_max * COMPARED:.1f}", "det J": _range(played)}
+
+
+def _range(played: Played) -> str:
+    return f"{played.statistics.det_min:.2f} to {played.statistics.det_max:.2f}"
 
 
 def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]:
@@ -359,26 +359,26 @@ def light(pixels: np.ndarray) -> np.ndarray:
     return srgb_to_linear(pixels / 255) @ np.array([0.2126, 0.7152, 0.0722])
 
 
-def sharpness(luminance: np.ndarray, where: np.ndarray | bool = True) -> float:
-    """Gradient energy as the eye sees it: the squared gradient summed over the pixels `where`, but the outermost."""
-    rows, columns = np.gradient(linear_to_srgb(np.clip(luminance, 0, 1)))
-    return float(((rows**2 + columns**2) * where)[2:-2, 2:-2].sum())
+def sharpness(luminance: np.ndarray) -> float:
+    """Gradient energy: the squared gradient of the luminance (h, w), summed over all pixels but the outermost two."""
+    rows, columns = np.gradient(luminance)
+    return float((rows**2 + columns**2)[2:-2, 2:-2].sum())
 
 
 def spline_warp(values: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """`values` (h, w) looked up at x + D(x) by the interpolating cubic B-spline, clamped at the edge: the reference.
+    """`values` (h, w) at x + D(x) for the centres x of the pixels, by the interpolating cubic B-spline, in float64.
 
-    `displacement` (h k, w k, 2) has k x k places a pixel, which are averaged as a pixel averages what it sees.
+    The reference that sharpness is measured against: the picture at the very places that the map (h, w, 2) names,
+    clamped at the edge. No pixel of it is an average.
     """
     height, width = values.shape
-    k = len(displacement) // height
     coefficients = values
     for n in (height, width):
         # The spline whose values at the pixels are the picture's; its ends mirror.
         matrix = np.diag(np.full(n, 4.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
         matrix[0, 1] = matrix[-1, -2] = 2.0
         coefficients = np.linalg.solve(matrix / 6, coefficients).T
-    row, column = (np.mgrid[0 : height * k, 0 : width * k] + 0.5) / k - 0.5
+    row, column = np.mgrid[0:height, 0:width]
     row = np.clip(row + displacement[..., 1] * max(height, width), 0, height - 1)
     column = np.clip(column + displacement[..., 0] * max(height, width), 0, width - 1)
     result = np.zeros(row.shape)
@@ -386,7 +386,7 @@ def spline_warp(values: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     for i, row_weight in enumerate(_spline_weights(row - top), -1):
         for j, column_weight in enumerate(_spline_weights(column - left), -1):
             result += row_weight * column_weight * coefficients[_mirrored(top + i, height), _mirrored(left + j, width)]
-    return result.reshape(height, k, width, k).mean(axis=(1, 3))
+    return result
 
 
 def _spline_weights(t: np.ndarray) -> tuple[np.ndarray, ...]:

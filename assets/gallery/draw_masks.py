@@ -29,10 +29,11 @@ def dark_window(size: tuple[int, int], centre: tuple[float, float], radii: tuple
     return _grey(1 - _smooth(depth / 0.28))
 
 
-def rise(size: tuple[int, int], low: float, high: float) -> Image.Image:
-    """White on top, black at the bottom, rising between two heights: its gradient points up."""
-    _, y = _fractions(size)
-    return _grey(_smooth((low - y) / (low - high)))
+def rise(size: tuple[int, int], centre: tuple[float, float], way: tuple[float, float], length: float) -> Image.Image:
+    """From black to white along a way, evenly over a length about the centre: its gradient points that way."""
+    x, y = _fractions(size)
+    along = ((x - centre[0]) * way[0] + (y - centre[1]) * way[1]) / np.hypot(*way)
+    return _grey(np.clip(0.5 + along / length, 0, 1))
 
 
 def _fractions(size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -51,13 +52,13 @@ def _grey(values: np.ndarray) -> Image.Image:
 def main() -> None:
     """Write the pictures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
-    hopper, astronaut = (760, 840), (780, 780)
+    portrait, mouth, brow = (600, 600), (0.65, 0.587), (0.613, 0.302)
     pictures = {
         "hat": hat(),
-        "mouth-viscosity": dark_window(hopper, (0.63, 0.615), (0.16, 0.125)),
-        "mouth-force": rise(hopper, 0.70, 0.54),
-        "brow-viscosity": dark_window(astronaut, (0.605, 0.318), (0.14, 0.064)),
-        "brow-force": rise(astronaut, 0.385, 0.285),
+        "mouth-viscosity": dark_window(portrait, mouth, (0.217, 0.187)),
+        "mouth-force": rise(portrait, mouth, (0.5, -1), 0.4),
+        "brow-viscosity": dark_window(portrait, brow, (0.192, 0.117)),
+        "brow-force": rise(portrait, brow, (0.3, -1), 0.25),
     }
     for name, picture in pictures.items():
         picture.save(folder / f"{name}.png", optimize=True)
