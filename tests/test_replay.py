@@ -15,6 +15,7 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.strokes import Stroke
 from solver.context import Device
+from solver.sampling import Sampler
 
 RECIPE = Recipe.parse("""
 duration = 1.0
@@ -202,4 +203,27 @@ def test_a_point_is_followed(device: Device):
     dx, dy = map_[int(y / height * 600), int(x / width * 800)]
     assert abs(x - 0.5 * width) + abs(y - 0.5 * height) > 0.02
     assert (x + dx, y + dy) == pytest.approx((0.5 * width, 0.5 * height), abs=2e-3)
+    replay.release()
+
+
+def test_a_frozen_pixel_is_the_same_in_every_later_frame(device: Device) -> None:
+    """Frozen by hand while it flows, after it has moved: not a bit of its colours changes from the next frame on."""
+    freeze = Stroke.model_validate(
+        {"tool": "freeze", "samples": ((5, 0.5, 0.45, 1), (8, 0.55, 0.5, 1)), "radius": 0.08}
+    )
+    recipe = RECIPE.edited(stroke=(*RECIPE.stroke, freeze))
+    replay, sampler = Replay(device, recipe, pictures(), budget=0), Sampler(device)
+    source = replay.pictures.source.pixels
+    row, column = (2 * np.mgrid[0:60, 0:80] + 1) * replay.grid.nx // 160
+    before, cells = source, np.zeros((replay.grid.ny, replay.grid.nx), bool)
+    kept = 0
+    for _ in range(LAST):
+        replay.advance()
+        now = sampler.apply(replay.warp, source)
+        stays = cells[row, column]
+        np.testing.assert_array_equal(now[stays], before[stays])
+        kept += np.count_nonzero((now != source).any(axis=-1) & stays)
+        before, cells = now, replay.masks.frozen.read.get() >= 0.5
+    assert kept > 1000, "what had moved before it was frozen"
+    sampler.release()
     replay.release()
