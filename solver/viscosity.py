@@ -210,6 +210,9 @@ class Viscosity:
             self._inverse.set(inverse_matrix(*entries(self._last)))
         self._stiff_parts.count = 0
         if self.plan.stiff:
+            finest = self.levels[0]
+            for field in (*finest.right.fields, *finest.faces.read.fields):
+                field.clear()
             self._stiff_parts.find(scaled > self.plan.stiff, frozen, self._apply_matrix)
 
     def _draw_coefficients(self, inputs: dict[str, Any]) -> None:
@@ -485,10 +488,8 @@ class Viscosity:
         residual(target.fields, region=level.region, **faces.inputs(), **right.inputs("right_"), **level.matrix)
 
     def _apply_matrix(self, draw: Callable[[tuple[Field, Field]], None]) -> tuple[Field, Field]:
-        """Minus the finest grid's matrix times the faces that `draw` fills, for `StiffParts.find`."""
+        """Minus the finest grid's matrix times the faces that `draw` fills, the others being zero; for `StiffParts`."""
         finest = self.levels[0]
-        for field in (*finest.right.fields, *finest.faces.read.fields):
-            field.clear()
         draw(finest.faces.read.fields)
         self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0])
         return self._residuals[0].fields
@@ -601,30 +602,31 @@ def inverse_matrix(
 ) -> np.ndarray:
     """The inverse of the matrix of these entries for `shaders/viscosity/exact.frag`, (unknowns, unknowns / 4, 4)."""
     height, width = cells_x.shape[0] // 2, cells_x.shape[1] // 2
-    # Numbers of the unknowns in the order of the texels, -1 where a face is pinned, with a frame of pinned faces.
-    texel = np.arange(width * height).reshape(height, width, 1) * 4 + np.arange(4)
-    u = np.pad(np.where(open_u, unpacked(texel), -1), 1, constant_values=-1)
-    v = np.pad(np.where(open_v, unpacked(texel) + texel.size, -1), 1, constant_values=-1)
-    count = 2 * texel.size
-    matrix = np.eye(count)
+    count = 8 * width * height
+    # Texels in lines along the shorter side, u and v together: each line meets its neighbours only.
+    texels = np.arange(count).reshape((height, width, 2, 4) if height >= width else (width, height, 2, 4))
+    if height < width:
+        texels = texels.swapaxes(0, 1)
+    # Numbers of the unknowns, -1 where a face is pinned, with a frame of pinned faces.
+    u = np.pad(np.where(open_u, unpacked(texels[:, :, 0]), -1), 1, constant_values=-1)
+    v = np.pad(np.where(open_v, unpacked(texels[:, :, 1]), -1), 1, constant_values=-1)
     strains = (
         (cells_x, ((u[1:-1, 2:], 1), (u[1:-1, 1:-1], -1))),
         (cells_y, ((v[2:, 1:-1], 1), (v[1:-1, 1:-1], -1))),
         (nodes, ((u[1:, 1:], 1), (u[:-1, 1:], -1), (v[1:, 1:], 1), (v[1:, :-1], -1))),
     )
+    places, entries = [np.arange(count) * (count + 1)], [np.ones(count)]
     for stiffness, ends in strains:
         for row, row_sign in ends:
             for column, column_sign in ends:
                 moves = (row >= 0) & (column >= 0)
-                # No two strains of a kind share both faces.
-                matrix[row[moves], column[moves]] += row_sign * column_sign * stiffness[moves]
-    # Texels in lines along the shorter side, u and v together: each line meets its neighbours only.
-    order = np.arange(count).reshape(2, height, width, 4)
-    order = np.moveaxis(order, 0, 2) if height >= width else order.transpose(2, 1, 0, 3)
-    order = order.ravel()
-    inverse = np.empty((count, count), np.float32)
-    inverse[np.ix_(order, order)] = inverse_of_blocks(matrix[np.ix_(order, order)], max(height, width))
-    return inverse.reshape(count, count // 4, 4)
+                places.append(row[moves] * count + column[moves])
+                entries.append(row_sign * column_sign * stiffness[moves])
+    matrix = np.bincount(np.concatenate(places), np.concatenate(entries), count**2).reshape(count, count)
+    inverse = inverse_of_blocks(matrix, max(height, width)).astype(np.float32)
+    # In the order of the texture: texel after texel, all u before all v.
+    order = np.moveaxis(texels, 2, 0).ravel()
+    return inverse[order[:, None], order].reshape(count, count // 4, 4)
 
 
 def inverse_of_blocks(matrix: np.ndarray, count: int) -> np.ndarray:
