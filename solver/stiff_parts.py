@@ -71,11 +71,11 @@ class StiffParts:
         self,
         stiff: np.ndarray,
         solid: np.ndarray,
-        apply_matrix: Callable[[Callable[[tuple[Field, Field]], None]], tuple[Field, Field]],
+        apply_matrix: Callable[[Callable[[tuple[Field, Field]], None], Region], tuple[Field, Field]],
     ) -> None:
         """Take up the stiff cells and the solid ones, (ny, nx) each.
 
-        `apply_matrix(draw)` lets `draw` fill packed faces and returns minus A times them.
+        `apply_matrix(draw, region)` lets `draw` fill packed faces and returns minus A times them there.
         """
         part = connected_parts(stiff & ~solid)
         self.count = int(part.max())
@@ -105,7 +105,7 @@ class StiffParts:
             if mode == 2:
                 motions[1:, 0], motions[1:, 1] = parts[1:, 3], -parts[1:, 2]
             self._motions.set(motions[None])
-            self._gather(apply_matrix(self._move))
+            self._gather(apply_matrix(self._move, self._region))
             loads = self._loads.get().reshape(-1, 4)[: len(of_entry)]
             for row in range(3):
                 matrix[:, row, mode] = -np.bincount(of_entry, loads[:, row], self.count + 1)[1:]

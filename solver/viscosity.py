@@ -483,15 +483,17 @@ class Viscosity:
             level.faces.swap()
             start = None
 
-    def _residual_of(self, level: Level, faces: Pair, right: Pair, target: Pair) -> None:
+    def _residual_of(self, level: Level, faces: Pair, right: Pair, target: Pair, region: Region | None = None) -> None:
         residual = self.device.pass_("viscosity/residual.frag", **level.defines)
-        residual(target.fields, region=level.region, **faces.inputs(), **right.inputs("right_"), **level.matrix)
+        residual(
+            target.fields, region=region or level.region, **faces.inputs(), **right.inputs("right_"), **level.matrix
+        )
 
-    def _apply_matrix(self, draw: Callable[[tuple[Field, Field]], None]) -> tuple[Field, Field]:
-        """Minus the finest grid's matrix times the faces that `draw` fills, the others being zero; for `StiffParts`."""
+    def _apply_matrix(self, draw: Callable[[tuple[Field, Field]], None], region: Region) -> tuple[Field, Field]:
+        """Minus A times the faces that `draw` fills, the others being zero, in a region; for `StiffParts`."""
         finest = self.levels[0]
         draw(finest.faces.read.fields)
-        self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0])
+        self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0], region)
         return self._residuals[0].fields
 
     def _restrict(self, residual: Pair, coarser: Level, target: Pair) -> None:
