@@ -137,14 +137,14 @@ class Output(Model):
         size: longer side of the result in pixels; left out, the picture's own.
         fps: frames per second of an animation.
         quality: 1-100, of JPEG, WebP and video.
-        samples: places looked up along a side of each pixel: "auto", as many as the map stretches there; 1 is the
-            sharpest, and shows steps where the map shrinks.
+        samples: places looked up along a side of each pixel: "auto", as many as the map stretches there; 1 is sharper,
+            and shows steps where the map shrinks the picture.
     """
 
     size: Annotated[int, Field(ge=1, le=32768)] | None = None
     fps: Annotated[float, Field(gt=0, le=1000)] = 30.0
     quality: Annotated[int, Field(ge=1, le=100)] = 90
-    samples: Literal["auto"] | Annotated[int, Field(ge=1, le=8)] = "auto"
+    samples: Literal["auto", 1] = "auto"
 
 
 class Recipe(Model):

@@ -37,8 +37,7 @@ class Sampling:
         quality: interpolation between pixels.
         edges: what lies beyond the picture. "transparent" is black where the picture has no alpha.
         samples: places looked up along a side of each pixel of the result; "auto" follows the stretch s of the map in
-            that direction there: clamp(ceil(1.5 s), 2, 8), and 1 where the map only shifts and turns. 1 everywhere is
-            the sharpest, and aliases where the map shrinks.
+            that direction there: clamp(ceil(1.5 s), 2, 8), and 1 where the map only shifts.
         linear_light: mix in linear light; uint8 and uint16 are taken as sRGB, float32 as linear already.
         dither: spread the rounding to 8 bits by a fixed pattern; by default where light is mixed.
     """

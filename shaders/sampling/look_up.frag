@@ -1,6 +1,6 @@
 // Look up: the picture at x + D(x), the mean of places spread evenly over each pixel of the result.
 // Along x and along y there are clamp(ceil(1.5 s), 2, 8) of them, s the stretch of the map in that direction over the
-// pixel, or one at the centre where the map only shifts and turns.
+// pixel, or one at the centre where the map only shifts.
 //
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels; premultiplied
 // where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
@@ -106,12 +106,12 @@ void main() {
     vec2 a = displacement(0, 0), b = displacement(1, 0), c = displacement(0, 1), d = displacement(1, 1);
     vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d), bend = a - b - c + d;
     vec2 along_x = 0.5 * (b - a + d - c) + vec2(zoom.x, 0.0), along_y = 0.5 * (c - a + d - b) + vec2(0.0, zoom.y);
-    vec2 stretch = vec2(length(along_x), length(along_y));
-    // Where the map only shifts and turns, one place is enough, and keeps the picture as sharp as it is; between that and a
-    // real distortion the places move apart, so that no seam shows.
-    float strain = abs(stretch.x - 1.0) + abs(stretch.y - 1.0) + abs(dot(along_x, along_y));
+    // Where the map only shifts and turns, one place is enough, and keeps the picture as sharp as it is; between that and
+    // a real distortion the places move apart, so that no seam shows.
+    float strain = abs(length(along_x) - 1.0) + abs(length(along_y) - 1.0) + abs(dot(along_x, along_y));
     float apart = smoothstep(0.0, 0.2, strain);
     bool shifted = apart < 1e-3;
+    vec2 stretch = vec2(length(along_x), length(along_y));
     vec2 samples = shifted ? vec2(1.0) : clamp(ceil(1.5 * stretch), float(LEAST_SAMPLES), float(MOST_SAMPLES));
     // As far apart as gives them the variance of the pixel itself: a mean of fourth order.
     vec2 spread = samples.x * samples.y > 1.0 ? apart * inversesqrt(1.0 - 1.0 / (samples * samples)) : vec2(0.0);
