@@ -145,14 +145,9 @@ class Fluid:
         with self.device.stage("project"):
             self._take_up_solids()
             source = self.source if self._has_source else None
-            self._pressure_solver.project(self.velocity, self._pressure_cycles(), source)
-            self.device.pass_("stages/carry_pressure.frag")(
-                self._carried.write,
-                before_projection=self.velocity.write,
-                velocity=self.velocity.read,
-                carried=self._carried.read,
+            self._pressure_solver.project(
+                self.velocity, self.params.pressure_cycles, source, warm=True, carried=self._carried
             )
-            self._carried.swap()
             if self._has_source:
                 self.source.clear()
                 self._has_source = False
@@ -165,7 +160,7 @@ class Fluid:
         faces[:, 0, 0] = 0.0
         faces[0, :, 1] = 0.0
         self.velocity.read.set(faces)
-        self._carried.read.clear()
+        self._forget_pressure()
 
     def set_viscosity(self, viscosity: np.ndarray | float) -> None:
         """Set the viscosity of the cells, lengths^2 / s, from (ny, nx) or one number.
@@ -256,7 +251,7 @@ class Fluid:
 
     def state(self) -> Sequence[Field]:
         """The fields that a later step depends on, for checkpoints: copies of them bring this moment back exactly."""
-        return self.velocity.read, self._carried.read, self.viscosity, self.solid
+        return self.velocity.read, self._carried.read, *self._pressure_solver.state(), self.viscosity, self.solid
 
     def load(self, state: Sequence[Field]) -> None:
         """Go back to copies of `state()` taken earlier."""
@@ -267,7 +262,7 @@ class Fluid:
     def clear_velocity(self) -> None:
         """Stop all motion."""
         self.velocity.read.clear()
-        self._carried.read.clear()
+        self._forget_pressure()
 
     def release(self) -> None:
         """Free the textures."""
@@ -276,13 +271,9 @@ class Fluid:
         self._viscosity_solver.release()
         self._pressure_solver.release()
 
-    def _pressure_cycles(self) -> int:
-        """As many as are asked for, or as leave about a thousandth of the divergence."""
-        if self.params.pressure_cycles is not None:
-            return self.params.pressure_cycles
-        # Where viscosity varies, its edges leave a rough divergence, of which two cycles would leave a hundredth.
-        varies = self._viscosity_solver.plan.steps > 0
-        return max(self._pressure_solver.cycles, 3 if varies else 0)
+    def _forget_pressure(self) -> None:
+        self._carried.read.clear()
+        self._pressure_solver.forget()
 
     def _take_up_solids(self) -> None:
         """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""

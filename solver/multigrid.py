@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import ceil, cos, pi, sqrt
+from math import ceil, cos, log, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver.field import DoubleField, Field
 from solver.passes import Target
+from solver.reduce import Reduction
+from solver.separable import Separable
 
 if TYPE_CHECKING:
     from solver.context import Device
@@ -35,8 +37,20 @@ SWEEPS = (chebyshev_weights(3, 0.7), chebyshev_weights(4, 0.35), chebyshev_weigh
 # there, and a second visit costs less than another cycle.
 TWICE = 2
 
-# See `Pressure.cycles`.
-TWO_CYCLES_FROM = 200
+# What the projection may leave of the divergence, and what a first cycle leaves of its rough and of all of its parts, and
+# each further one of that: found with all sorts of flows, see `left_by_one`.
+WANTED_LEFT = 1e-3
+ROUGH_LEFT, SMOOTH_LEFT, LEFT_BY_A_CYCLE = 0.25, 0.0025, 0.08
+
+
+def left_by_one(left: float, rough: float) -> float:
+    """What about one cycle leaves of a divergence, as parts of the one before the projection.
+
+    Args:
+        left: what there is before it; 1 when starting from rest.
+        rough: the same of what differs from the means over blocks of 2 x 2 cells.
+    """
+    return ROUGH_LEFT * rough + SMOOTH_LEFT * left
 
 
 class Level:
@@ -91,10 +105,17 @@ class Pressure:
         blocks, coarsest = self._levels[0].size, self._levels[-1].size
         count = coarsest[0] * coarsest[1]
         self._inverse = device.field((4 * count, count), 4, "pressure inverse")
-        self._base = device.field(blocks, 4, "pressure base")
-        self._change = device.double_field(blocks, 4, "pressure change")
+        # Where there are no solids a much finer level can be solved directly.
+        separable = next(level for level in self._levels if Separable.is_worth(level.size))
+        self._separable_level = separable
+        self._separable = Separable(device, separable.span, separable.size)
+        self._base, self._last, self._change = (
+            device.double_field(blocks, 4, f"pressure {name}") for name in ("base", "last", "change")
+        )
         self._applied = device.field(blocks, 4, "pressure applied")
-        self._u, self._v = (device.field(blocks, 4, f"velocity {name} in blocks") for name in "uv")
+        self._wanted, self._live = (device.field(blocks, 4, f"pressure {name}") for name in ("wanted", "live"))
+        self._squares = device.field(blocks, 4, "pressure squares")
+        self._add_squares = Reduction(device, blocks, 4, "sum")
         self._sums: list[Field] = []
         while blocks != (1, 1) or not self._sums:
             blocks = ((blocks[0] + 7) // 8, (blocks[1] + 7) // 8)
@@ -103,10 +124,10 @@ class Pressure:
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self._levels, *self._sums, self._inverse, self._base, self._change, self._applied):
+        for item in (*self._levels, *self._sums, self._inverse, self._separable, self._base, self._last, self._change):
             item.release()
-        self._u.release()
-        self._v.release()
+        for item in (self._applied, self._wanted, self._live, self._squares, self._add_squares):
+            item.release()
 
     # -- what goes in and comes out ---------------------------------------------------------------------------------
 
@@ -128,57 +149,68 @@ class Pressure:
         self._inverse.set(_inverse(levels[-1]))
 
     def project(
-        self, velocity: DoubleField, cycles: int | None = None, source: Field | None = None, warm: bool = False
-    ) -> None:
+        self,
+        velocity: DoubleField,
+        cycles: int | None = None,
+        source: Field | None = None,
+        warm: bool = False,
+        carried: DoubleField | None = None,
+    ) -> int:
         """Make `velocity` free of divergence, or its divergence equal to the source's; writes and swaps.
 
         Args:
             velocity: MAC velocity, lengths / s; its faces at edges and solids become exactly zero.
-            cycles: multigrid cycles, by default `self.cycles`; each leaves about a tenth of the divergence, and less of
-                a smooth one.
+            cycles: multigrid cycles, by default as many as leave a thousandth of the divergence.
             source: wanted divergence at cells, 1 / s; its mean over the fluid is taken off: nothing leaves the grid.
-            warm: start from the last pressure, scaled to leave the least: never worse than to start from none.
+            warm: start from the pressure that the last two let expect, unless that is worse than to start from rest.
+            carried: gradients at MAC faces, lengths / s, replaced by their mean with that of this pressure.
+
+        Returns:
+            The number of cycles.
         """
-        cycles = self.cycles if cycles is None else cycles
         finest = self._levels[0]
-        self._take_divergence(velocity.read, source)
-        corrections = 0
-        if warm:
-            pass_ = self.device.pass_("pressure/add.frag")
-            pass_(finest.pressure.read, a=self._base, b=self._change.read)
-            self._scale_and_subtract(finest)
-            self._keep_correction(corrections)
-            corrections += 1
+        from_rest, from_expected = self._try_expected(velocity.read, source)
+        is_warm = warm and from_expected <= 1.5 * from_rest
+        if not is_warm:
+            self._take_divergence(velocity.read, source)
+        if cycles is None:
+            left = max(WANTED_LEFT, from_expected if is_warm else from_rest)
+            cycles = 1 + ceil(log(left / WANTED_LEFT, 1 / LEFT_BY_A_CYCLE))
         for cycle in range(cycles):
             self._solve(0)
             if self._has_solids:
                 self._scale_and_subtract(finest)
             elif cycle < cycles - 1:
                 self._subtract_laplacian(finest, finest.pressure.read)
-            self._keep_correction(corrections)
-            corrections += 1
-        for part in (self._base, self._change.read)[corrections:]:
-            part.clear()
-        self._draw("subtract_gradient", (self._u, self._v), finest,
-                   velocity=velocity.read, base=self._base, change=self._change.read)  # fmt: skip
-        self.device.pass_("pressure/scatter_velocity.frag")(velocity.write, u=self._u, v=self._v)
-        velocity.swap()
+            self._keep_correction(cycle + is_warm)
+        if cycles + is_warm < 2:
+            self._change.read.clear()
+        parts = {"base": self._base.read, "change": self._change.read}
+        targets, carry = [velocity.write], {}
+        if carried is not None:
+            targets, carry = [velocity.write, carried.write], {"carried": carried.read}
+        subtract = self.device.pass_("pressure/subtract_gradient.frag", **self._variant, **({"CARRY": 1} if carry else {}))
+        subtract(targets, velocity=velocity.read, left=finest.left, up=finest.up, **parts, **carry)
+        self.device.pass_("pressure/expect.frag")(
+            (self._last.write, self._base.write), before=self._last.read, **parts, trend=float(is_warm)
+        )
+        for pair in (velocity, self._last, self._base, *([carried] if carried is not None else [])):
+            pair.swap()
+        return cycles
 
-    @property
-    def cycles(self) -> int:
-        """Cycles that leave at most about 1e-3 of the divergence of a few brush impulses, from a cold start.
+    def state(self) -> tuple[Field, Field]:
+        """The fields that a later warm start depends on."""
+        return self._last.read, self._base.read
 
-        Measured with Gaussians of radius 0.03-0.08: two leave 5e-4 in an open box, but up to 1.5e-3 of it on grids with
-        a side below `TWO_CYCLES_FROM` cells, where they are steep and near walls; thin walls cost one or two more.
-        """
-        if self._has_solids:
-            return 4
-        return 2 if min(self.size) >= TWO_CYCLES_FROM else 3
+    def forget(self) -> None:
+        """Expect no pressure: the velocity is a new one."""
+        for field in self.state():
+            field.clear()
 
     @property
     def pressure(self) -> np.ndarray:
         """The last pressure, (ny, nx) float32, lengths^2 / s: it includes the time step."""
-        return _cells(self._base.get() + self._change.read.get(), self.size) * np.float32(self.h)
+        return _cells(self._last.read.get(), self.size) * np.float32(self.h)
 
     def divergence_norm(self, velocity: Field) -> float:
         """Root mean square divergence of a MAC velocity over all cells, 1 / s; waits for the GPU."""
@@ -194,23 +226,35 @@ class Pressure:
     ) -> None:
         """Draw a pass that needs the faces of its level."""
         pass_ = self.device.pass_(f"pressure/{shader}.frag", **self._variant, **(defines or {}))
-        pass_(target, span=level.span, **level.faces, **inputs)
+        pass_(target, **(level.faces if self._has_solids else {"span": level.span}), **inputs)
 
-    def _take_divergence(self, velocity: Field, source: Field | None) -> None:
-        """The right-hand side of the finest level."""
+    def _take_divergence(self, velocity: Field, source: Field | None, **expected: Any) -> None:
+        """The right-hand side of the finest level; less what is `expected`, with the squares of both."""
         finest = self._levels[0]
-        if source is None:
-            self._draw("divergence", finest.residual.read, finest, velocity=velocity)
-            return
-        # The blocks of the velocity are free until the end of a projection.
-        wanted, live = self._u, self._v
-        self._draw("gather_source", (wanted, live), finest, source=source, scale=self.h)
-        self._draw("divergence", finest.residual.read, finest, {"WITH_SOURCE": 1},
-                   velocity=velocity, source=wanted, sums=self._dot(wanted, live))  # fmt: skip
+        defines: dict[str, Any] = {}
+        target: Target = finest.residual.read
+        if expected:
+            defines["EXPECTED"] = 1
+            target = finest.residual.read, self._squares
+        if source is not None:
+            defines["WITH_SOURCE"] = 1
+            self._draw("gather_source", (self._wanted, self._live), finest, source=source, scale=self.h)
+            expected |= {"source": self._wanted, "sums": self._dot(self._wanted, self._live)}
+        self._draw("divergence", target, finest, defines, velocity=velocity, **expected)
+
+    def _try_expected(self, velocity: Field, source: Field | None) -> tuple[float, float]:
+        """Start from the pressure expected; `left_by_one` from rest, and from there. Waits for the GPU."""
+        self._take_divergence(velocity, source, expected=self._base.read)
+        squares = self._add_squares(self._squares)
+        all_, rough, left, left_rough = np.sqrt(np.maximum(squares, 0.0) / (squares[0] or 1.0)).tolist()
+        return left_by_one(all_, rough), left_by_one(left, left_rough)
 
     def _solve(self, number: int) -> None:
         """One cycle from a level down: from a zero guess, the `pressure` that roughly accounts for its `residual`."""
         pass_, level = self.device.pass_, self._levels[number]
+        if not self._has_solids and level is self._separable_level:
+            self._separable.solve(level.residual.read, level.pressure.read)
+            return
         if level is self._levels[-1]:
             pass_("pressure/solve_directly.frag")(
                 level.pressure.read, residual=level.residual.read, inverse=self._inverse
@@ -255,7 +299,7 @@ class Pressure:
         """Make the correction part of the pressure: the base, or the change, or added to it, after `before` others."""
         pressure = self._levels[0].pressure
         if before == 0:
-            self._base, pressure.read = pressure.read, self._base
+            self._base.read, pressure.read = pressure.read, self._base.read
         elif before == 1:
             self._change.read, pressure.read = pressure.read, self._change.read
         else:

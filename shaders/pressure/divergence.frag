@@ -3,8 +3,9 @@
 // in:  u_velocity   MAC velocity, lengths / s
 //      u_left, u_up, u_far, u_span   faces
 // With WITH_SOURCE: u_source, h s at blocks, lengths / s; u_sums, whose quotient is its mean over the fluid.
-// out: r at blocks, lengths / s
-// reads: 11
+// With EXPECTED: u_expected, a pressure / h at blocks, lengths / s, that is subtracted: r - A p; and a second output.
+// out: r at blocks, lengths / s;  squares: R of r, G of r - A p, over the block
+// reads: 16
 #include "lib/block_faces.glsl"
 #include "lib/quotient.glsl"
 
@@ -14,7 +15,17 @@ uniform sampler2D u_source;
 uniform sampler2D u_sums;
 #endif
 
-out vec4 out_residual;
+layout(location = 0) out vec4 out_residual;
+#ifdef EXPECTED
+uniform sampler2D u_expected;
+layout(location = 1) out vec4 out_squares;
+
+// Sum of the squares, and that of what differs from the block's mean.
+vec2 squares(vec4 r) {
+    float whole = dot(r, r), sum = dot(r, vec4(1.0));
+    return vec2(whole, whole - 0.25 * sum * sum);
+}
+#endif
 
 void main() {
     vec2 texel = 1.0 / vec2(textureSize(u_velocity, 0)), a = (2.0 * floor(gl_FragCoord.xy) + 0.5) * texel;
@@ -28,5 +39,10 @@ void main() {
                  + f.down * vec4(v01.y, v11.y, down) - f.up * vec4(v00.y, v10.y, v01.y, v11.y);
 #ifdef WITH_SOURCE
     out_residual -= texture(u_source, v_uv) - quotient(u_sums) * live(f);
+#endif
+#ifdef EXPECTED
+    out_squares.xy = squares(out_residual);
+    out_residual -= laplacian(u_expected, texture(u_expected, v_uv), f);
+    out_squares.zw = squares(out_residual);
 #endif
 }

@@ -1,33 +1,43 @@
-// The velocity made free of divergence, still in blocks:  u - (p - p_left),  v - (p - p_up),  and 0 on closed faces.
+// The velocity made free of divergence:  u - (p - p_left),  v - (p - p_up),  and 0 on closed faces.
 // The pressure comes as a sum that is taken only after the differences, which keeps the digits of the smaller part.
 // in:  u_velocity         MAC velocity, lengths / s
 //      u_base, u_change   the two parts of pressure / h at blocks, lengths / s
-//      u_left, u_up, u_far, u_span   faces
-// out: u and v of the blocks' four cells, lengths / s
-// reads: 13
-#include "lib/block_faces.glsl"
-
+//      u_left, u_up       faces of the blocks, not needed with OPEN (no solids)
+// With CARRY: u_carried, gradients at MAC faces, lengths / s, and a second output.
+// out: MAC velocity, lengths / s;  the mean of u_carried and of this gradient
+// reads: 8
 uniform sampler2D u_velocity;
 uniform sampler2D u_base;
 uniform sampler2D u_change;
+uniform sampler2D u_left;
+uniform sampler2D u_up;
 
-layout(location = 0) out vec4 out_u;
-layout(location = 1) out vec4 out_v;
-
-void differences(sampler2D p, out vec4 dx, out vec4 dy) {
-    vec4 here = texture(p, v_uv);
-    dx = here - vec4(textureOffset(p, v_uv, ivec2(-1, 0)).yw, here.xz).xzyw;
-    dy = here - vec4(textureOffset(p, v_uv, ivec2(0, -1)).zw, here.xy);
-}
+in vec2 v_uv;
+layout(location = 0) out vec2 out_velocity;
+#ifdef CARRY
+uniform sampler2D u_carried;
+layout(location = 1) out vec2 out_carried;
+#endif
 
 void main() {
-    vec2 texel = 1.0 / vec2(textureSize(u_velocity, 0)), a = (2.0 * floor(gl_FragCoord.xy) + 0.5) * texel, b = a + texel;
-    vec2 v00 = texture(u_velocity, a).rg, v10 = texture(u_velocity, vec2(b.x, a.y)).rg;
-    vec2 v01 = texture(u_velocity, vec2(a.x, b.y)).rg, v11 = texture(u_velocity, b).rg;
-    vec4 base_x, base_y, change_x, change_y;
-    differences(u_base, base_x, base_y);
-    differences(u_change, change_x, change_y);
-    Faces f = faces();
-    out_u = f.left * (vec4(v00.x, v10.x, v01.x, v11.x) - base_x - change_x);
-    out_v = f.up * (vec4(v00.y, v10.y, v01.y, v11.y) - base_y - change_y);
+    // Where the cell itself, the one to the left and the one above lie in their blocks.
+    vec2 cell = floor(gl_FragCoord.xy), texel = 1.0 / vec2(textureSize(u_base, 0)), block = floor(0.5 * cell);
+    vec2 odd = cell - 2.0 * block, even = 1.0 - odd, at = (block + 0.5) * texel;
+    vec2 left = vec2(at.x - even.x * texel.x, at.y), up = vec2(at.x, at.y - even.y * texel.y);
+    vec4 here_is = vec2(even.x, odd.x).xyxy * vec2(even.y, odd.y).xxyy;
+    vec4 left_is = here_is.yxwz, up_is = here_is.zwxy;
+    vec4 base = texture(u_base, at), change = texture(u_change, at);
+    vec2 gradient = dot(here_is, base)
+                  - vec2(dot(left_is, texture(u_base, left)), dot(up_is, texture(u_base, up)));
+    gradient += dot(here_is, change)
+              - vec2(dot(left_is, texture(u_change, left)), dot(up_is, texture(u_change, up)));
+#ifdef OPEN
+    vec2 open = vec2(greaterThan(cell, vec2(0.5)));
+#else
+    vec2 open = vec2(dot(here_is, texture(u_left, at)), dot(here_is, texture(u_up, at)));
+#endif
+    out_velocity = open * (texture(u_velocity, v_uv).rg - gradient);
+#ifdef CARRY
+    out_carried = open * 0.5 * (texture(u_carried, v_uv).rg + gradient);
+#endif
 }
