@@ -72,6 +72,7 @@ class Fluid:
         self.solid = device.field(grid.size, 1, "solid", "f1")
         self.source = device.field(grid.size, 1, "divergence source")
         self._trace = device.field(grid.size, 2, "trace")
+        self._departing = device.field(grid.size, 4, "departing velocity")
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         self.measuring = False
         self.residuals = Residuals()
@@ -120,15 +121,13 @@ class Fluid:
         172 (2001), treat such schemes.
         """
         with self.device.stage("advect"):
-            walls = self._wall_inputs()
-            trace = self.device.pass_("stages/trace.frag", **self._wall_defines())
-            trace(self._trace, velocity=self.velocity.read, dt_over_h=dt / self.grid.h, **walls)
-            self.device.pass_("stages/add_force.frag")(
-                self.velocity.read, add=True, force=self._carried.read, impulse=-1.0
-            )
+            walls, dt_over_h = self._wall_inputs(), dt / self.grid.h
+            trace = self.device.pass_("stages/trace.frag", DEPART=1, **self._wall_defines())
+            trace((self._trace, self._departing), velocity=self.velocity.read, carried=self._carried.read,
+                  dt_over_h=dt_over_h, **walls)  # fmt: skip
             advect = self.device.pass_("stages/advect.frag", **self._wall_defines())
             decay = math.exp(-self.params.drag * dt)
-            advect(self.velocity.write, velocity=self.velocity.read, trace=self._trace, decay=decay, **walls)
+            advect(self.velocity.write, departing=self._departing, trace=self._trace, decay=decay, **walls)
             self.velocity.swap()
 
     def diffuse(self, dt: float) -> None:
@@ -266,7 +265,9 @@ class Fluid:
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self.velocity, self.viscosity, self.solid, self.source, self._trace, self._carried):
+        for item in (self.velocity, self.viscosity, self.solid, self.source):
+            item.release()
+        for item in (self._trace, self._departing, self._carried):
             item.release()
         self._viscosity_solver.release()
         self._pressure_solver.release()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, cos, log, pi, sqrt
 from typing import TYPE_CHECKING, Any
@@ -37,20 +38,34 @@ SWEEPS = (chebyshev_weights(3, 0.7), chebyshev_weights(4, 0.35), chebyshev_weigh
 # there, and a second visit costs less than another cycle.
 TWICE = 2
 
-# What the projection may leave of the divergence, and what a first cycle leaves of its rough and of all of its parts, and
-# each further one of that: found with all sorts of flows, see `left_by_one`.
+# What the projection may leave of the divergence.
 WANTED_LEFT = 1e-3
-ROUGH_LEFT, SMOOTH_LEFT, LEFT_BY_A_CYCLE = 0.25, 0.0025, 0.08
 
 
-def left_by_one(left: float, rough: float) -> float:
-    """What about one cycle leaves of a divergence, as parts of the one before the projection.
+@dataclass(frozen=True)
+class Convergence:
+    """What cycles leave of a divergence, about: found with impulses, strokes, painted viscosities and walls.
 
-    Args:
-        left: what there is before it; 1 when starting from rest.
-        rough: the same of what differs from the means over blocks of 2 x 2 cells.
+    Attributes:
+        rough: the part that the first one leaves of what differs from the means over blocks of 2 x 2 cells.
+        smooth: and of all.
+        each: the part of that which every further one leaves.
     """
-    return ROUGH_LEFT * rough + SMOOTH_LEFT * left
+
+    rough: float
+    smooth: float
+    each: float
+
+    def left_by_one(self, whole: float, rough: float) -> float:
+        """What one cycle leaves of the whole divergence and its rough part."""
+        return self.rough * rough + self.smooth * whole
+
+    def cycles(self, left_by_one: float) -> int:
+        """Cycles that leave little enough."""
+        return 1 + ceil(log(max(left_by_one / WANTED_LEFT, 1.0), 1 / self.each))
+
+
+OPEN, WALLED = Convergence(0.25, 0.0025, 0.08), Convergence(0.15, 0.0025, 0.18)
 
 
 class Level:
@@ -59,11 +74,13 @@ class Level:
     Attributes:
         span: the finest grid's size in cells of this level, which halves exactly: the last cells may be narrower.
         size: in blocks.
+        is_whole: no cell is narrower.
     """
 
     def __init__(self, device: Device, span: tuple[float, float], number: int) -> None:
         self.span = span
         self.size = (ceil(span[0] / 2), ceil(span[1] / 2))
+        self.is_whole = all(length == int(length) for length in span)
         label = f"pressure level {number}"
         # Between cells that are narrower than the others a face can count for more than 1.
         kind = "f2" if number else "f1"
@@ -113,7 +130,8 @@ class Pressure:
             device.double_field(blocks, 4, f"pressure {name}") for name in ("base", "last", "change")
         )
         self._applied = device.field(blocks, 4, "pressure applied")
-        self._wanted, self._live = (device.field(blocks, 4, f"pressure {name}") for name in ("wanted", "live"))
+        # While a velocity is projected, what is wanted of its divergence and where; then the pressure's gradient.
+        self._across, self._down = (device.field(blocks, 4, f"pressure {name}") for name in ("across", "down"))
         self._squares = device.field(blocks, 4, "pressure squares")
         self._add_squares = Reduction(device, blocks, 4, "sum")
         self._sums: list[Field] = []
@@ -126,7 +144,7 @@ class Pressure:
         """Free the textures."""
         for item in (*self._levels, *self._sums, self._inverse, self._separable, self._base, self._last, self._change):
             item.release()
-        for item in (self._applied, self._wanted, self._live, self._squares, self._add_squares):
+        for item in (self._applied, self._across, self._down, self._squares, self._add_squares):
             item.release()
 
     # -- what goes in and comes out ---------------------------------------------------------------------------------
@@ -136,6 +154,7 @@ class Pressure:
         shader, levels = self.device.pass_, self._levels
         self._has_solids = solid is not None
         self._variant: dict[str, Any] = {} if self._has_solids else {"OPEN": 1}
+        self._convergence = WALLED if self._has_solids else OPEN
         finest = levels[0]
         everywhere = solid or self.device.field(self.size, 1, "no solids", "f1")
         shader("pressure/open_faces.frag")((finest.left, finest.up, finest.far), solid=everywhere)
@@ -174,8 +193,7 @@ class Pressure:
         if not is_warm:
             self._take_divergence(velocity.read, source)
         if cycles is None:
-            left = max(WANTED_LEFT, from_expected if is_warm else from_rest)
-            cycles = 1 + ceil(log(left / WANTED_LEFT, 1 / LEFT_BY_A_CYCLE))
+            cycles = self._convergence.cycles(from_expected if is_warm else from_rest)
         for cycle in range(cycles):
             self._solve(0)
             if self._has_solids:
@@ -185,16 +203,21 @@ class Pressure:
             self._keep_correction(cycle + is_warm)
         if cycles + is_warm < 2:
             self._change.read.clear()
-        parts = {"base": self._base.read, "change": self._change.read}
-        targets, carry = [velocity.write], {}
-        if carried is not None:
-            targets, carry = [velocity.write, carried.write], {"carried": carried.read}
-        subtract = self.device.pass_("pressure/subtract_gradient.frag", **self._variant, **({"CARRY": 1} if carry else {}))
-        subtract(targets, velocity=velocity.read, left=finest.left, up=finest.up, **parts, **carry)
-        self.device.pass_("pressure/expect.frag")(
-            (self._last.write, self._base.write), before=self._last.read, **parts, trend=float(is_warm)
-        )
-        for pair in (velocity, self._last, self._base, *([carried] if carried is not None else [])):
+        pass_ = self.device.pass_
+        pass_("pressure/gradient.frag")(
+            (self._across, self._down, self._last.write, self._base.write),
+            base=self._base.read, change=self._change.read, before=self._last.read, trend=float(is_warm),
+        )  # fmt: skip
+        inputs: dict[str, Any] = {"velocity": velocity.read, "across": self._across, "down": self._down}
+        if self._has_solids:
+            inputs |= {"left": finest.left, "up": finest.up}
+        if carried is None:
+            pass_("pressure/subtract_gradient.frag", **self._variant)(velocity.write, **inputs)
+        else:
+            targets = velocity.write, carried.write
+            pass_("pressure/subtract_gradient.frag", CARRY=1, **self._variant)(targets, carried=carried.read, **inputs)
+            carried.swap()
+        for pair in (velocity, self._last, self._base):
             pair.swap()
         return cycles
 
@@ -225,7 +248,8 @@ class Pressure:
         self, shader: str, target: Target, level: Level, defines: dict[str, Any] | None = None, **inputs: Any
     ) -> None:
         """Draw a pass that needs the faces of its level."""
-        pass_ = self.device.pass_(f"pressure/{shader}.frag", **self._variant, **(defines or {}))
+        whole = {"WHOLE": 1} if not self._has_solids and level.is_whole else {}
+        pass_ = self.device.pass_(f"pressure/{shader}.frag", **self._variant, **whole, **(defines or {}))
         pass_(target, **(level.faces if self._has_solids else {"span": level.span}), **inputs)
 
     def _take_divergence(self, velocity: Field, source: Field | None, **expected: Any) -> None:
@@ -238,16 +262,16 @@ class Pressure:
             target = finest.residual.read, self._squares
         if source is not None:
             defines["WITH_SOURCE"] = 1
-            self._draw("gather_source", (self._wanted, self._live), finest, source=source, scale=self.h)
-            expected |= {"source": self._wanted, "sums": self._dot(self._wanted, self._live)}
+            self._draw("gather_source", (self._across, self._down), finest, source=source, scale=self.h)
+            expected |= {"source": self._across, "sums": self._dot(self._across, self._down)}
         self._draw("divergence", target, finest, defines, velocity=velocity, **expected)
 
     def _try_expected(self, velocity: Field, source: Field | None) -> tuple[float, float]:
-        """Start from the pressure expected; `left_by_one` from rest, and from there. Waits for the GPU."""
+        """Start from the pressure expected; what a cycle would leave from rest, and from there. Waits for the GPU."""
         self._take_divergence(velocity, source, expected=self._base.read)
         squares = self._add_squares(self._squares)
-        all_, rough, left, left_rough = np.sqrt(np.maximum(squares, 0.0) / (squares[0] or 1.0)).tolist()
-        return left_by_one(all_, rough), left_by_one(left, left_rough)
+        whole, rough, left, left_rough = np.sqrt(np.maximum(squares, 0.0) / (squares[0] or 1.0)).tolist()
+        return self._convergence.left_by_one(whole, rough), self._convergence.left_by_one(left, left_rough)
 
     def _solve(self, number: int) -> None:
         """One cycle from a level down: from a zero guess, the `pressure` that roughly accounts for its `residual`."""

@@ -102,13 +102,18 @@ class WarpMap:
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
-        self.device.pass_("stages/trace.frag")(self._trace, velocity=velocity, dt_over_h=dt / self.grid.h)
-        self.advance_traced(self._trace)
+        advance = self.device.pass_("warp/advance.frag", VELOCITY=1)
+        h = self.grid.h
+        advance(self._near.write, displacement=self._near.read, velocity=velocity, dt_over_h=dt / h, h=h)
+        self._advanced()
 
     def advance_traced(self, trace: Field) -> None:
         """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
         advance = self.device.pass_("warp/advance.frag")
         advance(self._near.write, displacement=self._near.read, trace=trace, h=self.grid.h)
+        self._advanced()
+
+    def _advanced(self) -> None:
         self._near.swap()
         self._steps += 1
         self._changed()

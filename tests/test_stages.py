@@ -33,13 +33,19 @@ def test_trace_and_advect(
     device: Device, nx: int, ny: int, no_slip: bool, speed: tuple[float, ...], courant: float
 ) -> None:
     faces = reference.smooth_velocity(nx, ny, seed=nx, cells=5 if courant < 1 else 20)
+    carried = reference.smooth_velocity(nx, ny, seed=nx + 1)
     velocity, back, after = device.upload(faces), device.field((nx, ny), 2), device.field((nx, ny), 2)
     defines, inputs = wall_inputs(no_slip, speed)
     device.pass_("stages/trace.frag", **defines)(back, velocity=velocity, dt_over_h=courant, **inputs)
-    wanted = reference.trace(faces, courant, no_slip=no_slip, speed=speed)
-    assert relative(back.get(), wanted) < 1e-4
-    device.pass_("stages/advect.frag", **defines)(after, velocity=velocity, trace=back, decay=0.5, **inputs)
-    wanted = 0.5 * reference.advect(faces, courant, no_slip=no_slip, speed=speed)
+    traced = reference.trace(faces, courant, no_slip=no_slip, speed=speed)
+    assert relative(back.get(), traced) < 1e-4
+    departing = device.field((nx, ny), 4)
+    depart = device.pass_("stages/trace.frag", DEPART=1, **defines)
+    depart((back, departing), velocity=velocity, carried=device.upload(carried), dt_over_h=courant, **inputs)
+    assert relative(back.get(), traced) < 1e-4
+    advect = device.pass_("stages/advect.frag", **defines)
+    advect(after, departing=departing, trace=back, decay=0.5, **inputs)
+    wanted = 0.5 * reference.advect(faces, courant, carried, no_slip=no_slip, speed=speed)
     assert relative(after.get(), wanted) < 1e-4
     assert (after.get()[:, 0, 0] == 0).all()
     assert (after.get()[0, :, 1] == 0).all()

@@ -1,5 +1,6 @@
 // The faces of this fragment's block, and the Laplacian over them. For passes whose target is a level's grid of blocks.
 // With OPEN there are no solids: the faces follow from u_span, the grid's size in cells of the level; else they are read.
+// With WHOLE, besides, that size is whole, and so are all cells.
 #include "lib/block.glsl"
 
 uniform sampler2D u_left;
@@ -14,7 +15,14 @@ vec2 link(vec2 side) { return 2.0 / (1.0 + side); }
 
 // 3 reads; none with OPEN.
 Faces faces() {
-#ifdef OPEN
+#ifdef WHOLE
+    // Whether there are cells before, in and behind the block's second half.
+    vec2 first = 2.0 * floor(gl_FragCoord.xy), near = vec2(greaterThan(first, vec2(0.5)));
+    vec2 inner = vec2(greaterThan(u_span, first + 1.5)), far = vec2(greaterThan(u_span, first + 2.5));
+    vec4 columns = vec2(1.0, inner.x).xyxy, rows = vec2(1.0, inner.y).xxyy;
+    return Faces(rows * vec2(near.x, inner.x).xyxy, rows * vec2(inner.x, far.x).xyxy,
+                 columns * vec2(near.y, inner.y).xxyy, columns * vec2(inner.y, far.y).xxyy);
+#elif defined(OPEN)
     // The sides of this block's cells and of the next, and how strong the links before, in and behind the block are.
     vec2 first = 2.0 * floor(gl_FragCoord.xy);
     vec2 side = min(u_span - first, 1.0), second = clamp(u_span - first - 1.0, 0.0, 1.0);

@@ -1,0 +1,32 @@
+// The gradient of the pressure, the whole pressure, and the one to expect next, by its trend.
+// The pressure comes as a sum that is taken only after the differences, which keeps the digits of the smaller part.
+// in:  u_base, u_change   the two parts of the pressure;  u_before   the one before;  u_trend   1, or 0 for none
+// out: across, down   p - p_left and p - p_up at the blocks' four cells, lengths / s
+//      last           base + change
+//      expected       last + trend (last - before), all of them pressure / h at blocks, lengths / s
+// reads: 7
+uniform sampler2D u_base;
+uniform sampler2D u_change;
+uniform sampler2D u_before;
+uniform float u_trend;
+
+in vec2 v_uv;
+layout(location = 0) out vec4 out_across;
+layout(location = 1) out vec4 out_down;
+layout(location = 2) out vec4 out_last;
+layout(location = 3) out vec4 out_expected;
+
+void differences(sampler2D p, vec4 here, out vec4 across, out vec4 down) {
+    across = here - vec4(textureOffset(p, v_uv, ivec2(-1, 0)).yw, here.xz).xzyw;
+    down = here - vec4(textureOffset(p, v_uv, ivec2(0, -1)).zw, here.xy);
+}
+
+void main() {
+    vec4 base = texture(u_base, v_uv), change = texture(u_change, v_uv), across, down;
+    differences(u_base, base, out_across, out_down);
+    differences(u_change, change, across, down);
+    out_across += across;
+    out_down += down;
+    out_last = base + change;
+    out_expected = out_last + u_trend * (out_last - texture(u_before, v_uv));
+}
