@@ -26,7 +26,7 @@ class FluidParams:
     Attributes:
         walls: see `Walls`.
         drag: rate at which all motion dies away, per second; 0 is the paper's fluid.
-        pressure_cycles: multigrid cycles of the projection; None leaves it to the projection, see `Pressure.cycles`.
+        pressure_cycles: multigrid cycles of the projection; None: as many as leave a thousandth of the divergence.
         sweeps: Jacobi sweeps of the paper's own scheme (solver "paper"), for viscosity and for pressure each.
     """
 

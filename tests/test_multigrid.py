@@ -10,7 +10,8 @@ from scipy.sparse.linalg import spsolve
 
 from solver.context import Device
 from solver.grid import Grid
-from solver.multigrid import Pressure
+from solver.multigrid import Level, Pressure
+from solver.separable import Separable
 
 SIZES = [(8, 8), (9, 13), (64, 64), (61, 40), (100, 23)]
 
@@ -127,6 +128,32 @@ def test_it_agrees_with_a_direct_solve(device: Device, size: tuple[int, int], de
     exact = exact_projection(velocity, solid)
     result = project(device, velocity, solid, 20)
     assert np.linalg.norm(result - exact) <= 1e-4 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("size", [(64, 64), (61, 40), (9, 13)])
+def test_small_grids_without_solids_are_solved_in_one_cycle(device: Device, size: tuple[int, int]) -> None:
+    solid = np.zeros((size[1], size[0]), bool)
+    velocity = np.random.default_rng(3).standard_normal((size[1], size[0], 2)).astype(np.float32)
+    exact = exact_projection(velocity, solid)
+    assert np.linalg.norm(project(device, velocity, solid, 1) - exact) <= 1e-5 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("span", [(42.625, 64.0), (13.5, 9.25), (7.0, 25.75)])
+def test_grids_with_narrow_last_cells_are_solved_exactly(device: Device, span: tuple[float, float]) -> None:
+    level = Level(device, span, 1)
+    solver = Separable(device, span, level.size)
+    applied = device.field(level.size, 4)
+    residual = np.random.default_rng(6).standard_normal((level.size[1], level.size[0], 4))
+    # What some pressure accounts for: its Laplacian.
+    level.pressure.read.set(residual)
+    laplacian = device.pass_("pressure/residual.frag", OPEN=1, ONLY_LAPLACIAN=1)
+    laplacian(level.residual.read, span=span, pressure=level.pressure.read)
+    solver.solve(level.residual.read, level.pressure.read)
+    laplacian(applied, span=span, pressure=level.pressure.read)
+    wanted = level.residual.read.get()
+    assert np.linalg.norm(applied.get() - wanted) <= 1e-5 * np.linalg.norm(wanted)
+    solver.release()
+    level.release()
 
 
 SIZES_TO_REACH = [(512, 512), (333, 217), (512, 100), (257, 255)]
