@@ -41,6 +41,10 @@ RESTORING = 6.0  # per second, the part of the displacement that is taken away
 
 MOST_HEADWAY = 20.0
 
+# How a push slips: radii of its path that it holds fast, and the part of its speed that it gives in the end.
+FIRM = 0.7
+LOOSEST = 0.3
+
 # What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
 FARTHEST = 2.0
 WIDEST = 3.0
@@ -275,7 +279,8 @@ class Replay:
         pressed = sum(amount for _, amount in tips) / len(tips)
         match stroke.tool:
             case "push":
-                self._lead(Push(whole, dt, pressed))
+                far = stroke.travelled(self.tick, self.grid.extent) / stroke.radius
+                self._lead(Push(whole, dt, pressed, grip(far)))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
@@ -299,12 +304,12 @@ class Replay:
 
     def _lead(self, motion: Push | Twirl) -> None:
         """Let a brush lead the fluid: with what viscosity and drag will take of it, and again once they have."""
-        self._brush.lead(self.fluid, motion, headway(self.settings, motion.tip.radius))
+        self._brush.lead(self.fluid, motion, headway(self.settings, motion.tip.radius), warp=self.warp)
         self._leading.append(motion)
 
     def _steer(self) -> None:
         for motion in self._leading:
-            self._brush.lead(self.fluid, motion, yielding=True)
+            self._brush.lead(self.fluid, motion, yielding=True, warp=self.warp)
 
     def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
         match stroke.tool:
@@ -416,6 +421,14 @@ class Replay:
             *(change.tick for change in self.recipe.change),
         )
         return self.tick in events
+
+
+def grip(far: float) -> float:
+    """The part of its speed that a push gives to the picture, `far` radii after it began: all at first, then it slips.
+
+    Else a long stroke would draw out what lay at its start into a thread thinner than a cell, where the map folds.
+    """
+    return LOOSEST + (1 - LOOSEST) / (1 + 2 * max(far - FIRM, 0.0) ** 2)
 
 
 def headway(settings: FluidSettings, radius: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import hypot
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
@@ -78,6 +79,14 @@ class Stroke(Model):
         before = None if tick == self.first_tick else self._interpolated(tick - 1)
         after = [] if inside else [self._interpolated(tick)]
         return self._joined(([before] if before else []) + inside + after)
+
+    def travelled(self, tick: int, extent: tuple[float, float]) -> float:
+        """The length of the path up to where the pieces of `at(tick)` begin, in units of `extent`'s sides."""
+        if tick <= self.first_tick:
+            return 0.0
+        passed = [sample for sample in self.samples if sample[0] < tick]
+        passed.append(self._interpolated(min(tick - 1, self.last_tick)))
+        return sum(hypot((b[1] - a[1]) * extent[0], (b[2] - a[2]) * extent[1]) for a, b in pairwise(passed))
 
     def _interpolated(self, tick: int) -> tuple[int, float, float, float]:
         """Where the pointer was at the end of `tick`, which lies between the first and the last."""

@@ -7,11 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from solver.context import Device
+from solver.field import Field
 from solver.fluid import Fluid
 from solver.grid import Grid
 from solver.passes import Region
+from solver.warp import WarpMap
 
 Point = tuple[float, float]
+
+# Of a brush's hardness, for a push: all that the core of its stream function moves has to flow back beside it, and with
+# little room left there it would do so many times faster than the brush moves.
+HARDEST_PUSH = 0.3
 
 
 @dataclass(frozen=True)
@@ -47,21 +53,30 @@ class Tip:
 
 @dataclass(frozen=True)
 class Push:
-    """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it."""
+    """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it.
+
+    `grip` is the part of its own speed that the tip gives to the fluid, however long it leads it.
+    """
 
     tip: Tip
     dt: float
     strength: float = 1.0
+    grip: float = 1.0
 
     @property
     def shader(self) -> str:
         return "brush/push.frag"
 
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self, carried: Field) -> dict[str, Any]:
         (x0, y0), (x1, y1) = self.tip.start, self.tip.end
         # Against the drag at the whole speed, and no stronger than along it.
-        speed = (1.0 if self.strength > 0 else -1.0) / self.dt
-        return {"brush_velocity": ((x1 - x0) * speed, (y1 - y0) * speed), "strength": abs(self.strength)}
+        speed = (self.grip if self.strength > 0 else -self.grip) / self.dt
+        return {
+            "brush_velocity": ((x1 - x0) * speed, (y1 - y0) * speed),
+            "strength": abs(self.strength),
+            "hardness": HARDEST_PUSH * min(max(self.tip.hardness, 0.0), 1.0),
+            "carried": carried,
+        }
 
 
 @dataclass(frozen=True)
@@ -75,7 +90,7 @@ class Twirl:
     def shader(self) -> str:
         return "brush/twirl.frag"
 
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self, carried: Field) -> dict[str, Any]:
         return {"rate": self.rate}
 
 
@@ -89,10 +104,19 @@ class Brush:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._motion = device.field((1, 1), 4, "motion at the brush")
+        self._carried = device.field((1, 1), 2, "displacement at the brush")
 
-    def lead(self, fluid: Fluid, motion: Push | Twirl, headway: float = 1.0, yielding: bool = False) -> None:
+    def lead(
+        self,
+        fluid: Fluid,
+        motion: Push | Twirl,
+        headway: float = 1.0,
+        yielding: bool = False,
+        warp: WarpMap | None = None,
+    ) -> None:
         """Add what the fluid lacks of a motion, `headway` times.
 
+        With `warp`, the picture's map, a push lets slip what has come a long way with it already.
         With `yielding` it spares what is thicker than the fluid at the tip, and what is frozen: for the last touch
         before the projection, which viscosity does not spread any more.
         """
@@ -101,8 +125,13 @@ class Brush:
         reach = max(0.25 * tip.radius / h, 0.5)
         probe = self.device.pass_("brush/probe.frag")
         probe(self._motion, velocity=fluid.faces(), viscosity=fluid.viscosity, at=at, reach=reach, h=h)
+        if warp is not None:
+            width, height = fluid.grid.extent
+            warp.probe(self._carried, (tip.start[0] / width, tip.start[1] / height))
+        else:
+            self._carried.clear()
         region = tip.region(fluid.grid)
-        inputs = tip.inputs(fluid.grid) | motion.inputs() | {"motion": self._motion, "headway": headway}
+        inputs = tip.inputs(fluid.grid) | motion.inputs(self._carried) | {"motion": self._motion, "headway": headway}
         masks = {"viscosity": fluid.viscosity, "solid": fluid.solid} if yielding else {}
         paint = self.device.pass_(motion.shader, **({"YIELDING": 1} if yielding else {}))
         fluid.add_impulse(lambda faces: paint(faces, add=True, region=region, **masks, **inputs))
@@ -124,3 +153,4 @@ class Brush:
 
     def release(self) -> None:
         self._motion.release()
+        self._carried.release()

@@ -13,6 +13,7 @@ import pytest
 from app import project as projects
 from app.export import Job, run
 from app.pictures import read_picture
+from app.presets import HONEY, PUTTY, Feel
 from app.progress import Progress
 from app.session import REST, Session
 from app.tools import TOOL, TOOLS, BrushSettings, Press
@@ -157,3 +158,33 @@ def test_the_first_stroke_does_not_fold(session: Session) -> None:
     statistics = session.replay.warp.statistics()
     assert statistics.displacement_max > 0.15
     assert statistics.folds == 0
+
+
+@pytest.mark.parametrize("feel", [HONEY, PUTTY], ids=lambda feel: feel.name)
+@pytest.mark.parametrize(
+    "ways",
+    [
+        [((0.1, 0.5), (0.9, 0.5))],
+        [((0.1, 0.1), (0.9, 0.9))],
+        [((0.1 + 0.2 * k, 0.5), (0.3 + 0.2 * k, 0.5)) for k in range(4)],
+    ],
+    ids=["across", "corner to corner", "four after one another"],
+)
+def test_a_long_push_smears_and_does_not_fold(session: Session, feel: Feel, ways: list) -> None:
+    session.set_grid(128)
+    session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+    press = Press(BrushSettings(), False, session.extent, session.dt)
+    steps, least = 48 // len(ways), 1.0
+    for (x0, y0), (x1, y1) in ways:
+        session.press(TOOL["push"], press, x0, y0)
+        for k in range(1, steps + 1):
+            session.move(x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps)
+            session.advance(1)
+            least = min(least, session.replay.warp.statistics().det_min)
+        session.release()
+        session.settle()
+    statistics = session.replay.warp.statistics()
+    assert least > 0
+    assert statistics.folds == 0
+    # It still takes what lay under it along for well over its own radius.
+    assert statistics.displacement_max > 1.4 * press.brush.radius
