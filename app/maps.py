@@ -27,6 +27,8 @@ Grid = Literal["centres", "corners", "pixels"]
 FLO_MAGIC = np.float32(202021.25)
 MAP_ENDINGS = (".exr", ".tif", ".tiff", ".flo", ".npy")
 
+HEAD = 65_536  # bytes at the start of a file in which an EXR or TIFF map says what it is
+
 CONVENTIONS = {
     "st": "ST map: R = u, G = v of the place looked up, 0-1, origin bottom left, pixel centres at (x + .5) / width",
     "offsets": "R = x, G = y offset in pixels to the place looked up, x to the right, y up",
@@ -82,6 +84,20 @@ def check_map(path: str | os.PathLike[str]) -> None:
     """Raise `UserError` if `path` has no ending of a map."""
     if Path(path).suffix.lower() not in MAP_ENDINGS:
         raise UserError(f"{path}: a map's name must end in one of {' '.join(MAP_ENDINGS)}.")
+
+
+def is_map(path: str | os.PathLike[str]) -> bool:
+    """True if a file is a warp map beyond doubt: by its ending, or because an EXR or TIFF of ours says so."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in (".exr", ".tif", ".tiff"):
+        return suffix in MAP_ENDINGS
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(HEAD)
+    except OSError:
+        return False
+    return any(convention.encode() in head for convention in CONVENTIONS.values())
 
 
 # Conversions --------------------------------------------------------------------------------------------------------

@@ -74,6 +74,10 @@ class Pictures:
             self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
         return self._maps[name]
 
+    def forget_map(self, name: str) -> None:
+        """Read a map anew when it is wanted next: its file may be another one now."""
+        self._maps.pop(name, None)
+
     def notice(self, text: str) -> None:
         """Note something the user should hear of, once."""
         if text not in self.notices:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.document import Document
+from app.errors import UserError
 from app.project import Project
 from app.recipe import Recipe
 from app.replay import Replay
@@ -361,6 +362,26 @@ class Session:
         """Replace parts of the recipe, as one entry of the history."""
         self.preview(**parts)
         self.commit(name)
+
+    def start_from_map(self, name: str | None) -> None:
+        """Begin with a warp map instead of the picture as it is, or, None, as it is again; an entry of the history.
+
+        Raises:
+            UserError: if it cannot be read, or does not fit the picture or the machine.
+        """
+        self.release()
+        recipe = self._base.edited(map=name)
+        if name is not None:
+            self.pictures.forget_map(name)
+            height, width = self.pictures.load_map(name).shape[:2]
+            most = self.device.limits.max_texture_size
+            if min(width, height) < 6 or max(width, height) > most:
+                raise UserError(f"{name} is {width} x {height}: a map to begin with has from 6 to {most} along a side")
+            recipe.checked(name)
+        if recipe.map == self._live.map:
+            # The same name, and perhaps another file by now.
+            self.preview(map=None)
+        self.edit("Start from a map" if name else "Start from the picture", map=name)
 
     def set_grid(self, cells: int, name: str = "Quality") -> None:
         """Simulate on another grid, by replaying all that has been done."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +13,7 @@ import numpy as np
 from app.pictures import Picture
 from app.project import Project, from_picture
 from app.ui.editor import Editor
-from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
+from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
 from app.ui.files import fresh_recipe
 from app.ui.preferences import Preferences
 from solver.context import Device
@@ -33,6 +37,11 @@ def small_project(folder: Path, grid: int = 48) -> Project:
     write_picture(folder / "pattern.png", pattern())
     recipe = fresh_recipe()
     return from_picture(folder / "pattern.png", recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": grid})))
+
+
+def command_line(*words: str) -> None:
+    """Run `fluidwarp words...` in a process of its own."""
+    subprocess.run([sys.executable, "-m", "app", *words], check=True, cwd=Path(__file__).parent.parent)
 
 
 class Robot:
@@ -113,6 +122,20 @@ class Robot:
         """Let everything come to rest."""
         self.editor.session.settle()
         self.frame(count=2)
+
+    def drop(self, path: Path) -> None:
+        """Let a file fall on the window, and wait until it has been read."""
+        self.frame(Drop((str(path),)))
+        self.until(lambda: not self.editor.files.is_loading)
+
+    def until(self, condition: Callable[[], bool], seconds: float = 60.0) -> None:
+        """Draw frames until something is so."""
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, [message.text for message in self.editor.messages.shown]
+            self.frame()
+            time.sleep(0.01)
+        self.frame()
 
     def warp(self) -> np.ndarray:
         """The displacement, (h, w, 2), longer sides."""

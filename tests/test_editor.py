@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app import project as projects
-from app.export import Job, run
-from app.pictures import read_picture
+from app.export import Job, MapOutput, run
+from app.maps import read_map
+from app.pictures import read_picture, write_picture
 from app.progress import Progress
 from app.recipe import Recipe
 from app.tools import TOOLS
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
 from app.ui.dialogs import Preferring, Shortcuts, Unsaved
-from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
-from app.ui.exporting import ExportDialog
-from editing import Robot, small_project
+from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Key, Mods, Move
+from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog
+from app.ui.saving import SaveDialog
+from editing import Robot, command_line, pattern, small_project
 from solver.context import Device
 
 
@@ -414,9 +417,6 @@ def test_clearing_and_resetting(robot: Robot) -> None:
 
 def test_opening_pictures_can_be_undone(robot: Robot, tmp_path: Path) -> None:
     """All the way back to the first, what was done to it included."""
-    from app.pictures import write_picture
-    from editing import pattern
-
     robot.drag((0.4, 0.5), (0.5, 0.5))
     robot.rest()
     warp = robot.warp()
@@ -425,8 +425,7 @@ def test_opening_pictures_can_be_undone(robot: Robot, tmp_path: Path) -> None:
         write_picture(tmp_path / f"{number}.png", pattern(*size))
         if robot.editor.is_dirty:
             assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
-        robot.frame(Drop((str(tmp_path / f"{number}.png"),)))
-        robot.frame()
+        robot.drop(tmp_path / f"{number}.png")
         assert robot.editor.canvas.size == size
     for size in sizes[-2::-1]:
         robot.key("ctrl+z")
@@ -488,8 +487,7 @@ def test_files_that_are_no_pictures_leave_the_work_alone(robot: Robot, tmp_path:
     for name, data in cases.items():
         (tmp_path / name).write_bytes(data)
         robot.editor.messages.shown.clear()
-        robot.frame(Drop((str(tmp_path / name),)))
-        robot.frame()
+        robot.drop(tmp_path / name)
         assert name in robot.editor.messages.shown[-1].text, name
         assert robot.editor.session.recipe is recipe
     assert (tmp_path / "kept.fluidwarp").read_bytes() == whole
@@ -524,7 +522,7 @@ def test_the_recipe_can_be_copied(robot: Robot) -> None:
 
 @pytest.mark.parametrize(
     ("key", "dialog"),
-    [("f1", Shortcuts), ("ctrl+,", Preferring), ("ctrl+e", ExportDialog), ("ctrl+o", Browser), ("ctrl+s", Browser)],
+    [("f1", Shortcuts), ("ctrl+,", Preferring), ("ctrl+e", ExportDialog), ("ctrl+o", Browser), ("ctrl+s", SaveDialog)],
 )
 def test_dialogs_open_and_close(robot: Robot, key: str, dialog: type) -> None:
     plain = robot.pixels().astype(int)
@@ -555,22 +553,160 @@ def test_unsaved_work_is_asked_about(robot: Robot, tmp_path: Path) -> None:
     assert robot.editor.closed
 
 
-def test_the_browser_saves_and_opens(robot: Robot, tmp_path: Path) -> None:
+def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_path: Path) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
     robot.editor.preferences.folder = str(tmp_path)
     robot.key("ctrl+s")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, SaveDialog)
+    # The name is marked: what is typed takes its place.
+    robot.type("kept")
+    robot.frame()
+    robot.key("enter")
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+    kept = projects.load(tmp_path / "kept.fluidwarp")
+    assert kept.embedded
+    assert robot.editor.preferences.recent[0].endswith("kept.fluidwarp")
+
+    robot.key("ctrl+shift+s")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, SaveDialog)
+    robot.type("small")
+    rect = dialog.rect
+    robot.click(rect.x + 100, rect.y + 130)
+    assert not dialog.embed
+    robot.click(rect.right - 60, rect.bottom - 36)
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+    small = projects.load(tmp_path / "small.fluidwarp")
+    assert not small.embedded
+    assert (tmp_path / "small.fluidwarp").stat().st_size < (tmp_path / "kept.fluidwarp").stat().st_size
+    # The choice is remembered, and kept for this project when it is saved again.
+    assert not robot.editor.preferences.embed
+    robot.drag((0.3, 0.6), (0.45, 0.6))
+    robot.editor.preferences.embed = True
+    robot.key("ctrl+s")
+    assert not projects.load(tmp_path / "small.fluidwarp").embedded
+
+
+def test_a_picture_that_is_only_in_a_project_stays_there(robot: Robot, tmp_path: Path) -> None:
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp", True)
+    robot.drop(tmp_path / "work.fluidwarp")
+    robot.editor.preferences.embed = False
+    robot.key("ctrl+shift+s")
+    robot.frame(count=2)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, SaveDialog)
+    assert dialog.must_embed
+    assert dialog.embed
+
+
+def test_the_browser_chooses_where(robot: Robot, tmp_path: Path) -> None:
+    chosen: list[Path] = []
+    robot.editor.files.ask_where("Save", tmp_path / "a.fluidwarp", (".fluidwarp",), chosen.append)
     robot.frame(count=2)
     browser = robot.editor.dialogs[-1]
     assert isinstance(browser, Browser)
-    browser.go(tmp_path)
-    browser.name = "saved"
+    browser.name = "saved.fluidwarp"
     width, height = robot.size
     robot.click(width / 2 + 640 / 2 - 24 - 44 - 8, height / 2 + 460 / 2 - 36)
     robot.frame(count=2)
-    assert (tmp_path / "saved.fluidwarp").exists()
+    assert chosen == [tmp_path / "saved.fluidwarp"]
     assert not robot.editor.dialogs
-    assert robot.editor.preferences.recent[0].endswith("saved.fluidwarp")
+
+
+# Warp maps ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["m.exr", "m.tif", "m.flo", "m.npy"])
+def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
+    device: Device, robot: Robot, tmp_path: Path, name: str
+) -> None:
+    clean = robot.canvas()
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    run(
+        device, Job(robot.editor.session.recipe, pattern(), tmp_path, None, maps=MapOutput(tmp_path / name)), Progress()
+    )
+    warped = robot.warp()
+    robot.key("ctrl+z")
+    robot.rest()
+    robot.drop(tmp_path / name)
+    robot.rest()
+    assert names(robot) == ["Open", "Start from a map"]
+    # Resampled to the grid of 48 cells: within a twentieth of a cell.
+    assert np.abs(robot.warp() - warped).max() < 0.05 / 48
+    robot.move(900, 20)
+    robot.frame(count=2)
+    assert np.abs(robot.canvas().astype(int) - clean).mean() > 1
+    # Painted on, saved and rendered by the command line's way, it is the same picture.
+    robot.drag((0.6, 0.3), (0.7, 0.3))
+    robot.rest()
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    (tmp_path / name).unlink()
+    loaded = projects.load(tmp_path / "work.fluidwarp")
+    robot.editor.open(loaded)
+    robot.rest()
+    painted = robot.warp()
+    files = [tmp_path / "window.png", tmp_path / "line.png"]
+    job = ExportDialog(robot.editor.session, str(tmp_path)).job()
+    run(device, replace(job, output=files[0]), Progress())
+    run(device, Job(loaded.recipe, loaded.picture, loaded.folder, files[1]), Progress())
+    assert files[0].read_bytes() == files[1].read_bytes()
+    robot.key("ctrl+z")
+    robot.key("ctrl+z")
+    robot.key("ctrl+z")
+    robot.rest()
+    assert np.abs(robot.warp()).max() == 0
+    assert np.abs(painted - warped).max() > 0.02
+
+
+def test_maps_that_do_not_fit_leave_the_work_alone(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    recipe, warp = robot.editor.session.recipe, robot.warp()
+    holes = np.zeros((18, 24, 2), np.float32)
+    holes[3, 4] = np.nan
+    cases = {
+        "nan.npy": (holes, "NaN"),
+        "wide.npy": (np.zeros((10, 40, 2), np.float32), "proportions"),
+        "tiny.npy": (np.zeros((3, 4, 2), np.float32), "6"),
+        "flat.npy": (np.zeros((18, 24), np.float32), "(18, 24)"),
+    }
+    for name, (values, said) in cases.items():
+        np.save(tmp_path / name, values)
+        robot.editor.messages.shown.clear()
+        robot.drop(tmp_path / name)
+        assert said in robot.editor.messages.shown[-1].text, name
+        assert name in robot.editor.messages.shown[-1].text or said == "proportions"
+        assert robot.editor.session.recipe is recipe
+        assert np.array_equal(robot.warp(), warp)
+
+
+@pytest.mark.parametrize("name", ["m.exr", "m.tif", "m.flo", "m.npy"])
+@pytest.mark.parametrize("forward", [False, True], ids=["inverse", "forward"])
+def test_a_map_exported_from_the_window_is_the_command_line_s(
+    robot: Robot, tmp_path: Path, name: str, forward: bool
+) -> None:
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog.kind, dialog.name, dialog.forward, dialog.size = MAP, "m", forward, 120
+    dialog.format[MAP] = [ending for _, ending in KINDS[MAP][1]].index(Path(name).suffix)
+    robot.editor.exports.start(dialog.job())
+    robot.until(lambda: not robot.editor.exports.is_running)
+    line = tmp_path / f"line{Path(name).suffix}"
+    more = ["--forward"] if forward else []
+    command_line("render", str(tmp_path / "work.fluidwarp"), "--size", "120", "--map", str(line), *more)
+    assert (tmp_path / name).read_bytes() == line.read_bytes()
+    read = read_map(tmp_path / name)
+    assert (read.width, read.height) == (120, 90)
+    assert np.abs(read.values).max() > 0.05
 
 
 def test_export_runs_beside_the_window(robot: Robot, tmp_path: Path) -> None:
@@ -591,7 +727,7 @@ def test_an_export_can_be_cancelled(robot: Robot, tmp_path: Path) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
     dialog = ExportDialog(robot.editor.session, str(tmp_path))
-    dialog.animation = True
+    dialog.kind = ANIMATION
     robot.editor.exports.start(dialog.job())
     robot.frame(count=2)
     robot.editor.exports.cancel()

@@ -53,6 +53,7 @@ def _table() -> list[Action]:
     add("File", "save", "Save", "ctrl+s", lambda e: e.files.save())
     add("File", "save_as", "Save as ...", "ctrl+shift+s", lambda e: e.files.ask_save())
     add("File", "apply_to", "Apply to another picture ...", "ctrl+shift+o", lambda e: e.files.ask_apply())
+    add("File", "import_map", "Start from a warp map ...", "ctrl+shift+m", lambda e: e.files.ask_map())
     add("File", "export", "Export ...", "ctrl+e", lambda e: e.ask_export())
     add("File", "copy_recipe", "Copy as recipe", "ctrl+shift+c", lambda e: e.copy_recipe())
     add("File", "preferences", "Preferences ...", "ctrl+,", lambda e: e.ask_preferences())

@@ -24,12 +24,13 @@ class Canvas:
 
     Args:
         device: where it is drawn.
-        picture: shown as sRGB, at most `LARGEST` pixels along a side.
+        picture: shown as sRGB, at most `largest` pixels along a side.
+        pixels: `shown_pixels` of it, if somebody has made them already.
     """
 
-    def __init__(self, device: Device, picture: Picture) -> None:
+    def __init__(self, device: Device, picture: Picture, pixels: np.ndarray | None = None) -> None:
         self.device = device
-        pixels = shown_pixels(picture, min(LARGEST, device.limits.max_texture_size))
+        pixels = shown_pixels(picture, self.largest) if pixels is None else pixels
         height, width = pixels.shape[:2]
         self.size = (picture.width, picture.height)
         self._shrunk = width / picture.width
@@ -40,6 +41,11 @@ class Canvas:
         # The warp as it was last seen at rest, shown while it is made again on another grid.
         self._kept: Field | None = None
         self._kept_at = -1
+
+    @property
+    def largest(self) -> int:
+        """Pixels along a side of the picture that are shown."""
+        return min(LARGEST, self.device.limits.max_texture_size)
 
     def draw(
         self,

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.ui.actions import ACTIONS
+from app.ui.viewport import Rect
 from app.ui.widgets import Ui, keys_shown
 
 if TYPE_CHECKING:
@@ -16,12 +17,17 @@ if TYPE_CHECKING:
 
 
 class Dialog:
-    """A window over everything, until it is answered or Escape is pressed."""
+    """A window over everything, until it is answered or Escape is pressed.
+
+    Attributes:
+        rect: where it was drawn last.
+    """
 
     width, height = 480.0, 0.0
 
     def __init__(self, title: str) -> None:
         self.title = title
+        self.rect = Rect(0, 0, 0, 0)
         self._open = True
 
     @property
@@ -59,6 +65,8 @@ class Dialog:
         try:
             ui.text(self.title, size=19, bold=True)
             imgui.dummy(ImVec2(0, ui.px(4)))
+            corner, size = imgui.get_window_pos(), imgui.get_window_size()
+            self.rect = Rect(corner.x, corner.y, size.x, size.y)
             going_on = self.body(ui, editor) and self._open
             # Only the topmost dialog hears Escape; it may just have opened another one.
             if imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active() and editor.dialogs[-1] is self:

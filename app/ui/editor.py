@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import moderngl
+import numpy as np
 from imgui_bundle import imgui
 
 from app.errors import UserError
@@ -19,7 +20,7 @@ from app.ui.canvas import Canvas
 from app.ui.clock import Clock
 from app.ui.dialogs import Dialog, Preferring, Shortcuts, Unsaved
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Wheel
-from app.ui.exporting import ExportDialog, Exports
+from app.ui.exporting import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
 from app.ui.hand import Hand
 from app.ui.host import Host
@@ -97,9 +98,12 @@ class Editor:
     def title(self) -> str:
         return f"{self.session.project.name}{' *' if self.is_dirty else ''} - fluidwarp"
 
-    def open(self, project: Project) -> None:
-        """Work on another project; Undo at its very start comes back to this one."""
-        canvas = Canvas(self.device, project.picture)
+    def open(self, project: Project, pixels: np.ndarray | None = None) -> None:
+        """Work on another project; Undo at its very start comes back to this one.
+
+        `pixels`: the picture as the canvas shows it, if it is at hand.
+        """
+        canvas = Canvas(self.device, project.picture, pixels)
         try:
             session = Session(self.device, project)
         except Exception:
@@ -186,14 +190,16 @@ class Editor:
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
-        if self.quality.is_measuring or any(dialog.is_busy for dialog in self.dialogs):
-            return True
-        return self.session.is_moving or self.exports.is_running or self.files.is_waiting or self.clock.settling > 0
+        return self.quality.is_measuring or self.session.is_moving or self.clock.settling > 0
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""
         if self.wants_frame():
             return 0.0
+        # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
+        elsewhere = self.exports.is_running or self.files.is_waiting or self.files.is_loading
+        if elsewhere or any(dialog.is_busy for dialog in self.dialogs):
+            return 0.1
         return min(self.messages.next_in or 60.0, 60.0)
 
     def _lay_out(self, size: tuple[float, float], density: float, scale: float) -> None:
@@ -265,6 +271,7 @@ class Editor:
                     self.messages.say(self.session.notice)
                     self.session.notice = None
                 self.exports.draw(self.ui, self.layout.canvas)
+                self.files.draw(self.ui, self.layout.canvas)
                 self.messages.draw(self.ui, self.layout.canvas, dt)
                 self._draw_dialog()
         except UserError as error:
@@ -369,8 +376,14 @@ class Editor:
         self.dialogs.append(ExportDialog(self.session, self.preferences.folder))
 
     def ask_quit(self) -> None:
-        """Leave, after having asked about what is not saved."""
-        self.unless_unsaved("quit", self._quit)
+        """Leave, after having asked about what is not saved and what is being exported."""
+        self.unless_unsaved("quit", self._quit_unless_exporting)
+
+    def _quit_unless_exporting(self) -> None:
+        if self.exports.is_running:
+            self.dialogs.append(StillExporting(self.exports, self._quit))
+        else:
+            self._quit()
 
     def unless_unsaved(self, what: str, then: Callable[[], None]) -> None:
         """Do something that would lose unsaved work, once the person has said what shall become of it."""

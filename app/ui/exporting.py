@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +13,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError
-from app.export import Job
+from app.export import Job, MapOutput
 from app.export_process import ExportProcess
 from app.pictures import read_picture
 from app.session import Session
@@ -28,20 +29,31 @@ if TYPE_CHECKING:
 
 PICTURES = (("PNG", ".png"), ("JPEG", ".jpg"), ("TIFF", ".tif"))
 ANIMATIONS = (("MP4", ".mp4"), ("GIF", ".gif"), ("PNG sequence", ".%04d.png"))
+MAPS = (("EXR", ".exr"), ("TIFF", ".tif"), ("FLO", ".flo"), ("NPY", ".npy"))
+KINDS = (("Picture", PICTURES), ("Animation", ANIMATIONS), ("Warp map", MAPS))
+PICTURE, ANIMATION, MAP = range(3)
 PREVIEW = 640  # pixels along the longer side
 FINER = (("As seen", 1), ("2 x", 2))
 
 
 class ExportDialog(Dialog):
-    """What is to be written: picture or animation, size, rate, part."""
+    """What is to be written: picture, animation or warp map, size, rate, part.
+
+    Attributes:
+        kind: PICTURE, ANIMATION or MAP.
+        format: which of its formats, for each kind.
+        forward: the map tells where the points of the original go.
+        offsets: an EXR or TIFF map holds offsets in pixels.
+    """
 
     width = 500
 
     def __init__(self, session: Session, folder: str) -> None:
         super().__init__("Export")
         self.session = session
-        self.animation = False
-        self.format = [0, 0]
+        self.kind = PICTURE
+        self.format = [0 for _ in KINDS]
+        self.forward = self.offsets = False
         self.picture = session.project.picture
         self.size = max(self.picture.width, self.picture.height)
         self.quality = session.recipe.output.quality
@@ -51,6 +63,7 @@ class ExportDialog(Dialog):
         self.finer = 0
         self.folder = Path(folder) if folder and Path(folder).is_dir() else Path.home()
         self.name = f"{session.project.name} warped"
+        self._named = self.name
         self._preview: ExportProcess | None = None
         self._image: moderngl.Texture | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -60,8 +73,12 @@ class ExportDialog(Dialog):
         return self._preview is not None
 
     @property
+    def animation(self) -> bool:
+        return self.kind == ANIMATION
+
+    @property
     def ending(self) -> str:
-        return (ANIMATIONS if self.animation else PICTURES)[self.format[self.animation]][1]
+        return KINDS[self.kind][1][self.format[self.kind]][1]
 
     @property
     def output(self) -> Path:
@@ -86,13 +103,15 @@ class ExportDialog(Dialog):
             time=part if self.animation else recipe.time,
             fluid=recipe.fluid if grid == recipe.fluid.grid else recipe.fluid.model_copy(update={"grid": grid}),
         )
+        if self.kind == MAP:
+            maps = MapOutput(self.output, "offsets" if self.offsets else "st", self.forward)
+            return Job(recipe, self.picture, session.project.folder, None, maps=maps)
         return Job(recipe, self.picture, session.project.folder, self.output)
 
     def body(self, ui: Ui, editor: Editor) -> bool:
-        self.animation = bool(ui.segmented("kind", ("Picture", "Animation"), int(self.animation), -1))
-        choices = ANIMATIONS if self.animation else PICTURES
-        kind = int(self.animation)
-        self.format[kind] = ui.segmented("format", [label for label, _ in choices], self.format[kind], -1)
+        self._choose(ui.segmented("kind", [label for label, _ in KINDS], self.kind, -1))
+        choices = KINDS[self.kind][1]
+        self.format[self.kind] = ui.segmented("format", [label for label, _ in choices], self.format[self.kind], -1)
         own = max(self.picture.width, self.picture.height)
         width, height = (round(side * self.size / own) for side in (self.picture.width, self.picture.height))
         slid = ui.slider("size", "Size", self.size, 16, max(own * 2, 64), f"{width} x {height} pixels", own)
@@ -100,6 +119,8 @@ class ExportDialog(Dialog):
         if self.ending in (".jpg", ".mp4"):
             slid = ui.slider("quality", "Quality", self.quality, 1, 100, f"{self.quality}", 90)
             self.quality = round(slid.value)
+        if self.kind == MAP:
+            self._ask_about_map(ui)
         if self.animation:
             seconds = self.session.end * self.session.dt
             slid = ui.slider("fps", "Frames a second", self.fps, 1, 60, f"{self.fps:g}", 30)
@@ -109,7 +130,7 @@ class ExportDialog(Dialog):
                 self.end = ui.slider("to", "To", self.end, 0, seconds, f"{self.end:.2f} s", seconds).value
         ui.dim("Simulate on the grid")
         self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
-        if self.finer:
+        if self.finer and self.kind != MAP:
             ui.dim("Finer detail, longer work; it may look a little different from what you see.")
             self._show_preview(ui, editor)
         imgui.dummy(ImVec2(0, ui.px(2)))
@@ -120,6 +141,8 @@ class ExportDialog(Dialog):
         if ui.button("Browse", width=96, height=30):
             editor.files.ask_where("Export to", self.output, (self.ending,), self._chosen)
         ui.dim(str(self.output))
+        if self.output.exists():
+            ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(6)))
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
         if ui.button("Cancel", width=96):
@@ -130,6 +153,24 @@ class ExportDialog(Dialog):
             if ui.button("Export", primary=True, width=96) or entered:
                 return not self._start(editor)
         return True
+
+    def _choose(self, kind: int) -> None:
+        """Take another kind; a name that is still the one proposed goes with it."""
+        if kind != self.kind:
+            proposed = f"{self.session.project.name} {'map' if kind == MAP else 'warped'}"
+            self.name = proposed if self.name == self._named else self.name
+            self._named = proposed
+        self.kind = kind
+
+    def _ask_about_map(self, ui: Ui) -> None:
+        self.forward = bool(ui.segmented("direction", ("To the original", "From the original"), int(self.forward), -1))
+        ui.dim(
+            "For each pixel of the original, where it goes."
+            if self.forward
+            else "For each pixel of the result, where it is looked up: what other programs apply."
+        )
+        if self.ending in (".exr", ".tif"):
+            self.offsets = bool(ui.segmented("values", ("ST map, 0 to 1", "Offsets in pixels"), int(self.offsets), -1))
 
     def _show_preview(self, ui: Ui, editor: Editor) -> None:
         """What the finer grid makes of it, small, beside what is seen; made in a process of its own."""
@@ -178,16 +219,64 @@ def _texture(editor: Editor, path: Path) -> moderngl.Texture:
     return texture
 
 
+class StillExporting(Dialog):
+    """Asks what shall become of an export that is under way when the person leaves."""
+
+    def __init__(self, exports: Exports, leave: Callable[[], None]) -> None:
+        super().__init__("An export is still running")
+        self._exports = exports
+        self._leave = leave
+        self._waits = False
+
+    @property
+    def is_busy(self) -> bool:
+        return True
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        if not self._exports.is_running:
+            # It has ended by itself: well, or with a message that should be read.
+            if self._exports.went_well:
+                self._leave()
+            return False
+        words = (
+            "fluidwarp closes as soon as it is finished." if self._waits else "Nothing of it is kept if it is stopped."
+        )
+        ui.wrapped(f"{self._exports.name} is {self._exports.part:.0%} done. {words}", ui.palette.dim, 14)
+        imgui.dummy(ImVec2(0, ui.px(8)))
+        if ui.button("Stop it and quit", width=132):
+            self._leave()
+            return False
+        imgui.same_line(imgui.get_window_width() - ui.px(24 + 96 + 8 + 148))
+        if ui.button("Cancel##leaving", width=96):
+            return False
+        imgui.same_line()
+        with ui.enabled(not self._waits):
+            if ui.button("Quit when finished", primary=True, width=148):
+                self._waits = True
+        return True
+
+
 class Exports:
     """The export that is under way, if any."""
 
     def __init__(self, messages: Messages) -> None:
         self.messages = messages
+        self.went_well = False  # the last one that has ended
         self._process: ExportProcess | None = None
 
     @property
     def is_running(self) -> bool:
         return self._process is not None
+
+    @property
+    def name(self) -> str:
+        """What is being written."""
+        return self._process.job.target.name if self._process else ""
+
+    @property
+    def part(self) -> float:
+        """How much of it is done, 0-1."""
+        return self._process.part if self._process else 1.0
 
     def start(self, job: Job) -> None:
         """Begin a job.
@@ -213,6 +302,7 @@ class Exports:
         process.poll()
         if process.is_done:
             self._process = None
+            self.went_well = not process.error
             if process.error:
                 self.messages.warn(process.error)
             elif not process.cancelled:

@@ -8,17 +8,25 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imgui_bundle import imgui
+
 from app import project as projects
 from app.errors import UserError
+from app.maps import MAP_ENDINGS, is_map
 from app.opening import PICTURE_ENDINGS, check_picture
 from app.project import SUFFIX, Project
 from app.recipe import Recipe
 from app.ui.browser import Browser
+from app.ui.loading import Loading
+from app.ui.saving import SaveDialog
+from app.ui.viewport import Rect
+from app.ui.widgets import Ui
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-OPENABLE = (*PICTURE_ENDINGS, SUFFIX, ".toml")
+OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS)))
+AT_ONCE = 0.15  # seconds that opening may take without a word about it
 Chosen = Callable[[Path], None]
 
 
@@ -33,6 +41,7 @@ class Files:
         self.editor = editor
         self.native = False
         self._waiting: tuple[Any, Chosen] | None = None
+        self._loading: Loading | None = None
 
     # -- opening ----------------------------------------------------------------------------------------------------
 
@@ -42,25 +51,85 @@ class Files:
     def ask_apply(self) -> None:
         self._ask_for("Apply this project to", PICTURE_ENDINGS, self.apply)
 
+    def ask_map(self) -> None:
+        self._ask_for("Start from a warp map", MAP_ENDINGS, self.start_from_map)
+
     def open(self, path: Path) -> None:
-        """Open a picture, a recipe or a project, after asking about unsaved work."""
-        self.editor.unless_unsaved("open something else", lambda: self._open(path))
+        """Open a picture, a recipe or a project, after asking about unsaved work; of a warp map, start from it."""
+        if is_map(path):
+            self.start_from_map(path)
+            return
+        self.editor.unless_unsaved("open something else", lambda: self._open(path, lambda: load_any(path)))
 
     def apply(self, path: Path) -> None:
         """Do to another picture what has been done to this one."""
         recipe = self.editor.session.recipe
         self._open(path, lambda: projects.from_picture(path, recipe))
 
-    def _open(self, path: Path, load: Callable[[], Project] | None = None) -> None:
+    def start_from_map(self, path: Path) -> None:
+        """Let what is done to the picture begin with a warp map instead of the picture as it is; can be undone.
+
+        Raises:
+            UserError: if it is none, or does not fit the picture.
+        """
+        editor, path = self.editor, path.resolve()
+        editor.session.start_from_map(str(path))
+        editor.preferences.folder = str(path.parent)
+        editor.messages.done(f"The picture now starts from {path.name}. Undo takes it away again.")
+
+    def _open(self, path: Path, load: Callable[[], Project]) -> None:
+        """Read a file in the background, and open it then; what was being read before is not wanted any more."""
         editor = self.editor
+        self._loading = Loading(path, load, editor.canvas.largest, editor.session.document.recipe)
+        self._loading.is_done(AT_ONCE)
+        self._look_at_loading()
+
+    @property
+    def is_loading(self) -> bool:
+        """A file is being read."""
+        return self._loading is not None
+
+    def give_up_loading(self) -> None:
+        """Open nothing; the thread ends by itself."""
+        self._loading = None
+
+    def _look_at_loading(self) -> None:
+        editor, loading = self.editor, self._loading
+        # Nobody's stroke is broken off by a file that has come at last.
+        if loading is None or not loading.is_done() or editor.session.is_painting:
+            return
+        self._loading = None
+        if loading.error:
+            editor.messages.warn(loading.error)
+        elif editor.is_dirty and editor.session.document.recipe is not loading.recipe:
+            editor.unless_unsaved(f"open {loading.path.name}", lambda: self._show(loading))
+        else:
+            self._show(loading)
+
+    def _show(self, loading: Loading) -> None:
+        editor = self.editor
+        assert loading.project is not None
         try:
-            editor.open(load() if load else load_any(path))
+            editor.open(loading.project, loading.pixels)
         except UserError as error:
             editor.messages.warn(str(error))
             return
-        editor.preferences.opened(path)
+        editor.preferences.opened(loading.path)
         for notice in editor.session.pictures.notices:
             editor.messages.say(notice)
+
+    def draw(self, ui: Ui, canvas: Rect) -> None:
+        """What is being read, with a button to give it up."""
+        if self._loading is None:
+            return
+        with ui.floating("loading", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
+            imgui.begin_group()
+            ui.text(f"Opening {self._loading.path.name} ...", size=14)
+            ui.dim("You can go on meanwhile.")
+            imgui.end_group()
+            imgui.same_line(0, ui.px(16))
+            if ui.button("Cancel##loading", height=30):
+                self.give_up_loading()
 
     # -- saving -----------------------------------------------------------------------------------------------------
 
@@ -74,17 +143,14 @@ class Files:
 
     def ask_save(self, then: Callable[[], None] | None = None) -> None:
         project = self.editor.session.project
+        path = project.path or self._folder() / f"{project.name}{SUFFIX}"
+        self.editor.dialogs.append(SaveDialog(self.editor, path, then))
 
-        def chosen(path: Path) -> None:
-            path = path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
-            if self.save_as(path) and then is not None:
-                then()
+    def save_as(self, path: Path, embed: bool | None = None) -> bool:
+        """Save the project; True if it could be done. What is still moving comes to rest first.
 
-        name = project.path or self._folder() / f"{project.name}{SUFFIX}"
-        self._ask_where("Save", name, (SUFFIX,), chosen)
-
-    def save_as(self, path: Path) -> bool:
-        """Save the project; True if it could be done. What is still moving comes to rest first."""
+        `embed`: the picture is kept in it; None is as it was saved last, or else as the person likes.
+        """
         from dataclasses import replace
 
         editor, session = self.editor, self.editor.session
@@ -93,8 +159,10 @@ class Files:
             session.settle(2.0)
             session.pause()
         project = replace(session.project, recipe=session.document.recipe)
+        if embed is None:
+            embed = project.embedded if project.path is not None else editor.preferences.embed
         try:
-            session.saved(projects.save(project, path, editor.preferences.embed))
+            session.saved(projects.save(project, path, embed))
         except UserError as error:
             editor.messages.warn(str(error))
             return False
@@ -114,7 +182,8 @@ class Files:
         return self._waiting is not None
 
     def poll(self) -> None:
-        """See whether the system's dialog has been answered."""
+        """See whether the system's dialog has been answered, and a file has been read."""
+        self._look_at_loading()
         if self._waiting is None or not self._waiting[0].ready(0):
             return
         (dialog, chosen), self._waiting = self._waiting, None

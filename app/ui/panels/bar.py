@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from app.ui.editor import Editor
 
 MENU = (
-    "open", "recent", "", "save", "save_as", "apply_to", "copy_recipe", "", "export", "", "preferences", "shortcuts",
-    "", "quit",
+    "open", "recent", "import_map", "", "save", "save_as", "apply_to", "copy_recipe", "", "export", "", "preferences",
+    "shortcuts", "", "quit",
 )  # fmt: skip
 
 
@@ -130,7 +130,7 @@ def _right(ui: Ui, editor: Editor) -> None:
     ui.divider()
     if ui.button("Export", primary=True, width=92, icon="export"):
         editor.do("export")
-    ui.tooltip("Export a picture or an animation", "ctrl+e")
+    ui.tooltip("Export a picture, an animation or the warp map", "ctrl+e")
 
 
 def _menu(ui: Ui, editor: Editor) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
@@ -97,6 +98,10 @@ def _quality(ui: Ui, editor: Editor) -> None:
     ui.tooltip("Cells along the longer side", more="More is finer and slower. What is seen is what is exported.")
     if chosen != index and chosen >= 0:
         session.set_grid(GRIDS[chosen], f"Grid of {GRIDS[chosen]}")
+    if session.recipe.map is not None:
+        ui.dim(f"Starts from the map {PurePath(session.recipe.map).name}")
+        if ui.button("Start from the picture", width=-1, height=30):
+            session.start_from_map(None)
     ui.dim("Beyond the edges of the picture")
     labels = ("Its outermost pixels", "Mirrored", "Repeated", "Transparent", "Black")
     imgui.set_next_item_width(-1)

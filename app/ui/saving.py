@@ -1,0 +1,96 @@
+"""Asking where a project is saved, and whether its picture goes into it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.project import SUFFIX
+from app.ui.dialogs import Dialog
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+
+class SaveDialog(Dialog):
+    """The name of a project, and the choice between keeping its picture and referring to it.
+
+    Args:
+        editor: whose work is saved.
+        path: proposed.
+        then: what is done once it is saved.
+    """
+
+    width = 500
+
+    def __init__(self, editor: Editor, path: Path, then: Callable[[], None] | None) -> None:
+        super().__init__("Save the project")
+        project = editor.session.project
+        self.folder = path.parent
+        self.name = path.name.removesuffix(SUFFIX)
+        # A picture that is only inside a project has no file to refer to.
+        self.must_embed = project.keeper is not None
+        self.embed = self.must_embed or editor.preferences.embed
+        self._picture = project.folder / (project.recipe.picture or "")
+        self._bytes = len(project.data)
+        self._own = project.path
+        self._then = then
+        self._is_new = True
+
+    @property
+    def path(self) -> Path:
+        return self.folder / (self.name.strip().removesuffix(SUFFIX) + SUFFIX)
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
+        if self._is_new:
+            imgui.set_keyboard_focus_here()
+            self._is_new = False
+        flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
+        entered, self.name = imgui.input_text("##name", self.name, flags)
+        imgui.same_line()
+        if ui.button("Browse", width=96, height=30):
+            editor.files.ask_where("Save", self.path, (SUFFIX,), self._chosen)
+        ui.dim(str(self.path))
+        if self.path.exists() and self.path != self._own:
+            ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
+        imgui.dummy(ImVec2(0, ui.px(2)))
+        with ui.enabled(not self.must_embed):
+            self.embed = ui.check("Keep the picture inside the project", self.embed)
+        if self.must_embed:
+            about = "The picture is only in the project, and stays there."
+        elif self.embed:
+            about = f"One file that opens anywhere, with {_size(self._bytes)} of picture in it."
+        else:
+            about = f"A small file that needs {self._picture} to stay where it is."
+        ui.wrapped(about, ui.palette.dim, 13)
+        imgui.dummy(ImVec2(0, ui.px(6)))
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
+        if ui.button("Cancel", width=96):
+            return False
+        imgui.same_line()
+        with ui.enabled(bool(self.name.strip())):
+            if (ui.button("Save", primary=True, width=96) or entered) and self.name.strip():
+                return not self._save(editor)
+        return True
+
+    def _save(self, editor: Editor) -> bool:
+        if not self.must_embed:
+            editor.preferences.embed = self.embed
+        saved = editor.files.save_as(self.path, self.embed)
+        if saved and self._then is not None:
+            self._then()
+        return saved
+
+    def _chosen(self, path: Path) -> None:
+        self.folder, self.name = path.parent, path.name.removesuffix(SUFFIX)
+
+
+def _size(count: int) -> str:
+    """A number of bytes as a person reads it."""
+    return f"{count / 2**20:.1f} MB" if count >= 2**20 else f"{max(count / 2**10, 1):.0f} KB"
