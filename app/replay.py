@@ -16,7 +16,7 @@ from app.masks import solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
 from app.strokes import Change, Dab, Stroke
-from app.timelaws import Law
+from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
 from solver.brush import Brush, Push, Tip, Twirl
 from solver.context import Device
@@ -69,6 +69,10 @@ class LoadedForce:
         peaks = [0.0 if a is None else float(np.abs(a).max()) for a in (force.faces, force.divergence)]
         return cls(force.label, force.law, fields[0], fields[1], peaks[0], peaks[1])
 
+    def acts_within(self, start: float, end: float) -> bool:
+        """True if it is at work between two times, in seconds; one that is fed back always may be."""
+        return isinstance(self.law, Feedback) or self.law.impulse(start, end) != 0
+
     def check(self, impulse: float, dt: float, time: float) -> None:
         """Make sure that the force is one that a step can follow.
 
@@ -101,13 +105,15 @@ class Replay:
     Attributes:
         tick: the steps made so far; strokes and changes at this tick come next.
         fluid, warp, masks, density: the simulation at this moment; `density` only in density mode.
+        forces: the recipe's own.
+        steps: made in all, whichever way; for measuring.
     """
 
     def __init__(self, device: Device, recipe: Recipe, pictures: Pictures, budget: int = DEFAULT_BUDGET) -> None:
         self.device = device
         self.recipe = recipe
         self.pictures = pictures
-        self.tick = 0
+        self.tick = self.steps = 0
         self.checkpoints = Checkpoints(budget)
         self._brush = Brush(device)
         self._passing: State | None = None
@@ -214,17 +220,19 @@ class Replay:
     def _step(self, part: float) -> None:
         """Everything at this tick; the warp is carried on by `part` of the step."""
         dt = self.recipe.fluid.dt
+        self.steps += 1
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
         self._set_parameters()
         painted = False
         self._leading.clear()
-        for stroke in self.recipe.stroke:
-            if dabs := stroke.at(self.tick):
-                painted |= self._draw(stroke, dabs, dt, part)
-        if painted:
-            self._apply_masks()
+        with self.device.stage("brush"):
+            for stroke in self.recipe.stroke:
+                if dabs := stroke.at(self.tick):
+                    painted |= self._draw(stroke, dabs, dt, part)
+            if painted:
+                self._apply_masks()
         self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
         with self.device.stage("warp map"):
             self.warp.advance(self.fluid.velocity.read, dt * part)
@@ -260,7 +268,7 @@ class Replay:
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
         """The force fields and their impulses in this tick; sources go into the fluid's own."""
         start, pushes = self.tick * dt, []
-        for force in self._forces_built:
+        for force in self.forces:
             impulse = force.law.impulse(start, start + dt, self)
             force.check(impulse, dt, start)
             if impulse and force.faces is not None:
@@ -308,8 +316,9 @@ class Replay:
         self._leading.append(motion)
 
     def _steer(self) -> None:
-        for motion in self._leading:
-            self._brush.lead(self.fluid, motion, yielding=True, warp=self.warp)
+        with self.device.stage("brush"):
+            for motion in self._leading:
+                self._brush.lead(self.fluid, motion, yielding=True, warp=self.warp)
 
     def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
         match stroke.tool:
@@ -344,7 +353,7 @@ class Replay:
         self._viscosity_in_force: float | None = None
         self._frozen = solid(recipe.freeze, self.grid, self.pictures)
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
-        self._forces_built = [LoadedForce.of(self.device, force) for force in built]
+        self.forces = [LoadedForce.of(self.device, force) for force in built]
         self._viscosity = cache(self._viscosity_over)
         self._set_parameters()
 
@@ -372,7 +381,7 @@ class Replay:
         return viscosity(self.recipe.viscosity, base, self.grid, self.pictures)
 
     def _release_simulation(self) -> None:
-        fields = [field for force in self._forces_built for field in (force.faces, force.divergence)]
+        fields = [field for force in self.forces for field in (force.faces, force.divergence)]
         for thing in (self.fluid, self.warp, self.masks, self.density, *fields):
             if thing is not None:
                 thing.release()

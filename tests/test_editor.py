@@ -6,6 +6,7 @@ import random
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -15,13 +16,15 @@ from app.export import Job, MapOutput, run
 from app.maps import read_map
 from app.pictures import read_picture, write_picture
 from app.progress import Progress
+from app.project import Project
 from app.recipe import Recipe
 from app.tools import TOOLS
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
 from app.ui.dialogs import Preferring, Shortcuts, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Key, Mods, Move
-from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog
+from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
+from app.ui.files import load_any
 from app.ui.saving import SaveDialog
 from editing import Robot, command_line, pattern, small_project
 from solver.context import Device
@@ -811,3 +814,166 @@ def test_random_doings_never_break_anything(robot: Robot, seed: int) -> None:
     session.replay.seek(0)
     session.replay.seek(tick)
     assert np.array_equal(robot.warp(), seen)
+
+
+# What goes on beside the work ---------------------------------------------------------------------------------------
+
+
+def test_leaving_asks_about_an_export_that_is_running(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog.kind, dialog.fps = ANIMATION, 60
+    for answer in ("cancel", "wait"):
+        robot.editor.exports.start(dialog.job())
+        robot.frame(CloseWish())
+        robot.frame(count=2)
+        asked = robot.editor.dialogs[-1]
+        assert isinstance(asked, StillExporting)
+        assert not robot.editor.closed
+        if answer == "cancel":
+            robot.key("escape")
+            robot.frame(count=2)
+            assert not robot.editor.dialogs
+            assert robot.editor.exports.is_running
+            robot.editor.exports.cancel()
+        else:
+            robot.click(asked.rect.right - 60, asked.rect.bottom - 36)
+            robot.until(lambda: robot.editor.closed)
+            assert dialog.output.exists()
+
+
+def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    files, goes_on = robot.editor.files, Event()
+
+    def load() -> Project:
+        assert goes_on.wait(60)
+        return load_any(tmp_path / "other.png")
+
+    files._open(tmp_path / "other.png", load)
+    plain = robot.pixels().astype(int)
+    robot.frame(count=2)
+    # A note lies over the picture, and the picture can be worked on.
+    assert np.abs(robot.pixels() - plain).max() > 50
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    assert names(robot) == ["Open", "Push"]
+    goes_on.set()
+    robot.until(lambda: not files.is_loading)
+    # What has been done meanwhile is not lost without a word.
+    assert robot.editor.canvas.size == (240, 180)
+    robot.frame(count=2)
+    asked = robot.editor.dialogs[-1]
+    assert isinstance(asked, Unsaved)
+    robot.click(asked.rect.x + 60, asked.rect.bottom - 36)
+    assert robot.editor.canvas.size == (100, 60)
+    robot.key("ctrl+z")
+    assert names(robot) == ["Open", "Push"]
+
+
+def test_reading_a_file_can_be_given_up(robot: Robot, tmp_path: Path) -> None:
+    files, goes_on = robot.editor.files, Event()
+    files._open(tmp_path / "pattern.png", lambda: load_any(tmp_path / "pattern.png") if goes_on.wait(60) else None)  # pyright: ignore[reportArgumentType]
+    robot.frame(count=2)
+    canvas = robot.editor.layout.canvas
+    for dx in range(0, 260, 20):
+        if files.is_loading:
+            robot.click(canvas.x + canvas.width / 2 + dx, canvas.y + 40)
+    assert not files.is_loading
+    goes_on.set()
+    robot.frame(count=5)
+    assert robot.editor._index == 0
+
+
+def test_the_forces_of_a_recipe_are_shown(robot: Robot, tmp_path: Path) -> None:
+    rotor = """
+    picture = "pattern.png"
+    duration = 0.2
+    [fluid]
+    grid = 48
+    [[force]]
+    kind = "vortex"
+    point = [0.3, 0.5]
+    radius = 0.15
+    strength = 3
+    at = 0.0
+    [[force]]
+    kind = "source"
+    point = [0.75, 0.5]
+    radius = 0.1
+    strength = 1
+    during = [0, 0.2]
+    """
+    (tmp_path / "rotor.toml").write_text(rotor)
+    robot.drop(tmp_path / "rotor.toml")
+    robot.editor.session.seek(0)
+    robot.rest()
+    robot.move(900, 20)
+    robot.frame(count=2)
+    without = robot.canvas().astype(int)
+    robot.key("5")
+    robot.frame()
+    changed = np.abs(robot.canvas() - without).max(axis=2) > 20
+    height, width = changed.shape
+    part = {
+        "vortex": changed[:, : width // 2].mean(),
+        "source": changed[:, width // 2 :].mean(),
+        "corner": changed[: height // 8, : width // 8].mean(),
+    }
+    assert part["vortex"] > 0.02
+    assert part["source"] > 0.02
+    assert part["corner"] == 0
+
+
+def test_the_time_of_each_stage_is_that_of_one_step(robot: Robot) -> None:
+    robot.key("ctrl+i")
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.frame(count=3)
+    timings, replay, numbers = robot.device.timings, robot.editor.session.replay, robot.editor.numbers
+    numbers._last = 0.0
+    timings.take()
+    steps = numbers._steps = replay.steps
+    robot.editor.session.pause()
+    for _ in range(4):
+        robot.editor.session.step()
+    booked = dict(timings.milliseconds)
+    assert {"advect", "diffuse", "project", "warp map"} <= booked.keys()
+    shown = numbers.take(robot.editor.session)
+    assert replay.steps == steps + 4
+    assert shown.stages == {name: spent / 4 for name, spent in booked.items()}
+    assert shown.map is not None
+    assert shown.map.det_min == pytest.approx(replay.warp.statistics().det_min)
+    assert shown.divergence == pytest.approx(float(np.abs(replay.fluid.divergence()).max()))
+    robot.key("ctrl+i")
+    assert not timings.enabled
+
+
+@pytest.mark.parametrize("feel", ["viscosity", "drag"])
+def test_sliders_take_a_typed_number_and_their_default(robot: Robot, feel: str) -> None:
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    x, y = rect.x + 120, rect.y + {"viscosity": 111, "drag": 147}[feel]
+    default = getattr(robot.editor.session.recipe.fluid, feel)
+
+    def value() -> float:
+        return getattr(robot.editor.session.recipe.fluid_at(robot.editor.session.tick), feel)
+
+    robot.mods = Mods(ctrl=True)
+    robot.click(x, y)
+    robot.mods = Mods()
+    robot.key("ctrl+a")
+    robot.type("1.25")
+    robot.frame()
+    robot.key("enter")
+    robot.frame(count=2)
+    assert value() == pytest.approx(1.25)
+    robot.frame(count=20)
+    for _ in range(2):
+        robot.press()
+        robot.release()
+    robot.frame(count=2)
+    assert value() == pytest.approx(default)
+    robot.key("ctrl+z")
+    assert value() == pytest.approx(1.25)

@@ -16,6 +16,9 @@ from solver.field import Field
 LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
 ARROW = 30.0  # points between two arrows
+FORCE_ARROW = 32.0
+FORCE_COLOUR = (1.0, 0.87, 0.2)
+RESTING = 0.5  # how strong a force is shown while it does not act
 GRID_LINES = 24.0
 
 
@@ -41,6 +44,8 @@ class Canvas:
         # The warp as it was last seen at rest, shown while it is made again on another grid.
         self._kept: Field | None = None
         self._kept_at = -1
+        self._force_fields: tuple[Field, Field] | None = None
+        self._forces_of: object = None
 
     @property
     def largest(self) -> int:
@@ -85,13 +90,18 @@ class Canvas:
             "target_height": float(height),
         }
         self._add_overlays(defines, inputs, session, state, scale * density)
+        if state.overlays["forces"].shown and not state.before and session.replay.forces:
+            force, room = self._forces(session)
+            defines["FORCES"] = 1
+            inputs |= {"force": force, "room": room, "force_arrow": FORCE_ARROW * scale * density}
+            inputs |= {"forces_opacity": state.overlays["forces"].opacity, "force_colour": FORCE_COLOUR}
         # One pixel more or less of a picture between pixels is nobody's; no pixel twice is what counts.
         left, top = round(visible.x * density), round(visible.y * density)
         right, bottom = round(visible.right * density), round(visible.bottom * density)
         before = target.viewport
         target.viewport = (left, height - bottom, right - left, bottom - top)
         draw = self.device.pass_("view/canvas.frag", **defines)
-        draw.draw_into(target, ("displacement", "viscosity", "solid", "velocity"), **inputs)
+        draw.draw_into(target, ("displacement", "viscosity", "solid", "velocity", "force", "room"), **inputs)
         target.viewport = before
 
     def release(self) -> None:
@@ -99,6 +109,34 @@ class Canvas:
         self._still.release()
         if self._kept is not None:
             self._kept.release()
+        self._release_forces()
+
+    def _release_forces(self) -> None:
+        for field in self._force_fields or ():
+            field.release()
+        self._force_fields = self._forces_of = None
+
+    def _forces(self, session: Session) -> tuple[Field, Field]:
+        """The recipe's own forces, all in one: on MAC faces, and as room that is made; 1 where one is strongest."""
+        replay, dt = session.replay, session.dt
+        start = replay.tick * dt
+        acting = tuple(force.acts_within(start, start + dt) for force in replay.forces)
+        key = (tuple(map(id, replay.forces)), acting)
+        if self._force_fields is not None and key == self._forces_of:
+            return self._force_fields
+        self._release_forces()
+        size = replay.grid.size
+        fields = self.device.field(size, 2, "forces shown"), self.device.field(size, 1, "sources shown")
+        for force, acts in zip(replay.forces, acting, strict=True):
+            share = 1.0 if acts else RESTING
+            if force.faces is not None and force.strongest:
+                add = self.device.pass_("stages/add_force.frag")
+                add(fields[0], add=True, force=force.faces, impulse=share / force.strongest)
+            if force.divergence is not None and force.widest:
+                add = self.device.pass_("stages/add_source.frag")
+                add(fields[1], add=True, source=force.divergence, amount=share / force.widest)
+        self._force_fields, self._forces_of = fields, key
+        return fields
 
     def _seen(self, session: Session) -> Field:
         """The displacement to show."""

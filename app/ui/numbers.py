@@ -13,7 +13,7 @@ EVERY = 0.5  # seconds
 
 @dataclass(frozen=True)
 class Stats:
-    """Milliseconds by stage, what the map does, and the largest divergence (1 / s)."""
+    """Milliseconds by stage of one step, what the map does, and the largest divergence (1 / s)."""
 
     stages: dict[str, float] = field(default_factory=dict)
     map: MapStatistics | None = None
@@ -27,13 +27,17 @@ class Numbers:
         self._stats = Stats()
         self._last = 0.0
         self._seen = -1
+        self._steps = 0
 
     def take(self, session: Session) -> Stats:
         """The numbers, at most `EVERY` old while something changes."""
         now = time.perf_counter()
         if session.changes != self._seen and now - self._last > EVERY:
-            ticks = max(session.changes - self._seen, 1)
-            stages = {name: value / ticks for name, value in session.device.timings.take().items()}
+            taken, steps = session.device.timings.take(), session.replay.steps - self._steps
+            self._steps += steps
+            stages = self._stats.stages
+            if steps > 0 and taken:
+                stages = {name: spent / steps for name, spent in taken.items()}
             self._last, self._seen = now, session.changes
             self._stats = Stats(stages, session.replay.warp.statistics(), session.divergence())
         return self._stats

@@ -25,11 +25,15 @@ PANEL = int(
 
 @dataclass
 class Slid:
-    """What a slider says: its value, whether it changed in this frame, and whether the person let go of it."""
+    """What a slider says: its value, whether it changed in this frame, and whether the person let go of it.
+
+    `again`: it was set to its default by a double click whose first click had set it to something else.
+    """
 
     value: float
     changed: bool
     done: bool
+    again: bool = False
 
 
 @dataclass
@@ -40,6 +44,7 @@ class Ui:
     fonts: Fonts
     scale: float
     density: float = 1.0
+    _slid: tuple[str, float] = ("", -1.0)  # the slider that was let go of last, and when
 
     def px(self, points: float) -> float:
         """Points of the design on this screen."""
@@ -291,10 +296,14 @@ class Ui:
         imgui.push_font(self.fonts.regular, 14.0)
         changed, new = imgui.slider_float(ident, value, low, high, "%.5g", flags)
         done = imgui.is_item_deactivated_after_edit()
-        hovered, held = imgui.is_item_hovered(), imgui.is_item_active()
+        hovered, held, again = imgui.is_item_hovered(), imgui.is_item_active(), False
         if hovered and default is not None and imgui.is_mouse_double_clicked(0) and not typing:
             internal.clear_active_id()
             new, changed, done = default, True, True
+            slid, when = self._slid
+            again = slid == name and imgui.get_time() - when < imgui.get_io().mouse_double_click_time
+        elif done:
+            self._slid = name, imgui.get_time()
         imgui.pop_style_color(3)
         imgui.pop_style_var()
         size = imgui.get_item_rect_size()
@@ -309,7 +318,7 @@ class Ui:
         imgui.pop_font()
         if title and not held:
             self.tooltip(title, key, more)
-        return Slid(new, changed, done)
+        return Slid(new, changed, done, again)
 
     def _fill(self, corner: ImVec2, size: ImVec2, part: float, lit: bool) -> None:
         draw, palette = imgui.get_window_draw_list(), self.palette

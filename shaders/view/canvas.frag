@@ -5,6 +5,7 @@
 // 3 mirror, 4 wrap; u_tile: side of a square of the checkerboard, pixels.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY, FROZEN: tint of decades of
 // viscosity over u_base, hatch. ARROWS: velocity on MAC faces, lengths / s, of which u_speed fills an arrow.
+// FORCES: u_force on MAC faces, 1 at its strongest, as arrows of u_force_colour; where u_room swells or shrinks, a tint.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
 // reads: 2, and up to 8 with overlays
 uniform sampler2D u_picture;
@@ -40,6 +41,13 @@ uniform float u_speed;
 uniform float u_arrows_opacity;
 uniform vec3 u_arrow_colour;
 #endif
+#ifdef FORCES
+uniform sampler2D u_force;
+uniform sampler2D u_room;
+uniform float u_force_arrow;
+uniform float u_forces_opacity;
+uniform vec3 u_force_colour;
+#endif
 layout(location = 0) out vec4 out_colour;
 
 float inside(vec2 place) { return float(all(greaterThanEqual(place, vec2(0.0))) && all(lessThanEqual(place, vec2(1.0)))); }
@@ -54,7 +62,7 @@ vec4 look_up(vec2 place) {
     return colour;
 }
 
-#ifdef ARROWS
+#if defined(ARROWS) || defined(FORCES)
 // Coverage of an arrow along v (of length 0-1) in a square from -1 to 1, whose pixel is `soft` wide.
 float arrow(vec2 p, vec2 v, float soft) {
     float size = length(v);
@@ -65,6 +73,21 @@ float arrow(vec2 p, vec2 v, float soft) {
     float shaft = max(q.y - 0.07, max(-reach - q.x, q.x - reach + head));
     float tip = max(0.5 * (q.x - reach) + q.y, reach - head - q.x);
     return 1.0 - smoothstep(-soft, soft, min(shaft, tip));
+}
+
+// `seen` with arrows over it, one in every square of `side` pixels, along `field`, of which `most` fills an arrow.
+vec3 with_arrows(vec3 seen, vec2 pixel, sampler2D field, float most, float side, vec3 colour, float opacity) {
+    vec2 tile = (floor(pixel / side) + 0.5) * side;
+    vec2 middle = tile * u_step;
+    if (inside(middle) < 0.5) return seen;
+    vec2 v = texture(field, middle).rg / most;
+    float size = length(v);
+    // Weak places are drawn longer than in proportion, or nothing but the strongest would be seen.
+    if (size > 0.0) v *= pow(min(size, 1.0), 0.4) / size;
+    vec2 p = (pixel - tile) / (0.5 * side);
+    float soft = 2.0 / side;
+    seen = mix(seen, vec3(0.0), opacity * 0.6 * arrow(p * 0.9, v * 1.12, 2.0 * soft));
+    return mix(seen, colour, opacity * arrow(p, v, soft));
 }
 #endif
 
@@ -103,19 +126,14 @@ void main() {
         seen = mix(seen, vec3(0.0), u_grid_opacity * 0.35 * max(shade.x, shade.y));
         seen = mix(seen, vec3(1.0), u_grid_opacity * max(line.x, line.y));
 #endif
+#ifdef FORCES
+        float room = texture(u_room, x).r;
+        vec3 swelling = room > 0.0 ? vec3(0.90, 0.62, 0.0) : vec3(0.34, 0.71, 0.91);
+        seen = mix(seen, swelling, u_forces_opacity * 0.9 * sqrt(min(abs(room), 1.0)));
+        seen = with_arrows(seen, pixel, u_force, 1.0, u_force_arrow, u_force_colour, u_forces_opacity);
+#endif
 #ifdef ARROWS
-        vec2 tile = (floor(pixel / u_arrow) + 0.5) * u_arrow;
-        vec2 middle = tile * u_step;
-        if (inside(middle) > 0.5) {
-            vec2 v = texture(u_velocity, middle).rg / u_speed;
-            float size = length(v);
-            // Slow places are drawn longer than in proportion, or nothing but the fastest would be seen.
-            if (size > 0.0) v *= pow(min(size, 1.0), 0.4) / size;
-            vec2 p = (pixel - tile) / (0.5 * u_arrow);
-            float soft = 2.0 / u_arrow;
-            seen = mix(seen, vec3(0.0), u_arrows_opacity * 0.6 * arrow(p * 0.9, v * 1.12, 2.0 * soft));
-            seen = mix(seen, u_arrow_colour, u_arrows_opacity * arrow(p, v, soft));
-        }
+        seen = with_arrows(seen, pixel, u_velocity, u_speed, u_arrow, u_arrow_colour, u_arrows_opacity);
 #endif
     }
     out_colour = vec4(seen, 1.0);

@@ -187,7 +187,11 @@ def _statistics(ui: Ui, editor: Editor) -> None:
     stats = editor.numbers.take(session)
     with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85):
         clock = editor.clock.milliseconds
-        ui.dim(f"Frame  {clock.get('frame', 0):.1f} ms    simulate {clock.get('simulate', 0):.1f}")
+        ui.text(f"Frame  {clock.get('frame', 0):.1f} ms", size=13)
+        for name in ("simulate", "canvas", "panels", "interface"):
+            ui.dim(f"    {name}  {clock.get(name, 0):.1f} ms")
+        if stats.stages:
+            ui.text(f"Step  {sum(stats.stages.values()):.1f} ms", size=13)
         for name, value in stats.stages.items():
             ui.dim(f"    {name}  {value:.1f} ms")
         if stats.map is not None:

@@ -9,8 +9,9 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.presets import DEFAULT, FEELS
+from app.session import Session
 from app.ui.theme import packed
-from app.ui.widgets import Ui
+from app.ui.widgets import Slid, Ui
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
@@ -59,23 +60,27 @@ def _fluid(ui: Ui, editor: Editor) -> None:
         title="Viscosity",
         more="How thick the fluid is. Thin fluids swirl on, thick ones move as one piece and stop at once.",
     )  # fmt: skip
-    if slid.changed:
-        session.preview_change(viscosity=slid.value)
-    if slid.done:
-        session.commit("Viscosity")
+    _set(session, "Viscosity", slid, viscosity=slid.value)
     slid = ui.slider(
         "drag", "Drag", fluid.drag, 0.0, 10.0, f"{fluid.drag:.1f} / s", DEFAULT.drag,
         title="Drag", more="How fast all motion dies away. At 0 only viscosity brings it to rest.",
     )  # fmt: skip
-    if slid.changed:
-        session.preview_change(drag=slid.value)
-    if slid.done:
-        session.commit("Drag")
+    _set(session, "Drag", slid, drag=slid.value)
     slip = WALLS.index(fluid.walls)
     chosen = ui.segmented("walls", ("Edges glide", "Edges hold"), slip, -1)
     if chosen != slip:
         session.change("Edges of the fluid", walls=WALLS[chosen])
     ui.tooltip("At the picture's edges", more="The fluid glides along them, or sticks to them.")
+
+
+def _set(session: Session, name: str, slid: Slid, **setting: float) -> None:
+    """Set what a slider says: an edit once it is let go of."""
+    if slid.again:
+        session.undo()
+    if slid.changed:
+        session.preview_change(**setting)
+    if slid.done:
+        session.commit(name)
 
 
 def _view(ui: Ui, editor: Editor) -> None:
