@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from app import project as projects
 from app.pictures import read_picture, write_picture
@@ -109,6 +110,20 @@ class Desk:
             time.sleep(attempt)
         self.until(condition, what)
 
+    def save(self, path: Path) -> None:
+        """Save what is open under a new name in the folder that is proposed."""
+
+        def do() -> None:
+            self.key("ctrl+s")
+            time.sleep(1.5)
+            # The name is marked, and what is typed takes its place.
+            self.key("ctrl+a")
+            self.type(path.stem)
+            self.key("Return")
+
+        self.insist(do, path.exists, "the project to be saved")
+        self.until(lambda: self.title() == f"{path.stem} - fluidwarp", "the title to say so")
+
     def until_gone(self) -> None:
         """Wait until the editor has ended by itself, and well."""
         assert self.editor is not None
@@ -148,17 +163,7 @@ def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
     desk.key("ctrl+y")
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "everything to be redone")
 
-    def save() -> None:
-        desk.key("ctrl+s")
-        time.sleep(1.5)
-        # In the dialog: the name's field, then Enter.
-        desk.do("mousemove", "640", "540", "sleep", "0.3", "click", "1", "sleep", "0.5")
-        desk.key("ctrl+a")
-        desk.type("work")
-        desk.key("Return")
-
-    desk.insist(save, work.exists, "the project to be saved")
-    desk.until(lambda: desk.title() == "work - fluidwarp", "the title to say so")
+    desk.save(work)
     saved = projects.load(work)
     assert [stroke.tool for stroke in saved.recipe.stroke] == ["push", "freeze"]
     assert np.array_equal(saved.picture.pixels, pattern().pixels)
@@ -194,3 +199,91 @@ def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
     assert "fluidwarp render" in done.stderr
     assert "fluidwarp doctor" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_a_file_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
+    picture, other = tmp_path / "pattern.png", tmp_path / "Käse 2.png"
+    write_picture(picture, pattern())
+    write_picture(other, pattern(100, 60))
+    desk.open(str(picture))
+    command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(other)]
+    subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
+    desk.until(lambda: desk.title() == "Käse 2 - fluidwarp", "the dropped picture")
+    desk.key("ctrl+z")
+    desk.until(lambda: desk.title() == "pattern - fluidwarp", "the first picture again")
+
+
+def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Path) -> None:
+    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
+    write_picture(picture, pattern())
+    desk.open(str(picture))
+    desk.save(work)
+
+    def viscosity() -> float:
+        """As it is in the project, saved now."""
+        desk.key("ctrl+s")
+        desk.until(lambda: desk.title() == "work - fluidwarp", "it to be saved")
+        return projects.load(work).recipe.fluid.viscosity
+
+    def type_number() -> None:
+        hold, let_go = ("keydown", "ctrl", "sleep", "0.2"), ("sleep", "0.2", "keyup", "ctrl", "sleep", "0.5")
+        desk.do("mousemove", "1128", "159", "sleep", "0.3", *hold, "click", "1", *let_go)
+        desk.key("ctrl+a")
+        desk.type("1.25")
+        desk.key("Return")
+
+    def click_twice() -> None:
+        desk.do(
+            "mousemove", "1128", "159", "sleep", "0.3", "click", "--repeat", "2", "--delay", "60", "1", "sleep", "1"
+        )
+
+    desk.insist(type_number, lambda: viscosity() == pytest.approx(1.25), "the number to be taken")
+    desk.insist(click_twice, lambda: viscosity() == pytest.approx(0.03), "the default to be taken")
+
+
+# Where in a window of 1280 x 800 the export dialog has its kinds and, for each of them, its formats.
+KINDS = {"picture": (489, 283), "animation": (639, 283), "map": (790, 283)}
+FORMATS = {"picture": 319, "animation": 247, "map": 272}
+
+
+@pytest.mark.parametrize(
+    ("kind", "across", "name"),
+    [
+        ("picture", 640, "work warped.jpg"),
+        ("picture", 790, "work warped.tif"),
+        ("animation", 790, "work warped.%04d.png"),
+        ("map", 470, "work map.exr"),
+    ],
+)
+def test_what_is_exported_is_what_the_command_line_makes(
+    desk: Desk, tmp_path: Path, kind: str, across: int, name: str
+) -> None:
+    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
+    write_picture(picture, pattern())
+    desk.open(str(picture))
+    desk.drag((400, 400), (520, 400))
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
+    desk.save(work)
+    desk.key("ctrl+e")
+    time.sleep(1.5)
+    for x, y in (KINDS[kind], (across, FORMATS[kind])):
+        desk.do("mousemove", str(x), str(y), "sleep", "0.4", "click", "1", "sleep", "0.6")
+    desk.key("Return")
+    pattern_of_names = name.replace("%04d", "*")
+    desk.until(lambda: bool(list(tmp_path.glob(pattern_of_names))), "the export")
+    line = tmp_path / "line"
+    line.mkdir()
+    how = ["--map", str(line / name)] if kind == "map" else ["-o", str(line / name)]
+    command = [sys.executable, "-m", "app", "render", str(work), *how]
+    subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
+    made = sorted(line.iterdir())
+    assert [path.name for path in made] == sorted(path.name for path in tmp_path.glob(pattern_of_names))
+    assert (len(made) > 10) == (kind == "animation")
+    for path in made:
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
+    if kind != "map":
+        with Image.open(tmp_path / made[-1].name) as seen:
+            assert seen.size == (240, 180)
+            assert seen.format == {"jpg": "JPEG", "tif": "TIFF", "png": "PNG"}[name[-3:]]
+            difference = np.abs(np.asarray(seen.convert("RGB"), float) - pattern().pixels).mean()
+        assert difference > 1
