@@ -30,10 +30,6 @@ def chebyshev_weights(sweeps: int, smallest: float) -> tuple[float, ...]:
     return tuple(sorted((1 / (middle + half * cos(pi * (k + 0.5) / sweeps)) for k in range(sweeps)), reverse=True))
 
 
-# Sweeps after each interpolation, from the finest level down; the last entry serves all coarser ones. There are none
-# before a restriction: from a zero guess the residual is the right-hand side itself, and the way down costs little.
-SWEEPS = (chebyshev_weights(3, 0.7), chebyshev_weights(4, 0.35), chebyshev_weights(5, 0.25))
-
 # Where there are solids, each of the first so many levels visits the next coarser one twice: thin walls cost accuracy
 # there, and a second visit costs less than another cycle.
 TWICE = 2
@@ -43,15 +39,19 @@ WANTED_LEFT = 1e-3
 
 
 @dataclass(frozen=True)
-class Convergence:
-    """What cycles leave of a divergence, about: found with impulses, strokes, painted viscosities and walls.
+class Cycle:
+    """How a cycle smooths, and what it leaves, about: found with impulses, strokes, painted viscosities and walls.
 
     Attributes:
-        rough: the part that the first one leaves of what differs from the means over blocks of 2 x 2 cells.
+        sweeps: their weights after each interpolation, from the finest level down; the last entry serves all coarser
+            ones. There are none before a restriction: from a zero guess the residual is the right-hand side itself, and
+            the way down costs little.
+        rough: the part that the first cycle leaves of what differs from the means over blocks of 2 x 2 cells.
         smooth: and of all.
         each: the part of that which every further one leaves.
     """
 
+    sweeps: tuple[tuple[float, ...], ...]
     rough: float
     smooth: float
     each: float
@@ -60,12 +60,16 @@ class Convergence:
         """What one cycle leaves of the whole divergence and its rough part."""
         return self.rough * rough + self.smooth * whole
 
-    def cycles(self, left_by_one: float) -> int:
+    def count(self, whole: float, rough: float) -> int:
         """Cycles that leave little enough."""
-        return 1 + ceil(log(max(left_by_one / WANTED_LEFT, 1.0), 1 / self.each))
+        return 1 + ceil(log(max(self.left_by_one(whole, rough) / WANTED_LEFT, 1.0), 1 / self.each))
 
 
-OPEN, WALLED = Convergence(0.25, 0.0025, 0.08), Convergence(0.15, 0.0025, 0.18)
+_COARSER = chebyshev_weights(4, 0.35), chebyshev_weights(5, 0.25)
+WALLED = Cycle((chebyshev_weights(3, 0.7), *_COARSER), rough=0.15, smooth=0.0025, each=0.18)
+QUICK = Cycle((chebyshev_weights(3, 0.7), *_COARSER), rough=0.25, smooth=0.0025, each=0.08)
+# One more sweep pays where one cycle is not enough.
+THOROUGH = Cycle((chebyshev_weights(4, 0.5), *_COARSER), rough=0.13, smooth=0.002, each=0.045)
 
 
 class Level:
@@ -156,7 +160,7 @@ class Pressure:
         shader, levels = self.device.pass_, self._levels
         self._has_solids = solid is not None
         self._variant: dict[str, Any] = {} if self._has_solids else {"OPEN": 1}
-        self._convergence = WALLED if self._has_solids else OPEN
+        self._cycle = self._cycle_for(1.0, 1.0)
         finest = levels[0]
         everywhere = solid or self.device.field(self.size, 1, "no solids", "f1")
         shader("pressure/open_faces.frag")((finest.left, finest.up, finest.far), solid=everywhere)
@@ -190,12 +194,12 @@ class Pressure:
             The number of cycles.
         """
         finest = self._levels[0]
-        from_rest, from_expected = self._try_expected(velocity.read, source)
-        is_warm = warm and from_expected <= 1.5 * from_rest
+        at_rest, expected = self._try_expected(velocity.read, source)
+        is_warm = warm and QUICK.left_by_one(*expected) <= 1.5 * QUICK.left_by_one(*at_rest)
         if not is_warm:
             self._take_divergence(velocity.read, source)
-        if cycles is None:
-            cycles = self._convergence.cycles(from_expected if is_warm else from_rest)
+        self._cycle = self._cycle_for(*(expected if is_warm else at_rest))
+        cycles = cycles or self._cycle.count(*(expected if is_warm else at_rest))
         for cycle in range(cycles):
             self._solve(0)
             if self._has_solids:
@@ -268,12 +272,17 @@ class Pressure:
             expected |= {"source": self._across, "sums": self._dot(self._across, self._down)}
         self._draw("divergence", target, finest, defines, velocity=velocity, **expected)
 
-    def _try_expected(self, velocity: Field, source: Field | None) -> tuple[float, float]:
-        """Start from the pressure expected; what a cycle would leave from rest, and from there. Waits for the GPU."""
+    def _try_expected(self, velocity: Field, source: Field | None) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Start from the pressure expected; what is left from rest, and there: of all and of the rough. Waits."""
         self._take_divergence(velocity, source, expected=self._base.read)
         squares = self._add_squares(self._squares)
         whole, rough, left, left_rough = np.sqrt(np.maximum(squares, 0.0) / (squares[0] or 1.0)).tolist()
-        return self._convergence.left_by_one(whole, rough), self._convergence.left_by_one(left, left_rough)
+        return (whole, rough), (left, left_rough)
+
+    def _cycle_for(self, whole: float, rough: float) -> Cycle:
+        if self._has_solids:
+            return WALLED
+        return QUICK if QUICK.count(whole, rough) == 1 else THOROUGH
 
     def _solve(self, number: int) -> None:
         """One cycle from a level down: from a zero guess, the `pressure` that roughly accounts for its `residual`."""
@@ -300,7 +309,7 @@ class Pressure:
         pass_("pressure/prolong.frag", **self._variant)(
             pressure.read, coarse=coarser.pressure.read, links=level.links, span=level.span
         )
-        for weight in SWEEPS[min(number, len(SWEEPS) - 1)]:
+        for weight in self._cycle.sweeps[min(number, len(self._cycle.sweeps) - 1)]:
             self._draw("smooth", pressure.write, level,
                        pressure=pressure.read, residual=level.residual.read, weight=weight)  # fmt: skip
             pressure.swap()
