@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import moderngl
 import numpy as np
+from PIL import Image
 
 from app.pictures import Picture, to_bits
 from app.session import Session
@@ -187,8 +188,13 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
     step = -(-max(picture.width, picture.height) // largest)
     if step > 1:
         height, width = (size // step * step for size in pixels.shape[:2])
-        blocks = pixels[:height, :width].reshape(height // step, step, width // step, step, -1)
-        pixels = blocks.mean(axis=(1, 3), dtype=np.float32).astype(picture.pixels.dtype)
+        pixels = pixels[:height, :width]
+        if pixels.dtype == np.uint8 and pixels.shape[2] in (3, 4):
+            # The same means, several times faster, and other threads go on meanwhile.
+            pixels = np.asarray(Image.fromarray(pixels).reduce(step))
+        else:
+            blocks = pixels.reshape(height // step, step, width // step, step, -1)
+            pixels = blocks.mean(axis=(1, 3), dtype=np.float32).astype(picture.pixels.dtype)
     pixels = to_bits(pixels, 8, dither=False)
     if pixels.shape[2] <= 2:
         pixels = np.concatenate([pixels[..., :1].repeat(3, axis=2), pixels[..., 1:]], axis=2)
