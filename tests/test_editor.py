@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 from collections.abc import Iterator
 from dataclasses import replace
@@ -620,6 +621,39 @@ def test_the_browser_chooses_where(robot: Robot, tmp_path: Path) -> None:
     robot.frame(count=2)
     assert chosen == [tmp_path / "saved.fluidwarp"]
     assert not robot.editor.dialogs
+
+
+@pytest.mark.parametrize("helper", ["absent", "failing", "working"])
+def test_without_a_system_s_file_dialog_there_is_ours(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, helper: str
+) -> None:
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    if helper == "absent":
+        monkeypatch.setenv("PATH", str(programs))
+    else:
+        answer = f"echo {tmp_path}/other.png" if helper == "working" else "exit 1"
+        (programs / "zenity").write_text(f"#!/bin/sh\nsleep 0.1\n{answer}\n")
+        (programs / "zenity").chmod(0o755)
+        monkeypatch.setenv("PATH", f"{programs}:{os.environ['PATH']}")
+    robot.editor.files.native = True
+    robot.key("ctrl+o")
+    robot.until(lambda: not robot.editor.files.is_waiting)
+    if helper == "working":
+        robot.until(lambda: not robot.editor.files.is_loading)
+    else:
+        assert "zenity" in robot.editor.messages.shown[-1].text
+        browser = robot.editor.dialogs[-1]
+        assert isinstance(browser, Browser)
+        browser.go(tmp_path)
+        robot.frame(count=2)
+        row = [path.name for path in browser._inside].index("other.png")
+        robot.frame(count=20)
+        for _ in range(2):
+            robot.click(browser.rect.x + 120, browser.rect.y + 115 + row * 34)
+        robot.until(lambda: not robot.editor.files.is_loading)
+    assert robot.editor.canvas.size == (100, 60)
 
 
 # Warp maps ----------------------------------------------------------------------------------------------------------

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import shutil
 import sys
+import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,8 +28,19 @@ if TYPE_CHECKING:
     from app.ui.editor import Editor
 
 OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS)))
+TOO_FAST = 0.4  # seconds in which nobody answers a dialog
 AT_ONCE = 0.15  # seconds that opening may take without a word about it
 Chosen = Callable[[Path], None]
+
+
+@dataclass
+class _Waiting:
+    """A dialog of the system that is open, who is told the answer, and ours that takes its place if it fails."""
+
+    dialog: Any
+    chosen: Chosen
+    instead: Callable[[], Browser]
+    since: float = field(default_factory=time.monotonic)
 
 
 class Files:
@@ -40,7 +53,7 @@ class Files:
     def __init__(self, editor: Editor) -> None:
         self.editor = editor
         self.native = False
-        self._waiting: tuple[Any, Chosen] | None = None
+        self._waiting: _Waiting | None = None
         self._loading: Loading | None = None
 
     # -- opening ----------------------------------------------------------------------------------------------------
@@ -184,48 +197,64 @@ class Files:
     def poll(self) -> None:
         """See whether the system's dialog has been answered, and a file has been read."""
         self._look_at_loading()
-        if self._waiting is None or not self._waiting[0].ready(0):
+        if self._waiting is None or not self._waiting.dialog.ready(0):
             return
-        (dialog, chosen), self._waiting = self._waiting, None
-        answer: str | list[str] = dialog.result()
+        waiting, self._waiting = self._waiting, None
+        answer: str | list[str] = waiting.dialog.result()
         name = answer if isinstance(answer, str) else next(iter(answer), "")
         if name:
-            chosen(Path(name))
+            waiting.chosen(Path(name))
+        elif time.monotonic() - waiting.since < TOO_FAST:
+            # A program that fails answers like a person who cancels, only faster than one can.
+            self.native = False
+            self.editor.messages.warn(
+                "The system's file dialog did not open, so here is our own. "
+                "`zenity --file-selection` in a terminal shows what is wrong with it."
+            )
+            self.editor.dialogs.append(waiting.instead())
 
     def _folder(self) -> Path:
         folder = Path(self.editor.preferences.folder or Path.home())
         return folder if folder.is_dir() else Path.home()
 
     def _ask_for(self, title: str, endings: tuple[str, ...], chosen: Chosen) -> None:
+        def ours() -> Browser:
+            return Browser(title, self._folder(), endings, chosen)
+
         if self._waiting is not None:
             return
         if self._has_system_dialogs():
             from imgui_bundle import portable_file_dialogs as dialogs
 
             patterns = " ".join(f"*{ending}" for ending in endings)
-            dialog = dialogs.open_file(
-                title, str(self._folder()), ["Pictures and projects", patterns, "All files", "*"]
-            )
-            self._waiting = (dialog, chosen)
+            filters = ["Pictures and projects", patterns, "All files", "*"]
+            self._waiting = _Waiting(dialogs.open_file(title, str(self._folder()), filters), chosen, ours)
         else:
-            self.editor.dialogs.append(Browser(title, self._folder(), endings, chosen))
+            self.editor.dialogs.append(ours())
 
     def _ask_where(self, title: str, path: Path, endings: tuple[str, ...], chosen: Chosen) -> None:
+        def ours() -> Browser:
+            return Browser(title, path.parent, endings, chosen, path.name)
+
         if self._waiting is not None:
             return
         if self._has_system_dialogs():
             from imgui_bundle import portable_file_dialogs as dialogs
 
             patterns = " ".join(f"*{ending}" for ending in endings)
-            self._waiting = (dialogs.save_file(title, str(path), [title, patterns]), chosen)
+            self._waiting = _Waiting(dialogs.save_file(title, str(path), [title, patterns]), chosen, ours)
         else:
-            self.editor.dialogs.append(Browser(title, path.parent, endings, chosen, path.name))
+            self.editor.dialogs.append(ours())
 
     def _has_system_dialogs(self) -> bool:
         if not self.native:
             return False
         helpers = ("zenity", "kdialog", "matedialog", "qarma")
-        return sys.platform in ("win32", "darwin") or any(shutil.which(helper) for helper in helpers)
+        found = sys.platform in ("win32", "darwin") or any(shutil.which(helper) for helper in helpers)
+        if not found:
+            self.native = False
+            self.editor.messages.say("There is no zenity or kdialog here, so this is fluidwarp's own file dialog.")
+        return found
 
 
 def load_any(path: Path) -> Project:
