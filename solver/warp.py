@@ -278,7 +278,8 @@ class WarpMap:
     def probe(self, target: Field, place: tuple[float, float]) -> None:
         """Draw the displacement at one place, 0-1 of the domain, into a field of one texel."""
         origin = place[0] - 0.5, place[1] - 0.5
-        self.device.pass_("warp/compose.frag")(target, **self._parts(), origin=origin, step=(1.0, 1.0))
+        compose = self.device.pass_("warp/compose.frag", **self._held_defines())
+        compose(target, **self._parts(), origin=origin, step=(1.0, 1.0))
 
     @cached_property
     def forward(self) -> ForwardMap:
