@@ -197,6 +197,7 @@ class _Export:
         self.progress = progress
         self.device = device
         self.pictures = Pictures(job.picture, job.folder)
+        job.picture.pixels.flags.writeable = False  # so that it stays on the GPU from frame to frame
         playback = job.recipe.time
         # A moving source has no frame that is shown twice: what goes back does so in the simulation.
         self.is_spooled = job.clip is None and not (job.maps and job.maps.is_sequence)

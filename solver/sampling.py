@@ -36,8 +36,8 @@ class Sampling:
     Attributes:
         quality: interpolation between pixels.
         edges: what lies beyond the picture. "transparent" is black where the picture has no alpha.
-        samples: places looked up along a side of each pixel of the result; "auto" follows the stretch s of the map in
-            that direction there: clamp(ceil(1.5 s), 2, 8), and 1 where the map only shifts.
+        samples: places looked up along a side of each pixel of the result, 1 or an even number; "auto" follows the
+            stretch s of the map in that direction there: 2 clamp(ceil(0.75 s), 1, 4), or one where it only shifts.
         linear_light: mix in linear light; uint8 and uint16 are taken as sRGB, float32 as linear already.
         dither: spread the rounding to 8 bits by a fixed pattern; by default where light is mixed.
     """
@@ -131,11 +131,11 @@ class _Job:
         return self.how.edges in ("mirror", "wrap")
 
     @property
-    def inside(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom bounds, in pixels, beyond which there is nothing."""
+    def half(self) -> tuple[float, float]:
+        """Half of the sides of the rectangle, in pixels, beyond which there is nothing."""
         # What is a part of a texel of the map outside is there because of the interpolation, not of the fluid.
         width, height = self.source_size
-        return (-self.slack, -self.slack, width + self.slack, height + self.slack)
+        return 0.5 * width + self.slack, 0.5 * height + self.slack
 
     def defines(self, whole: bool) -> dict[str, object]:
         """Of `look_up.frag`."""
@@ -149,6 +149,7 @@ class _Job:
             "SINGLE": self.is_single,
             "PREPARED": self.is_prepared,
             "LINEAR_LIGHT": self.is_curved and self.is_prepared,
+            "CODES": levels > 0,  # of 8 or 16 bits, and so neither infinite nor NaN
             "CLAMPED": levels > 0 and self.how.quality == "catmull-rom",  # the only one that overshoots
             "DITHER": dither and kind == "f1" and self.how.quality != "nearest",
             "OPAQUE": not self.has_alpha,
@@ -156,8 +157,8 @@ class _Job:
         }
         values: dict[str, object] = {name: 1 for name, wanted in flags.items() if wanted}
         values |= {"TAPS": _TAPS[self.how.quality]}
-        values |= {"LEAST_SAMPLES": 2 if samples == "auto" else samples}
-        values |= {"MOST_SAMPLES": MOST_SAMPLES if samples == "auto" else samples}
+        least, most = (1, MOST_SAMPLES // 2) if samples == "auto" else (samples // 2, samples // 2)
+        values |= {"LEAST_PAIRS": least, "MOST_PAIRS": most}
         return values
 
 
@@ -178,6 +179,7 @@ class Sampler:
         self._fields: dict[str, Field] = {}
         self._textures: dict[str, tuple[moderngl.Texture, tuple[object, ...]]] = {}
         self._spread_for: tuple[object, ...] = ()
+        self._held: tuple[np.ndarray, bool, bool] | None = None
 
     def apply(
         self,
@@ -190,7 +192,8 @@ class Sampler:
 
         Args:
             warp: the map, laid over the whole of the picture.
-            picture: (h, w) or (h, w, 1-4), uint8, uint16 or float32, straight alpha last.
+            picture: (h, w) or (h, w, 1-4), uint8, uint16 or float32, straight alpha last. A read-only array that is
+                given again is still there and is not uploaded again.
             size: (width, height) of the result, by default the picture's.
             how: see `Sampling`.
 
@@ -222,8 +225,10 @@ class Sampler:
         width, height = job.size
         rows, columns = (height, width) if self._fits(job.size) else (self.tile[1], self.tile[0])
         whole = self._fits(job.source_size) and not job.is_repeated
-        if whole:
+        if whole and not self._holds(picture, job):
             self._load(job, (0, 0, *job.source_size))
+            # The array itself and not its id: no other can take its place in memory as long as it is held.
+            self._held = None if picture.flags.writeable else (picture, job.is_prepared, job.is_curved)
         for top in range(0, height, rows):
             bottom = min(top + rows, height)
             shape = bottom - top, width, job.channels
@@ -240,6 +245,7 @@ class Sampler:
             field.release()
         for texture, _ in self._textures.values():
             texture.release()
+        self._held = None
         self._fields.clear()
         self._textures.clear()
 
@@ -352,14 +358,22 @@ class Sampler:
             pixel=origin,
             zoom=job.zoom,
             longer=job.longer,
-            inside=job.inside,
-            outside=(0.0, 0.0, 0.0, 1.0 if opaque else 0.0),
+            middle=(0.5 * job.source_size[0], 0.5 * job.source_size[1]),
+            half=job.half,
+            outside=1.0 if opaque else 0.0,
         )
 
     # -- textures ---------------------------------------------------------------------------------------------------
 
+    def _holds(self, picture: np.ndarray, job: _Job) -> bool:
+        """Whether all of the picture is on the GPU as the job needs it."""
+        if self._held is None or self._held[0] is not picture:
+            return False
+        return self._held[1:] == (job.is_prepared, job.is_curved)
+
     def _load(self, job: _Job, piece: tuple[int, int, int, int]) -> None:
         """Upload a piece of the picture (left, top, right, bottom) and prepare it."""
+        self._held = None
         left, top, right, bottom = piece
         width, height = right - left, bottom - top
         if job.is_repeated:

@@ -170,3 +170,21 @@ def test_what_cannot_be_looked_up_says_so(device: Device) -> None:
         sampler.apply(warp, np.zeros((8, 8, 5), np.uint8))
     with pytest.raises(SamplingError, match="map of shape"):
         GivenMap(device, np.zeros((8, 8)))
+
+
+def test_a_picture_that_is_read_only_stays_uploaded_and_no_other_is_taken_for_it(device: Device) -> None:
+    first, second = noise((60, 80, 3), "8", 1), noise((60, 80, 3), "8", 2)
+    warp, sampler = GivenMap(device, waves((80, 60), 0.05)), Sampler(device)
+    wanted = [Sampler(device).apply(warp, picture) for picture in (first, second)]
+    first.flags.writeable = False
+    loads: list[object] = []
+    load = sampler._load
+    sampler._load = lambda *given: (loads.append(given), load(*given))[1]
+    for picture, result in ((first, 0), (first, 0), (second, 1), (second, 1), (first, 0)):
+        np.testing.assert_array_equal(sampler.apply(warp, picture), wanted[result])
+    assert len(loads) == 4  # all but the second
+    # The same picture without linear light is another one on the GPU.
+    plain = Sampling("bilinear", linear_light=False)
+    np.testing.assert_array_equal(sampler.apply(warp, first, how=plain), Sampler(device).apply(warp, first, how=plain))
+    second[:] = 7
+    np.testing.assert_array_equal(sampler.apply(warp, second), Sampler(device).apply(warp, second))

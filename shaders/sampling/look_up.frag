@@ -1,21 +1,22 @@
 // Look up: the picture at x + D(x), the mean of places spread evenly over each pixel of the result.
-// Along x and along y there are clamp(ceil(1.5 s), 2, 8) of them, s the stretch of the map in that direction over the
-// pixel, or one at the centre where the map only shifts.
+// Along x and along y there are 2 clamp(ceil(0.75 s), 1, 4) of them, s the stretch of the map in that direction over the
+// pixel; where the map only shifts, they come together at the centre. Four neighbours lie within a pixel of the picture,
+// so they are looked up together, from the one block of pixels that holds all that each of them needs.
 //
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels; premultiplied
 // where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels, or at their centres with SINGLE defined;
 // u_pixel: the result's pixel of the first fragment; u_zoom: pixels of the picture to a pixel of the result;
-// u_longer: pixels of the picture to a longer side; u_inside: left, top, right, bottom bounds, pixels, beyond which
-// there is u_outside.
-// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_SAMPLES, MOST_SAMPLES; SINGLE; PREPARED;
-// WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; OPAQUE if there is
-// no alpha; LINEAR_LIGHT to encode; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA.
-// reads: 69
+// u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
+// beyond which there is nothing, with an alpha of u_outside.
+// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places; SINGLE;
+// PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; OPAQUE if
+// there is no alpha; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA.
+// reads: 30
 #ifndef TAPS
 #define TAPS 4
-#define LEAST_SAMPLES 2
-#define MOST_SAMPLES 8
+#define LEAST_PAIRS 1
+#define MOST_PAIRS 4
 #endif
 #include "lib/srgb.glsl"
 uniform sampler2D u_source;
@@ -26,8 +27,9 @@ uniform vec2 u_extent;
 uniform vec2 u_pixel;
 uniform vec2 u_zoom;
 uniform vec2 u_longer;
-uniform vec4 u_inside;
-uniform vec4 u_outside;
+uniform vec2 u_middle;
+uniform vec2 u_half;
+uniform float u_outside;
 layout(location = 0) out vec4 out_color;
 
 // A component that is never read costs nothing.
@@ -48,37 +50,105 @@ layout(location = 0) out vec4 out_color;
 #define WITHIN(place, count) min(max(place, 0.5), (count) - 0.5)
 #endif
 
-vec4 catmull_rom(float f) {
-    return vec4(f * (-0.5 + f * (1.0 - 0.5 * f)), 1.0 + f * f * (-2.5 + 1.5 * f), f * (0.5 + f * (2.0 - 1.5 * f)),
-                f * f * (-0.5 + 0.5 * f));
+#define AT(x, y) texture(u_source, vec2(x, y)).PARTS
+
+// 1 within the bounds of the picture, 0 beyond them.
+float within(vec2 place) {
+#ifdef BOUNDED
+    vec2 beyond = abs(place - u_middle) - u_half;
+    return step(max(beyond.x, beyond.y), 0.0);
+#else
+    return 1.0;
+#endif
 }
 
-// The picture at `part` pixels from the corner of the pixel `whole`, two parts so that large pictures lose no precision.
-COLOR picture(vec2 whole, vec2 part) {
-    vec2 texel = 1.0 / vec2(textureSize(u_source, 0));
-#define AT(x, y) texture(u_source, vec2(x, y)).PARTS
-#if TAPS == 1
-    vec2 only = WITHIN(whole - CORNER + floor(part) + 0.5, u_extent) * texel;
-    COLOR sum = AT(only.x, only.y);
-#else
-    vec2 cell = floor(part - 0.5), f = part - 0.5 - cell, first = whole - CORNER + cell;
+#if TAPS > 1
+const int BLOCK = TAPS + 1;
+
+// Weights of the pixels 0, 1 ... TAPS for a place between the middle two of the first or of the last TAPS: f in [0, 2].
+float[BLOCK] weights(float f) {
+    float later = step(1.0, f), g = f - later, sooner = 1.0 - later;
 #if TAPS == 2
+    return float[BLOCK](sooner * (1.0 - g), mix(g, 1.0 - g, later), later * g);
+#else
+    // Catmull-Rom.
+    float a = g * (-0.5 + g * (1.0 - 0.5 * g)), b = 1.0 + g * g * (-2.5 + 1.5 * g);
+    float c = g * (0.5 + g * (2.0 - 1.5 * g)), d = g * g * (-0.5 + 0.5 * g);
+    return float[BLOCK](sooner * a, mix(b, a, later), mix(c, b, later), mix(d, c, later), later * d);
+#endif
+}
+
+// Texture coordinates of the first, second ... pixel of a block, in one direction.
+float[BLOCK] coordinates(float first, float count, float texel) {
+    float at[BLOCK];
+    for (int i = 0; i < BLOCK; ++i)
+        at[i] = WITHIN(first + float(i) + 0.5, count) * texel;
+    return at;
+}
+
+// The mean of the picture at four places within a pixel of each other, given in pixels from the corner of the pixel
+// `whole`: two parts, so that large pictures lose no precision. Beyond the bounds there is nothing.
+COLOR four_places(vec2 whole, vec2 places[4]) {
+    vec2 cell = floor(min(min(places[0], places[1]), min(places[2], places[3])) - float(TAPS / 2) + 0.5);
+    vec2 first = whole - CORNER + cell, texel = 1.0 / vec2(textureSize(u_source, 0));
+    float x[BLOCK] = coordinates(first.x, u_extent.x, texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, texel.y);
+    float along[4 * BLOCK], down[4 * BLOCK], there = 0.0;
+    for (int k = 0; k < 4; ++k) {
+        vec2 f = places[k] - cell - float(TAPS / 2) + 0.5;
+        float wx[BLOCK] = weights(f.x), wy[BLOCK] = weights(f.y), part = 0.25 * within(whole + places[k]);
+        there += part;
+        for (int i = 0; i < BLOCK; ++i) {
+            along[k * BLOCK + i] = part * wx[i];
+            down[k * BLOCK + i] = wy[i];
+        }
+    }
+    COLOR sum = COLOR(0.0);
+    for (int j = 0; j < BLOCK; ++j)
+        for (int i = 0; i < BLOCK; ++i) {
+            float weight = 0.0;
+            for (int k = 0; k < 4; ++k)
+                weight += down[k * BLOCK + j] * along[k * BLOCK + i];
+            sum += weight * AT(x[i], y[j]);
+        }
+#ifdef BOUNDED
+    sum = there > 0.0 ? sum : COLOR(0.0);  // nothing times infinity is not nothing
+#ifndef OPAQUE
+    sum.a += (1.0 - there) * u_outside;
+#endif
+#endif
+    return sum;
+}
+#endif
+
+// The picture at one place.
+COLOR one_place(vec2 whole, vec2 place) {
+    vec2 texel = 1.0 / vec2(textureSize(u_source, 0));
+#if TAPS == 1
+    vec2 only = WITHIN(whole - CORNER + floor(place) + 0.5, u_extent) * texel;
+    COLOR sum = AT(only.x, only.y);
+#elif TAPS == 2
+    vec2 cell = floor(place - 0.5), f = place - 0.5 - cell, first = whole - CORNER + cell;
     vec2 a = WITHIN(first + 0.5, u_extent) * texel, b = WITHIN(first + 1.5, u_extent) * texel;
     COLOR sum = mix(mix(AT(a.x, a.y), AT(b.x, a.y), f.x), mix(AT(a.x, b.y), AT(b.x, b.y), f.x), f.y);
 #else
-    const vec4 OFFSETS = vec4(-0.5, 0.5, 1.5, 2.5);
-    vec4 x = WITHIN(first.x + OFFSETS, u_extent.x) * texel.x, y = WITHIN(first.y + OFFSETS, u_extent.y) * texel.y;
-    vec4 wx = catmull_rom(f.x), wy = catmull_rom(f.y);
+    vec2 cell = floor(place - 1.5), first = whole - CORNER + cell;
+    float x[BLOCK] = coordinates(first.x, u_extent.x, texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, texel.y);
+    float wx[BLOCK] = weights(place.x - 1.5 - cell.x), wy[BLOCK] = weights(place.y - 1.5 - cell.y);
     COLOR sum = COLOR(0.0);
-    for (int j = 0; j < 4; ++j)
-        sum += wy[j] * (wx.x * AT(x.x, y[j]) + wx.y * AT(x.y, y[j]) + wx.z * AT(x.z, y[j]) + wx.w * AT(x.w, y[j]));
+    for (int j = 0; j < TAPS; ++j)
+        for (int i = 0; i < TAPS; ++i)
+            sum += wy[j] * wx[i] * AT(x[i], y[j]);
 #endif
-#endif
-#undef AT
 #ifdef BOUNDED
-    vec2 place = whole + part;
-    bool inside = all(greaterThanEqual(vec4(place, u_inside.zw), vec4(u_inside.xy, place)));
-    sum = inside ? sum : u_outside.PARTS;
+    float there = within(whole + place);
+#if defined(CODES)
+    sum *= there;
+#else
+    sum = there > 0.0 ? sum : COLOR(0.0);
+#endif
+#ifndef OPAQUE
+    sum.a += (1.0 - there) * u_outside;
+#endif
 #endif
     return sum;
 }
@@ -100,7 +170,7 @@ void main() {
 #endif
 #ifdef SINGLE
     vec2 centre = rest + 0.5 * zoom + displacement(0, 0);
-    COLOR color = picture(whole, centre);
+    COLOR color = one_place(whole, centre);
     bool shifted = true;
 #else
     vec2 a = displacement(0, 0), b = displacement(1, 0), c = displacement(0, 1), d = displacement(1, 1);
@@ -112,17 +182,24 @@ void main() {
     float apart = smoothstep(0.0, 0.2, strain);
     bool shifted = apart < 1e-3;
     vec2 stretch = vec2(length(along_x), length(along_y));
-    vec2 samples = shifted ? vec2(1.0) : clamp(ceil(1.5 * stretch), float(LEAST_SAMPLES), float(MOST_SAMPLES));
-    // As far apart as gives them the variance of the pixel itself: a mean of fourth order.
-    vec2 spread = samples.x * samples.y > 1.0 ? apart * inversesqrt(1.0 - 1.0 / (samples * samples)) : vec2(0.0);
+    vec2 pairs = shifted ? vec2(1.0) : clamp(ceil(0.75 * stretch), float(LEAST_PAIRS), float(MOST_PAIRS));
+    // As far apart as gives the places the variance of the pixel itself: a mean of fourth order.
+    vec2 spread = (shifted ? 0.0 : apart) * inversesqrt(1.0 - 0.25 / (pairs * pairs));
+    // Half of the way from a place to its neighbours, and no farther than lets four of them share a block.
+    vec2 near = 0.25 * spread / pairs, reach = near.x * abs(along_x) + near.y * abs(along_y) + near.x * near.y * abs(bend);
+    near *= min(1.0, 0.499 / max(max(reach.x, reach.y), 1e-6));
     COLOR color = COLOR(0.0);
-    vec2 place = vec2(0.5);
-    for (int n = int(samples.x * samples.y); n > 0; --n) {
-        vec2 off = spread * (place / samples - 0.5);
-        color += picture(whole, centre + off.x * along_x + off.y * along_y + (off.x * off.y) * bend);
-        place = place.x + 1.0 < samples.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
+    vec2 place = vec2(0.5), places[4];
+    for (int n = int(pairs.x * pairs.y); n > 0; --n) {
+        vec2 off = spread * (place / pairs - 0.5);
+        for (int k = 0; k < 4; ++k) {
+            vec2 at = off + near * vec2(2 * (k & 1) - 1, (k & 2) - 1);
+            places[k] = centre + at.x * along_x + at.y * along_y + (at.x * at.y) * bend;
+        }
+        color += four_places(whole, places);
+        place = place.x + 1.0 < pairs.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
     }
-    color /= samples.x * samples.y;
+    color /= pairs.x * pairs.y;
 #endif
 
 #if defined(PREPARED) && !defined(OPAQUE)
