@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -59,6 +59,19 @@ def _webm(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
     return ["-vf", BT709, "-pix_fmt", "yuva420p" if alpha else "yuv420p", *quality, *speed]
 
 
+def _av1(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    quality = ["-crf", str(30 if crf is None else crf)]
+    speed = {
+        "libsvtav1": ["-c:v", "libsvtav1", "-preset", "8"],
+        "libaom-av1": ["-c:v", "libaom-av1", "-b:v", "0", "-cpu-used", "6", "-row-mt", "1"],
+    }
+    encoder = next((name for name in speed if name in ffmpeg.encoders()), None)
+    if encoder is None:
+        raise UserError("This ffmpeg has no encoder for AV1; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another.")
+    kind = "yuv420p" if bits == 8 else "yuv420p10le"
+    return ["-vf", (ON_BLACK if alpha else "") + BT709, "-pix_fmt", kind, *speed[encoder], *quality]
+
+
 def _ffv1(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
     kind = {(False, 8): "bgr0", (True, 8): "bgra", (False, 16): "gbrp16le", (True, 16): "gbrap16le"}[alpha, bits]
     return ["-vf", SRGB, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
@@ -67,6 +80,11 @@ def _ffv1(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
 def _prores(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
     kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if alpha else "yuv444p10le", "-vendor", "apl0"]
     return ["-vf", BT709, "-c:v", "prores_ks", *kind]
+
+
+def _prores_422_hq(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+    kind = ["-profile:v", "hq", "-pix_fmt", "yuv422p10le", "-vendor", "apl0"]
+    return ["-vf", (ON_BLACK if alpha else "") + BT709, "-c:v", "prores_ks", *kind]
 
 
 def _apng(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
@@ -80,26 +98,44 @@ def _webp(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
 
 @dataclass(frozen=True)
 class Container:
-    """A kind of animation file: its options, whether sides must be even, and the sound it carries.
+    """A kind of animation file: its options by codec, whether sides must be even, and the sound it carries.
 
-    `sound` names the codecs taken over as they are; any other is turned into the first one, by `encoder`.
+    The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
+    is turned into the first one, by `encoder`.
     """
 
     name: str
-    encoding: Encoding
+    codecs: Mapping[str, Encoding]
     even: bool = False
     sound: tuple[str, ...] = ()
     encoder: tuple[str, ...] = ()
 
+    def encoding(self, codec: str | None) -> Encoding:
+        return self.codecs[codec or next(iter(self.codecs))]
+
 
 ANIMATIONS = {
-    ".mp4": Container("MP4", _mp4, even=True, sound=("aac", "mp3", "ac3"), encoder=("aac", "-b:a", "192k")),
-    ".webm": Container("WebM", _webm, even=True, sound=("opus", "vorbis"), encoder=("libopus", "-b:a", "128k")),
-    ".mkv": Container("FFV1", _ffv1, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("flac",)),
-    ".mov": Container("ProRes", _prores, even=True, sound=("pcm_s16le", "pcm_s24le", "aac"), encoder=("pcm_s16le",)),
-    ".gif": Container("GIF", _ffv1),  # by way of a lossless file, see _gif_writer
-    ".apng": Container("APNG", _apng),
-    ".webp": Container("animated WebP", _webp),
+    ".mp4": Container("MP4", {"h264": _mp4}, even=True, sound=("aac", "mp3", "ac3"), encoder=("aac", "-b:a", "192k")),
+    ".webm": Container(
+        "WebM",
+        {"vp9": _webm, "av1": _av1},
+        even=True,
+        sound=("opus", "vorbis"),
+        encoder=("libopus", "-b:a", "128k"),
+    ),
+    ".mkv": Container(
+        "FFV1", {"ffv1": _ffv1}, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("flac",)
+    ),
+    ".mov": Container(
+        "ProRes",
+        {"prores-4444": _prores, "prores-422-hq": _prores_422_hq},
+        even=True,
+        sound=("pcm_s16le", "pcm_s24le", "aac"),
+        encoder=("pcm_s16le",),
+    ),
+    ".gif": Container("GIF", {"gif": _ffv1}),  # by way of a lossless file, see _gif_writer
+    ".apng": Container("APNG", {"apng": _apng}),
+    ".webp": Container("animated WebP", {"webp": _webp}),
 }
 
 
@@ -114,21 +150,32 @@ def is_animation(path: str | os.PathLike[str]) -> bool:
     return is_sequence(path) or (suffix in ANIMATIONS and suffix != ".webp")
 
 
-def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1) -> None:
-    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate."""
+def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1, codec: str | None = None) -> None:
+    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate or codec."""
     if not 0 < fps <= 1000:
         raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
     if is_sequence(path):
         if "%" in NUMBER.sub("", Path(path).name, count=1):
             raise UserError(f"Cannot write {path}: a sequence's name holds one number, as in name.%04d.png.")
         picture_format(path)
+        if codec is not None:
+            raise UserError(f"Cannot write {path}: a sequence of pictures has no codec; leave out --codec.")
         return
     suffix = Path(path).suffix.lower()
     if suffix not in ANIMATIONS:
         endings = " ".join(ANIMATIONS)
         raise UserError(f"Cannot write {path}: an animation ends in one of {endings}, or is name.%04d.png.")
+    known = ANIMATIONS[suffix].codecs
+    if codec is not None and codec not in known:
+        raise UserError(f"Cannot write {path}: {suffix} holds {' or '.join(known)}, not {codec}; change --codec.")
     if suffix == ".gif" and fps > 50:
         raise UserError(f"Cannot write {path}: GIF shows at most 50 frames a second; lower the rate or use .apng.")
+
+
+def check_no_codec(path: str | os.PathLike[str], codec: str | None) -> None:
+    """Raise `UserError` if a codec is asked for in a still picture."""
+    if codec is not None:
+        raise UserError(f"Cannot write {path}: a picture has no codec; leave out --codec, or write a video.")
 
 
 @contextmanager
@@ -136,6 +183,7 @@ def animation_writer(
     path: str | os.PathLike[str],
     fps: float | Fraction = 30,
     *,
+    codec: str | None = None,
     crf: int | None = None,
     quality: int = 95,
     bits: int | None = None,
@@ -150,14 +198,15 @@ def animation_writer(
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
     path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on.
-    crf: H.264's (18) or VP9's (24) constant rate factor. loops: GIF, APNG, WebP; 0 is for ever.
+    codec: one of the container's; None is its first. crf: constant rate factor of H.264 (18), VP9 (24) or AV1 (30).
+    loops: GIF, APNG, WebP; 0 is for ever.
     quality, bits: of a sequence's pictures; see `write_picture`.
     sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
     like: the picture whose profile and metadata the pictures of a sequence get.
     cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
     """
-    check_animation(path, fps)
+    check_animation(path, fps, codec)
     if is_sequence(path):
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
@@ -175,7 +224,9 @@ def animation_writer(
                 yield write
             return
         sound_in, sound_out = _sound(container, sound, rate, frames, sound_from)
-        with _Video(temporary, str(path), container, rate, crf, loops, sound_in, sound_out, cancel) as video:
+        encoding = container.encoding(codec)
+        even = container.even
+        with _Video(temporary, str(path), encoding, rate, even, crf, loops, sound_in, sound_out, cancel) as video:
             yield video.write
             video.finish()
 
@@ -187,15 +238,16 @@ class _Video:
         self,
         temporary: Path,
         label: str,
-        container: Container,
+        encoding: Encoding,
         rate: Fraction,
+        even: bool = False,
         crf: int | None = None,
         loops: int = 0,
         sound_in: list[str] | None = None,
         sound_out: list[str] | None = None,
         cancel: Callable[[], bool] = never,
     ) -> None:
-        self._temporary, self._label, self._container, self._rate = temporary, label, container, rate
+        self._temporary, self._label, self._encoding, self._rate, self._even = temporary, label, encoding, rate, even
         self._crf, self._loops, self._cancel = crf, loops, cancel
         self._sound_in, self._sound_out = sound_in or [], sound_out or []
         self._process: ffmpeg.Ffmpeg | None = None
@@ -218,14 +270,14 @@ class _Video:
             raise ValueError(f"a frame {frame.shape} {frame.dtype} among frames {self._kind}")
         if frame.dtype == np.float32:
             frame = to_bits(frame, 16)
-        if self._container.even and (frame.shape[0] % 2 or frame.shape[1] % 2):
+        if self._even and (frame.shape[0] % 2 or frame.shape[1] % 2):
             # the edge is repeated: a black line would show, a resize would blur
             frame = np.pad(frame, ((0, frame.shape[0] % 2), (0, frame.shape[1] % 2), (0, 0)), mode="edge")
         self._process.feed(np.ascontiguousarray(frame).data.cast("B"))
 
     def _start(self, frame: np.ndarray) -> ffmpeg.Ffmpeg:
         height, width, channels = frame.shape
-        if self._container.even:
+        if self._even:
             height, width = height + height % 2, width + width % 2
         bits = 8 if frame.dtype == np.uint8 else 16
         names = ("gray", "ya8", "rgb24", "rgba") if bits == 8 else ("gray16le", "ya16le", "rgb48le", "rgba64le")
@@ -233,7 +285,7 @@ class _Video:
             [
                 *["-f", "rawvideo", "-pix_fmt", names[channels - 1], "-s", f"{width}x{height}", "-r", str(self._rate)],
                 *["-i", "-", *self._sound_in, "-map", "0:v:0"],
-                *self._container.encoding(channels in (2, 4), bits, self._crf, self._loops),
+                *self._encoding(channels in (2, 4), bits, self._crf, self._loops),
                 *self._sound_out,
                 f"file:{self._temporary}",
             ],
@@ -271,7 +323,7 @@ def _gif_writer(
     alpha = False
     name = temporary_beside(temporary.with_suffix(".mkv"))
     with temporary_file(name) as spool, temporary_file(name.with_suffix(".png")) as palette:
-        with _Video(spool, label, ANIMATIONS[".mkv"], rate, cancel=cancel) as video:
+        with _Video(spool, label, _ffv1, rate, cancel=cancel) as video:
 
             def write(frame: np.ndarray) -> None:
                 nonlocal alpha

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from app import maps
-from app.animation import NUMBER, animation_writer, check_animation, is_animation, is_sequence
+from app.animation import NUMBER, animation_writer, check_animation, check_no_codec, is_animation, is_sequence
 from app.errors import UserError
 from app.export import longer_side, looked_up
 from app.files import writable
@@ -86,7 +86,7 @@ class Application:
         maps: of a sequence, map k warps frame k, or makes frame k of a picture's animation; the last one stays.
         source: the picture or clip.
         output: a picture's file, an animation's, or the pattern of a sequence.
-        edges, size, quality, bits, strip: as in a recipe's job.
+        edges, size, quality, bits, strip, codec: as in a recipe's job.
         fps: of a picture's animation; a clip keeps its own rate.
     """
 
@@ -99,13 +99,15 @@ class Application:
     fps: float = 30.0
     bits: int | None = None
     strip: bool = False
+    codec: str | None = None
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written. Raises `UserError`."""
         if is_animation(self.output):
-            check_animation(self.output, self.fps)
+            check_animation(self.output, self.fps, self.codec)
         else:
             check_picture_output(self.output, self.bits)
+            check_no_codec(self.output, self.codec)
         maps.check_map(self.maps.path)
         writable(self.output)
 
@@ -147,6 +149,7 @@ class Application:
             writer = animation_writer(
                 self.output,
                 clip.fps if clip else self.fps,
+                codec=self.codec,
                 crf=round(45 - 0.3 * self.quality),
                 quality=self.quality,
                 bits=self.bits,

@@ -72,7 +72,7 @@ class Task:
         recipe: its file, or the name of one that comes with fluidwarp.
         edits: to the recipe.
         picture: the picture or clip; None is the recipe's own.
-        output, stats, maps, part, animated, bits, strip: as in `Job`.
+        output, stats, maps, part, animated, bits, strip, codec: as in `Job`.
         max_pixels: larger pictures are refused.
     """
 
@@ -87,6 +87,7 @@ class Task:
     bits: int | None = None
     strip: bool = False
     max_pixels: int = MAX_PIXELS
+    codec: str | None = None
 
     @property
     def label(self) -> str:
@@ -117,6 +118,7 @@ class Task:
             self.animated,
             self.bits,
             self.strip,
+            self.codec,
         )
 
 

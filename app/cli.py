@@ -93,6 +93,10 @@ def edit(
 MaxPixels = Annotated[int, typer.Option(help="Refuse larger pictures, clips and maps.")]
 Bits = Annotated[Optional[int], typer.Option(help="8, 16 or 32 bits a channel, instead of the picture's own.")]  # noqa: UP045
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
+Codec = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(help="Of a video, instead of its usual one: av1 in .webm, prores-422-hq in .mov."),
+]
 MapKind = Annotated[Optional[str], typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]  # noqa: UP045
 StGrid = Annotated[
     Optional[str],  # noqa: UP045
@@ -139,6 +143,7 @@ def render(
         typer.Option(metavar="A-B", help="Only these frames of an animation, counted from 0."),
     ] = None,
     animated: Annotated[bool, typer.Option("--animated", help="OUT.webp is the animation.")] = False,
+    codec: Codec = None,
     bits: Bits = None,
     strip: Strip = False,
     max_pixels: MaxPixels = 400_000_000,
@@ -181,6 +186,7 @@ def render(
         bits,
         strip,
         max_pixels,
+        codec,
     )
     if len(given) < 2 and cluster is None and not (given and output and _is_folder(output)):
         _render_one(task.named(), opened)
@@ -261,6 +267,7 @@ def apply(
     size: Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")] = None,  # noqa: UP045
     fps: Annotated[Optional[float], typer.Option(help="Frames per second of a picture's animation.")] = None,  # noqa: UP045
     quality: Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")] = None,  # noqa: UP045
+    codec: Codec = None,
     bits: Bits = None,
     strip: Strip = False,
     max_pixels: MaxPixels = 400_000_000,
@@ -283,6 +290,7 @@ def apply(
         fps=asked.output.fps,
         bits=bits,
         strip=strip,
+        codec=codec,
     )
     job.check()
     with on_terminal(output.name, None) as progress, Device.headless() as device:

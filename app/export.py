@@ -18,6 +18,7 @@ from app.animation import (
     FrameWriter,
     animation_writer,
     check_animation,
+    check_no_codec,
     frame_order,
     is_animation,
     is_sequence,
@@ -82,6 +83,7 @@ class Job:
         animated: for endings that stand for both, as .webp does: an animation is wanted.
         bits: a channel, of pictures; None keeps the source's.
         strip: leave out the source's metadata.
+        codec: of a video; None is the usual one of its ending.
     """
 
     recipe: Recipe
@@ -95,6 +97,7 @@ class Job:
     animated: bool = False
     bits: int | None = None
     strip: bool = False
+    codec: str | None = None
 
     @property
     def target(self) -> Path:
@@ -125,9 +128,10 @@ class Job:
         """
         check_picture(self.picture, self.recipe.fluid.grid)
         if self.output is not None and self.is_animation:
-            check_animation(self.output, self.rate)
+            check_animation(self.output, self.rate, self.codec)
         elif self.output is not None:
             check_picture_output(self.output, self.bits)
+            check_no_codec(self.output, self.codec)
         if self.maps is not None:
             check_map(self.maps.path)
             if self.maps.is_sequence and not self.has_frames:
@@ -311,6 +315,7 @@ class _Export:
         return animation_writer(
             job.output,
             job.rate,
+            codec=job.codec,
             crf=round(45 - 0.3 * output.quality),
             quality=output.quality,
             bits=job.bits,

@@ -37,6 +37,15 @@ def executable() -> str:
         raise UserError("No ffmpeg was found: install one, or set IMAGEIO_FFMPEG_EXE to its path.") from error
 
 
+@functools.cache
+def encoders() -> frozenset[str]:
+    """Names of the encoders that this ffmpeg has."""
+    told = subprocess.run(
+        [executable(), "-hide_banner", "-encoders"], capture_output=True, text=True, check=False
+    ).stdout
+    return frozenset(re.findall(r"^ [VAS][A-Z.]{5} (\S+)", told, re.MULTILINE))
+
+
 class Ffmpeg:
     """One run of ffmpeg; as a context manager it never outlives its block.
 

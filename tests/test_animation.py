@@ -100,6 +100,75 @@ def test_ffprobe_finds_what_was_asked(tmp_path: Path, ending: str, bits: int, ch
     assert contents(tmp_path) == [path.name]
 
 
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize(
+    ("ending", "codec", "dtype", "name", "pixel_format", "profile"),
+    [
+        (".webm", "vp9", np.uint8, "vp9", "yuv420p", "Profile 0"),
+        (".webm", "av1", np.uint8, "av1", "yuv420p", "Main"),
+        (".webm", "av1", np.uint16, "av1", "yuv420p10le", "Main"),
+        (".mov", "prores-422-hq", np.uint8, "prores", "yuv422p10le", "HQ"),
+        (".mov", "prores-422-hq", np.uint16, "prores", "yuv422p10le", "HQ"),
+    ],
+)
+def test_codecs_that_are_asked_for(
+    tmp_path: Path,
+    ending: str,
+    codec: str,
+    dtype: type,
+    name: str,
+    pixel_format: str,
+    profile: str,
+    channels: int,
+):
+    """Pixel format, tags, frames, rate and duration by ffprobe, and the frames come back."""
+    path = tmp_path / f"a{ending}"
+    with animation_writer(path, Fraction(24000, 1001), codec=codec, crf=12) as write:
+        for frame in frames(6, channels, 64, 96, dtype):
+            write(frame)
+    (stream,) = probe(path)
+    assert (stream["codec_name"], stream["pix_fmt"], stream["profile"]) == (name, pixel_format, profile)
+    assert (stream["width"], stream["height"], stream["r_frame_rate"]) == (96, 64, "24000/1001")
+    assert int(stream["nb_read_frames"]) == 6
+    tags = stream["color_range"], stream["color_space"], stream["color_transfer"], stream["color_primaries"]
+    assert tags == ("tv", "bt709", "bt709", "bt709")
+    duration = subprocess.run(
+        ["ffprobe", "-v", "error", "-show_entries", "format=duration", "-of", "csv=p=0", str(path)],
+        capture_output=True,
+        check=True,
+    ).stdout
+    assert float(duration) == pytest.approx(6 * 1001 / 24000, abs=0.02)
+    scale = 1 if dtype is np.uint8 else 257
+    for seen, given in zip(read_clip(path).read_frames(), frames(6, channels, 64, 96, dtype), strict=True):
+        shown = given[..., :3].astype(float)
+        if channels == 4 and name != "vp9":  # these have no alpha: the frame is laid over black
+            shown *= given[..., 3:] / np.iinfo(dtype).max
+        seen = seen[..., :3] * (1.0 if seen.dtype == dtype else 1 / 257 if dtype is np.uint8 else 257.0)
+        near = given[..., 3] > np.iinfo(dtype).max // 8 if channels == 4 and name == "vp9" else np.ones((64, 96), bool)
+        assert np.abs(seen - shown)[near].mean() < 3 * scale
+
+
+def test_a_codec_that_does_not_fit_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name, codec, message in [
+        ("a.mp4", "av1", r"a\.mp4: \.mp4 holds h264, not av1; change --codec"),
+        ("a.mov", "x", "holds prores-4444 or prores-422-hq, not x"),
+        ("a.%d.png", "av1", "a sequence of pictures has no codec"),
+    ]:
+        with pytest.raises(UserError, match=message):
+            check_animation(tmp_path / name, 25, codec)
+    monkeypatch.setattr(ffmpeg, "encoders", lambda: frozenset({"libaom-av1"}))  # of a build without SVT-AV1
+    save(tmp_path / "a.webm", 2, codec="av1")
+    assert [stream["codec_name"] for stream in probe(tmp_path / "a.webm")] == ["av1"]
+    (tmp_path / "a.webm").unlink()
+    monkeypatch.setattr(ffmpeg, "encoders", lambda: frozenset({"libx264"}))
+    with (
+        pytest.raises(UserError, match="has no encoder for AV1"),
+        animation_writer(tmp_path / "a.webm", codec="av1") as write,
+    ):
+        write(np.zeros((64, 64, 3), np.uint8))
+    assert contents(tmp_path) == []
+
+
 def test_mp4_starts_fast_and_follows_the_crf(tmp_path: Path):
     for crf in (10, 30):
         save(tmp_path / f"{crf}.mp4", crf=crf)

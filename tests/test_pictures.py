@@ -101,6 +101,22 @@ def test_exr_is_exact(tmp_path: Path, channels: int):
     np.testing.assert_allclose(read.pixels, pixels, rtol=3e-7)
 
 
+@pytest.mark.parametrize("bits", [10, 12])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_a_deep_avif_is_read_in_its_depth(tmp_path: Path, bits: int, channels: int):
+    import imagecodecs
+
+    top = 2**bits - 1
+    values = np.linspace(0, top, 40 * 48 * channels).round().astype(np.uint16).reshape(40, 48, channels)
+    (tmp_path / "a.avif").write_bytes(
+        imagecodecs.avif_encode(values, level=100, bitspersample=bits, pixelformat="444", matrix=0)
+    )
+    read = read_picture(tmp_path / "a.avif")
+    assert read.pixels.dtype == np.uint16
+    assert (read.pixels.min(), read.pixels.max()) == (0, 65535)
+    np.testing.assert_array_equal(np.round(read.pixels / 65535 * top), values)
+
+
 @pytest.mark.parametrize("channels", MODES, ids=MODES.get)
 @pytest.mark.parametrize("ending", [".jpg", ".webp", ".avif"])
 def test_lossy_formats_are_close(tmp_path: Path, ending: str, channels: int):
