@@ -72,7 +72,7 @@ class Task:
         recipe: its file, or the name of one that comes with fluidwarp.
         edits: to the recipe.
         picture: the picture or clip; None is the recipe's own.
-        output, stats, maps, part, animated, bits, strip, codec: as in `Job`.
+        output, stats, maps, part, animated, bits, strip, codec, states: as in `Job`.
         max_pixels: larger pictures are refused.
     """
 
@@ -88,6 +88,7 @@ class Task:
     strip: bool = False
     max_pixels: int = MAX_PIXELS
     codec: str | None = None
+    states: Path | None = None
 
     @property
     def label(self) -> str:
@@ -119,6 +120,7 @@ class Task:
             self.bits,
             self.strip,
             self.codec,
+            self.states,
         )
 
 
@@ -155,7 +157,8 @@ def spread(task: Task, pictures: Sequence[Path]) -> list[Task]:
     for picture in pictures:
         into = output and (output if NAME in str(output) else output / (picture.stem + _ending(picture)))
         one = replace(task, recipe=recipe, picture=picture, output=into).named()
-        tasks.append(replace(one, output=one.output and one.output.absolute()))
+        states = one.states and one.states.absolute()
+        tasks.append(replace(one, output=one.output and one.output.absolute(), states=states))
     _check_apart(tasks)
     # A cluster's workers do not start from this folder.
     return [replace(one, picture=one.picture and one.picture.absolute()) for one in tasks]

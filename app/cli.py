@@ -142,6 +142,10 @@ def render(
         Optional[str],  # noqa: UP045
         typer.Option(metavar="A-B", help="Only these frames of an animation, counted from 0."),
     ] = None,
+    states: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(metavar="DIR", help="Keep states of the simulation there; a later part begins with the nearest."),
+    ] = None,
     animated: Annotated[bool, typer.Option("--animated", help="OUT.webp is the animation.")] = False,
     codec: Codec = None,
     bits: Bits = None,
@@ -187,6 +191,7 @@ def render(
         strip,
         max_pixels,
         codec,
+        states,
     )
     if len(given) < 2 and cluster is None and not (given and output and _is_folder(output)):
         _render_one(task.named(), opened)

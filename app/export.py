@@ -34,6 +34,7 @@ from app.progress import Progress
 from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
+from app.states import StoredStates
 from app.threads import ahead, behind
 from app.timeline import Sentinel, Timeline, frame_positions
 from app.video import Clip
@@ -84,6 +85,7 @@ class Job:
         bits: a channel, of pictures; None keeps the source's.
         strip: leave out the source's metadata.
         codec: of a video; None is the usual one of its ending.
+        states: a folder of states of the simulation, for parts to begin with and to leave for others.
     """
 
     recipe: Recipe
@@ -98,6 +100,7 @@ class Job:
     bits: int | None = None
     strip: bool = False
     codec: str | None = None
+    states: Path | None = None
 
     @property
     def target(self) -> Path:
@@ -207,6 +210,7 @@ class _Export:
         self.is_spooled = job.clip is None and not (job.maps and job.maps.is_sequence)
         goes_back = (playback.reverse or playback.ping_pong) and not self.is_spooled
         self.replay = Replay(device, job.recipe, self.pictures, budget=DEFAULT_BUDGET if goes_back else 0)
+        self.states = StoredStates(job.states, self.replay, self.pictures.notice) if job.states else None
         self.sampler = Sampler(device)
         self.size = result_size(job.recipe, job.picture)
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
@@ -241,6 +245,8 @@ class _Export:
         if job.stats is not None:
             with replacing(job.stats) as temporary:
                 temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
+        if self.states is not None:
+            self.states.keep(last=True)  # where the next part begins
         return Report(count, end, verdict, tuple(self.pictures.notices))
 
     def _run_until_stopped(self) -> str | None:
@@ -347,9 +353,13 @@ class _Export:
         if position == self._position:
             return
         whole = position // 1
+        begins = self._position is None or whole < self.replay.tick
         if whole < self.replay.tick:
             nearest = self.replay.checkpoints.nearest(self.recipe, whole)
             self.replay.seek(nearest.tick if nearest else 0)
+        before = self.replay.tick
+        if self.states is not None and begins and self.states.resume(whole):
+            self.progress.advance(self.replay.tick - before)
         while self.replay.tick < whole:
             self._advance()
         self.replay.seek(position)
@@ -382,6 +392,8 @@ class _Export:
 
     def _advance(self) -> None:
         self.replay.advance()
+        if self.states is not None:
+            self.states.keep()
         self.progress.advance()
 
     # -- numbers ----------------------------------------------------------------------------------------------------

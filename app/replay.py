@@ -27,7 +27,7 @@ from solver.grid import Grid
 from solver.masks import Masks
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
-from solver.warp import WarpMap
+from solver.warp import MapState, WarpMap
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought
@@ -88,6 +88,14 @@ class LoadedForce:
         if (swollen := self.widest * abs(impulse)) > WIDEST:
             grown = f"makes areas e^{swollen:.3g} times as large within one tick"
             raise UserError(f"{self.label}: at t = {time:.3g} s it {grown}; {mend}")
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything that later steps depend on, in arrays; `steps` of the map since its last fold."""
+
+    fields: tuple[np.ndarray, ...]
+    steps: int
 
 
 class Replay:
@@ -166,6 +174,34 @@ class Replay:
         """Keep this moment, so that going back to it costs nothing."""
         self._leave_passing()
         self._keep(self.recipe)
+
+    def snapshot(self) -> Snapshot:
+        """A copy of this moment off the GPU, for `resume`."""
+        self._leave_passing()
+        state = self._state()
+        taken = Snapshot(tuple(field.get() for field in (*state.fields, *state.warp.fields)), state.warp.steps)
+        state.release()
+        return taken
+
+    def resume(self, tick: int, snapshot: Snapshot) -> None:
+        """Go to a tick by a snapshot taken there, of the same simulation.
+
+        Raises:
+            ValueError: if its fields are not those of this simulation.
+        """
+        self._leave_passing()
+        state = self._state()
+        try:
+            fields = (*state.fields, *state.warp.fields)
+            kinds = [(field.get().shape, field.get().dtype) for field in fields]
+            if kinds != [(array.shape, array.dtype) for array in snapshot.fields]:
+                raise ValueError("its fields are of another size")
+            for field, array in zip(fields, snapshot.fields, strict=True):
+                field.set(array)
+            self._restore(State(state.fields, MapState(state.warp.fields, snapshot.steps)))
+        finally:
+            state.release()
+        self.tick = tick
 
     def release(self) -> None:
         """Free the textures."""

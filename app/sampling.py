@@ -78,6 +78,11 @@ class Pictures:
         """Read a map anew when it is wanted next: its file may be another one now."""
         self._maps.pop(name, None)
 
+    def values(self) -> list[np.ndarray]:
+        """The pixels of all that was read so far and the values of maps, the source first, the others by name."""
+        read = [self._read[name].pixels for name in sorted(self._read)]
+        return [self.source.pixels, *read, *(self._maps[name] for name in sorted(self._maps))]
+
     def notice(self, text: str) -> None:
         """Note something the user should hear of, once."""
         if text not in self.notices:

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import batch
+from app import batch, files, states
 from app.batch import Edits, Outcome, Task, perform, run_batch, spread
 from app.errors import Cancelled, UserError
 from app.pictures import Picture, read_picture, write_picture
 from app.progress import Progress
+from app.replay import Replay
 from solver.context import Device
 
 ROOT = Path(__file__).parent.parent
@@ -234,3 +235,140 @@ def test_the_parts_are_the_whole(folder: Path, playback: str):
     told = perform(Task(recipe, Edits(), picture, parts / "f.%03d.png", part=(count, None)))
     assert f"the frames 0-{count - 1}, and none from {count} on" in told.error
     assert read_picture(whole / "f.000.png").pixels.shape == (48, 64, 3)
+
+
+# Stored states ------------------------------------------------------------------------------------------------------
+
+WORK = {
+    "forces": RECIPE,
+    "paper": RECIPE.replace("grid = 32", 'grid = 32\nsolver = "paper"'),
+    "density": 'mode = "density"' + RECIPE,
+    "strokes": RECIPE
+    + """
+[[change]]
+tick = 4
+viscosity = 0.01
+[[stroke]]
+tool = "thicken"
+radius = 0.2
+samples = [[1, 0.3, 0.5, 1.0], [6, 0.6, 0.5, 1.0]]
+[[stroke]]
+tool = "freeze"
+radius = 0.1
+samples = [[2, 0.7, 0.3, 1.0], [3, 0.7, 0.4, 1.0]]
+[[stroke]]
+tool = "push"
+radius = 0.2
+samples = [[1, 0.3, 0.5, 1.0], [9, 0.7, 0.5, 1.0]]
+""",
+}
+
+
+def part(
+    folder: Path, output: str, first: int, last: int | None, recipe: str = "b.toml", **options: object
+) -> tuple[int, Outcome]:
+    """A part of the animation in a folder of its own, and how many steps were simulated for it."""
+    (folder / output).mkdir(exist_ok=True)
+    task = Task(
+        str(folder / recipe),
+        Edits(),
+        folder / "p0.png",
+        folder / output / "f.%03d.png",
+        part=(first, last),
+        **options,
+    )  # type: ignore[arg-type]
+    steps: list[int] = []
+    advance = Replay.advance
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Replay, "advance", lambda replay: (steps.append(replay.tick), advance(replay))[1])
+        outcome = perform(task)
+    return len(steps), outcome
+
+
+@pytest.mark.parametrize("work", WORK)
+def test_a_part_begins_with_the_nearest_stored_state(folder: Path, work: str, monkeypatch: pytest.MonkeyPatch):
+    """And comes to the same bytes: frames between the ticks, painted masks, the folds of the map, other solvers."""
+    monkeypatch.setattr(states, "EVERY", 3)
+    (folder / "b.toml").write_text(WORK[work] + "[output]\nfps = 70\n")
+    assert part(folder, "whole", 0, None)[1].error == ""
+    count, kept = len(contents(folder / "whole")), folder / "states"
+    assert count == 15
+    taken = [part(folder, "parts", first, first + 3, states=kept) for first in range(0, count, 4)]
+    assert [outcome for _, outcome in taken] == [Outcome(str(folder / "p0.png"))] * 4
+    assert [steps for steps, _ in taken] == [2, 3, 2, 3]  # together the ticks of the whole
+    assert contents(folder / "parts") == contents(folder / "whole")
+    # Out of order, and again when all is there.
+    again = [part(folder, "again", first, first + 3, states=kept)[0] for first in (12, 4, 0, 8)]
+    assert again == [3, 3, 2, 2]
+    assert contents(folder / "again") == contents(folder / "whole")
+
+
+def test_states_of_something_else_are_not_taken(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """Another recipe, another picture, another grid, a damaged file, one under another's name."""
+    monkeypatch.setattr(states, "EVERY", 2)
+    kept = folder / "states"
+
+    def fresh(name: str, recipe: str) -> tuple[int, Outcome]:
+        (folder / f"{name}.toml").write_text(recipe)
+        part(folder, f"{name}-alone", 5, 6, f"{name}.toml")
+        found = part(folder, name, 5, 6, f"{name}.toml", states=kept)
+        assert found[1].error == ""
+        assert contents(folder / name) == contents(folder / f"{name}-alone")
+        return found
+
+    whole = fresh("first", RECIPE)[0]
+    assert whole == fresh("strength", RECIPE.replace("strength = 5", "strength = 4"))[0] == 10
+    assert fresh("grid", RECIPE.replace("grid = 32", "grid = 40"))[0] == whole
+    assert fresh("named", f'name = "another name"{RECIPE}')[0] == 2
+    draw(folder / "p0.png", 7)  # the fluid does not look at it here, but it could
+    assert fresh("picture", RECIPE)[0] == whole
+    draw(folder / "p0.png", 0)
+    for path in kept.iterdir():
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 1
+        path.write_bytes(data[: len(data) // 3] if "08" in path.name else data)
+    steps, outcome = fresh("damaged", RECIPE)
+    assert steps == whole
+    assert len(outcome.notices) == 4  # of the ticks 8, 6, 4 and 2
+    assert all("is damaged" in notice and "made anew" in notice for notice in outcome.notices)
+    assert fresh("mended", RECIPE) == (2, Outcome(str(folder / "p0.png")))
+    named = {path.name[-17:-10]: path for path in kept.glob(f"{newest(kept).name[:32]}-*")}
+    named["0000008"].unlink()
+    named["0000002"].rename(str(named["0000002"]).replace("0000002", "0000007"))
+    steps, outcome = fresh("misnamed", RECIPE)
+    assert steps == 4  # from 6
+    assert [notice.count("it is of another simulation") for notice in outcome.notices] == [1]
+
+
+def newest(folder: Path) -> Path:
+    return max(folder.iterdir(), key=lambda path: path.stat().st_mtime)
+
+
+def test_a_folder_of_states_is_bounded_and_may_be_full(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(states, "EVERY", 1)
+    (folder / "b.toml").write_text(RECIPE)
+    part(folder, "out", 0, None, states=folder / "all")
+    sizes = [path.stat().st_size for path in (folder / "all").iterdir()]
+    assert len(sizes) == 10
+    monkeypatch.setattr(states, "BUDGET", 4 * max(sizes))
+    part(folder, "bounded", 0, None, states=folder / "some")
+    assert sorted(path.name[-17:] for path in (folder / "some").iterdir()) == [
+        f"{tick:07d}.state.npz" for tick in (7, 8, 9, 10)
+    ]
+    (folder / "file").touch()
+    assert "Cannot write" in part(folder, "none", 0, 1, states=folder / "file")[1].error
+
+    def full(path: Path) -> Path:
+        if not path.name.endswith(".npz"):
+            return path.with_name(f".{path.name}")
+        temporary = path.with_name(f".full{path.suffix}")
+        temporary.symlink_to("/dev/full")
+        return temporary
+
+    monkeypatch.setattr(files, "temporary_beside", full)
+    outcome = part(folder, "full", 0, None, states=folder / "disk")[1]
+    assert outcome.error == ""
+    assert len(outcome.notices) == 1
+    assert "No more states are kept" in outcome.notices[0]
+    assert "the disk is full" in outcome.notices[0]
+    assert contents(folder / "full") == contents(folder / "out")

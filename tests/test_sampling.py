@@ -172,14 +172,16 @@ def test_what_cannot_be_looked_up_says_so(device: Device) -> None:
         GivenMap(device, np.zeros((8, 8)))
 
 
-def test_a_picture_that_is_read_only_stays_uploaded_and_no_other_is_taken_for_it(device: Device) -> None:
+def test_a_picture_that_is_read_only_stays_uploaded_and_no_other_is_taken_for_it(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
     first, second = noise((60, 80, 3), "8", 1), noise((60, 80, 3), "8", 2)
     warp, sampler = GivenMap(device, waves((80, 60), 0.05)), Sampler(device)
     wanted = [Sampler(device).apply(warp, picture) for picture in (first, second)]
     first.flags.writeable = False
     loads: list[object] = []
     load = sampler._load
-    sampler._load = lambda *given: (loads.append(given), load(*given))[1]
+    monkeypatch.setattr(sampler, "_load", lambda *given: (loads.append(given), load(*given))[1])
     for picture, result in ((first, 0), (first, 0), (second, 1), (second, 1), (first, 0)):
         np.testing.assert_array_equal(sampler.apply(warp, picture), wanted[result])
     assert len(loads) == 4  # all but the second
