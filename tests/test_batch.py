@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -265,7 +266,7 @@ samples = [[1, 0.3, 0.5, 1.0], [9, 0.7, 0.5, 1.0]]
 
 
 def part(
-    folder: Path, output: str, first: int, last: int | None, recipe: str = "b.toml", **options: object
+    folder: Path, output: str, first: int, last: int | None, recipe: str = "b.toml", **options: Any
 ) -> tuple[int, Outcome]:
     """A part of the animation in a folder of its own, and how many steps were simulated for it."""
     (folder / output).mkdir(exist_ok=True)
@@ -276,7 +277,7 @@ def part(
         folder / output / "f.%03d.png",
         part=(first, last),
         **options,
-    )  # type: ignore[arg-type]
+    )
     steps: list[int] = []
     advance = Replay.advance
     with pytest.MonkeyPatch.context() as patched:
