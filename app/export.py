@@ -272,7 +272,8 @@ class _Export:
                 writer = map_writer(job.maps.path, job.maps.kind, first=first, cancel=self.progress.cancel)
                 take_map = stack.enter_context(behind(stack.enter_context(writer)))
             if job.clip is not None:
-                source = stack.enter_context(ahead(islice(job.clip.read_frames(self.progress.cancel), first, until)))
+                clip_frames = job.clip.read_frames(self.progress.cancel, self.pictures.notice)
+                source = stack.enter_context(ahead(islice(clip_frames, first, until)))
                 self._expect(len(range(job.clip.frames or len(shown))[first:until]))
                 # Once the fluid has come to its end, the clip goes on with the last warp.
                 positions = islice(chain(shown, repeat(shown[-1])), first, None)

@@ -137,16 +137,21 @@ class Ffmpeg:
         if self._cancel():
             raise Cancelled
 
+    def complaint(self) -> str:
+        """The first thing it has complained of, without a full stop; "" if nothing."""
+        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in self._said().splitlines() if line.strip()]
+        return lines[0].rstrip(".") if lines else ""  # the reason stands first, its consequences follow it
+
     def failure(self) -> UserError:
         """What its complaints mean for the user."""
-        self._complaints.seek(0)
-        said = self._complaints.read().decode("utf-8", "replace")
-        if os.strerror(errno.ENOSPC) in said:
+        if os.strerror(errno.ENOSPC) in self._said():
             return cannot_write(self._label, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
-        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in said.splitlines() if line.strip()]
-        # the reason stands first, its consequences follow it
-        reason = lines[0].rstrip(".") if lines else f"it ended with status {self._process.returncode}"
+        reason = self.complaint() or f"it ended with status {self._process.returncode}"
         return UserError(f"Cannot {self._doing} {self._label}: ffmpeg says: {reason}.")
+
+    def _said(self) -> str:
+        self._complaints.seek(0)
+        return self._complaints.read().decode("utf-8", "replace")
 
 
 def run(arguments: Sequence[str], label: str, *, doing: str = "write", cancel: Callable[[], bool] = never) -> None:

@@ -98,10 +98,12 @@ def load(path: str | os.PathLike[str]) -> Project:
             return _read(path, archive)
     except FileNotFoundError:
         raise UserError(f"{path} does not exist") from None
-    except (zipfile.BadZipFile, EOFError, KeyError, UnicodeDecodeError, NotImplementedError, ValueError):
-        raise UserError(f"{path} is no fluidwarp project, or is cut short or damaged; get it again") from None
+    except UserError:
+        raise
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror or error}") from None
+    except Exception:  # of a damaged archive: BadZipFile, zlib.error, NotImplementedError, RuntimeError, IndexError ...
+        raise UserError(f"{path} is no fluidwarp project, or is cut short or damaged; get it again") from None
 
 
 def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) -> Project:

@@ -38,8 +38,13 @@ class Clip:
     decoder: tuple[str, ...]
     filters: str
 
-    def read_frames(self, cancel: Callable[[], bool] = never) -> Generator[np.ndarray, None, None]:
-        """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time."""
+    def read_frames(
+        self, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
+    ) -> Generator[np.ndarray, None, None]:
+        """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time.
+
+        notice: hears, at the end, what was damaged in a clip that could be read all the same.
+        """
         channels = 4 if self.alpha else 3
         kind = {(False, 8): "rgb24", (True, 8): "rgba", (False, 16): "rgb48le", (True, 16): "rgba64le"}
         arguments = [
@@ -51,6 +56,8 @@ class Clip:
         with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel) as process:
             for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
                 yield np.frombuffer(block, dtype).reshape(shape)
+            if complaint := process.complaint():
+                notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
 
 
 def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
