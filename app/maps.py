@@ -285,8 +285,11 @@ def _read_npy(file: Path) -> np.ndarray:
 
     try:
         values = np.load(io.BytesIO(_bytes(file)), allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({error}).") from error
+    except MemoryError:
+        raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
+    except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error
     if not isinstance(values, np.ndarray) or values.ndim != 3 or values.shape[2] != 2 or values.dtype.kind != "f":
         shape = getattr(values, "shape", ())
         raise UserError(f"Cannot read {file}: a map is a float array (height, width, 2), this one is {shape}.")

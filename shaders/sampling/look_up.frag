@@ -1,17 +1,18 @@
 // Look up: the picture at x + D(x), the mean of places spread evenly over each pixel of the result.
-// Along x and along y there are 2 clamp(ceil(0.75 s), 1, 4) of them, s the stretch of the map in that direction over the
-// pixel; where the map only shifts, they come together at the centre. Four neighbours lie within a pixel of the picture,
-// so they are looked up together, from the one block of pixels that holds all that each of them needs.
+// Along x and along y there are 2 clamp(ceil(0.75 s), 1, 4) of them, s the stretch of the map in that direction over
+// the pixel; where the map only shifts, there is one at the centre. Four neighbours lie within a pixel of the picture:
+// they are looked up at once, in the block of pixels that holds what they are made of.
 //
-// u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels; premultiplied
-// where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
+// u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels;
+// premultiplied where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels, or at their centres with SINGLE defined;
 // u_pixel: the result's pixel of the first fragment; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
 // Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places; SINGLE;
-// PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; OPAQUE if
-// there is no alpha; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA.
+// PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
+// OPAQUE if there is no alpha; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
+// GREY_ALPHA.
 // reads: 30
 #ifndef TAPS
 #define TAPS 4
@@ -52,29 +53,26 @@ layout(location = 0) out vec4 out_color;
 
 #define AT(x, y) texture(u_source, vec2(x, y)).PARTS
 
-// 1 within the bounds of the picture, 0 beyond them.
-float within(vec2 place) {
+// For two places, and for x and y of each: 1 within the bounds of the picture, 0 beyond them.
+vec4 within(vec2 a, vec2 b) {
 #ifdef BOUNDED
-    vec2 beyond = abs(place - u_middle) - u_half;
-    return step(max(beyond.x, beyond.y), 0.0);
+    return step(abs(vec4(a, b) - u_middle.xyxy), u_half.xyxy);
 #else
-    return 1.0;
+    return vec4(1.0);
 #endif
 }
 
 #if TAPS > 1
 const int BLOCK = TAPS + 1;
 
-// Weights of the pixels 0, 1 ... TAPS for a place between the middle two of the first or of the last TAPS: f in [0, 2].
-float[BLOCK] weights(float f) {
-    float later = step(1.0, f), g = f - later, sooner = 1.0 - later;
+// Weights of the pixels that a place is interpolated from, in one direction: f in [0, 1] between the middle two.
+float[TAPS] weights(float f) {
 #if TAPS == 2
-    return float[BLOCK](sooner * (1.0 - g), mix(g, 1.0 - g, later), later * g);
+    return float[TAPS](1.0 - f, f);
 #else
     // Catmull-Rom.
-    float a = g * (-0.5 + g * (1.0 - 0.5 * g)), b = 1.0 + g * g * (-2.5 + 1.5 * g);
-    float c = g * (0.5 + g * (2.0 - 1.5 * g)), d = g * g * (-0.5 + 0.5 * g);
-    return float[BLOCK](sooner * a, mix(b, a, later), mix(c, b, later), mix(d, c, later), later * d);
+    return float[TAPS](f * (-0.5 + f * (1.0 - 0.5 * f)), 1.0 + f * f * (-2.5 + 1.5 * f),
+                       f * (0.5 + f * (2.0 - 1.5 * f)), f * f * (-0.5 + 0.5 * f));
 #endif
 }
 
@@ -86,34 +84,43 @@ float[BLOCK] coordinates(float first, float count, float texel) {
     return at;
 }
 
-// The mean of the picture at four places within a pixel of each other, given in pixels from the corner of the pixel
-// `whole`: two parts, so that large pictures lose no precision. Beyond the bounds there is nothing.
-COLOR four_places(vec2 whole, vec2 places[4]) {
-    vec2 cell = floor(min(min(places[0], places[1]), min(places[2], places[3])) - float(TAPS / 2) + 0.5);
-    vec2 first = whole - CORNER + cell, texel = 1.0 / vec2(textureSize(u_source, 0));
-    float x[BLOCK] = coordinates(first.x, u_extent.x, texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, texel.y);
-    float along[4 * BLOCK], down[4 * BLOCK], there = 0.0;
-    for (int k = 0; k < 4; ++k) {
-        vec2 f = places[k] - cell - float(TAPS / 2) + 0.5;
-        float wx[BLOCK] = weights(f.x), wy[BLOCK] = weights(f.y), part = 0.25 * within(whole + places[k]);
-        there += part;
-        for (int i = 0; i < BLOCK; ++i) {
-            along[k * BLOCK + i] = part * wx[i];
-            down[k * BLOCK + i] = wy[i];
-        }
+// Weights of the pixels of a block for two places in one direction, at `low` in [0, 1] and `high` in [0, 2] between its
+// middle ones: half their sum, and half their difference. `there` is 0 for a place beyond the bounds.
+void both(float low, float high, vec2 there, out float mean[BLOCK], out float odd[BLOCK]) {
+    float later = step(1.0, high), a[TAPS] = weights(low), b[TAPS] = weights(high - later);
+    for (int i = 0; i < BLOCK; ++i) {
+        float first = i < TAPS ? 0.5 * there.x * a[i] : 0.0;
+        float second = (i < TAPS ? (1.0 - later) * b[i] : 0.0) + (i > 0 ? later * b[i - 1] : 0.0);
+        mean[i] = first + 0.5 * there.y * second;
+        odd[i] = 0.5 * there.y * second - first;
     }
+}
+
+// The mean of the picture over four places: `middle` with `apart` added or taken away along x and along y, in pixels
+// from the corner of the pixel `whole` (two parts, so that large pictures lose no precision). The two on one diagonal
+// weigh (1 + correlation) / 4 each, the others (1 - correlation) / 4, so that any parallelogram's second moments are
+// met. Beyond the bounds there is nothing. `apart` is less than half a pixel, and so all are made of one block.
+COLOR four_places(vec2 whole, vec2 middle, vec2 apart, float correlation) {
+    vec2 cell = floor(middle - apart - float(TAPS / 2) + 0.5), first = whole - CORNER + cell;
+    vec2 low = middle - apart - cell - float(TAPS / 2) + 0.5, high = low + 2.0 * apart;
+    vec4 there = within(whole + middle - apart, whole + middle + apart);
+    vec2 texel = 1.0 / vec2(textureSize(u_source, 0));
+    float x[BLOCK] = coordinates(first.x, u_extent.x, texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, texel.y);
+    float mean_x[BLOCK], odd_x[BLOCK], mean_y[BLOCK], odd_y[BLOCK];
+    both(low.x, high.x, there.xz, mean_x, odd_x);
+    both(low.y, high.y, there.yw, mean_y, odd_y);
     COLOR sum = COLOR(0.0);
-    for (int j = 0; j < BLOCK; ++j)
-        for (int i = 0; i < BLOCK; ++i) {
-            float weight = 0.0;
-            for (int k = 0; k < 4; ++k)
-                weight += down[k * BLOCK + j] * along[k * BLOCK + i];
-            sum += weight * AT(x[i], y[j]);
-        }
+    for (int j = 0; j < BLOCK; ++j) {
+        float odd = correlation * odd_y[j];
+        for (int i = 0; i < BLOCK; ++i)
+            sum += (mean_y[j] * mean_x[i] + odd * odd_x[i]) * AT(x[i], y[j]);
+    }
 #ifdef BOUNDED
-    sum = there > 0.0 ? sum : COLOR(0.0);  // nothing times infinity is not nothing
+    vec2 some = there.xy + there.zw, odds = there.zw - there.xy;
+    float part = 0.25 * (some.x * some.y + correlation * odds.x * odds.y);
+    sum = part > 0.0 ? sum : COLOR(0.0);  // nothing times infinity is not nothing
 #ifndef OPAQUE
-    sum.a += (1.0 - there) * u_outside;
+    sum.a += (1.0 - part) * u_outside;
 #endif
 #endif
     return sum;
@@ -133,14 +140,15 @@ COLOR one_place(vec2 whole, vec2 place) {
 #else
     vec2 cell = floor(place - 1.5), first = whole - CORNER + cell;
     float x[BLOCK] = coordinates(first.x, u_extent.x, texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, texel.y);
-    float wx[BLOCK] = weights(place.x - 1.5 - cell.x), wy[BLOCK] = weights(place.y - 1.5 - cell.y);
+    float wx[TAPS] = weights(place.x - 1.5 - cell.x), wy[TAPS] = weights(place.y - 1.5 - cell.y);
     COLOR sum = COLOR(0.0);
     for (int j = 0; j < TAPS; ++j)
         for (int i = 0; i < TAPS; ++i)
             sum += wy[j] * wx[i] * AT(x[i], y[j]);
 #endif
 #ifdef BOUNDED
-    float there = within(whole + place);
+    vec2 beyond = abs(whole + place - u_middle) - u_half;
+    float there = step(max(beyond.x, beyond.y), 0.0);
 #if defined(CODES)
     sum *= there;
 #else
@@ -182,24 +190,27 @@ void main() {
     float apart = smoothstep(0.0, 0.2, strain);
     bool shifted = apart < 1e-3;
     vec2 stretch = vec2(length(along_x), length(along_y));
-    vec2 pairs = shifted ? vec2(1.0) : clamp(ceil(0.75 * stretch), float(LEAST_PAIRS), float(MOST_PAIRS));
+    vec2 pairs = clamp(ceil(0.75 * stretch), float(LEAST_PAIRS), float(MOST_PAIRS));
     // As far apart as gives the places the variance of the pixel itself: a mean of fourth order.
-    vec2 spread = (shifted ? 0.0 : apart) * inversesqrt(1.0 - 0.25 / (pairs * pairs));
-    // Half of the way from a place to its neighbours, and no farther than lets four of them share a block.
-    vec2 near = 0.25 * spread / pairs, reach = near.x * abs(along_x) + near.y * abs(along_y) + near.x * near.y * abs(bend);
-    near *= min(1.0, 0.499 / max(max(reach.x, reach.y), 1e-6));
+    vec2 spread = apart * inversesqrt(1.0 - 0.25 / (pairs * pairs));
     COLOR color = COLOR(0.0);
-    vec2 place = vec2(0.5), places[4];
-    for (int n = int(pairs.x * pairs.y); n > 0; --n) {
-        vec2 off = spread * (place / pairs - 0.5);
-        for (int k = 0; k < 4; ++k) {
-            vec2 at = off + near * vec2(2 * (k & 1) - 1, (k & 2) - 1);
-            places[k] = centre + at.x * along_x + at.y * along_y + (at.x * at.y) * bend;
+    if (shifted) {
+        color = one_place(whole, centre);
+    } else {
+        // The second moments of the four places about the middle of each four.
+        vec2 u = 0.25 * spread.x / pairs.x * along_x, v = 0.25 * spread.y / pairs.y * along_y;
+        vec2 moments = u * u + v * v;
+        float correlation = (u.x * u.y + v.x * v.y) * inversesqrt(max(moments.x * moments.y, 1e-20));
+        vec2 away = min(sqrt(moments), 0.499);
+        vec2 place = vec2(0.5);
+        for (int n = int(pairs.x * pairs.y); n > 0; --n) {
+            vec2 off = spread * (place / pairs - 0.5);
+            vec2 middle = centre + off.x * along_x + off.y * along_y + (off.x * off.y) * bend;
+            color += four_places(whole, middle, away, correlation);
+            place = place.x + 1.0 < pairs.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
         }
-        color += four_places(whole, places);
-        place = place.x + 1.0 < pairs.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
+        color /= pairs.x * pairs.y;
     }
-    color /= pairs.x * pairs.y;
 #endif
 
 #if defined(PREPARED) && !defined(OPAQUE)
