@@ -92,10 +92,11 @@ class LoadedForce:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything that later steps depend on, in arrays; `steps` of the map since its last fold."""
+    """Everything that later steps depend on, in arrays; `steps` of the map since its last fold, `held` its cells."""
 
     fields: tuple[np.ndarray, ...]
     steps: int
+    held: np.ndarray | None
 
 
 class Replay:
@@ -179,7 +180,8 @@ class Replay:
         """A copy of this moment off the GPU, for `resume`."""
         self._leave_passing()
         state = self._state()
-        taken = Snapshot(tuple(field.get() for field in (*state.fields, *state.warp.fields)), state.warp.steps)
+        fields = tuple(field.get() for field in (*state.fields, *state.warp.fields))
+        taken = Snapshot(fields, state.warp.steps, state.warp.held)
         state.release()
         return taken
 
@@ -198,7 +200,7 @@ class Replay:
                 raise ValueError("its fields are of another size")
             for field, array in zip(fields, snapshot.fields, strict=True):
                 field.set(array)
-            self._restore(State(state.fields, MapState(state.warp.fields, snapshot.steps)))
+            self._restore(State(state.fields, MapState(state.warp.fields, snapshot.steps, snapshot.held)))
         finally:
             state.release()
         self.tick = tick

@@ -69,6 +69,8 @@ class StoredStates:
             return
         snapshot = self._replay.snapshot()
         parts: dict[str, Any] = {f"field{number}": field for number, field in enumerate(snapshot.fields)}
+        if snapshot.held is not None:
+            parts["held"] = snapshot.held
         try:
             with replacing(path) as temporary, temporary.open("wb") as stream:
                 np.savez(stream, about=np.array(self._about(tick)), steps=np.array(snapshot.steps), **parts)
@@ -83,8 +85,10 @@ class StoredStates:
             with np.load(path, allow_pickle=False) as stored:  # a zip file, whose checksums NumPy looks at
                 if str(stored["about"]) != self._about(tick):
                     raise ValueError("it is of another simulation")
-                fields = tuple(stored[f"field{number}"] for number in range(len(stored.files) - 2))
-                self._replay.resume(tick, Snapshot(fields, int(stored["steps"])))
+                count = sum(name.startswith("field") for name in stored.files)
+                fields = tuple(stored[f"field{number}"] for number in range(count))
+                held = stored["held"] if "held" in stored.files else None
+                self._replay.resume(tick, Snapshot(fields, int(stored["steps"]), held))
             os.utime(path)
         except FileNotFoundError:  # another process has just tidied it up
             return False
