@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -200,6 +200,9 @@ class Viscosity:
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         self._largest = largest
         self.plan = plan_for(least, largest)
+        if self.plan.grids and len(self.levels) == 1:
+            # The only grid is solved exactly: one step along what v* has left.
+            self.plan = replace(self.plan, steps=1)
         is_uniform = least == largest and not some_frozen
         for level in self.levels:
             level.use(least / 4.0**level.depth if is_uniform else None, self._slip)
@@ -364,7 +367,7 @@ class Viscosity:
         self._residual_of(finest, v_star, right, residual)
         self._restrict(residual, coarser, coarser.right)
         part = self._part_of(right, coarser)
-        self._nested_grids(1, coarser.right)
+        self._nested_grids()
         # The part of it that the coarser grid does carry is not to be added face by face once more.
         k = self._largest
         carried = weights[0] * (1.0 + 1.5 * k) / (1.0 + 6.0 * k)
@@ -400,11 +403,11 @@ class Viscosity:
         coarser.right, coarser.faces.read = damped, coarser.right
         return self._factors.read
 
-    def _nested_grids(self, first: int, right: Pair) -> Pair:
-        """A correction from a depth on: solved on the coarsest grid, then carried up and improved grid by grid."""
+    def _nested_grids(self) -> None:
+        """A correction on the coarser grids: solved on the coarsest, then carried up and improved grid by grid."""
         last = self._last
-        levels = self.levels[first : last.depth + 1]
-        rights = [right, *(level.right for level in levels[1:])]
+        levels = self.levels[1 : last.depth + 1]
+        rights = [level.right for level in levels]
         for fine, coarser in zip(rights, levels[1:], strict=False):
             self._restrict(fine, coarser, coarser.right)
         self._cycle(last, rights[-1])
@@ -423,7 +426,6 @@ class Viscosity:
             # A cycle overwrites the right-hand sides of coarser grids only, and those are used up by now.
             if 0 < finer.depth <= self.plan.nested:
                 self._cycle(finer, right, warm=True)
-        return levels[0].faces.read
 
     def _cycle(self, level: Level, right: Pair, warm: bool = False) -> None:
         """One multigrid cycle for A faces = right, from rest or (`warm`) from the level's iterate."""
