@@ -32,8 +32,13 @@ pytestmark = pytest.mark.skipif(
 class Desk:
     """A virtual screen with the editor on it."""
 
-    def __init__(self, folder: Path, number: int) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
+        # The server takes a display that nobody has, and tells its number once it listens.
+        command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"]
+        self.screen = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        assert self.screen.stdout is not None
+        number = int(self.screen.stdout.readline())
         self.env = {
             **os.environ,
             "DISPLAY": f":{number}",
@@ -42,8 +47,6 @@ class Desk:
             "PATH": os.environ["PATH"],
         }
         self.env.pop("WAYLAND_DISPLAY", None)
-        command = ["Xvfb", f":{number}", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"]
-        self.screen = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.editor: subprocess.Popen[str] | None = None
         self.window = ""
 
@@ -138,10 +141,7 @@ class Desk:
 
 @pytest.fixture
 def desk(tmp_path: Path) -> Iterator[Desk]:
-    # Another number for each process that tests in parallel.
-    number = 90 + int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:] or 0)
-    desk = Desk(tmp_path, number)
-    time.sleep(0.5)
+    desk = Desk(tmp_path)
     yield desk
     desk.close()
 
