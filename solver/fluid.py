@@ -159,7 +159,7 @@ class Fluid:
         faces[:, 0, 0] = 0.0
         faces[0, :, 1] = 0.0
         self.velocity.read.set(faces)
-        self._forget_pressure()
+        self._forget_last_step()
 
     def set_viscosity(self, viscosity: np.ndarray | float) -> None:
         """Set the viscosity of the cells, lengths^2 / s, from (ny, nx) or one number.
@@ -250,7 +250,8 @@ class Fluid:
 
     def state(self) -> Sequence[Field]:
         """The fields that a later step depends on, for checkpoints: copies of them bring this moment back exactly."""
-        return self.velocity.read, self._carried.read, *self._pressure_solver.state(), self.viscosity, self.solid
+        solvers = *self._viscosity_solver.state(), *self._pressure_solver.state()
+        return self.velocity.read, self._carried.read, *solvers, self.viscosity, self.solid
 
     def load(self, state: Sequence[Field]) -> None:
         """Go back to copies of `state()` taken earlier."""
@@ -261,7 +262,7 @@ class Fluid:
     def clear_velocity(self) -> None:
         """Stop all motion."""
         self.velocity.read.clear()
-        self._forget_pressure()
+        self._forget_last_step()
 
     def release(self) -> None:
         """Free the textures."""
@@ -272,8 +273,9 @@ class Fluid:
         self._viscosity_solver.release()
         self._pressure_solver.release()
 
-    def _forget_pressure(self) -> None:
+    def _forget_last_step(self) -> None:
         self._carried.read.clear()
+        self._viscosity_solver.forget()
         self._pressure_solver.forget()
 
     def _take_up_solids(self) -> None:

@@ -34,8 +34,8 @@ class Plan:
     Attributes:
         grids: coarser grids that are visited, at most; without any, and so without all that follows, v* is smoothed.
         nested: of these, the finest so many get a multigrid cycle while one correction is carried up through them.
-        steps: conjugate gradient steps after v*, at most, each with one multigrid cycle; with 0 there are no conjugate
-            gradients: v* is corrected once and then smoothed.
+        steps: conjugate gradient steps after the first, at most, each with one multigrid cycle; with 0 there are no
+            conjugate gradients: v* is corrected once and then smoothed.
         tolerance: steps end after one that has brought less than this part of the energy norm.
         sweeps: smoothing sweeps before and after the coarser grids: (on the finest, on the others).
         stiff: dt mu / h^2 above which patches of fluid are moved as rigid pieces too; 0: none are.
@@ -176,13 +176,18 @@ class Viscosity:
         ringed = finest.right.u.size
         self._ways = [Pair(device, ringed, f"viscous way {step}") for step in range(1, MOST_STEPS + 1)]
         self._solution = Pair(device, ringed, "viscous solution")
+        # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
+        self._change = DoublePair(device, ringed, "viscous change")
         # Three follow one another; the last holds the right-hand side that moving walls make.
         self._residuals = [Pair(device, ringed, f"viscous residual {step}") for step in range(4)]
         self._stiff_parts = StiffParts(device, finest.texels)
         self._az = Pair(device, ringed, "viscous stress of z")
+        self._a_change = Pair(device, ringed, "viscous stress of the change")
         self._factors = device.double_field((MOST_STEPS + 1, 1), 4, "viscous steps")
         self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
+        self._change_products = device.field(ringed, 1, "viscous product of the change")
+        self._change_sum = Reduction(device, ringed, 1, "sum")
         coarser = self.levels[min(1, len(self.levels) - 1)].right.u.size
         self._weighed = device.field(coarser, 4, "viscous weights")
         self._weights_sum = Reduction(device, coarser, 4, "sum")
@@ -235,9 +240,9 @@ class Viscosity:
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution.
 
-        By conjugate gradients from rest, the first direction being v* itself, or by one correction to a part of v*:
-        where little changes the rest of the work goes into the change, so that a steady state stays one, and where v*
-        is damped away nothing is left of it.
+        By conjugate gradients from rest, first along v* and what the last step made of its v*, or by one correction to
+        a part of v*: where little changes the rest of the work goes into the change, so that a steady state stays one,
+        and where v* is damped away nothing is left of it.
         """
         right = v_star = self.levels[0].right
         if self.plan.steps:
@@ -282,34 +287,60 @@ class Viscosity:
         return solution
 
     def _round(self, first: Pair, right: Pair, count: int) -> bool:
-        """Leave in `_solution` what the way `first` and so many more can do; true if still more would do little.
+        """Leave in `_solution` the best of the plane of `first` and the last change, and then of so many more ways.
 
         The ways z are kept as they are, and only their factors are made conjugate; they are added up once, at the end.
+
+        Returns:
+            Whether still more would do little.
         """
-        finest, ways, before = self.levels[0], [first], right
-        for step in range(count + 1):
-            self._measure(ways[-1], right, before, step)
-            is_enough = self._is_enough(step)
-            if step == count or is_enough:
-                break
+        finest, ways, before = self.levels[0], list[Pair](), right
+        self._measure_first(first, right)
+        for step in range(count):
             left = self._residuals[step % 3]
             self._advance(right, before, left, step)
             before, right = right, left
             self._finest_cycle(right)
             finest.faces.read, self._ways[step] = self._ways[step], finest.faces.read
             ways.append(self._ways[step])
-        combine = self.device.pass_("viscosity/combine.frag", WAYS=len(ways))
-        inputs = {name: field for step, way in enumerate(ways) for name, field in way.inputs(f"z{step}_").items()}
-        combine(finest.faces.write.fields, region=finest.region, factors=self._factors.read, **inputs)
+            self._measure(ways[-1], right, before, step + 1)
+            if is_enough := self._is_enough(step + 1):
+                break
+        inputs = {name: field for step, way in enumerate(ways) for name, field in way.inputs(f"z{step + 1}_").items()}
+        self.device.pass_("viscosity/combine.frag", WAYS=len(ways))(
+            finest.faces.write.fields + self._change.write.fields,
+            region=finest.region,
+            factors=self._factors.read,
+            **first.inputs("first_"),
+            **self._change.read.inputs("change_"),
+            **inputs,
+        )
         finest.faces.write, self._solution = self._solution, finest.faces.write
+        self._change.swap()
         return is_enough
+
+    def _measure_first(self, first: Pair, right: Pair) -> None:
+        """A times `first` and the last change, and how much of both has the least energy."""
+        finest = self.levels[0]
+        self.device.pass_("viscosity/measure_first.frag", **finest.defines)(
+            (*self._az.fields, *self._a_change.fields, self._products, self._change_products),
+            region=finest.region,
+            **first.inputs(),
+            **self._change.read.inputs("change_"),
+            **right.inputs("right_"),
+            **finest.matrix,
+        )
+        self.device.pass_("viscosity/least.frag")(
+            self._factors.write,
+            products=self._sum.shrink(self._products),
+            change_products=self._change_sum.shrink(self._change_products),
+        )
+        self._factors.swap()
 
     def _measure(self, z: Pair, right: Pair, before: Pair, step: int) -> None:
         """A z, and from the residuals now and before how far to go along z once it is conjugate to the last way."""
         finest = self.levels[0]
-        defines: dict[str, Any] = {} if step else {"FIRST": 1}
-        measure = self.device.pass_("viscosity/measure.frag", **finest.defines, **defines)
-        measure(
+        self.device.pass_("viscosity/measure.frag", **finest.defines)(
             (*self._az.fields, self._products),
             region=finest.region,
             **z.inputs(),
@@ -326,7 +357,7 @@ class Viscosity:
         """Whether the last step has found so little energy that the next ones are not worth their time."""
         alpha, _, curvature, _ = self._factors.read.get()[0, : step + 1].T.astype(np.float64)
         gains = alpha**2 * curvature
-        return step > 0 and bool(gains[step] <= self.plan.tolerance**2 * gains.sum())
+        return bool(gains[step] <= self.plan.tolerance**2 * gains.sum())
 
     def _advance(self, right: Pair, before: Pair, left: Pair, step: int) -> None:
         """What the step leaves of the residual, and on it the first sweep of a cycle from rest."""
@@ -340,7 +371,7 @@ class Viscosity:
             weight=self._weights(finest)[0],
             **right.inputs("right_"),
             **self._az.inputs(),
-            **before.inputs("before_"),
+            **(before.inputs("before_") if step else self._a_change.inputs("change_")),
             **finest.matrix,
         )
         finest.faces.swap()
@@ -524,6 +555,17 @@ class Viscosity:
         )
         level.faces.swap()
 
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def state(self) -> tuple[Field, Field]:
+        """The fields that a later step depends on."""
+        return self._change.read.fields
+
+    def forget(self) -> None:
+        """Expect no change: the velocity is a new one."""
+        for field in self.state():
+            field.clear()
+
     # -- statistics -------------------------------------------------------------------------------------------------
 
     def residual_norm(self, before: Field, after: Field) -> float:
@@ -546,12 +588,14 @@ class Viscosity:
     def nbytes(self) -> int:
         """Bytes of texture memory."""
         pairs = [side for level in self.levels for side in (level.faces.read, level.faces.write)]
-        pairs += [*self._residuals, *self._ways, self._solution, self._az]
+        pairs += [*self._residuals, *self._ways, self._solution, self._az, self._a_change]
+        pairs += [self._change.read, self._change.write]
         fields = [field for pair in pairs for field in pair.fields]
         for level in self.levels:
             fields += [level.cells, *level.packed.values(), *level.right.fields]
-        own = sum(field.nbytes for field in (*fields, self._inverse, self._products, self._weighed))
-        return own + self._sum.nbytes + self._weights_sum.nbytes + self._stiff_parts.nbytes
+        fields += [self._inverse, self._products, self._change_products, self._weighed]
+        others = self._sum, self._change_sum, self._weights_sum, self._stiff_parts
+        return sum(thing.nbytes for thing in (*fields, *others))
 
     def release(self) -> None:
         """Free the textures."""
@@ -561,6 +605,10 @@ class Viscosity:
             self._factors,
             self._products,
             self._az,
+            self._a_change,
+            self._change,
+            self._change_products,
+            self._change_sum,
             self._sum,
             self._weighed,
             self._weights_sum,
