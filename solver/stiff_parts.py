@@ -12,6 +12,7 @@ from solver.passes import Region
 
 MOST_PARTS = 63
 SMALLEST_PART = 12  # cells
+SLENDER = 2  # cells on either side of a line or neck that bends, at most
 TILE = 8  # texels, as in shaders/viscosity/gather_parts.frag
 ENTRIES_WIDE = 64
 
@@ -42,6 +43,27 @@ def connected_parts(inside: np.ndarray) -> np.ndarray:
     return number[part]
 
 
+def some_bend(part: np.ndarray) -> bool:
+    """Whether some of the numbered parts is a line, or pieces on thin necks: gone or apart once its rim is taken."""
+    solid = np.pad(part > 0, SLENDER, constant_values=True)
+    for axis in (0, 1):
+        solid = np.logical_and.reduce([np.roll(solid, shift, axis) for shift in range(-SLENDER, SLENDER + 1)])
+    pieces = connected_parts(solid[SLENDER:-SLENDER, SLENDER:-SLENDER])
+    first = np.unique(pieces, return_index=True)[1]
+    count = np.bincount(part.ravel()[first[pieces.ravel()[first] > 0]], minlength=int(part.max()) + 1)
+    if (count > 1).any():
+        return True
+    # Small parts of which nothing is left may still be as broad as they are long.
+    rows, columns = np.nonzero((part > 0) & (count[part] == 0))
+    lengths = np.zeros(len(count), int)
+    for at in (rows, columns):
+        first, last = np.full(len(count), part.size), np.zeros(len(count), int)
+        np.minimum.at(first, part[rows, columns], at)
+        np.maximum.at(last, part[rows, columns], at)
+        lengths = np.maximum(lengths, last + 1 - first)
+    return bool((lengths > 3 * (2 * SLENDER + 1)).any())
+
+
 class StiffParts:
     """The rigid motions of the stiff parts as a coarse space: f += Z (Z^T A Z)^-1 Z^T r, part by part.
 
@@ -56,6 +78,7 @@ class StiffParts:
         self.device = device
         self.texels = texels
         self.count = 0
+        self.some_bend = False
         self._region: Region = (1, 1, *texels)
         ringed = texels[0] + 2, texels[1] + 2
         tiles = -(-texels[0] // TILE) * -(-texels[1] // TILE)
@@ -78,7 +101,7 @@ class StiffParts:
         `apply_matrix(draw, region)` lets `draw` fill packed faces and returns minus A times them there.
         """
         part = connected_parts(stiff & ~solid)
-        self.count = int(part.max())
+        self.count, self.some_bend = int(part.max()), some_bend(part)
         if not self.count:
             return
         faces = [np.maximum(part, np.roll(part, 1, axis)) for axis in (1, 0)]

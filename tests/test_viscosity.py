@@ -13,7 +13,7 @@ from scipy import ndimage
 import reference
 from solver.context import Device
 from solver.params import Walls
-from solver.stiff_parts import MOST_PARTS, SMALLEST_PART, connected_parts
+from solver.stiff_parts import MOST_PARTS, SMALLEST_PART, connected_parts, some_bend
 from solver.viscosity import Viscosity
 
 
@@ -141,10 +141,9 @@ def test_converges_to_the_direct_solution(device: Device, nx: int, ny: int, wall
 def test_painted_masks_as_solved_live(device: Device, kind: str, contrast: float) -> None:
     size = 90, 100
     step = Step(device, contrast ** mask(kind, *size))
-    # The hardest are nearly rigid in pieces and pliant between them: lines of three cells; two blobs on one thin neck.
-    allowed = {1e2: 0.01, 1e5: 0.05} | {"lines": {1e5: 0.12}, "blobs": {1e5: 0.11}}.get(kind, {})
     for faces in (push(*size), vortices(*size)):
-        assert error(step(faces), step.exact(faces)) < allowed[contrast]
+        step.solver.forget()
+        assert error(step(faces), step.exact(faces)) < {1e2: 0.01, 1e5: 0.05}[contrast]
 
 
 def uniform_exactly(faces: np.ndarray, k: float) -> np.ndarray:
@@ -281,13 +280,13 @@ def test_the_same_step_twice_is_the_same(device: Device) -> None:
     np.testing.assert_array_equal(first, step(faces))
 
 
-@pytest.mark.parametrize("kind", ["disc", "blobs", "lines"])
-def test_what_the_last_step_changed_makes_the_next_one_more_exact(device: Device, kind: str) -> None:
+@pytest.mark.parametrize(("kind", "part"), [("disc", 0.2), ("soft disc", 0.8), ("blobs", 0.95), ("lines", 0.9)])
+def test_what_the_last_step_changed_makes_the_next_one_more_exact(device: Device, kind: str, part: float) -> None:
     size = 90, 100
     step, faces = Step(device, 1e5 ** mask(kind, *size)), vortices(*size)
     exact = step.exact(faces)
-    errors = [error(step(faces), exact) for _ in range(4)]
-    assert errors[3] < 0.5 * errors[0]
+    errors = [error(step(faces), exact) for _ in range(5)]
+    assert errors[4] < part * errors[0]
     # A wholly different flow is none the worse for it.
     exact = step.exact(push(*size))
     misled = error(step(push(*size)), exact)
@@ -306,3 +305,22 @@ def test_connected_parts_are_those_of_scipy(seed: int) -> None:
     np.testing.assert_array_equal(np.bincount(found.ravel())[1:], kept)
     for number in range(1, found.max() + 1):
         assert len(np.unique(wanted[found == number])) == 1
+
+
+def test_lines_and_necks_bend_and_what_is_broad_does_not() -> None:
+    y, x = np.mgrid[:60, :100]
+    two_discs = (np.hypot(x - 30, y - 30) < 12) | (np.hypot(x - 70, y - 30) < 12)
+    bending = {
+        "line": abs(y - 0.4 * x - 10) < 1.5,
+        "thin neck": two_discs | ((abs(y - 30) < 2) & (abs(x - 50) < 20)),
+    }
+    stiff = {
+        "nothing": x < 0,
+        "everything": x >= 0,
+        "two discs": two_discs,
+        "broad neck": two_discs | ((abs(y - 30) < 6) & (abs(x - 50) < 20)),
+        "small squares": (x % 10 < 4) & (y % 10 < 4),
+        "along the wall": y < 4,
+    }
+    assert all(some_bend(connected_parts(mask)) for mask in bending.values())
+    assert not any(some_bend(connected_parts(mask)) for mask in stiff.values())
