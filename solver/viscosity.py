@@ -67,7 +67,7 @@ def plan_for(least: float, largest: float) -> Plan:
     if largest <= 300.0 * least:
         return Plan(tolerance=0.03)
     # Rigid pieces pay only where they are far stiffer than what is around them.
-    return Plan(tolerance=0.12, sweeps=(1, 1), stiff=max(100.0, math.sqrt(least * largest)))
+    return Plan(tolerance=0.08, sweeps=(1, 1), stiff=max(100.0, math.sqrt(least * largest)))
 
 
 class Pair:
