@@ -51,7 +51,7 @@ class Pass:
         target: Target,
         *,
         add: bool = False,
-        region: Region | None = None,
+        region: Region | list[Region] | None = None,
         vertices: int = 3,
         **inputs: object,
     ) -> None:
@@ -60,7 +60,7 @@ class Pass:
         Args:
             target: a field, or several fields of one size.
             add: add to what the target holds (float blending) instead of replacing it.
-            region: (x, y, width, height) in texels, to draw only there; clipped to the target.
+            region: (x, y, width, height) in texels, or several of them, to draw only there; clipped to the target.
             vertices: of the triangles, where the pass has a vertex shader of its own.
             inputs: the shader's uniforms without their `u_`.
         """
@@ -68,24 +68,23 @@ class Pass:
         for name, value in inputs.items():
             self._bind(f"u_{name}", value)
         framebuffer = self.device.framebuffer(*fields)
-        width, height = fields[0].size
-        if region is not None:
-            x, y = max(region[0], 0), max(region[1], 0)
-            width, height = min(region[0] + region[2], width) - x, min(region[1] + region[3], height) - y
-            if width <= 0 or height <= 0:
-                return
-            framebuffer.scissor = (x, y, width, height)
+        regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
+        if not regions:
+            return
         ctx = self.device.ctx
         if add:
             ctx.enable_only(moderngl.BLEND)
             ctx.blend_func = moderngl.ONE, moderngl.ONE
-        framebuffer.use()
-        self._vertices.render(moderngl.TRIANGLES, vertices=vertices)
+        for x, y, width, height in regions:
+            if region is not None:
+                framebuffer.scissor = (x, y, width, height)
+            framebuffer.use()
+            self._vertices.render(moderngl.TRIANGLES, vertices=vertices)
+            self.device.timings.count(width * height, self.reads)
         if add:
             ctx.enable_only(moderngl.NOTHING)
         if region is not None:
             framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]
-        self.device.timings.count(width * height, self.reads)
 
     def draw_into(self, framebuffer: moderngl.Framebuffer, smooth: Sequence[str] = (), **inputs: object) -> None:
         """Draw over the viewport of a framebuffer that is not a field's, such as the window's.
@@ -118,3 +117,15 @@ class Pass:
             value.use(self._units[name])
         else:
             uniform.value = value  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def _clipped(region: Region | list[Region], size: tuple[int, int]) -> list[Region]:
+    """The parts of one region or several that lie within a target."""
+    several = region if isinstance(region, list) else [region]
+    found: list[Region] = []
+    for left, top, width, height in several:
+        x, y = max(left, 0), max(top, 0)
+        right, bottom = min(left + width, size[0]), min(top + height, size[1])
+        if right > x and bottom > y:
+            found.append((x, y, right - x, bottom - y))
+    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from solver.context import Device
 from solver.field import Field
+from solver.passes import Region
 from solver.warp import WarpMap
 
 Quality = Literal["catmull-rom", "bilinear", "nearest"]
@@ -23,6 +24,7 @@ _KINDS = {np.dtype(np.uint8): ("f1", 255.0), np.dtype(np.uint16): ("nu2", 65535.
 _SWIZZLES = {1: "RRR1", 2: "RRRG", 3: "RGB1", 4: "RGBA"}
 _TARGET_COMPONENTS = {1: 1, 2: 2, 3: 4, 4: 4}  # targets of three components are not promised by GL
 _SMALLEST_TILE = 16
+_BLOCK = 64  # pixels along a block of the result that is drawn by a shader of its own kind; as llvmpipe's tiles
 
 
 class SamplingError(ValueError):
@@ -37,7 +39,7 @@ class Sampling:
         quality: interpolation between pixels.
         edges: what lies beyond the picture. "transparent" is black where the picture has no alpha.
         samples: places looked up along a side of each pixel of the result, 1 or an even number; "auto" follows the
-            stretch s of the map in that direction there: 2 clamp(ceil(0.75 s), 1, 4), or one where it only shifts.
+            stretch s of the map in that direction there: 2 clamp(ceil(0.75 s), 1, 4), 1 where it shifts or enlarges.
         linear_light: mix in linear light; uint8 and uint16 are taken as sRGB, float32 as linear already.
         dither: spread the rounding to 8 bits by a fixed pattern; by default where light is mixed.
     """
@@ -131,22 +133,38 @@ class _Job:
         return self.how.edges in ("mirror", "wrap")
 
     @property
+    def is_bounded(self) -> bool:
+        """True if there is nothing beyond the picture."""
+        return self.how.edges in ("transparent", "black")
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Middle of the picture, in pixels."""
+        return 0.5 * self.source_size[0], 0.5 * self.source_size[1]
+
+    @property
     def half(self) -> tuple[float, float]:
         """Half of the sides of the rectangle, in pixels, beyond which there is nothing."""
         # What is a part of a texel of the map outside is there because of the interpolation, not of the fluid.
         width, height = self.source_size
         return 0.5 * width + self.slack, 0.5 * height + self.slack
 
-    def defines(self, whole: bool) -> dict[str, object]:
-        """Of `look_up.frag`."""
-        kind, levels = _KINDS[self.picture.dtype]
+    @property
+    def pairs(self) -> tuple[int, int]:
+        """The fewest and the most pairs of places along a side of a pixel, where one place is not enough."""
         samples = self.how.samples
+        return (1, MOST_SAMPLES // 2) if samples == "auto" else (samples // 2, samples // 2)
+
+    def defines(self, whole: bool, places: int, inside: bool) -> dict[str, object]:
+        """Of `look_up.frag`, for blocks that want one place a pixel (0), four (1) or more (2) and lie inside or not."""
+        kind, levels = _KINDS[self.picture.dtype]
         dither = self.is_curved if self.how.dither is None else self.how.dither
         flags = {
             "WHOLE": whole,
             "ZOOMED": self.zoom != (1.0, 1.0),
-            "BOUNDED": self.how.edges in ("transparent", "black"),
+            "BOUNDED": self.is_bounded and not inside,
             "SINGLE": self.is_single,
+            "ONE": places == 0,
             "PREPARED": self.is_prepared,
             "LINEAR_LIGHT": self.is_curved and self.is_prepared,
             "CODES": levels > 0,  # of 8 or 16 bits, and so neither infinite nor NaN
@@ -156,9 +174,8 @@ class _Job:
             "GREY_ALPHA": self.channels == 2,
         }
         values: dict[str, object] = {name: 1 for name, wanted in flags.items() if wanted}
-        values |= {"TAPS": _TAPS[self.how.quality]}
-        least, most = (1, MOST_SAMPLES // 2) if samples == "auto" else (samples // 2, samples // 2)
-        values |= {"LEAST_PAIRS": least, "MOST_PAIRS": most}
+        least, most = self.pairs
+        values |= {"TAPS": _TAPS[self.how.quality], "LEAST_PAIRS": least, "MOST_PAIRS": most if places == 2 else 1}
         return values
 
 
@@ -179,6 +196,8 @@ class Sampler:
         self._fields: dict[str, Field] = {}
         self._textures: dict[str, tuple[moderngl.Texture, tuple[object, ...]]] = {}
         self._spread_for: tuple[object, ...] = ()
+        self._classes_for: tuple[object, ...] = ()
+        self._classes = np.empty((0, 0), np.uint8)
         self._held: tuple[np.ndarray, bool, bool] | None = None
 
     def apply(
@@ -344,24 +363,59 @@ class Sampler:
     ) -> None:
         """Draw a region of a tile from a piece of the picture, or from all of it."""
         raw, _ = self._textures["raw"]
-        defines = job.defines(whole=piece is None)
-        piece = piece or (0, 0, *job.source_size)
+        target, classes = self._fields["result"], self._classify(job)
+        extent = piece or (0, 0, *job.source_size)
         opaque = job.how.edges == "black" or not job.has_alpha
-        self.device.pass_("sampling/look_up.frag", **defines)(
-            self._fields["result"],
-            region=region,
-            source=self._fields["prepared"] if job.is_prepared else raw,
-            raw=raw,
-            displacement=lattice,
-            corner=piece[:2],
-            extent=(piece[2] - piece[0], piece[3] - piece[1]),
-            pixel=origin,
-            zoom=job.zoom,
-            longer=job.longer,
-            middle=(0.5 * job.source_size[0], 0.5 * job.source_size[1]),
-            half=job.half,
-            outside=1.0 if opaque else 0.0,
-        )
+        left, top = region[0] + origin[0], region[1] + origin[1]
+        shown = classes[
+            top // _BLOCK : -(-(top + region[3]) // _BLOCK), left // _BLOCK : -(-(left + region[2]) // _BLOCK)
+        ]
+        for kind in np.unique(shown).tolist():
+            defines = job.defines(whole=piece is None, places=kind // 2, inside=kind % 2 == 1)
+            blocks = _rectangles(shown == kind) * _BLOCK
+            blocks[:, :2] += np.array((left // _BLOCK, top // _BLOCK)) * _BLOCK - origin
+            self.device.pass_("sampling/look_up.frag", **defines)(
+                target,
+                region=[_overlap(block, region) for block in blocks.tolist()],
+                source=self._fields["prepared"] if job.is_prepared else raw,
+                raw=raw,
+                displacement=lattice,
+                corner=extent[:2],
+                extent=(extent[2] - extent[0], extent[3] - extent[1]),
+                pixel=origin,
+                zoom=job.zoom,
+                longer=job.longer,
+                middle=job.middle,
+                half=job.half,
+                outside=1.0 if opaque else 0.0,
+            )
+
+    def _classify(self, job: _Job) -> np.ndarray:
+        """What each block of the result wants, (rows, columns) uint8, as `classify.frag` has it.
+
+        The blocks are of the result and not of a tile of it, so that tiles are drawn to the same bits as the whole.
+        """
+        key = (*job.key, job.size, job.source_size, job.how)
+        if key != self._classes_for:
+            self._classes_for = key
+            columns, rows = -(-job.size[0] // _BLOCK), -(-job.size[1] // _BLOCK)
+            classes = self._field("classes", (columns, rows), 1, "f1")
+            source = job.displacement
+            defines: dict[str, object] = {"SINGLE": 1} if job.is_single else {}
+            if job.how.samples != "auto":
+                defines["EVERYWHERE"] = min(job.pairs[0], 2)
+            self.device.pass_("sampling/classify.frag", **defines)(
+                classes,
+                displacement=source,
+                side=float(_BLOCK),
+                scale=(source.width / job.size[0], source.height / job.size[1]),
+                zoom=job.zoom,
+                longer=job.longer,
+                middle=job.middle,
+                half=job.half,
+            )
+            self._classes = classes.get()
+        return self._classes
 
     # -- textures ---------------------------------------------------------------------------------------------------
 
@@ -434,6 +488,26 @@ def apply(
         return sampler.apply(warp, picture, size, how)
     finally:
         sampler.release()
+
+
+def _rectangles(mask: np.ndarray) -> np.ndarray:
+    """What is true in a mask as rectangles, (n, 4) of x, y, width and height: runs in its rows, joined downwards."""
+    found: list[list[int]] = []
+    above: dict[tuple[int, int], list[int]] = {}
+    for y, row in enumerate(mask):
+        edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2).tolist()
+        above = {(x, end): above.get((x, end)) or [x, y, end - x, 0] for x, end in edges}
+        for rectangle in above.values():
+            rectangle[3] += 1
+            if rectangle[3] == 1:
+                found.append(rectangle)
+    return np.array(found, int).reshape(-1, 4)
+
+
+def _overlap(a: Sequence[int], b: Sequence[int]) -> Region:
+    """What two rectangles (x, y, width, height) have in common."""
+    x, y = max(a[0], b[0]), max(a[1], b[1])
+    return x, y, min(a[0] + a[2], b[0] + b[2]) - x, min(a[1] + a[3], b[1] + b[3]) - y
 
 
 def _edge_index(index: np.ndarray, count: int, edges: str) -> np.ndarray:

@@ -1,7 +1,8 @@
 // Look up: the picture at x + D(x), the mean of places spread evenly over each pixel of the result.
 // Along x and along y there are 2 clamp(ceil(0.75 s), 1, 4) of them, s the stretch of the map in that direction over
-// the pixel; where the map only shifts, there is one at the centre. Four neighbours lie within a pixel of the picture:
-// they are looked up at once, in the block of pixels that holds what they are made of.
+// the pixel; where the map shrinks and distorts nothing, there is one at the centre. Four neighbours lie within a pixel of the
+// picture: they are looked up at once, in the block of pixels that holds what they are made of.
+// Blocks of one class are drawn at a time (classify.frag), as a software rasteriser goes through every branch.
 //
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels;
 // premultiplied where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
@@ -9,8 +10,8 @@
 // u_pixel: the result's pixel of the first fragment; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
-// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places; SINGLE;
-// PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
+// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places; ONE place,
+// and SINGLE where there is one everywhere; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
 // OPAQUE if there is no alpha; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
 // GREY_ALPHA.
 // reads: 30
@@ -20,6 +21,7 @@
 #define MOST_PAIRS 4
 #endif
 #include "lib/srgb.glsl"
+#include "lib/apart.glsl"
 uniform sampler2D u_source;
 uniform sampler2D u_raw;
 uniform sampler2D u_displacement;
@@ -178,39 +180,43 @@ void main() {
 #endif
 #ifdef SINGLE
     vec2 centre = rest + 0.5 * zoom + displacement(0, 0);
-    COLOR color = one_place(whole, centre);
-    bool shifted = true;
 #else
     vec2 a = displacement(0, 0), b = displacement(1, 0), c = displacement(0, 1), d = displacement(1, 1);
-    vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d), bend = a - b - c + d;
+    vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d);
+#endif
+#ifdef ONE
+    const bool shifted = true;
+    COLOR color = one_place(whole, centre);
+#else
     vec2 along_x = 0.5 * (b - a + d - c) + vec2(zoom.x, 0.0), along_y = 0.5 * (c - a + d - b) + vec2(0.0, zoom.y);
-    // Where the map only shifts and turns, one place is enough, and keeps the picture as sharp as it is; between that and
-    // a real distortion the places move apart, so that no seam shows.
-    float strain = abs(length(along_x) - 1.0) + abs(length(along_y) - 1.0) + abs(dot(along_x, along_y));
-    float apart = smoothstep(0.0, 0.2, strain);
-    bool shifted = apart < 1e-3;
-    vec2 stretch = vec2(length(along_x), length(along_y));
+    float away_from_one = apart(along_x, along_y);
+    bool shifted = away_from_one < 1e-3;
+#if MOST_PAIRS > 1
+    vec2 bend = a - b - c + d, stretch = vec2(length(along_x), length(along_y));
     vec2 pairs = clamp(ceil(0.75 * stretch), float(LEAST_PAIRS), float(MOST_PAIRS));
+#else
+    const vec2 pairs = vec2(1.0);
+#endif
     // As far apart as gives the places the variance of the pixel itself: a mean of fourth order.
-    vec2 spread = apart * inversesqrt(1.0 - 0.25 / (pairs * pairs));
+    vec2 spread = away_from_one * inversesqrt(1.0 - 0.25 / (pairs * pairs));
+    // The second moments of the four places about the middle of each four.
+    vec2 u = 0.25 * spread.x / pairs.x * along_x, v = 0.25 * spread.y / pairs.y * along_y;
+    vec2 moments = u * u + v * v;
+    float correlation = (u.x * u.y + v.x * v.y) * inversesqrt(max(moments.x * moments.y, 1e-20));
+    vec2 away = min(sqrt(moments), 0.499);
+#if MOST_PAIRS > 1
     COLOR color = COLOR(0.0);
-    if (shifted) {
-        color = one_place(whole, centre);
-    } else {
-        // The second moments of the four places about the middle of each four.
-        vec2 u = 0.25 * spread.x / pairs.x * along_x, v = 0.25 * spread.y / pairs.y * along_y;
-        vec2 moments = u * u + v * v;
-        float correlation = (u.x * u.y + v.x * v.y) * inversesqrt(max(moments.x * moments.y, 1e-20));
-        vec2 away = min(sqrt(moments), 0.499);
-        vec2 place = vec2(0.5);
-        for (int n = int(pairs.x * pairs.y); n > 0; --n) {
-            vec2 off = spread * (place / pairs - 0.5);
-            vec2 middle = centre + off.x * along_x + off.y * along_y + (off.x * off.y) * bend;
-            color += four_places(whole, middle, away, correlation);
-            place = place.x + 1.0 < pairs.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
-        }
-        color /= pairs.x * pairs.y;
+    vec2 place = vec2(0.5);
+    for (int n = int(pairs.x * pairs.y); n > 0; --n) {
+        vec2 off = spread * (place / pairs - 0.5);
+        vec2 middle = centre + off.x * along_x + off.y * along_y + (off.x * off.y) * bend;
+        color += four_places(whole, middle, away, correlation);
+        place = place.x + 1.0 < pairs.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
     }
+    color /= pairs.x * pairs.y;
+#else
+    COLOR color = four_places(whole, centre, away, correlation);
+#endif
 #endif
 
 #if defined(PREPARED) && !defined(OPAQUE)
