@@ -380,6 +380,8 @@ class Sampler:
                 source=self._fields["prepared"] if job.is_prepared else raw,
                 raw=raw,
                 displacement=lattice,
+                texel=(1 / raw.width, 1 / raw.height),
+                next=lattice.texel,
                 corner=extent[:2],
                 extent=(extent[2] - extent[0], extent[3] - extent[1]),
                 pixel=origin,
@@ -407,6 +409,7 @@ class Sampler:
             self.device.pass_("sampling/classify.frag", **defines)(
                 classes,
                 displacement=source,
+                texel=source.texel,
                 side=float(_BLOCK),
                 scale=(source.width / job.size[0], source.height / job.size[1]),
                 zoom=job.zoom,

@@ -1,13 +1,14 @@
 // Classify: what the blocks of a result want when they are looked up, from the map's texels about each block: 2 kind +
 // inside, over 255. Kind 0: one place a pixel is enough; 1: four places are, as 0.75 of the stretch is at
 // most 1; 2: more are wanted. Inside: 1 where every place lies within the bounds of the picture.
-// u_displacement: longer sides; u_side: pixels of the result along a block; u_scale: texels to a pixel of the result;
+// u_displacement: longer sides, of texels of u_texel, 0-1; u_side: pixels of the result along a block; u_scale: texels to a pixel of the result;
 // u_zoom: pixels of the picture to one of the result; u_longer: pixels of the picture to a longer side;
 // u_middle, u_half: middle and half sides, pixels, of the rectangle beyond which there is nothing.
 // Define SINGLE where one place is enough anyway, EVERYWHERE where four or more are wanted as soon as one is not enough.
 // reads: 300
 #include "lib/apart.glsl"
 uniform sampler2D u_displacement;
+uniform vec2 u_texel;
 uniform float u_side;
 uniform vec2 u_scale;
 uniform vec2 u_zoom;
@@ -19,19 +20,20 @@ layout(location = 0) out float out_class;
 const float ONE_PLACE = 0.05;  // as near each other as that they make less than a quarter of a level of 255
 const float FOUR_PLACES = 1.33;
 
+vec2 displacement(vec2 texel) { return texture(u_displacement, (texel + 0.5) * u_texel).rg * u_longer; }
+
 void main() {
-    ivec2 count = textureSize(u_displacement, 0);
+    vec2 count = 1.0 / u_texel;
     vec2 corner = floor(gl_FragCoord.xy) * u_side, step_x = vec2(u_zoom.x, 0.0), step_y = vec2(0.0, u_zoom.y);
     // A cubic reaches two texels beyond its place.
-    ivec2 first = clamp(ivec2(floor(corner * u_scale - 0.5)) - 1, ivec2(0), count - 2);
-    ivec2 last = clamp(ivec2(floor((corner + u_side) * u_scale - 0.5)) + 2, first + 1, count - 1);
+    vec2 first = clamp(floor(corner * u_scale - 1.5), vec2(0.0), count - 2.0);
+    vec2 last = clamp(floor((corner + u_side) * u_scale + 1.5), first + 1.0, count - 1.0);
     vec2 low = vec2(1e30), high = vec2(-1e30), most = vec2(0.0);
     float farthest = 0.0, longest = 0.0;
-    for (int j = first.y; j < last.y; ++j) {
-        vec2 here = texelFetch(u_displacement, ivec2(first.x, j), 0).rg * u_longer;
-        for (int i = first.x; i < last.x; ++i) {
-            vec2 right = texelFetch(u_displacement, ivec2(i + 1, j), 0).rg * u_longer;
-            vec2 below = texelFetch(u_displacement, ivec2(i, j + 1), 0).rg * u_longer;
+    for (float j = first.y; j < last.y - 0.5; ++j) {
+        vec2 here = displacement(vec2(first.x, j));
+        for (float i = first.x; i < last.x - 0.5; ++i) {
+            vec2 right = displacement(vec2(i + 1.0, j)), below = displacement(vec2(i, j + 1.0));
             low = min(low, min(here, min(right, below)));
             high = max(high, max(here, max(right, below)));
             most = max(most, max(abs(right - here), abs(below - here)));

@@ -7,6 +7,7 @@
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels;
 // premultiplied where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels, or at their centres with SINGLE defined;
+// u_texel, u_next: size of a texel of the picture and of the displacement, 0-1;
 // u_pixel: the result's pixel of the first fragment; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
@@ -25,6 +26,8 @@
 uniform sampler2D u_source;
 uniform sampler2D u_raw;
 uniform sampler2D u_displacement;
+uniform vec2 u_texel;
+uniform vec2 u_next;
 uniform vec2 u_corner;
 uniform vec2 u_extent;
 uniform vec2 u_pixel;
@@ -106,8 +109,7 @@ COLOR four_places(vec2 whole, vec2 middle, vec2 apart, float correlation) {
     vec2 cell = floor(middle - apart - float(TAPS / 2) + 0.5), first = whole - CORNER + cell;
     vec2 low = middle - apart - cell - float(TAPS / 2) + 0.5, high = low + 2.0 * apart;
     vec4 there = within(whole + middle - apart, whole + middle + apart);
-    vec2 texel = 1.0 / vec2(textureSize(u_source, 0));
-    float x[BLOCK] = coordinates(first.x, u_extent.x, texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, texel.y);
+    float x[BLOCK] = coordinates(first.x, u_extent.x, u_texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, u_texel.y);
     float mean_x[BLOCK], odd_x[BLOCK], mean_y[BLOCK], odd_y[BLOCK];
     both(low.x, high.x, there.xz, mean_x, odd_x);
     both(low.y, high.y, there.yw, mean_y, odd_y);
@@ -131,17 +133,16 @@ COLOR four_places(vec2 whole, vec2 middle, vec2 apart, float correlation) {
 
 // The picture at one place.
 COLOR one_place(vec2 whole, vec2 place) {
-    vec2 texel = 1.0 / vec2(textureSize(u_source, 0));
 #if TAPS == 1
-    vec2 only = WITHIN(whole - CORNER + floor(place) + 0.5, u_extent) * texel;
+    vec2 only = WITHIN(whole - CORNER + floor(place) + 0.5, u_extent) * u_texel;
     COLOR sum = AT(only.x, only.y);
 #elif TAPS == 2
     vec2 cell = floor(place - 0.5), f = place - 0.5 - cell, first = whole - CORNER + cell;
-    vec2 a = WITHIN(first + 0.5, u_extent) * texel, b = WITHIN(first + 1.5, u_extent) * texel;
+    vec2 a = WITHIN(first + 0.5, u_extent) * u_texel, b = WITHIN(first + 1.5, u_extent) * u_texel;
     COLOR sum = mix(mix(AT(a.x, a.y), AT(b.x, a.y), f.x), mix(AT(a.x, b.y), AT(b.x, b.y), f.x), f.y);
 #else
     vec2 cell = floor(place - 1.5), first = whole - CORNER + cell;
-    float x[BLOCK] = coordinates(first.x, u_extent.x, texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, texel.y);
+    float x[BLOCK] = coordinates(first.x, u_extent.x, u_texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, u_texel.y);
     float wx[TAPS] = weights(place.x - 1.5 - cell.x), wy[TAPS] = weights(place.y - 1.5 - cell.y);
     COLOR sum = COLOR(0.0);
     for (int j = 0; j < TAPS; ++j)
@@ -167,7 +168,7 @@ COLOR one_place(vec2 whole, vec2 place) {
 float even_noise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
 
 vec2 displacement(int i, int j) {
-    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) / vec2(textureSize(u_displacement, 0))).rg * u_longer;
+    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) * u_next).rg * u_longer;
 }
 
 void main() {
@@ -232,12 +233,12 @@ void main() {
 #ifdef DITHER
     color.rgb = floor(color.rgb * 255.0 + even_noise(pixel)) / 255.0;
 #endif
-#ifdef PREPARED
+#if defined(PREPARED) && !defined(ZOOMED)
     // Moved by whole pixels, and above all not at all: the very values of the picture.
     vec2 nearest = floor(centre), same = whole - CORNER + nearest + 0.5;
     bool copied = shifted && all(lessThan(abs(centre - nearest - 0.5), vec2(1.0 / 1024.0)))
                && all(greaterThan(same, vec2(0.0))) && all(lessThan(same, u_extent));
-    COLOR value = texture(u_raw, same / vec2(textureSize(u_raw, 0))).PARTS;
+    COLOR value = texture(u_raw, same * u_texel).PARTS;
     color = copied ? value : color;
 #endif
 #ifdef GREY_ALPHA
