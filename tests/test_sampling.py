@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 from scipy import ndimage
 
 from solver.context import Device
@@ -160,6 +161,31 @@ def test_result_of_another_size_follows_the_map(device: Device) -> None:
         assert found.shape == size[::-1]
         back = cv2.resize(found, (120, 80), interpolation=cv2.INTER_CUBIC)
         assert np.abs(back - sampler.apply(warp, picture, None, Sampling(edges="clamp")))[4:-4, 4:-4].max() < 0.01
+
+
+@pytest.mark.parametrize("factor", [1.5, 2.0, 3.2])
+def test_enlarging_is_pillows_bicubic(device: Device, factor: float) -> None:
+    """Where nothing is shrunk, one place a pixel: sharp as Pillow's resize, whose bicubic is Catmull-Rom's."""
+    picture = noise((80, 120), "float")
+    size = round(120 * factor), round(80 * factor)
+    found = Sampler(device).apply(WarpMap(device, Grid(24, 16)), picture, size, Sampling(edges="clamp"))
+    wanted = np.asarray(Image.fromarray(picture, "F").resize(size, Image.Resampling.BICUBIC))
+    inner = slice(round(3 * factor), -round(3 * factor))  # Pillow weighs the pixels at the edge in another way
+    np.testing.assert_allclose(found[inner, inner], wanted[inner, inner], atol=2e-5)
+
+
+def test_one_place_where_it_is_enough_leaves_no_seam(device: Device) -> None:
+    """A map that distorts more and more to the right, from blocks with one place a pixel to blocks with many."""
+    picture = noise((448, 640), "float")
+    x, y = np.meshgrid(np.arange(640) / 640, np.arange(448) / 640)
+    displacement = 0.02 * x[..., None] ** 2 * np.stack([np.sin(20 * y), np.sin(20 * x)], axis=-1)
+    found = Sampler(device).apply(GivenMap(device, displacement), picture, how=Sampling(edges="clamp"))
+    # The same as a part of a larger picture, whose blocks lie elsewhere.
+    around = np.pad(displacement * 640 / 704, ((24, 40), (24, 40), (0, 0)), mode="edge")
+    larger = np.pad(picture, ((24, 40), (24, 40)))
+    wanted = Sampler(device).apply(GivenMap(device, around), larger, how=Sampling(edges="clamp"))[24:472, 24:664]
+    difference = np.abs(found - wanted)[32:-32, 32:-32]
+    assert 0 < difference.max() < 0.25 / 255
 
 
 def test_what_cannot_be_looked_up_says_so(device: Device) -> None:
