@@ -5,11 +5,14 @@
 By the same writer with the same settings; rendering alone is the export into a writer that takes everything. The runs
 alternate, and the medians are compared. With a GPU the export is to be bound by the slower of the two; where the GL is
 a software rasteriser, both want the same cores, and the best it can come to is 1 / (1 / encoder + 1 / rendering).
+The last two columns are of processor time, of this process and of the encoder's: the work a frame takes, and the share
+of it that is the encoder's. Other programs running beside disturb them least.
 """
 
 from __future__ import annotations
 
 import os
+import resource
 import statistics
 import sys
 import tempfile
@@ -52,8 +55,8 @@ def main() -> None:
     recipe = opened.recipe.edited(output=Output(size=side, fps=RATE), duration=max(dt, (wanted - 1) / RATE))
     device = Device.headless()
     print(f"{device.limits.renderer}, {os.cpu_count()} cores, {side} pixels, {wanted} frames")
-    print("| output | encoder alone, frames/s | rendering alone | export | export / encoder | export / in turns |")
-    print("|---|---|---|---|---|---|")
+    print("| output | encoder, frames/s | rendering | export | export / encoder | / in turns | CPU ms | encoder's |")
+    print("|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         frames = rendered(device, recipe, source, opened.folder, Path(folder))
         for ending in ENDINGS:
@@ -64,16 +67,27 @@ def main() -> None:
                 partial(run, device, job, Progress()),
             )
             rates: list[list[float]] = [[], [], []]
+            costs: list[list[float]] = [[], [], []]
             for _ in range(ROUNDS):
-                for work, found in zip(works, rates, strict=True):
-                    started = time.perf_counter()
-                    work()
+                for do, found, spent in zip(works, rates, costs, strict=True):
+                    started, busy = time.perf_counter(), processor_time()
+                    do()
                     found.append(len(frames) / (time.perf_counter() - started))
+                    spent.append((processor_time() - busy) / len(frames))
             encoder, rendering, export = map(statistics.median, rates)
+            encoding, _, exporting = map(statistics.median, costs)
             turns = 1 / (1 / encoder + 1 / rendering)
-            shares = f"{export / encoder:.0%} | {export / turns:.0%}"
+            shares = (
+                f"{export / encoder:.0%} | {export / turns:.0%} | {exporting * 1e3:.0f} | {encoding / exporting:.0%}"
+            )
             print(f"| `{ending}` | {encoder:.1f} | {rendering:.1f} | {export:.1f} | {shares} |", flush=True)
     device.release()
+
+
+def processor_time() -> float:
+    """Seconds of the processor that this process and the encoders it ran have taken."""
+    spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in spent)
 
 
 @contextmanager
