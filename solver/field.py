@@ -88,9 +88,10 @@ class Field:
 
     def get(self) -> np.ndarray:
         """Read back as an array of shape (height, width) or (height, width, components), row 0 on top."""
-        raw = self.framebuffer.read(components=self.components, dtype=self.dtype, alignment=1)
         shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
-        return np.frombuffer(raw, _NUMPY[self.dtype]).reshape(shape).copy()
+        array = np.empty(shape, _NUMPY[self.dtype])
+        self.framebuffer.read_into(array, components=self.components, dtype=self.dtype, alignment=1)
+        return array
 
     def copy_from(self, other: Field) -> None:
         """Take over the texels of `other`, which has the same size and components."""

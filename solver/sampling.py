@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import ceil, sqrt
 from typing import Any, Literal
 
 import moderngl
@@ -242,8 +243,9 @@ class Sampler:
         """
         job = self._job(warp, picture, size, how or Sampling())
         width, height = job.size
-        rows, columns = (height, width) if self._fits(job.size) else (self.tile[1], self.tile[0])
         whole = self._fits(job.source_size) and not job.is_repeated
+        columns, rows = job.size if whole and self._fits(job.size) else self._tile(job.size)
+        room = None if whole else self._room(job, (columns, rows))
         if whole and not self._holds(picture, job):
             self._load(job, (0, 0, *job.source_size))
             # The array itself and not its id: no other can take its place in memory as long as it is held.
@@ -254,7 +256,8 @@ class Sampler:
             band = np.empty(shape, job.picture.dtype) if result is None else result[top:bottom].reshape(shape)
             for left in range(0, width, columns):
                 right = min(left + columns, width)
-                self._draw(job, (left, top, right, bottom), whole)
+                # Some may reach a pixel beyond the result: so all are of one size, and no texture is made anew.
+                self._draw(job, (left, top, left + columns, top + rows), room)
                 self._take(job, band[:, left:right])
             yield band.reshape(bottom - top, width, *picture.shape[2:])
 
@@ -285,20 +288,35 @@ class Sampler:
         # The lattice of corners is one larger than the picture.
         return size[0] * size[1] <= self.whole and max(size) < self.device.limits.max_texture_size
 
-    def _draw(self, job: _Job, tile: tuple[int, int, int, int], whole: bool) -> None:
-        """Draw one tile of the result into the field "result"."""
+    def _tile(self, size: tuple[int, int]) -> tuple[int, int]:
+        """(width, height) of the tiles of a result: all alike."""
+        width, height = (ceil(side / ceil(side / most)) for side, most in zip(size, self.tile, strict=True))
+        return width, height
+
+    def _room(self, job: _Job, tile: tuple[int, int]) -> tuple[int, int]:
+        """(width, height) of the textures for pieces of the picture: what a tile turned by any angle needs.
+
+        Were they as large as each piece, those of a film would change with every frame, and memory fall to bits.
+        """
+        needed = min(tile[0] * job.zoom[0] + tile[1] * job.zoom[1], sum(self.tile))
+        side = ceil(needed / sqrt(2)) + 2 * _REACH + 2
+        return (side, side) if job.is_repeated else (min(side, job.source_size[0]), min(side, job.source_size[1]))
+
+    def _draw(self, job: _Job, tile: tuple[int, int, int, int], room: tuple[int, int] | None) -> None:
+        """Draw one tile of the result into the field "result", from the whole picture or by pieces that fit `room`."""
         left, top, right, bottom = tile
         lattice = self._spread(job, tile)
         kind, _ = _KINDS[job.picture.dtype]
         self._field("result", (right - left, bottom - top), _TARGET_COMPONENTS[job.channels], kind)
-        if whole:
+        if room is None:
             self._look_up(job, lattice, (left, top), (0, 0, right - left, bottom - top), None)
         else:
-            places = lattice.get() * np.array(job.longer, np.float32)
+            places = lattice.get()
+            places *= np.array(job.longer, np.float32)
             more = 0 if job.is_single else 1
             places[..., 0] += (np.arange(left, right + more) * job.zoom[0])[None, :]
             places[..., 1] += (np.arange(top, bottom + more) * job.zoom[1])[:, None]
-            self._draw_pieces(job, lattice, places, (left, top), (0, 0, right - left, bottom - top))
+            self._draw_pieces(job, lattice, places, (left, top), (0, 0, right - left, bottom - top), room)
 
     def _draw_pieces(
         self,
@@ -307,31 +325,33 @@ class Sampler:
         places: np.ndarray,
         origin: tuple[int, int],
         region: tuple[int, int, int, int],
+        room: tuple[int, int],
     ) -> None:
         """Draw a region of a tile from the piece of the picture it needs, or its halves, if that is too large."""
         x, y, width, height = region
         more = 0 if job.is_single else 1
-        within = places[y : y + height + more, x : x + width + more].reshape(-1, 2)
-        low = np.floor(within.min(axis=0)).astype(int) - _REACH
-        high = np.ceil(within.max(axis=0) + np.array(job.zoom)).astype(int) + _REACH
+        within = places[y : y + height + more, x : x + width + more]
+        low = np.floor(within.min(axis=(0, 1))).astype(int) - _REACH
+        high = np.ceil(within.max(axis=(0, 1)) + np.array(job.zoom)).astype(int) + _REACH
         if not job.is_repeated:
             limits = np.array(job.source_size)
             low, high = np.clip(low, 0, limits - 1), np.clip(high, 1, limits)
         piece = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
-        if not self._fits((piece[2] - piece[0], piece[3] - piece[1])):
-            if max(width, height) <= _SMALLEST_TILE:
-                raise SamplingError(
-                    f"the map tears a patch of {width} x {height} pixels over {piece[2] - piece[0]} x "
-                    f"{piece[3] - piece[1]} pixels of the picture"
-                )
+        size = piece[2] - piece[0], piece[3] - piece[1]
+        is_smallest = max(width, height) <= _SMALLEST_TILE
+        if is_smallest and not self._fits(size):
+            raise SamplingError(
+                f"the map tears a patch of {width} x {height} pixels over {size[0]} x {size[1]} pixels of the picture"
+            )
+        if not is_smallest and (size[0] > room[0] or size[1] > room[1]):
             if width >= height:
                 halves = (x, y, width // 2, height), (x + width // 2, y, width - width // 2, height)
             else:
                 halves = (x, y, width, height // 2), (x, y + height // 2, width, height - height // 2)
             for half in halves:
-                self._draw_pieces(job, lattice, places, origin, half)
+                self._draw_pieces(job, lattice, places, origin, half, room)
             return
-        self._load(job, piece)
+        self._load(job, piece, room)
         self._look_up(job, lattice, origin, region, piece)
 
     def _spread(self, job: _Job, tile: tuple[int, int, int, int]) -> Field:
@@ -428,8 +448,8 @@ class Sampler:
             return False
         return self._held[1:] == (job.is_prepared, job.is_curved)
 
-    def _load(self, job: _Job, piece: tuple[int, int, int, int]) -> None:
-        """Upload a piece of the picture (left, top, right, bottom) and prepare it."""
+    def _load(self, job: _Job, piece: tuple[int, int, int, int], room: tuple[int, int] | None = None) -> None:
+        """Upload a piece of the picture (left, top, right, bottom) and prepare it; without `room` it is all of it."""
         self._held = None
         left, top, right, bottom = piece
         width, height = right - left, bottom - top
@@ -440,7 +460,8 @@ class Sampler:
         else:
             pixels = job.picture[top:bottom, left:right]
         kind, _ = _KINDS[job.picture.dtype]
-        raw = self._texture("raw", (width, height), job.channels, kind, exact=piece == (0, 0, *job.source_size))
+        least = (width, height) if room is None else (max(width, room[0]), max(height, room[1]))
+        raw = self._texture("raw", least, job.channels, kind, exact=room is None)
         raw.write(np.ascontiguousarray(pixels), viewport=(0, 0, width, height))
         if job.is_prepared:
             prepared = self._field("prepared", raw.size, 4, "f4")
@@ -451,11 +472,12 @@ class Sampler:
     def _take(self, job: _Job, target: np.ndarray) -> None:
         """Read the field "result" into an array."""
         field = self._fields["result"]
+        within = target.shape[1], target.shape[0]
         settings: dict[str, Any] = {"components": job.channels, "dtype": field.dtype, "alignment": 1}
         if target.flags.c_contiguous:
-            field.framebuffer.read_into(target, **settings)
+            field.framebuffer.read_into(target, within, **settings)
         else:
-            data = field.framebuffer.read(**settings)
+            data = field.framebuffer.read(within, **settings)
             target[...] = np.frombuffer(data, target.dtype).reshape(target.shape)
 
     def _field(self, role: str, size: tuple[int, int], components: int, dtype: str) -> Field:

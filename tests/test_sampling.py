@@ -90,6 +90,20 @@ def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
             np.testing.assert_array_equal(np.concatenate(list(tiled.bands(warp, picture, size, how))), wanted)
 
 
+@pytest.mark.parametrize("edges", ["transparent", "mirror"])
+def test_a_film_in_tiles_makes_no_texture_anew(device: Device, edges: str) -> None:
+    """Textures as large as each piece would be of another size at every frame, and memory fall to bits."""
+    sampler, warp = Sampler(device, whole=12_000, tile=(64, 50)), WarpMap(device, Grid(46, 30))
+    picture, how = noise((151, 231, 3), "8"), Sampling(edges=edges)  # type: ignore[arg-type]
+    seen = set()
+    for frame in range(12):
+        warp.set(waves((46, 30), 0.02 * frame, seed=frame))
+        sampler.apply(warp, picture, how=how)
+        kept = *(texture for texture, _ in sampler._textures.values()), *(f.texture for f in sampler._fields.values())
+        seen.add(tuple(texture.glo for texture in kept))
+    assert len(seen) == 1
+
+
 def test_no_precision_is_lost_across_a_wide_picture(device: Device) -> None:
     """A shift by a quarter of a pixel at x = 11,900 gives what it gives at x = 100."""
     patch = noise((24, 100), "float")
