@@ -16,7 +16,7 @@ from app import maps
 from app.animation import NUMBER, animation_writer, check_animation, check_no_codec, is_animation, is_sequence
 from app.errors import UserError
 from app.export import longer_side, looked_up
-from app.files import writable
+from app.files import check_kept, writable
 from app.maps import Displacement, Kind, cropped, read_map
 from app.opening import Source, open_source
 from app.pictures import MAX_PIXELS, check_picture_output, picture_format, write_picture
@@ -110,6 +110,7 @@ class Application:
             check_no_codec(self.output, self.codec)
         maps.check_map(self.maps.path)
         writable(self.output)
+        check_kept(self.source, self.output)
 
     def run(self, device: Device, progress: Progress) -> None:
         """Do it; nothing is left behind if it is cancelled or fails.
@@ -239,6 +240,7 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
     """
     maps.check_map(output)
     writable(output)
+    check_kept(source.path, output)
     files = source.files()
     progress.total = len(files)
     if is_sequence(output) != source.is_sequence:

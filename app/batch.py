@@ -24,7 +24,7 @@ from typing import Any
 from app.animation import ANIMATIONS
 from app.errors import Cancelled, UserError
 from app.export import Job, MapOutput, run
-from app.files import abandon, cannot_write
+from app.files import abandon, cannot_write, check_kept
 from app.opening import CLIP_ENDINGS, Opened, open_recipe
 from app.pictures import FORMATS, MAX_PIXELS
 from app.progress import GRACE, INTERRUPTED, Progress, never
@@ -106,6 +106,9 @@ class Task:
     def job(self, opened: Opened | None = None) -> Job:
         """The job, with its picture read. Raises `UserError`."""
         opened = opened or _opened(self.recipe)
+        file = opened.source_file(self.picture)
+        if file is not None and self.output is not None:
+            check_kept(file, self.output)
         source = opened.source(self.picture, self.max_pixels)
         return Job(
             self.edits.applied(opened.recipe),
@@ -143,13 +146,9 @@ def spread(task: Task, pictures: Sequence[Path]) -> list[Task]:
     """
     recipe = str(Path(task.recipe).absolute()) if Path(task.recipe).exists() else task.recipe
     output = task.output
-    if output is not None and NAME not in str(output):
-        if output.suffix and not output.is_dir():
-            raise UserError(f"{len(pictures)} pictures cannot all become {output}; write a folder, or out/{NAME}.png")
-        try:
-            output.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(output, error) from None
+    folder = output if NAME not in str(output) else None
+    if folder is not None and folder.suffix and not folder.is_dir():
+        raise UserError(f"{len(pictures)} pictures cannot all become {output}; write a folder, or out/{NAME}.png")
     for path in (task.stats, task.maps and task.maps.path):
         if path is not None and NAME not in str(path) and len(pictures) > 1:
             raise UserError(f"{len(pictures)} pictures cannot all write {path}; put {NAME} into its name")
@@ -160,6 +159,11 @@ def spread(task: Task, pictures: Sequence[Path]) -> list[Task]:
         states = one.states and one.states.absolute()
         tasks.append(replace(one, output=one.output and one.output.absolute(), states=states))
     _check_apart(tasks)
+    if folder is not None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(folder, error) from None
     # A cluster's workers do not start from this folder.
     return [replace(one, picture=one.picture and one.picture.absolute()) for one in tasks]
 
@@ -178,8 +182,8 @@ def _check_apart(tasks: Sequence[Task]) -> None:
             continue
         if task.output in seen:
             raise UserError(f"{seen[task.output]} and {task.picture} would both become {task.output}; rename one")
-        if task.picture is not None and task.output.resolve() == task.picture.resolve():
-            raise UserError(f"{task.picture} would be replaced by its own result; choose another --output")
+        if task.picture is not None:
+            check_kept(task.picture, task.output)
         seen[task.output] = task.picture
 
 
@@ -402,9 +406,13 @@ def _perform_on_worker(task: Task) -> Outcome:
 def _run_on_cluster(tasks: Sequence[Task], address: str, report: Report, progress: Progress) -> None:
     try:
         from distributed import Client
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError:
         raise UserError("a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'", 2) from None
     try:
+        scheme, place = parse_address(address)
+        if scheme in ("tcp", "tls"):
+            parse_host_port(place)  # the client finds out too, but goes on for half a minute and ends in a traceback
         client = Client(address, timeout=CONNECTING, set_as_default=False)
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise UserError(f"no Dask scheduler answers at {address} ({error}); give for example tcp://host:8786") from None

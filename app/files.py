@@ -21,6 +21,8 @@ MENDS = {
     errno.EPERM: "no permission; choose another folder or change its permissions",
     errno.EROFS: "the disk is read-only; choose another folder",
     errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
+    errno.EEXIST: "a file of this name is in the way; choose another folder",
+    errno.ENOTDIR: "a part of its path is a file; choose another folder",
     errno.EFBIG: "the file grows larger than this disk allows; choose another folder or a smaller size",
 }
 
@@ -78,6 +80,12 @@ def writable(path: str | os.PathLike[str]) -> Path:
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise UserError(f"Cannot write {path}: {MENDS[errno.EACCES]}.")
     return target
+
+
+def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> None:
+    """Make sure that what is made of `source` does not take its place. Raises `UserError`."""
+    if os.path.realpath(source) == os.path.realpath(output):
+        raise UserError(f"{source} would be replaced by its own result; choose another --output")
 
 
 def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:

@@ -283,8 +283,9 @@ def _read_flo(file: Path) -> np.ndarray:
 def _read_npy(file: Path) -> np.ndarray:
     import io
 
+    data = io.BytesIO(_bytes(file))
     try:
-        values = np.load(io.BytesIO(_bytes(file)), allow_pickle=False)
+        values = np.load(data, allow_pickle=False)
     except MemoryError:
         raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
     except Exception as error:  # its header is read by Python's own tokenizer, which raises anything

@@ -68,19 +68,31 @@ class Opened:
     label: str
     project: Project | None = None
 
+    def source_file(self, other: Path | None = None) -> Path | None:
+        """The file of the picture or clip `other`, or else of the recipe's own; None if that is part of a project.
+
+        Raises:
+            UserError: if the recipe names none.
+        """
+        if other is not None:
+            return other
+        if self.project is not None:
+            return None
+        if self.recipe.picture is None:
+            raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
+        return self.folder / self.recipe.picture
+
     def source(self, other: Path | None = None, max_pixels: int = MAX_PIXELS) -> Source:
         """The picture or clip `other`, or else the recipe's own.
 
         Raises:
             UserError: if there is none, or it cannot be read.
         """
-        if other is not None:
-            return open_source(other, max_pixels)
-        if self.project is not None:
-            return Source(self.project.picture)
-        if self.recipe.picture is None:
-            raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
-        return open_source(self.folder / self.recipe.picture, max_pixels)
+        file = self.source_file(other)
+        if file is not None:
+            return open_source(file, max_pixels)
+        assert self.project is not None
+        return Source(self.project.picture)
 
 
 def shipped_recipes() -> dict[str, Path]:

@@ -238,7 +238,8 @@ def _decoding(file: Path, name: str) -> Iterator[None]:
     except MemoryError:
         raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
     except Exception as error:  # decoders of damaged files raise anything: IndexError, struct.error, zlib.error ...
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        lines = [line.strip() for line in str(error).splitlines()]
+        reason = next((line for line in lines if line.strip("0123456789")), type(error).__name__)
         message = f"Cannot read {file}: the {name} file is truncated or damaged ({reason}); get it again."
         raise UserError(message) from error
 

@@ -231,7 +231,7 @@ class Recipe(Model):
         except IsADirectoryError:
             raise UserError(f"{path} is a folder, not a recipe") from None
         except UnicodeDecodeError:
-            raise UserError(f"{path} is not a recipe: it is not text") from None
+            raise UserError(f"{path} is not a recipe: it is not text, or not saved as UTF-8") from None
         except OSError as error:
             raise UserError(f"{path} cannot be read: {error.strerror}") from None
         return cls.parse(text, str(path))

@@ -171,6 +171,12 @@ BAD = {
     "no such folder": (["a.toml", "-o", "none/x.png"], "none"),
     "a folder": (["a.toml", "-o", "sub.png"], "it is a folder"),
     "stats nowhere": (["a.toml", "-o", "x.png", "--stats", "none/s.json"], "none"),
+    "onto its source": (["a.toml", "-i", "cat.png", "-o", "cat.png"], "cat.png would be replaced by its own result"),
+    "onto the recipe's picture": (["a.toml", "-o", "sub.png/../cat.png"], "would be replaced by its own result"),
+    "states in a file": (["a.toml", "-o", "x.png", "--states", "cat.png"], "a file of this name is in the way"),
+    "no place for a folder": (["a.toml", "cat.png", "-o", "cat.png/sub"], "a part of its path is a file"),
+    "two of one name": (["a.toml", "cat.png", "cat.png", "-o", "new"], "would both become"),
+    "no address": (["a.toml", "cat.png", "-o", "sub.png", "--cluster", "here"], "give for example tcp://host:8786"),
     "several into one": (["a.toml", "cat.png", "cat.png", "-o", "x.png"], "{name}"),
     "grid 0": (["a.toml", "-o", "x.png", "--grid", "0"], "'fluid.grid' must be at least 8, not 0"),
     "fps nan": (["a.toml", "-o", "x.gif", "--fps", "nan"], "'output.fps' must be a finite number"),
@@ -188,7 +194,7 @@ BAD = {
 def test_bad_input_is_told_in_a_sentence(
     case: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """In this process, as all of it is told before any GL is touched."""
+    """In this process, as nearly all of it is told before any GL is touched."""
     words, expected = BAD[case]
     point = '[[force]]\nname = "x"\nkind = "vortex"\npoint = [0.5, 0.5]\n'
     for name, text in {

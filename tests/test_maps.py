@@ -273,6 +273,8 @@ def test_what_is_no_map(tmp_path: Path):
     np.save(tmp_path / "a.npy", np.array([{}]), allow_pickle=True)
     with pytest.raises(UserError, match="no NumPy array"):
         read_map(tmp_path / "a.npy")
+    with pytest.raises(UserError, match=r"b\.npy: there is no such file; check the name\.$"):
+        read_map(tmp_path / "b.npy")
     write_map(tmp_path / "b.tif", identity(8, 8))
     with pytest.raises(UserError, match="an overscan of 4 leaves nothing"):
         read_map(tmp_path / "b.tif", overscan=4)
