@@ -39,7 +39,7 @@ from app.threads import ahead, behind
 from app.timeline import Sentinel, Timeline, frame_positions
 from app.video import Clip
 from solver.context import Device
-from solver.sampling import GivenMap, Sampler, Sampling
+from solver.sampling import GivenMap, Sampler, Sampling, SamplingError
 from solver.warp import WarpMap
 
 POINTS_AT_ONCE = 1_000_000  # of a map
@@ -373,7 +373,10 @@ class _Export:
         alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
         with self.device.stage("sample picture"):
             how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
-            return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, self.progress.check)
+            try:
+                return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, self.progress.check)
+            except SamplingError as error:
+                raise UserError(f"The map cannot be applied: {error}.") from None
 
     def _density_frame(self, values: np.ndarray) -> np.ndarray:
         """The densities as 8-bit colours, in the result's size."""

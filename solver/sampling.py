@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil, sqrt
+from math import ceil, prod, sqrt
 from typing import Any, Literal
 
 import moderngl
@@ -24,7 +24,7 @@ _REACH = 2  # pixels that the taps reach beyond a place
 _KINDS = {np.dtype(np.uint8): ("f1", 255.0), np.dtype(np.uint16): ("nu2", 65535.0), np.dtype(np.float32): ("f4", 0.0)}
 _SWIZZLES = {1: "RRR1", 2: "RRRG", 3: "RGB1", 4: "RGBA"}
 _TARGET_COMPONENTS = {1: 1, 2: 2, 3: 4, 4: 4}  # targets of three components are not promised by GL
-_SMALLEST_TILE = 16
+_SMALLEST_TILE = 16  # pixels of the picture, were there no map
 _BLOCK = 64  # pixels along a block of the result that is drawn by a shader of its own kind; as llvmpipe's tiles
 
 
@@ -329,18 +329,12 @@ class Sampler:
     ) -> None:
         """Draw a region of a tile from the piece of the picture it needs, or its halves, if that is too large."""
         x, y, width, height = region
-        more = 0 if job.is_single else 1
-        within = places[y : y + height + more, x : x + width + more]
-        # One axis after the other: over both at once NumPy is fifty times slower.
-        low = np.floor(within.min(axis=0).min(axis=0)).astype(int) - _REACH
-        high = np.ceil(within.max(axis=0).max(axis=0) + np.array(job.zoom)).astype(int) + _REACH
-        if not job.is_repeated:
-            limits = np.array(job.source_size)
-            low, high = np.clip(low, 0, limits - 1), np.clip(high, 1, limits)
-        piece = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
-        size = piece[2] - piece[0], piece[3] - piece[1]
-        is_smallest = max(width, height) <= _SMALLEST_TILE
-        if is_smallest and not self._fits(size):
+        piece = _piece(job, places, region)
+        size = _size(piece)
+        fits = self._fits(size)
+        unwarped = max(width * max(job.zoom[0], 1), height * max(job.zoom[1], 1))
+        is_smallest = unwarped <= _SMALLEST_TILE or width == height == 1
+        if is_smallest and not fits:
             raise SamplingError(
                 f"the map tears a patch of {width} x {height} pixels over {size[0]} x {size[1]} pixels of the picture"
             )
@@ -349,9 +343,11 @@ class Sampler:
                 halves = (x, y, width // 2, height), (x + width // 2, y, width - width // 2, height)
             else:
                 halves = (x, y, width, height // 2), (x, y + height // 2, width, height - height // 2)
-            for half in halves:
-                self._draw_pieces(job, lattice, places, origin, half, room)
-            return
+            # Where the map is torn, both halves may need what the whole does.
+            if not fits or sum(prod(_size(_piece(job, places, half))) for half in halves) < 1.5 * prod(size):
+                for half in halves:
+                    self._draw_pieces(job, lattice, places, origin, half, room)
+                return
         self._load(job, piece, room)
         self._look_up(job, lattice, origin, region, piece)
 
@@ -534,6 +530,24 @@ def _overlap(a: Sequence[int], b: Sequence[int]) -> Region:
     """What two rectangles (x, y, width, height) have in common."""
     x, y = max(a[0], b[0]), max(a[1], b[1])
     return x, y, min(a[0] + a[2], b[0] + b[2]) - x, min(a[1] + a[3], b[1] + b[3]) - y
+
+
+def _piece(job: _Job, places: np.ndarray, region: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
+    """What a region (x, y, width, height) of a tile needs of the picture: left, top, right and bottom."""
+    x, y, width, height = region
+    more = 0 if job.is_single else 1
+    within = places[y : y + height + more, x : x + width + more]
+    # One axis after the other: over both at once NumPy is fifty times slower.
+    low = np.floor(within.min(axis=0).min(axis=0)).astype(int) - _REACH
+    high = np.ceil(within.max(axis=0).max(axis=0) + np.array(job.zoom)).astype(int) + _REACH
+    if not job.is_repeated:
+        limits = np.array(job.source_size)
+        low, high = np.clip(low, 0, limits - 1), np.clip(high, 1, limits)
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
+def _size(piece: tuple[int, int, int, int]) -> tuple[int, int]:
+    return piece[2] - piece[0], piece[3] - piece[1]
 
 
 def _edge_index(index: np.ndarray, count: int, edges: str) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -28,6 +29,7 @@ from app.sampling import Pictures
 from app.threads import ahead, behind
 from app.video import read_clip
 from solver.context import Device
+from solver.sampling import Sampler
 
 WIDTH, HEIGHT = 96, 64
 WHIRL = """
@@ -320,3 +322,15 @@ def test_one_place_a_pixel_is_as_sharp_as_a_spline(device: Device, tmp_path: Pat
     replay.release()
     assert energy['"auto"'] < 0.95 * energy["1"]
     assert energy["1"] == pytest.approx(sharpness(reference), rel=0.05)
+
+
+def test_a_map_that_tears_a_large_picture_is_told(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Ours does not: but a recipe may begin with one from elsewhere."""
+    torn = np.zeros((HEIGHT, WIDTH, 2), np.float32)
+    torn[::2], torn[1::2] = -0.4, 0.4
+    np.save(tmp_path / "torn.npy", torn)
+    monkeypatch.setattr("app.export.Sampler", partial(Sampler, whole=2_000, tile=(48, 32)))
+    job = Job(Recipe.parse(f'map = "torn.npy"\n{WHIRL}'), Picture(scene()), tmp_path, tmp_path / "x.png")
+    with pytest.raises(UserError, match="The map cannot be applied: the map tears a patch"):
+        run(device, job, Progress())
+    assert not (tmp_path / "x.png").exists()

@@ -104,6 +104,27 @@ def test_a_film_in_tiles_makes_no_texture_anew(device: Device, edges: str) -> No
     assert len(seen) == 1
 
 
+def test_a_thumbnail_of_a_picture_in_tiles(device: Device) -> None:
+    """Each of its pixels needs a piece of its own."""
+    picture, warp = noise((450, 600, 3), "8"), GivenMap(device, waves((60, 45), 0.05))
+    tiled = Sampler(device, whole=12_000, tile=(64, 50)).apply(warp, picture, (16, 12))
+    np.testing.assert_array_equal(tiled, Sampler(device).apply(warp, picture, (16, 12)))
+
+
+def test_a_torn_map_is_not_cut_up_in_vain(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where each half of a tile needs as much of the picture as all of it: 12 tiles, and not 192 patches."""
+    picture, torn = noise((150, 230, 3), "8"), np.zeros((150, 230, 2), np.float32)
+    torn[:, 1::2] = 100 / 230
+    torn[:, ::2] = -100 / 230
+    sampler = Sampler(device, whole=34_499, tile=(64, 50))
+    pieces: list[object] = []
+    load = sampler._load
+    monkeypatch.setattr(sampler, "_load", lambda *given: (pieces.append(given), load(*given))[1])
+    found = sampler.apply(GivenMap(device, torn), picture)
+    assert 12 <= len(pieces) < 24
+    np.testing.assert_array_equal(found, Sampler(device).apply(GivenMap(device, torn), picture))
+
+
 def test_no_precision_is_lost_across_a_wide_picture(device: Device) -> None:
     """A shift by a quarter of a pixel at x = 11,900 gives what it gives at x = 100."""
     patch = noise((24, 100), "float")
