@@ -3,7 +3,8 @@
     python tests/benchmarks/bench_memory.py [frames]   grid 1024, a picture of 4000 x 3000, 300 frames as JPEG; long
     python tests/benchmarks/bench_memory.py --still    a picture of 12,000 x 9,000, RGB of 8 bits
 
-Resident memory is that of this process, where a software rasteriser keeps its textures too.
+Resident memory is that of this process, where a software rasteriser keeps its textures too; it encodes JPEG itself, so
+that there is no other process to count.
 """
 
 from __future__ import annotations
