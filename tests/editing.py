@@ -47,11 +47,18 @@ def command_line(*words: str) -> None:
 class Robot:
     """An editor with a framebuffer, and a pointer and keys to use it with."""
 
-    def __init__(self, device: Device, project: Project, size: tuple[int, int] = SIZE, scale: float = 1.0) -> None:
+    def __init__(
+        self,
+        device: Device,
+        project: Project,
+        size: tuple[int, int] = SIZE,
+        scale: float = 1.0,
+        preferences: Preferences | None = None,
+    ) -> None:
         self.device, self.size, self.scale = device, size, scale
         self.texture = device.ctx.texture(size, 4)
         self.target = device.ctx.framebuffer([self.texture])
-        self.editor = Editor(device, project, Preferences(auto_quality=False))
+        self.editor = Editor(device, project, preferences or Preferences(auto_quality=False))
         self.mods = Mods()
         self.frame()
         self.frame()

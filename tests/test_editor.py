@@ -25,7 +25,9 @@ from app.ui.browser import Browser
 from app.ui.dialogs import Preferring, Shortcuts, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
-from app.ui.files import load_any
+from app.ui.files import fresh_recipe, load_any
+from app.ui.preferences import Preferences
+from app.ui.quality import GRIDS
 from app.ui.saving import SaveDialog
 from editing import Robot, command_line, pattern, small_project
 from solver.context import Device
@@ -1011,3 +1013,58 @@ def test_sliders_take_a_typed_number_and_their_default(robot: Robot, feel: str) 
     assert value() == pytest.approx(default)
     robot.key("ctrl+z")
     assert value() == pytest.approx(1.25)
+
+
+# Automatic quality ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def automatic(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    """An editor that has just been opened, and has not measured the machine yet."""
+    write_picture(tmp_path / "pattern.png", pattern())
+    project = projects.from_picture(tmp_path / "pattern.png", fresh_recipe())
+    robot = Robot(device, project, preferences=Preferences(auto_quality=True))
+    assert robot.editor.quality.is_measuring
+    yield robot
+    robot.close()
+
+
+def test_the_grid_is_chosen_from_the_machine_measured(automatic: Robot) -> None:
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    assert automatic.editor.session.recipe.fluid.grid in GRIDS
+    assert names(automatic) == ["Open"]
+    assert not automatic.editor.is_dirty
+
+
+def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> None:
+    automatic.drag((0.4, 0.5), (0.55, 0.5))
+    automatic.key("ctrl+z")
+    assert automatic.editor.quality.is_measuring
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    automatic.key("ctrl+shift+z")
+    assert names(automatic) == ["Open", "Push"]
+    assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
+
+
+def test_slow_painting_is_answered_by_a_coarser_grid_but_never_by_losing_redo(automatic: Robot) -> None:
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    session = automatic.editor.session
+    session.begin_with(grid=128)
+
+    def paint_slowly() -> None:
+        automatic.move(*automatic.at(0.4, 0.5))
+        automatic.press()
+        automatic.frame(count=1, dt=0.1)
+        for step in range(20):
+            automatic.frame(Move(*automatic.at(0.4 + 0.005 * step, 0.5)), dt=0.1)
+        automatic.release()
+
+    paint_slowly()
+    automatic.key("ctrl+z")
+    automatic.frame(count=5)
+    assert session.recipe.fluid.grid == 128
+    automatic.key("ctrl+y")
+    automatic.rest()
+    assert names(automatic) == ["Open", "Push", "Grid of 96"]
+    assert session.recipe.fluid.grid == 96
+    assert "below 30 frames a second" in automatic.editor.messages.shown[-1].text

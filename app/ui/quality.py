@@ -26,7 +26,6 @@ class Quality:
     def __init__(self, editor: Editor) -> None:
         self.editor = editor
         self._slow_for = 0.0
-        self._last = 0.0
         self._pending = False
         self._limit = GRIDS[-1]
         self._frames = 0
@@ -38,7 +37,9 @@ class Quality:
         """Something new is open; an untouched picture is given the grid that this machine does well on."""
         self._slow_for, self._pending = 0.0, False
         session = self.editor.session
-        fresh = session.recipe.edited(picture=None) == fresh_recipe()
+        # Who has undone everything may want it back: what can be redone was made on the grid as it is.
+        history = session.document.history
+        fresh = len(history.entries) == 1 and history.recipe.edited(picture=None) == fresh_recipe()
         if self._measured is None or not self.editor.state.auto_quality or not fresh:
             return
         grid = self.best_grid(self._measured)
@@ -79,19 +80,21 @@ class Quality:
             self.opened()
 
     def look(self, dt: float) -> None:
-        """Watch the rate while the person paints; a coarser grid is taken when the stroke is finished."""
+        """Watch the rate while the person paints; a coarser grid is taken when the stroke is finished.
+
+        `dt`: seconds since the last frame.
+        """
         editor = self.editor
-        now = time.perf_counter()
-        spent, self._last = now - self._last, now
         if not editor.state.auto_quality:
             return
         if editor.session.is_painting:
             # A hiccup, such as a shader that is compiled, is no slow machine.
-            if spent < 0.25:
-                slow = spent > 1.2 / WANTED
-                self._slow_for = min(max(self._slow_for + (spent if slow else -spent), 0.0), 3.0)
+            if dt < 0.25:
+                slow = dt > 1.2 / WANTED
+                self._slow_for = min(max(self._slow_for + (dt if slow else -dt), 0.0), 3.0)
             self._pending = self._pending or self._slow_for > PATIENCE
-        elif self._pending and not editor.session.is_moving:
+        elif self._pending and not editor.session.is_moving and not editor.session.document.history.can_redo:
+            # Another grid is an edit, after which there is nothing to redo; nobody has asked for it.
             self._pending, self._slow_for = False, 0.0
             self._coarsen()
 
