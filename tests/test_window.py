@@ -64,7 +64,6 @@ class Desk:
         self.window = self._find()[0]
         # Its first frame is drawn once its title is that of the picture.
         self.until(lambda: " - fluidwarp" in self.title(), "the first frame")
-        time.sleep(0.5)
 
     def _find(self) -> list[str]:
         return self.do("search", "--onlyvisible", "--name", "fluidwarp").split()
