@@ -38,6 +38,7 @@ class Canvas:
         height, width = pixels.shape[:2]
         self.size = (picture.width, picture.height)
         self._shrunk = width / picture.width
+        self._has_alpha = picture.has_alpha
         self._texture = device.ctx.texture((width, height), 4, pixels.tobytes())
         self._texture.repeat_x = self._texture.repeat_y = False
         self._texture.build_mipmaps()
@@ -76,20 +77,21 @@ class Canvas:
             # The fine map is dearer than the rest of the frame; while things move, nobody sees the difference.
             displacement = self._seen(session)
         self._filter(viewport)
-        defines: dict[str, object] = {}
+        defines: dict[str, object] = {"EDGES": EDGES[session.recipe.edges]}
         inputs: dict[str, object] = {
             "picture": texture,
             "displacement": displacement,
             "origin": (rect.x * density, rect.y * density),
             "step": (1 / (rect.width * density), 1 / (rect.height * density)),
             "extent": session.extent,
-            "split": 2.0 if state.before else (state.split if state.split is not None else -1e9),
-            "edges": EDGES[session.recipe.edges],
-            "light": palette.checker[1][:3],
-            "dark": palette.checker[0][:3],
-            "tile": 8.0 * scale * density,
             "target_height": float(height),
         }
+        if state.before or state.split is not None:
+            defines["SPLIT"] = 1
+            inputs["split"] = 2.0 if state.before else state.split
+        if self._has_alpha or session.recipe.edges == "transparent" or replay.density is not None:
+            defines["CHECKER"] = 1
+            inputs |= {"light": palette.checker[1][:3], "dark": palette.checker[0][:3], "tile": 8.0 * scale * density}
         self._add_overlays(defines, inputs, session, state, scale * density)
         if state.overlays["forces"].shown and not state.before and session.replay.forces:
             force, room = self._forces(session)

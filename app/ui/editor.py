@@ -30,7 +30,7 @@ from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
 from app.ui.state import LARGEST, SMALLEST, State
-from app.ui.viewport import Viewport
+from app.ui.viewport import Rect, Viewport
 from app.ui.widgets import Ui
 from solver.context import Device
 
@@ -259,7 +259,9 @@ class Editor:
 
     def _draw(self, target: moderngl.Framebuffer, size: tuple[int, int], dt: float, events: Sequence[Event]) -> None:
         target.viewport = (0, 0, *size)
-        target.clear(*self.ui.palette.ground)
+        # Clearing is many times cheaper than the same rectangles drawn by imgui, which blends every pixel.
+        target.clear(*self.ui.palette.panel)
+        target.clear(*self.ui.palette.ground, viewport=self._in_pixels(self.layout.canvas, size[1]))
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         points, by_keys = (size[0] / self.ui.density, size[1] / self.ui.density), bool(self.dialogs) or self._popup_open
@@ -283,6 +285,13 @@ class Editor:
         self._popup_open = imgui.is_popup_open("", anywhere)
         with self.clock.measure("interface"):
             self.host.end(target)
+
+    def _in_pixels(self, rect: Rect, height: int) -> tuple[int, int, int, int]:
+        """A rectangle as GL counts: x, y from below, width, height."""
+        density = self.ui.density
+        left, top = round(rect.x * density), round(rect.y * density)
+        right, bottom = round(rect.right * density), round(rect.bottom * density)
+        return left, height - bottom, right - left, bottom - top
 
     def _draw_dialog(self) -> None:
         self.files.poll()

@@ -57,12 +57,12 @@ class Ui:
 
     @contextmanager
     def panel(self, name: str, rect: Rect, padding: tuple[float, float] = (8, 8), flags: int = 0) -> Iterator[None]:
-        """A part of the window that stays where it is."""
+        """A part of the window that stays where it is, on the ground that `Editor` has filled."""
         imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
         imgui.set_next_window_size(ImVec2(rect.width, rect.height))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(padding[0]), self.px(padding[1])))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
-        imgui.begin(name, None, PANEL | flags)
+        imgui.begin(name, None, PANEL | imgui.WindowFlags_.no_background | flags)
         imgui.pop_style_var(2)
         try:
             yield

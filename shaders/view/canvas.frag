@@ -1,23 +1,31 @@
 // Canvas: what lies under a pixel of the screen: the picture through the warp map, on a checkerboard, with its overlays.
 //   colour(x) = picture(x + D(x)),  x = (pixel - u_origin) u_step  in 0-1 of the picture
 // u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering; u_extent: width and height in longer
-// sides; u_split: left of this x the picture is as it was (0: nowhere); u_edges: 0 transparent, 1 black, 2 clamp,
-// 3 mirror, 4 wrap; u_tile: side of a square of the checkerboard, pixels.
+// sides. EDGES: beyond the picture it is 0 transparent, 1 black, 2 as at its edge (the sampler clamps), 3 mirrored,
+// 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
+// square of the checkerboard, pixels.
+// What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY, FROZEN: tint of decades of
 // viscosity over u_base, hatch. ARROWS: velocity on MAC faces, lengths / s, of which u_speed fills an arrow.
 // FORCES: u_force on MAC faces, 1 at its strongest, as arrows of u_force_colour; where u_room swells or shrinks, a tint.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
 // reads: 2, and up to 8 with overlays
+#ifndef EDGES
+#define EDGES 2
+#endif
 uniform sampler2D u_picture;
 uniform sampler2D u_displacement;
 uniform vec2 u_origin;
 uniform vec2 u_step;
 uniform vec2 u_extent;
+#ifdef SPLIT
 uniform float u_split;
-uniform int u_edges;
+#endif
+#ifdef CHECKER
 uniform vec3 u_light;
 uniform vec3 u_dark;
 uniform float u_tile;
+#endif
 uniform float u_target_height;
 #ifdef GRID
 uniform float u_grid;
@@ -53,12 +61,17 @@ layout(location = 0) out vec4 out_colour;
 float inside(vec2 place) { return float(all(greaterThanEqual(place, vec2(0.0))) && all(lessThanEqual(place, vec2(1.0)))); }
 
 vec4 look_up(vec2 place) {
-    if (u_edges == 2) place = clamp(place, 0.0, 1.0);
-    if (u_edges == 3) place = 1.0 - abs(mod(place, 2.0) - 1.0);
-    if (u_edges == 4) place = fract(place);
+#if EDGES == 3
+    place = 1.0 - abs(mod(place, 2.0) - 1.0);
+#elif EDGES == 4
+    place = fract(place);
+#endif
     vec4 colour = texture(u_picture, place);
-    if (u_edges == 0) colour *= inside(place);
-    if (u_edges == 1 && inside(place) < 0.5) colour = vec4(0.0, 0.0, 0.0, 1.0);
+#if EDGES == 0
+    colour *= inside(place);
+#elif EDGES == 1
+    if (inside(place) < 0.5) colour = vec4(0.0, 0.0, 0.0, 1.0);
+#endif
     return colour;
 }
 
@@ -94,14 +107,20 @@ vec3 with_arrows(vec3 seen, vec2 pixel, sampler2D field, float most, float side,
 void main() {
     vec2 pixel = vec2(gl_FragCoord.x, u_target_height - gl_FragCoord.y) - u_origin;
     vec2 x = pixel * u_step;
+#ifdef SPLIT
     bool warped = x.x >= u_split;
+#else
+    const bool warped = true;
+#endif
     vec2 place = x;
     if (warped) place += texture(u_displacement, x).rg / u_extent;
     vec4 colour = look_up(place);
+#ifdef CHECKER
     if (colour.a < 0.999) {
         vec2 tile = floor(gl_FragCoord.xy / u_tile);
         colour.rgb += (1.0 - colour.a) * (mod(tile.x + tile.y, 2.0) < 0.5 ? u_light : u_dark);
     }
+#endif
     vec3 seen = colour.rgb;
     if (warped) {
 #ifdef VISCOSITY

@@ -1,0 +1,246 @@
+"""What a frame of the editor costs while someone paints: python tests/benchmarks/bench_editor.py [--window]
+
+A Push stroke of 60 moves over the sample picture with the default preset, 1280 x 800, one tick a frame, without a
+window. First the frame as it is, waiting for the GPU at its end only; then its parts, waiting around each of them. J is
+one five-point Jacobi pass on the simulation's grid in the same run. Shares and J hold when the machine's speed drifts,
+milliseconds do not; processor time counts what all threads of this process have used, and not what others have.
+
+With `--window`, the real one under Xvfb, dragged about by xdotool: from the start of the process to its first frame,
+the load of ten seconds at rest, and the time between two frames while painting.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import cos, sin
+from pathlib import Path
+
+from bench_step import Jacobi
+from rich.console import Console
+from rich.table import Table
+
+from app.ui.clock import Clock
+from app.ui.events import LEFT, Button, Move
+from app.ui.screenshots import TICK, Studio, line
+from solver import Device
+
+ROOT = Path(__file__).parent.parent.parent
+MOVES = 60
+REST = 10.0  # seconds
+STAGES = ("brush", "advect", "diffuse", "project", "warp map")
+PARTS = ("simulate", "canvas", "panels", "interface")
+
+
+class Waiting(Clock):
+    """A clock that waits for the GPU around what it measures, and adds up."""
+
+    def __init__(self, device: Device) -> None:
+        super().__init__()
+        self.device = device
+        self.spent: dict[str, float] = defaultdict(float)
+
+    @contextmanager
+    def measure(self, name: str) -> Iterator[None]:
+        self.device.ctx.finish()
+        start = time.perf_counter()
+        yield
+        self.device.ctx.finish()
+        self.spent[name] += (time.perf_counter() - start) * 1e3
+
+
+def stroke(studio: Studio, each: Callable[[Callable[[], None]], None]) -> None:
+    """One stroke, each frame of it by `each`; then everything as before it."""
+    editor, path = studio.editor, line((0.45, 0.55), (0.65, 0.45), -0.03)
+    for move in range(MOVES + 1):
+        events = [Move(*editor.view.to_screen(*path(move / MOVES))), *([Button(LEFT, True)] if move == 0 else [])]
+        each(lambda events=events: editor.frame(studio.target, studio.size, TICK, events, studio.density))
+    studio.frame(Button(LEFT, False))
+    editor.session.pause()
+    editor.do("undo")
+    for _ in range(3):
+        studio.frame()
+
+
+def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
+    """The rows of one grid."""
+    studio = Studio(device, grid=cells)
+    jacobi = Jacobi(device, studio.editor.session.replay.grid)
+    walls: list[float] = []
+    works: list[float] = []
+    units: list[float] = []
+
+    def whole(frame: Callable[[], None]) -> None:
+        device.ctx.finish()
+        wall, work = time.perf_counter(), time.process_time()
+        frame()
+        device.ctx.finish()
+        walls.append((time.perf_counter() - wall) * 1e3)
+        works.append((time.process_time() - work) * 1e3)
+        start = time.perf_counter()
+        jacobi.ten()
+        device.ctx.finish()
+        units.append((time.perf_counter() - start) * 1e2)
+
+    stroke(studio, lambda frame: frame())
+    for _ in range(rounds):
+        stroke(studio, whole)
+    wall, unit = statistics.median(walls), statistics.median(units)
+    late = sorted(walls)[int(0.95 * len(walls))]
+    work = statistics.median(works)
+    table.add_row(f"{cells}", "frame, median", f"{wall:.1f}", f"{wall / unit:.0f}", "", f"{work:.1f} of processor time")
+    table.add_row("", "frame, 95 of 100", f"{late:.1f}", f"{late / unit:.0f}")
+
+    clock = studio.editor.clock = Waiting(device)
+    device.timings.take()
+    device.timings.enabled = True
+    count = 0
+
+    def part(frame: Callable[[], None]) -> None:
+        nonlocal count
+        frame()
+        count += 1
+
+    spent: dict[str, float] = defaultdict(float)
+    passes: dict[str, float] = defaultdict(float)
+    for _ in range(rounds):
+        clock.spent.clear()
+        device.timings.take()
+        session = studio.editor.session
+
+        def last(frame: Callable[[], None]) -> None:
+            part(frame)
+            if count % (MOVES + 1) == 0:
+                for name, milliseconds in (clock.spent | device.timings.milliseconds).items():
+                    spent[name] += milliseconds
+                for name, number in device.timings.passes.items():
+                    passes[name] += number
+
+        stroke(studio, last)
+        assert not session.is_painting
+    device.timings.enabled = False
+    spent["keeping, recording"] = spent["simulate"] - sum(spent[name] for name in STAGES)
+    whole_frame = spent["frame"]
+    spent["the rest"] = whole_frame - sum(spent[name] for name in PARTS)
+    for name in ("simulate", *STAGES, "keeping, recording", "canvas", "panels", "interface", "the rest"):
+        mean = spent[name] / count
+        inner = name in (*STAGES, "keeping, recording")
+        number = f"{passes[name] / count:.0f} passes" if name in STAGES else ""
+        row = f"{'    ' if inner else '  '}{name}", f"{mean:.2f}", f"{mean / unit:.1f}"
+        table.add_row("", *row, f"{spent[name] / whole_frame:.0%}", number)
+    jacobi.pair.release()
+    studio.close()
+
+
+# The real window ------------------------------------------------------------------------------------------------------
+
+# Runs in the editor's process: tells when each frame was shown.
+CHILD = """
+import sys, time, glfw
+real = glfw.swap_buffers
+def swap(window):
+    real(window)
+    print(f"{time.time():.6f}", flush=True)
+glfw.swap_buffers = swap
+from app.cli import main
+main(["edit"])
+"""
+
+
+def drag(env: dict[str, str], seconds: float) -> None:
+    """Drag about on the canvas in a circle."""
+    words = ["mousemove", "560", "300", "mousedown", "1"]
+    steps = int(seconds / 0.01)
+    for step in range(steps):
+        turn = step * 0.02
+        words += ["mousemove", str(round(460 + 100 * cos(turn))), str(round(300 + 100 * sin(turn))), "sleep", "0.01"]
+    subprocess.run(["xdotool", *words, "mouseup", "1"], env=env, check=True)
+
+
+def processor_time(pid: int) -> float:
+    """Seconds that a process has used so far."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def window(console: Console, rounds: int) -> None:
+    """The real window's figures."""
+    screen = subprocess.Popen(
+        ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"],
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    assert screen.stdout is not None
+    display = f":{int(screen.stdout.readline())}"
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            env = {**os.environ, "DISPLAY": display, "XDG_CONFIG_HOME": folder, "HOME": folder}
+            env.pop("WAYLAND_DISPLAY", None)
+            starts = []
+            for number in range(rounds):
+                begun = time.time()
+                log = Path(folder) / "frames"
+                with log.open("w") as out:
+                    child = subprocess.Popen([sys.executable, "-c", CHILD], env=env, cwd=ROOT, stdout=out)
+                while not (shown := log.read_text().split()):
+                    assert child.poll() is None, "the editor ended"
+                    time.sleep(0.02)
+                starts.append(float(shown[0]) - begun)
+                if number < rounds - 1:
+                    child.kill()
+                    child.wait()
+            console.print("from the start of the process to its first frame:", *(f"{start:.2f} s" for start in starts))
+            time.sleep(8)  # until it has measured the machine and is at rest
+            before = processor_time(child.pid)
+            time.sleep(REST)
+            console.print(f"at rest: {(processor_time(child.pid) - before) / REST:.2%} of a core")
+            drag(env, 3.0)  # whatever has to be compiled
+            time.sleep(3)
+            start, used = time.time(), processor_time(child.pid)
+            drag(env, 6.0)
+            end = time.time()
+            times = [float(word) for word in log.read_text().split()]
+            times = [moment for moment in times if start + 0.3 < moment < end - 0.1]
+            gaps = sorted((b - a) * 1e3 for a, b in zip(times, times[1:], strict=False))
+            used = (processor_time(child.pid) - used) / (end - start)
+            console.print(
+                f"painting: {len(gaps) / (times[-1] - times[0]):.1f} frames a second; between two frames "
+                f"{statistics.median(gaps):.1f} ms, 95 of 100 within {gaps[int(0.95 * len(gaps))]:.1f} ms; "
+                f"{used:.0%} of a core"
+            )
+            child.kill()
+            child.wait()
+    finally:
+        screen.terminate()
+        screen.wait()
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--grids", type=int, nargs="*", default=[192, 256])
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--window", action="store_true", help="the real window, under Xvfb")
+    args = parser.parse_args()
+    console = Console(width=110)
+    if args.window:
+        window(console, args.rounds)
+        return
+    with Device.headless() as device:
+        table = Table(title=f"{device.limits.renderer}, {os.cpu_count()} cores")
+        for head in ("grid", "part", "ms", "J", "share", ""):
+            table.add_column(head, justify="right" if head in ("ms", "J", "share") else "left")
+        for cells in args.grids:
+            frames(device, cells, args.rounds, table)
+        console.print(table)
+
+
+if __name__ == "__main__":
+    main()
