@@ -25,6 +25,8 @@ REST = 0.004  # longer sides a second: a pixel of a screen in four frames
 LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each waits for the GPU
 KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
 MOST_COASTING = 60.0  # seconds
+PATIENCE = 0.05  # seconds of a frame for getting to where the playhead was sent
+QUICK = 0.01  # seconds a tick may take for another one in the same frame: rather a slower fluid than fewer frames
 
 
 class Session:
@@ -194,11 +196,11 @@ class Session:
 
     # -- time -------------------------------------------------------------------------------------------------------
 
-    def advance(self, ticks: int, patience: float = 0.05) -> None:
-        """Let time go on by up to `ticks`, for at most `patience` seconds of work (but always by one)."""
-        deadline = time.perf_counter() + patience
+    def advance(self, ticks: int) -> None:
+        """Let time go on by up to `ticks`, but always by one; on the way to the playhead's target, by what it takes."""
+        start = time.perf_counter()
         if self.is_behind:
-            self._approach(deadline)
+            self._approach(start + PATIENCE)
             return
         for _ in range(ticks):
             if self.is_painting and (self.stroke is not None or self.coasting):
@@ -213,7 +215,7 @@ class Session:
                 self._step()
             else:
                 return
-            if time.perf_counter() > deadline:
+            if time.perf_counter() - start > QUICK:
                 return
 
     def play(self) -> None:

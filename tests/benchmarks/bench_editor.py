@@ -21,6 +21,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from math import cos, sin
 from pathlib import Path
 
@@ -150,8 +151,9 @@ def swap(window):
     real(window)
     print(f"{time.time():.6f}", flush=True)
 glfw.swap_buffers = swap
+sys.argv = ["fluidwarp", "edit"]
 from app.cli import main
-main(["edit"])
+main()
 """
 
 
@@ -208,7 +210,7 @@ def window(console: Console, rounds: int) -> None:
             end = time.time()
             times = [float(word) for word in log.read_text().split()]
             times = [moment for moment in times if start + 0.3 < moment < end - 0.1]
-            gaps = sorted((b - a) * 1e3 for a, b in zip(times, times[1:], strict=False))
+            gaps = sorted((b - a) * 1e3 for a, b in pairwise(times))
             used = (processor_time(child.pid) - used) / (end - start)
             console.print(
                 f"painting: {len(gaps) / (times[-1] - times[0]):.1f} frames a second; between two frames "
