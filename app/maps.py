@@ -15,17 +15,22 @@ import numpy as np
 from app.animation import sequence_writer
 from app.errors import UserError
 from app.files import replacing
-from app.pictures import MAX_PIXELS, read_exr, read_picture, write_exr
+from app.pictures import MAX_PIXELS, exr_channels, read_exr, read_picture, write_exr
 from app.progress import never
 
 Kind = Literal["st", "offsets"]
 """What an EXR or TIFF holds: absolute places in 0-1 from the bottom left, or pixels from here to there, y up."""
+
+Holds = Literal["map", "picture", "either"]
 
 Grid = Literal["centres", "corners", "pixels"]
 """The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
 
 FLO_MAGIC = np.float32(202021.25)
 MAP_ENDINGS = (".exr", ".tif", ".tiff", ".flo", ".npy")
+
+# Names of the channels of an EXR that hold a map, whatever layer they are in.
+PAIRS = (("R", "G"), ("U", "V"), ("u", "v"), ("X", "Y"))
 
 HEAD = 65_536  # bytes at the start of a file in which an EXR or TIFF map says what it is
 
@@ -86,18 +91,43 @@ def check_map(path: str | os.PathLike[str]) -> None:
         raise UserError(f"{path}: a map's name must end in one of {' '.join(MAP_ENDINGS)}.")
 
 
-def is_map(path: str | os.PathLike[str]) -> bool:
-    """True if a file is a warp map beyond doubt: by its ending, or because an EXR or TIFF of ours says so."""
+def holds(path: str | os.PathLike[str]) -> Holds:
+    """What a file holds, by its ending and its header: "either" where three channels of floats say nothing about it.
+
+    A file that cannot be read is taken for a picture, or whatever else it turns out to be when it is opened.
+    """
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in (".exr", ".tif", ".tiff"):
-        return suffix in MAP_ENDINGS
+        return "map" if suffix in MAP_ENDINGS else "picture"
     try:
         with path.open("rb") as stream:
             head = stream.read(HEAD)
-    except OSError:
-        return False
-    return any(convention.encode() in head for convention in CONVENTIONS.values())
+        if any(convention.encode() in head for convention in CONVENTIONS.values()):
+            return "map"
+        return _exr_holds(path) if suffix == ".exr" else _tiff_holds(path)
+    except Exception:  # the decoders raise anything
+        return "picture"
+
+
+def _exr_holds(file: Path) -> Holds:
+    names = [name.rpartition(".")[2] for name in exr_channels(file)]
+    if len(names) == 2 and any(set(pair) == set(names) for pair in PAIRS):
+        return "map"
+    return "either" if sorted(names) == ["B", "G", "R"] else "picture"
+
+
+def _tiff_holds(file: Path) -> Holds:
+    import tifffile
+
+    with tifffile.TiffFile(file) as tiff:
+        page = tiff.pages.first
+        if page.dtype is None or page.dtype.kind != "f":
+            return "picture"
+        alpha = any(extra in (1, 2) for extra in page.extrasamples)
+        if page.samplesperpixel == 2 and not alpha:
+            return "map"
+        return "either" if page.samplesperpixel == 3 else "picture"
 
 
 # Conversions --------------------------------------------------------------------------------------------------------
@@ -310,7 +340,7 @@ def _bytes(file: Path) -> bytes:
 
 def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
     channels, header = read_exr(file, max_pixels)
-    for x, y in (("R", "G"), ("U", "V"), ("u", "v"), ("X", "Y")):
+    for x, y in PAIRS:
         found = {key.rpartition(".")[2]: plane for key, plane in reversed(channels.items())}
         if x in found and y in found:
             values = np.stack([found[x], found[y]], axis=-1)

@@ -471,6 +471,15 @@ def _quiet() -> Iterator[None]:
         os.close(nowhere)
 
 
+def exr_channels(file: Path) -> list[str]:
+    """The names of the channels of an EXR's first part, by its header; raises `UserError`."""
+    import OpenEXR
+
+    _head(file)
+    with _decoding(file, "OpenEXR"), _quiet():
+        return [channel.name for channel in OpenEXR.File(str(file), header_only=True).header()["channels"]]
+
+
 def read_exr(file: Path, max_pixels: int = MAX_PIXELS) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """The channels (h, w) float32 by name, filling the data window, and the header of an EXR's first part.
 

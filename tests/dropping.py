@@ -60,7 +60,8 @@ def drop(window: int, files: list[Path]) -> bool:
             assert heard.data[1][1] & 1, "the window refuses the files"
             tell("XdndDrop", 0, X.CurrentTime)
         elif heard.type == X.ClientMessage and heard.client_type == atom("XdndFinished"):
-            return bool(heard.data[1][1] & 1)
+            # Bit 0 by the letter; GLFW puts the number of bytes there that it has taken.
+            return heard.data[1][1] != 0
     return False
 
 

@@ -39,6 +39,16 @@ def small_project(folder: Path, grid: int = 48) -> Project:
     return from_picture(folder / "pattern.png", recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": grid})))
 
 
+def write_foreign_map(path: Path, width: int, height: int, names: str = "RGB") -> None:
+    """An ST map as other programs write them, with nothing in it that says so: all goes a tenth to the left."""
+    import OpenEXR
+
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+    planes = ((x + 0.5) / width + 0.1, 1 - (y + 0.5) / height, np.ones_like(x))
+    channels = {name: OpenEXR.Channel(np.ascontiguousarray(plane)) for name, plane in zip(names, planes, strict=False)}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(path))
+
+
 def command_line(*words: str) -> None:
     """Run `fluidwarp words...` in a process of its own."""
     subprocess.run([sys.executable, "-m", "app", *words], check=True, cwd=Path(__file__).parent.parent)

@@ -22,14 +22,14 @@ from app.recipe import Recipe
 from app.tools import TOOLS
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
-from app.ui.dialogs import Preferring, Shortcuts, Unsaved
+from app.ui.dialogs import PictureOrMap, Preferring, Shortcuts, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS
 from app.ui.saving import SaveDialog
-from editing import Robot, command_line, pattern, small_project
+from editing import Robot, command_line, pattern, small_project, write_foreign_map
 from solver.context import Device
 
 
@@ -704,6 +704,54 @@ def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
     assert np.abs(painted - warped).max() > 0.02
 
 
+def test_a_file_that_may_be_a_picture_or_a_map_is_asked_about(robot: Robot, tmp_path: Path) -> None:
+    write_foreign_map(tmp_path / "st.exr", 240, 180)
+    robot.drop(tmp_path / "st.exr")
+    asked = robot.editor.dialogs[-1]
+    assert isinstance(asked, PictureOrMap)
+    robot.frame(count=2)
+    robot.click(asked.rect.right - 24 - 144 - 8 - 56, asked.rect.bottom - 36)
+    assert not robot.editor.dialogs
+    assert names(robot) == ["Open", "Start from a map"]
+    robot.rest()
+    assert np.allclose(robot.warp()[:, :-6], (0.1, 0.0), atol=1e-4)
+    robot.key("ctrl+z")
+
+    robot.drop(tmp_path / "st.exr")
+    asked = robot.editor.dialogs[-1]
+    robot.frame(count=2)
+    robot.click(asked.rect.right - 24 - 72, asked.rect.bottom - 36)
+    robot.until(lambda: not robot.editor.files.is_loading)
+    assert robot.editor.session.project.name == "st"
+    assert robot.editor.canvas.size == (240, 180)
+
+    robot.drop(tmp_path / "st.exr")
+    robot.frame(count=2)
+    robot.key("escape")
+    assert not robot.editor.dialogs
+    assert names(robot) == ["Open"]
+
+
+def test_two_channels_of_floats_are_a_map(robot: Robot, tmp_path: Path) -> None:
+    write_foreign_map(tmp_path / "uv.exr", 240, 180, "UV")
+    robot.drop(tmp_path / "uv.exr")
+    assert names(robot) == ["Open", "Start from a map"]
+    robot.rest()
+    assert np.allclose(robot.warp()[:, :-6], (0.1, 0.0), atol=1e-4)
+
+
+def test_a_map_that_was_asked_about_and_does_not_fit_is_told_of(robot: Robot, tmp_path: Path) -> None:
+    write_foreign_map(tmp_path / "wide.exr", 240, 80)
+    robot.drop(tmp_path / "wide.exr")
+    asked = robot.editor.dialogs[-1]
+    robot.frame(count=2)
+    robot.click(asked.rect.right - 24 - 144 - 8 - 56, asked.rect.bottom - 36)
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+    assert "proportions" in robot.editor.messages.shown[-1].text
+    assert names(robot) == ["Open"]
+
+
 def test_maps_that_do_not_fit_leave_the_work_alone(robot: Robot, tmp_path: Path) -> None:
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
@@ -905,6 +953,23 @@ def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
     assert isinstance(asked, Unsaved)
     robot.click(asked.rect.x + 60, asked.rect.bottom - 36)
     assert robot.editor.canvas.size == (100, 60)
+    robot.key("ctrl+z")
+    assert names(robot) == ["Open", "Push"]
+
+
+def test_what_is_only_there_until_a_file_has_been_read_is_replaced(robot: Robot, tmp_path: Path) -> None:
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    robot.editor.placeholder = robot.editor.session
+    robot.drop(tmp_path / "other.png")
+    assert robot.editor.canvas.size == (100, 60)
+    assert not robot.editor.can_undo
+    robot.editor.placeholder = robot.editor.session
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.drop(tmp_path / "pattern.png")
+    robot.click(robot.editor.dialogs[-1].rect.x + 60, robot.editor.dialogs[-1].rect.bottom - 36)
+    robot.until(lambda: not robot.editor.files.is_loading)
+    assert robot.editor.canvas.size == (240, 180)
     robot.key("ctrl+z")
     assert names(robot) == ["Open", "Push"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from app.maps import (
     Kind,
     from_offsets,
     from_st,
+    holds,
     map_writer,
     read_map,
     to_offsets,
@@ -305,3 +307,45 @@ def test_offsets_there_and_back():
     for up in (True, False):
         back = from_offsets(to_offsets(map_, up=up), up=up, overscan=3)
         np.testing.assert_allclose(back.values, map_.values, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("channels", "found"),
+    [("RG", "map"), ("UV", "map"), ("uv", "map"), ("RGB", "either"), ("RGBA", "picture"), ("YA", "picture")],
+)
+def test_what_an_exr_of_another_program_holds(tmp_path: Path, channels: str, found: str) -> None:
+    import OpenEXR
+
+    planes = {name: OpenEXR.Channel(np.zeros((4, 6), np.float32)) for name in channels}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, planes).write(str(tmp_path / "a.exr"))
+    assert holds(tmp_path / "a.exr") == found
+
+
+@pytest.mark.parametrize(
+    ("shape", "dtype", "extra", "found"),
+    [
+        ((4, 6, 2), np.float32, ["unspecified"], "map"),
+        ((4, 6, 2), np.float32, ["unassalpha"], "picture"),
+        ((4, 6, 2), np.uint16, ["unspecified"], "picture"),
+        ((4, 6, 3), np.float32, None, "either"),
+        ((4, 6, 3), np.uint16, None, "picture"),
+        ((4, 6, 4), np.float32, ["unassalpha"], "picture"),
+        ((4, 6), np.float32, None, "picture"),
+    ],
+)
+def test_what_a_tiff_of_another_program_holds(
+    tmp_path: Path, shape: tuple[int, ...], dtype: type, extra: list[str] | None, found: str
+) -> None:
+    import tifffile
+
+    kind = "rgb" if shape[2:] > (2,) else "minisblack"
+    options: dict[str, Any] = {"planarconfig": "contig"} if len(shape) > 2 else {}
+    tifffile.imwrite(tmp_path / "a.tif", np.zeros(shape, dtype), photometric=kind, extrasamples=extra, **options)
+    assert holds(tmp_path / "a.tif") == found
+
+
+def test_what_is_no_exr_at_all_is_left_to_the_reader_of_pictures(tmp_path: Path) -> None:
+    (tmp_path / "a.exr").write_bytes(b"nothing of the kind" * 9)
+    assert holds(tmp_path / "a.exr") == "picture"
+    assert holds(tmp_path / "nonesuch.tif") == "picture"
+    assert holds(tmp_path / "a.flo") == holds(tmp_path / "a.npy") == "map"

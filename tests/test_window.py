@@ -18,7 +18,7 @@ from PIL import Image
 from app import project as projects
 from app.pictures import read_picture, write_picture
 from app.recipe import Recipe
-from editing import pattern
+from editing import pattern, write_foreign_map
 
 NEEDED = ("Xvfb", "xdotool")
 PATIENCE = 90.0
@@ -50,10 +50,10 @@ class Desk:
         self.editor: subprocess.Popen[str] | None = None
         self.window = ""
 
-    def open(self, *arguments: str) -> None:
-        """Start the editor and wait for its window."""
+    def open(self, file: Path) -> None:
+        """Start the editor with a file and wait until it is open."""
         self.editor = subprocess.Popen(
-            [sys.executable, "-m", "app", "edit", *arguments],
+            [sys.executable, "-m", "app", "edit", str(file)],
             env=self.env,
             cwd=Path(__file__).parent.parent,
             stdout=subprocess.PIPE,
@@ -62,8 +62,7 @@ class Desk:
         )
         self.until(lambda: bool(self._find()), "a window")
         self.window = self._find()[0]
-        # Its first frame is drawn once its title is that of the picture.
-        self.until(lambda: " - fluidwarp" in self.title(), "the first frame")
+        self.until(lambda: self.title() == f"{file.stem} - fluidwarp", "the file to be open")
 
     def _find(self) -> list[str]:
         return self.do("search", "--onlyvisible", "--name", "fluidwarp").split()
@@ -148,9 +147,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
 def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
-    desk.open(str(picture))
-    assert desk.title() == "pattern - fluidwarp"
-
+    desk.open(picture)
     desk.drag((400, 400), (520, 400))
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
     desk.key("f")
@@ -178,8 +175,7 @@ def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
     desk.key("ctrl+q")
     desk.until_gone()
 
-    desk.open(str(work))
-    assert desk.title() == "work - fluidwarp"
+    desk.open(work)
     desk.key("ctrl+q")
     desk.until_gone()
     rendered = tmp_path / "rendered.png"
@@ -200,22 +196,50 @@ def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize("name", ["nonesuch.png", "nonesuch.toml", "nonesuch.fluidwarp"])
+def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, name: str) -> None:
+    command = [sys.executable, "-m", "app", "edit", str(tmp_path / name)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parent.parent)
+    assert done.returncode == 1
+    assert name in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
 def test_a_file_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
     picture, other = tmp_path / "pattern.png", tmp_path / "Käse 2.png"
     write_picture(picture, pattern())
     write_picture(other, pattern(100, 60))
-    desk.open(str(picture))
+    desk.open(picture)
     command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(other)]
     subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
     desk.until(lambda: desk.title() == "Käse 2 - fluidwarp", "the dropped picture")
     desk.key("ctrl+z")
     desk.until(lambda: desk.title() == "pattern - fluidwarp", "the first picture again")
+    # The sample that was there until the picture had been read is nothing to go back to.
+    desk.key("ctrl+z")
+    time.sleep(0.5)
+    assert desk.title() == "pattern - fluidwarp"
+
+
+def test_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
+    picture, st_map = tmp_path / "pattern.png", tmp_path / "st.exr"
+    write_picture(picture, pattern())
+    write_foreign_map(st_map, 240, 180)
+    desk.open(picture)
+    command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(st_map)]
+    subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
+
+    def use_as_map() -> None:
+        desk.do("mousemove", "643", "442", "sleep", "0.4", "click", "1", "sleep", "0.6")
+
+    use_as_map()
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the map to be taken")
 
 
 def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Path) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
-    desk.open(str(picture))
+    desk.open(picture)
     desk.save(work)
 
     def viscosity() -> float:
@@ -259,7 +283,7 @@ def test_what_is_exported_is_what_the_command_line_makes(
 ) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
-    desk.open(str(picture))
+    desk.open(picture)
     desk.drag((400, 400), (520, 400))
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
     desk.save(work)

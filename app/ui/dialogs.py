@@ -109,6 +109,36 @@ class Unsaved(Dialog):
         return True
 
 
+class PictureOrMap(Dialog):
+    """Asks what a file is to be taken for that may be either."""
+
+    def __init__(self, name: str, picture: Callable[[], None], use: Callable[[], None]) -> None:
+        super().__init__("A picture or a warp map?")
+        self._name = name
+        self._picture = picture
+        self._use = use
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        about = f"“{self._name}” holds floating-point colours, or the places of an ST map."
+        ui.wrapped(about, ui.palette.dim, 14)
+        imgui.dummy(ImVec2(0, ui.px(8)))
+        if ui.button("Cancel", width=96):
+            return False
+        imgui.same_line(imgui.get_window_width() - ui.px(24 + 144 + 8 + 112))
+        chosen = None
+        if ui.button("Use as map", width=112):
+            chosen = self._use
+        imgui.same_line()
+        if ui.button("Open as picture", primary=True, width=144):
+            chosen = self._picture
+        if chosen is None:
+            return True
+        # Answered, whatever comes of it.
+        self.close()
+        chosen()
+        return False
+
+
 class Shortcuts(Dialog):
     """The sheet of all keys."""
 

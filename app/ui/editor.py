@@ -49,6 +49,7 @@ class Editor:
     Attributes:
         closed: the person has left.
         clipboard: puts a text on the clipboard; the window sets it.
+        placeholder: work that is only there until something else has been read: untouched, it is nothing to go back to.
     """
 
     def __init__(self, device: Device, project: Project, preferences: Preferences | None = None) -> None:
@@ -75,6 +76,7 @@ class Editor:
         self._styled: tuple[object, ...] = ()
         self._held_by_imgui = False
         self._popup_open = False
+        self.placeholder: Session | None = None
         self._sessions: list[tuple[Session, Canvas]] = []
         self._index = -1
         self.view = Viewport(self.layout.canvas, (1, 1))
@@ -112,6 +114,7 @@ class Editor:
         for old in self._sessions[self._index + 1 :]:
             self._close(*old)
         kept = self._sessions[: self._index + 1]
+        replaced = kept.pop() if kept and kept[-1][0] is self.placeholder and not self.is_dirty else None
         # Those further back keep what makes them, and replay it when they are wanted.
         for old, _ in kept[:-1]:
             old.replay.checkpoints.clear()
@@ -119,6 +122,8 @@ class Editor:
             self._close(*kept.pop(0))
         self._sessions = [*kept, (session, canvas)]
         self._turn_to(len(self._sessions) - 1)
+        if replaced is not None:
+            self._close(*replaced)
         self.quality.opened()
 
     def undo(self) -> None:

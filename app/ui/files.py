@@ -14,11 +14,12 @@ from imgui_bundle import imgui
 
 from app import project as projects
 from app.errors import UserError
-from app.maps import MAP_ENDINGS, is_map
+from app.maps import MAP_ENDINGS, holds
 from app.opening import PICTURE_ENDINGS, check_picture
 from app.project import SUFFIX, Project
 from app.recipe import Recipe
 from app.ui.browser import Browser
+from app.ui.dialogs import PictureOrMap
 from app.ui.loading import Loading
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
@@ -68,10 +69,21 @@ class Files:
         self._ask_for("Start from a warp map", MAP_ENDINGS, self.start_from_map)
 
     def open(self, path: Path) -> None:
-        """Open a picture, a recipe or a project, after asking about unsaved work; of a warp map, start from it."""
-        if is_map(path):
-            self.start_from_map(path)
-            return
+        """Open a picture, a recipe or a project, after asking about unsaved work; of a warp map, start from it.
+
+        What may be a picture as well as a map is asked about.
+        """
+        match holds(path):
+            case "map":
+                self.start_from_map(path)
+            case "either":
+                asked = PictureOrMap(path.name, lambda: self.open_work(path), lambda: self.start_from_map(path))
+                self.editor.dialogs.append(asked)
+            case "picture":
+                self.open_work(path)
+
+    def open_work(self, path: Path) -> None:
+        """Open a picture, a recipe or a project, after asking about unsaved work."""
         self.editor.unless_unsaved("open something else", lambda: self._open(path, lambda: load_any(path)))
 
     def apply(self, path: Path) -> None:

@@ -211,17 +211,19 @@ class Window:
 
 
 def run(file: Path | None = None) -> None:
-    """Open the editor with a file, or with the sample picture.
+    """Open the editor with the sample picture, and on it, as if it had been dropped there, a file.
 
     Raises:
-        UserError: if there is no window to be had (status 2), or the file cannot be read.
+        UserError: if there is no window to be had (status 2), or no such file.
     """
-    project = load_any(file or sample())
+    if file is not None and not file.exists():
+        load_any(file)
     window = Window()
     try:
-        editor = Editor(window.device, project, Preferences.load())
+        editor = Editor(window.device, load_any(sample()), Preferences.load())
         if file is not None:
-            editor.preferences.opened(file)
+            editor.placeholder = editor.session
+            window.events.append(Drop((str(file),)))
         try:
             window.show(editor)
         finally:

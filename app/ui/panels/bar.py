@@ -160,7 +160,7 @@ def _recent(ui: Ui, editor: Editor) -> None:
         for name in list(recent):
             path = Path(name)
             if imgui.menu_item(f"{path.name}##{name}", "", False)[0]:
-                editor.files.open(path)
+                editor.files.open_work(path)
             if imgui.is_item_hovered():
                 imgui.set_tooltip(str(path.parent))
         imgui.end_menu()
