@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.presets import FEELS
+from app.tools import BrushSettings
 from app.ui.actions import ACTIONS
 from app.ui.state import LARGEST, SMALLEST
 from app.ui.widgets import Ui, keys_shown
@@ -20,6 +21,31 @@ MENU = (
     "open", "recent", "import_map", "", "save", "save_as", "apply_to", "copy_recipe", "", "export", "", "preferences",
     "shortcuts", "", "quit",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A slider for a part of the brush, shown where the bar is more than `room` points wide."""
+
+    name: str
+    label: str
+    title: str
+    low: float
+    high: float
+    key: str
+    more: str
+    room: float = 0.0
+
+
+SETTINGS = (
+    Setting("radius", "Size", "Size of the brush", SMALLEST, LARGEST, "[",
+            "] makes it larger. Or drag with the right button."),
+    Setting("hardness", "Hardness", "Hardness", 0.0, 1.0, "{",
+            "} makes it harder. A soft brush bends the picture gently.", room=820),
+    Setting("strength", "Strength", "Strength", 0.05, 1.0, ";",
+            "' makes it stronger. Full strength moves the picture with the pointer.", room=920),
+)  # fmt: skip
+DEFAULTS = BrushSettings()
 
 
 def draw(ui: Ui, editor: Editor) -> None:
@@ -61,40 +87,27 @@ def _brush(ui: Ui, editor: Editor) -> None:
         state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(back)))
         imgui.end_group()
         ui.tooltip("Direction", f"shift+{tool.key}", "Hold Alt for the other one.")
-    imgui.same_line(0, ui.px(16))
-    brush, width = state.brush, 148 if wide else 112
-    imgui.set_cursor_pos_y(ui.px(10))
-    size = brush.radius * max(editor.canvas.size) * 2
-    slid = ui.slider(
-        "size", "Size", brush.radius, SMALLEST, LARGEST, f"{size:.0f} px", default=0.15, logarithmic=True, width=width,
-        title="Size of the brush", key="[", more="] makes it larger. Or drag with the right button.",
-    )  # fmt: skip
-    if slid.changed:
-        brush = replace(brush, radius=slid.value)
-    room = imgui.get_window_width() / ui.scale
-    if room > 820:
-        imgui.same_line()
-        imgui.set_cursor_pos_y(ui.px(10))
-        slid = ui.slider(
-            "hardness", "Hardness", brush.hardness, 0, 1, f"{brush.hardness:.0%}", default=0.0, width=width,
-            title="Hardness", key="{", more="} makes it harder. A soft brush bends the picture gently.",
-        )  # fmt: skip
-        if slid.changed:
-            brush = replace(brush, hardness=slid.value)
-    if room > 920:
-        imgui.same_line()
-        imgui.set_cursor_pos_y(ui.px(10))
-        slid = ui.slider(
-            "strength", "Strength", brush.strength, 0.05, 1, f"{brush.strength:.0%}", default=1.0, width=width,
-            title="Strength", key=";", more="' makes it stronger. Full strength moves the picture with the pointer.",
-        )  # fmt: skip
-        if slid.changed:
-            brush = replace(brush, strength=slid.value)
-    state.brush = brush
+    for place, setting in enumerate(SETTINGS):
+        if imgui.get_window_width() > ui.px(setting.room):
+            imgui.same_line(0, ui.px(8 if place else 16))
+            imgui.set_cursor_pos_y(ui.px(10))
+            _slider(ui, editor, setting, 148 if wide else 112)
     if imgui.get_window_width() > ui.px(1180) and not editor.state.inspector:
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(10))
         feels(ui, editor, "bar feel")
+
+
+def _slider(ui: Ui, editor: Editor, setting: Setting, width: float) -> None:
+    brush, is_size = editor.state.brush, setting.name == "radius"
+    value: float = getattr(brush, setting.name)
+    shown = f"{value * max(editor.canvas.size) * 2:.0f} px" if is_size else f"{value:.0%}"
+    slid = ui.slider(
+        setting.name, setting.label, value, setting.low, setting.high, shown, getattr(DEFAULTS, setting.name),
+        logarithmic=is_size, width=width, title=setting.title, key=setting.key, more=setting.more,
+    )  # fmt: skip
+    if slid.changed:
+        editor.state.brush = replace(brush, **{setting.name: slid.value})
 
 
 def feels(ui: Ui, editor: Editor, name: str, width: float = 0.0) -> None:
