@@ -64,8 +64,10 @@ class Robot:
         size: tuple[int, int] = SIZE,
         scale: float = 1.0,
         preferences: Preferences | None = None,
+        density: float = 1.0,
     ) -> None:
-        self.device, self.size, self.scale = device, size, scale
+        self.device, self.scale, self.density = device, scale, density
+        self.size = size = round(size[0] * density), round(size[1] * density)
         self.texture = device.ctx.texture(size, 4)
         self.target = device.ctx.framebuffer([self.texture])
         self.editor = Editor(device, project, preferences or Preferences(auto_quality=False))
@@ -75,7 +77,7 @@ class Robot:
 
     def frame(self, *events: Event, count: int = 1, dt: float = TICK) -> None:
         for number in range(count):
-            self.editor.frame(self.target, self.size, dt, events if number == 0 else (), 1.0, self.scale)
+            self.editor.frame(self.target, self.size, dt, events if number == 0 else (), self.density, self.scale)
 
     def pixels(self) -> np.ndarray:
         """What is seen, (h, w, 3) uint8, top row first."""

@@ -22,10 +22,11 @@ SQUARE = 24
 
 
 @pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+def robot(device: Device, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Robot]:
+    """An editor on a screen of one pixel a point, or of as many as the test says."""
     if not device.limits.is_software:
         pytest.skip("golden pictures are of the software rasteriser")
-    robot = Robot(device, small_project(tmp_path), SIZE)
+    robot = Robot(device, small_project(tmp_path), SIZE, density=getattr(request, "param", 1.0))
     yield robot
     robot.close()
 
@@ -68,6 +69,29 @@ def light(robot: Robot) -> None:
     robot.move(700, 20)
 
 
+def light_masks(robot: Robot) -> None:
+    robot.key("ctrl+l")
+    robot.key("v")
+    robot.drag((0.3, 0.5), (0.4, 0.5), hold=20)
+    robot.key("f")
+    robot.drag((0.7, 0.4), (0.7, 0.5), steps=4)
+    robot.rest()
+    for key in ("2", "3"):
+        robot.key(key)
+    robot.move(700, 20)
+
+
+def light_export(robot: Robot) -> None:
+    robot.key("ctrl+l")
+    export(robot)
+
+
+def error(robot: Robot) -> None:
+    robot.key("ctrl+l")
+    robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
+    robot.move(700, 20)
+
+
 def coarse(pixels: np.ndarray) -> np.ndarray:
     """The means of squares of `SQUARE` pixels."""
     height, width = (side // SQUARE for side in pixels.shape[:2])
@@ -75,19 +99,33 @@ def coarse(pixels: np.ndarray) -> np.ndarray:
     return squares.mean(axis=(1, 3))
 
 
-@pytest.mark.parametrize("state", [start, warped, shortcuts, export, light], ids=lambda state: state.__name__)
+STATES = [start, warped, shortcuts, export, light, light_masks, light_export, error]
+
+
+@pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
 def test_looks_as_it_should(robot: Robot, state: Callable[[Robot], None], tmp_path: Path) -> None:
+    compare(robot, state, f"editor-{state.__name__}.png", tmp_path)
+
+
+@pytest.mark.parametrize("robot", [2.0], indirect=True, ids=["2x"])
+@pytest.mark.parametrize("state", [start, light_masks], ids=lambda state: state.__name__)
+def test_looks_as_it_should_on_a_fine_screen(robot: Robot, state: Callable[[Robot], None], tmp_path: Path) -> None:
+    compare(robot, state, f"editor-{state.__name__}-2x.png", tmp_path)
+
+
+def compare(robot: Robot, state: Callable[[Robot], None], name: str, folder: Path) -> None:
+    """Make the state, and see that it looks like the golden picture of that name."""
     state(robot)
     robot.frame(count=2)
     seen = robot.pixels()
-    path = GOLDEN / f"editor-{state.__name__}.png"
+    path = GOLDEN / name
     if os.environ.get("FLUIDWARP_GOLDEN") == "write":
         write_picture(path, Picture(seen))
     difference = np.abs(coarse(seen) - coarse(read_picture(path).pixels)).max(axis=2)
     # Letters and thin lines may fall a little differently with another version of the libraries or another rounding of
     # the solver; what is where, and in which colour, may not.
     if difference.mean() >= 3 or (difference > 40).mean() >= 0.02:
-        write_picture(tmp_path / "seen.png", Picture(seen))
+        write_picture(folder / "seen.png", Picture(seen))
         magnified = np.minimum(np.kron(difference * 4, np.ones((SQUARE, SQUARE))), 255).astype(np.uint8)[..., None]
-        write_picture(tmp_path / "difference.png", Picture(magnified))
-        pytest.fail(f"differs by {difference.mean():.2f} on average; see {tmp_path}")
+        write_picture(folder / "difference.png", Picture(magnified))
+        pytest.fail(f"differs by {difference.mean():.2f} on average; see {folder}")

@@ -138,7 +138,7 @@ class ExportDialog(Dialog):
         imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
         _, self.name = imgui.input_text("##name", self.name)
         imgui.same_line()
-        if ui.button("Browse", width=96, height=30):
+        if ui.button("Browse", width=96, height=27):
             editor.files.ask_where("Export to", self.output, (self.ending,), self._chosen)
         ui.dim(str(self.output))
         if self.output.exists():

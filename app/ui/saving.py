@@ -54,7 +54,7 @@ class SaveDialog(Dialog):
         flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
         entered, self.name = imgui.input_text("##name", self.name, flags)
         imgui.same_line()
-        if ui.button("Browse", width=96, height=30):
+        if ui.button("Browse", width=96, height=27):
             editor.files.ask_where("Save", self.path, (SUFFIX,), self._chosen)
         ui.dim(str(self.path))
         if self.path.exists() and self.path != self._own:

@@ -312,7 +312,7 @@ class Ui:
             draw = imgui.get_window_draw_list()
             y = corner.y + (size.y - imgui.get_font_size()) / 2
             ink = imgui.get_style().alpha
-            draw.add_text(ImVec2(corner.x + self.px(9), y), packed(palette.dim, ink), label)
+            draw.add_text(ImVec2(corner.x + self.px(9), y), packed(palette.text, 0.75 * ink), label)
             right = corner.x + size.x - self.px(9) - imgui.calc_text_size(shown).x
             draw.add_text(ImVec2(right, y), packed(palette.text, ink), shown)
         imgui.pop_font()
@@ -354,19 +354,21 @@ class Ui:
         imgui.pop_font()
         return is_open
 
+    def rule(self, low: ImVec2, high: ImVec2) -> None:
+        """A thin line as a rectangle: a line proper would be smoothed over two rows of pixels."""
+        imgui.get_window_draw_list().add_rect_filled(low, high, packed(self.palette.line))
+
     def line(self) -> None:
         """A thin line across, from edge to edge."""
         window, corner = imgui.get_window_pos(), imgui.get_cursor_screen_pos()
         y = corner.y - self.px(4)
-        right = ImVec2(window.x + imgui.get_window_width(), y)
-        imgui.get_window_draw_list().add_line(ImVec2(window.x, y), right, packed(self.palette.line), self.px(1))
+        self.rule(ImVec2(window.x, y), ImVec2(window.x + imgui.get_window_width(), y + self.px(1)))
 
     def divider(self) -> None:
         """A thin upright line between two groups of a bar."""
         imgui.same_line(0, self.px(GRID))
         corner = imgui.get_cursor_screen_pos()
-        low, high = ImVec2(corner.x, corner.y + self.px(6)), ImVec2(corner.x, corner.y + self.px(26))
-        imgui.get_window_draw_list().add_line(low, high, packed(self.palette.line), self.px(1))
+        self.rule(corner + ImVec2(0, self.px(6)), corner + ImVec2(self.px(1), self.px(26)))
         imgui.dummy(ImVec2(self.px(1), self.px(32)))
         imgui.same_line(0, self.px(GRID))
 

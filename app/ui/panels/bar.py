@@ -64,7 +64,7 @@ def draw(ui: Ui, editor: Editor) -> None:
 
 
 def _aligned(ui: Ui, title: str, hint: str = "") -> None:
-    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(7))
+    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(8.5))
     ui.text(title, bold=True)
     if hint:
         imgui.same_line(0, ui.px(12))
@@ -76,7 +76,7 @@ def _brush(ui: Ui, editor: Editor) -> None:
     wide = imgui.get_window_width() > ui.px(1080)
     label = tool.label
     imgui.begin_group()
-    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(7))
+    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(8.5))
     ui.text(label, bold=True)
     imgui.end_group()
     if tool.directions:

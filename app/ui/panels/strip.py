@@ -8,7 +8,6 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.tools import TOOLS
-from app.ui.theme import packed
 from app.ui.widgets import Ui
 
 if TYPE_CHECKING:
@@ -30,8 +29,6 @@ def draw(ui: Ui, editor: Editor) -> None:
                 editor.choose_tool(tool.name, editor.state.opposite.get(tool.name, False))
             if tool.name in GROUP_ENDS:
                 corner, width = imgui.get_cursor_screen_pos(), ui.px(40)
-                low = ImVec2(corner.x + ui.px(8), corner.y + ui.px(3))
-                high = ImVec2(corner.x + width - ui.px(8), corner.y + ui.px(3))
-                imgui.get_window_draw_list().add_line(low, high, packed(ui.palette.line), ui.px(1))
+                ui.rule(corner + ImVec2(ui.px(8), ui.px(3)), corner + ImVec2(width - ui.px(8), ui.px(4)))
                 imgui.dummy(ImVec2(width, ui.px(6)))
     imgui.pop_style_var()
