@@ -22,7 +22,9 @@ class Feel:
 
 PUTTY = Feel("Putty", "Stops with the brush", 0.3, 0.0)
 HONEY = Feel("Honey", "Sinks softly to rest", 0.03, 2.0)
-WATER = Feel("Water", "Swirls on by itself", 0.0006, 0.5)
+# As thin as a single stroke of moderate length allows: thinner, its whirls wind up into layers thinner than a cell, and
+# the map folds.
+WATER = Feel("Water", "Swirls on by itself", 0.006, 1.0)
 FEELS = (PUTTY, HONEY, WATER)
 """From stiff to thin."""
 

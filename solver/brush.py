@@ -16,8 +16,8 @@ from solver.warp import WarpMap
 Point = tuple[float, float]
 
 # Of a brush's hardness, for a push: all that the core of its stream function moves has to flow back beside it, and with
-# little room left there it would do so many times faster than the brush moves.
-HARDEST_PUSH = 0.3
+# little room left there it would do so many times faster than the brush moves. With .3 a stroke of Putty folds there.
+HARDEST_PUSH = 0.15
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import pytest
 from app import project as projects
 from app.export import Job, run
 from app.pictures import read_picture
-from app.presets import HONEY, PUTTY, Feel
+from app.presets import FEELS, HONEY, PUTTY, Feel
 from app.progress import Progress
 from app.session import REST, Session
 from app.tools import TOOL, TOOLS, BrushSettings, Press
@@ -158,6 +158,24 @@ def test_the_first_stroke_does_not_fold(session: Session) -> None:
     statistics = session.replay.warp.statistics()
     assert statistics.displacement_max > 0.15
     assert statistics.folds == 0
+
+
+@pytest.mark.parametrize("hardness", [0.0, 0.5, 1.0], ids=["soft", "half hard", "hard"])
+@pytest.mark.parametrize("radius", [0.1, 0.15])
+@pytest.mark.parametrize("feel", FEELS, ids=lambda feel: feel.name)
+def test_a_moderate_push_does_not_fold(session: Session, feel: Feel, radius: float, hardness: float) -> None:
+    session.set_grid(128)
+    session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+    press = Press(BrushSettings(radius, hardness), False, session.extent, session.dt)
+    session.press(TOOL["push"], press, 0.35, 0.5)
+    for k in range(1, 16):
+        session.move(0.35 + 0.02 * k, 0.5)
+        session.advance(1)
+    session.release()
+    session.settle()
+    statistics = session.replay.warp.statistics()
+    assert statistics.folds == 0
+    assert statistics.displacement_max > 0.15
 
 
 @pytest.mark.parametrize("feel", [HONEY, PUTTY], ids=lambda feel: feel.name)
