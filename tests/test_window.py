@@ -227,13 +227,12 @@ def test_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Pa
     write_foreign_map(st_map, 240, 180)
     desk.open(picture)
     command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(st_map)]
-    subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
 
     def use_as_map() -> None:
-        desk.do("mousemove", "643", "442", "sleep", "0.4", "click", "1", "sleep", "0.6")
+        subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
+        desk.do("sleep", "1.5", "mousemove", "643", "440", "sleep", "0.4", "click", "1", "sleep", "0.6")
 
-    use_as_map()
-    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the map to be taken")
+    desk.insist(use_as_map, lambda: desk.title() == "pattern * - fluidwarp", "the map to be taken")
 
 
 def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Path) -> None:
