@@ -443,7 +443,10 @@ class Viscosity:
         rights = [level.right for level in levels]
         for fine, coarser in zip(rights, levels[1:], strict=False):
             self._restrict(fine, coarser, coarser.right)
-        self._cycle(last, rights[-1])
+        if last is not self.levels[-1]:
+            self._start(last, rights[-1], last.faces.write, self._weights(last)[0])
+            last.faces.swap()
+        self._cycle(last, rights[-1], begun=True)
         for finer, coarser, right in reversed(list(zip(levels, levels[1:], rights, strict=False))):
             prolong = self.device.pass_("viscosity/prolong.frag", START=1, **finer.defines)
             prolong(
@@ -458,20 +461,16 @@ class Viscosity:
             self._smooth(finer, right, self._weights(finer)[::-1])
             # A cycle overwrites the right-hand sides of coarser grids only, and those are used up by now.
             if 0 < finer.depth <= self.plan.nested:
-                self._cycle(finer, right, warm=True)
+                self._cycle(finer, right)
 
-    def _cycle(self, level: Level, right: Pair, warm: bool = False) -> None:
-        """One multigrid cycle for A faces = right, from rest or (`warm`) from the level's iterate."""
+    def _cycle(self, level: Level, right: Pair, begun: bool = False) -> None:
+        """One multigrid cycle for A faces = right, from the level's iterate, or, `begun`, on from its first sweep."""
         if level is self.levels[-1]:
             self._solve_exactly(right)
             return
-        is_last = level is self._last
         weights = self._weights(level)
-        if not warm:
-            self._start(level, right, level.faces.write, weights[0])
-            level.faces.swap()
-        self._smooth(level, right, weights if warm else weights[1:])
-        if is_last:
+        self._smooth(level, right, weights[1:] if begun else weights)
+        if level is self._last:
             return
         self._correct(level, right)
         self._smooth(level, right, weights[::-1])
@@ -481,8 +480,8 @@ class Viscosity:
         # The write side is free until the correction is added.
         self._residual_of(level, level.faces.read, right, level.faces.write)
         coarser = self.levels[level.depth + 1]
-        self._restrict(level.faces.write, coarser, coarser.right)
-        self._cycle(coarser, coarser.right)
+        self._restrict(level.faces.write, coarser, coarser.right, begin=True)
+        self._cycle(coarser, coarser.right, begun=True)
         self._prolong(coarser, level)
 
     def _weights(self, level: Level, count: int = 0) -> list[float]:
@@ -531,9 +530,21 @@ class Viscosity:
         self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0], region)
         return self._residuals[0].fields
 
-    def _restrict(self, residual: Pair, coarser: Level, target: Pair) -> None:
-        restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
-        restrict(target.fields, region=coarser.region, **residual.inputs(), **coarser.open)
+    def _restrict(self, residual: Pair, coarser: Level, target: Pair, begin: bool = False) -> None:
+        """The residual on the coarser grid; with `begin`, where that is not solved exactly, the first sweep too."""
+        if not begin or coarser is self.levels[-1]:
+            restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
+            restrict(target.fields, region=coarser.region, **residual.inputs(), **coarser.open)
+            return
+        restrict = self.device.pass_("viscosity/restrict.frag", START=1, **coarser.defines)
+        restrict(
+            target.fields + coarser.faces.write.fields,
+            region=coarser.region,
+            weight=self._weights(coarser)[0],
+            **residual.inputs(),
+            **coarser.matrix,
+        )
+        coarser.faces.swap()
 
     def _prolong(self, coarser: Level, finer: Level) -> None:
         prolong = self.device.pass_("viscosity/prolong.frag", **finer.defines)

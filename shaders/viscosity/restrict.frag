@@ -3,13 +3,16 @@
 // with UNIFORM box.glsl.
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a pinned neighbour.
+// With START a second pair of outputs, the first damped Jacobi sweep on it from rest: u_weight D^-1 times it.
 // reads: 29
 uniform sampler2D u_u;
 uniform sampler2D u_v;
-#ifdef UNIFORM
-#include "viscosity/box.glsl"
-#else
-#include "viscosity/openness.glsl"
+#include "viscosity/block.glsl"
+#ifdef START
+uniform float u_weight;
+in vec2 v_uv;
+layout(location = 2) out vec4 out_start_u;
+layout(location = 3) out vec4 out_start_v;
 #endif
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -44,4 +47,9 @@ void main() {
     vec2 p = (2.0 * here + 1.5) * fine_texel, fx = x * fine_texel, fy = y * fine_texel;
     out_u = gather(u_u, p, fx, fy, false, open_u(here - y), open_u(here), open_u(here + y));
     out_v = gather(u_v, p, fy, fx, true, open_v(here - x).xzyw, open_v(here).xzyw, open_v(here + x).xzyw).xzyw;
+#ifdef START
+    Faces inverse = inverse_diagonal(v_uv);
+    out_start_u = u_weight * inverse.u * out_u;
+    out_start_v = u_weight * inverse.v * out_v;
+#endif
 }
