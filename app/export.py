@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import json
 from collections.abc import Callable, Iterable, Iterator
@@ -26,7 +27,7 @@ from app.animation import (
 )
 from app.checkpoints import DEFAULT_BUDGET
 from app.errors import UserError
-from app.files import replacing, writable
+from app.files import cannot_write, replacing, writable
 from app.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.opening import check_picture
 from app.pictures import Picture, check_picture_output, picture_format, write_picture
@@ -149,6 +150,8 @@ class Job:
         for path in (self.output, self.stats, self.maps and self.maps.path):
             if path is not None:
                 writable(path)
+        if self.states is not None and self.states.exists() and not self.states.is_dir():
+            raise cannot_write(self.states, FileExistsError(errno.EEXIST, "it is a file"))
 
 
 @dataclass(frozen=True)

@@ -194,7 +194,7 @@ BAD = {
 def test_bad_input_is_told_in_a_sentence(
     case: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """In this process, as nearly all of it is told before any GL is touched."""
+    """In this process, as all of it is told before any GL is touched."""
     words, expected = BAD[case]
     point = '[[force]]\nname = "x"\nkind = "vortex"\npoint = [0.5, 0.5]\n'
     for name, text in {
