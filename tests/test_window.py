@@ -242,9 +242,8 @@ def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Pat
     desk.save(work)
 
     def viscosity() -> float:
-        """As it is in the project, saved now."""
-        desk.key("ctrl+s")
-        desk.until(lambda: desk.title() == "work - fluidwarp", "it to be saved")
+        """As it is in the project, saved now; while the number is still being typed, Ctrl+S is none of ours."""
+        desk.insist(lambda: desk.key("ctrl+s"), lambda: desk.title() == "work - fluidwarp", "it to be saved")
         return projects.load(work).recipe.fluid.viscosity
 
     def type_number() -> None:
