@@ -13,6 +13,7 @@ linearly.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
@@ -43,7 +44,7 @@ FINE = 1024  # cells along the longer side, at least, that a picture is quantise
 Viscosity = Annotated[float, Field(ge=0, le=MOST_VISCOUS)]
 
 
-class _Layer(Model):
+class _Layer(Model, ABC):
     """What all layers share.
 
     Attributes:
@@ -54,13 +55,13 @@ class _Layer(Model):
     name: str = ""
     window: Window | None = None
 
+    @abstractmethod
     def intensity(self, grid: Grid, pictures: Pictures) -> np.ndarray:
         """The layer on the cells, (ny, nx) float64 in [0, 1].
 
         Raises:
             ValueError: what is wrong with it on this picture.
         """
-        raise NotImplementedError
 
     def coverage(self, grid: Grid) -> np.ndarray:
         """How much it works in each cell, (ny, nx) in [0, 1]."""

@@ -19,6 +19,7 @@ from app.session import REST, Session
 from app.tools import TOOL, TOOLS, BrushSettings, Press
 from editing import small_project
 from solver.context import Device
+from solver.warp import MapStatistics
 
 PAINTING = [tool for tool in TOOLS if tool.gesture is not None]
 
@@ -146,16 +147,20 @@ def test_pixels_follow_the_pointer_at_its_speed_in_putty(session: Session) -> No
     assert carried == pytest.approx(0.144, rel=0.08)
 
 
-def test_the_first_stroke_does_not_fold(session: Session) -> None:
+def pushed(session: Session, brush: BrushSettings, start: float, step: float) -> MapStatistics:
+    """The map after a push to the right of fifteen moves, once the fluid has come to rest."""
     session.set_grid(128)
-    press = Press(BrushSettings(), False, session.extent, session.dt)
-    session.press(TOOL["push"], press, 0.4, 0.5)
+    session.press(TOOL["push"], Press(brush, False, session.extent, session.dt), start, 0.5)
     for k in range(1, 16):
-        session.move(0.4 + 0.012 * k, 0.5)
+        session.move(start + step * k, 0.5)
         session.advance(1)
     session.release()
     session.settle()
-    statistics = session.replay.warp.statistics()
+    return session.replay.warp.statistics()
+
+
+def test_the_first_stroke_does_not_fold(session: Session) -> None:
+    statistics = pushed(session, BrushSettings(), 0.4, 0.012)
     assert statistics.displacement_max > 0.15
     assert statistics.folds == 0
 
@@ -164,16 +169,8 @@ def test_the_first_stroke_does_not_fold(session: Session) -> None:
 @pytest.mark.parametrize("radius", [0.1, 0.15])
 @pytest.mark.parametrize("feel", FEELS, ids=lambda feel: feel.name)
 def test_a_moderate_push_does_not_fold(session: Session, feel: Feel, radius: float, hardness: float) -> None:
-    session.set_grid(128)
     session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
-    press = Press(BrushSettings(radius, hardness), False, session.extent, session.dt)
-    session.press(TOOL["push"], press, 0.35, 0.5)
-    for k in range(1, 16):
-        session.move(0.35 + 0.02 * k, 0.5)
-        session.advance(1)
-    session.release()
-    session.settle()
-    statistics = session.replay.warp.statistics()
+    statistics = pushed(session, BrushSettings(radius, hardness), 0.35, 0.02)
     assert statistics.folds == 0
     assert statistics.displacement_max > 0.15
 

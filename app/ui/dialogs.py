@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from app.ui.editor import Editor
 
 
-class Dialog:
+class Dialog(ABC):
     """A window over everything, until it is answered or Escape is pressed.
 
     Attributes:
@@ -38,9 +39,9 @@ class Dialog:
     def close(self) -> None:
         self._open = False
 
+    @abstractmethod
     def body(self, ui: Ui, editor: Editor) -> bool:
         """Draw what is in it; False once it is done with."""
-        raise NotImplementedError
 
     def draw(self, ui: Ui, editor: Editor) -> bool:
         """Draw it; False once it is done with."""
