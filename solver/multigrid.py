@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil, cos, log, pi, sqrt
+from math import ceil, cos, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,12 +30,9 @@ def chebyshev_weights(sweeps: int, smallest: float) -> tuple[float, ...]:
     return tuple(sorted((1 / (middle + half * cos(pi * (k + 0.5) / sweeps)) for k in range(sweeps)), reverse=True))
 
 
-# Where there are solids, each of the first so many levels visits the next coarser one twice: thin walls cost accuracy
-# there, and a second visit costs less than another cycle.
-TWICE = 2
-
-# What the projection may leave of the divergence.
+# What the projection may leave of the divergence, and the most cycles it takes for it.
 WANTED_LEFT = 1e-3
+MOST_CYCLES = 8
 
 
 @dataclass(frozen=True)
@@ -49,27 +46,47 @@ class Cycle:
         rough: the part that the first cycle leaves of what differs from the means over blocks of 2 x 2 cells.
         smooth: and of all.
         each: the part of that which every further one leaves.
+        twice: each of the first so many levels visits the next coarser one twice: thin walls cost accuracy there.
     """
 
     sweeps: tuple[tuple[float, ...], ...]
     rough: float
     smooth: float
     each: float
+    twice: int = 0
 
-    def left_by_one(self, whole: float, rough: float) -> float:
-        """What one cycle leaves of the whole divergence and its rough part."""
-        return self.rough * rough + self.smooth * whole
-
-    def count(self, whole: float, rough: float) -> int:
-        """Cycles that leave little enough."""
-        return 1 + ceil(log(max(self.left_by_one(whole, rough) / WANTED_LEFT, 1.0), 1 / self.each))
+    def left(self, whole: float, rough: float, cycles: int = 1) -> float:
+        """What so many cycles leave of the whole divergence and its rough part."""
+        return (self.rough * rough + self.smooth * whole) * self.each ** (cycles - 1)
 
 
+_LIGHT = chebyshev_weights(2, 0.6), chebyshev_weights(3, 0.35), chebyshev_weights(4, 0.25)
 _COARSER = chebyshev_weights(4, 0.35), chebyshev_weights(5, 0.25)
-WALLED = Cycle((chebyshev_weights(3, 0.7), *_COARSER), rough=0.15, smooth=0.0025, each=0.18)
-QUICK = Cycle((chebyshev_weights(3, 0.7), *_COARSER), rough=0.25, smooth=0.0025, each=0.08)
-# One more sweep pays where one cycle is not enough.
-THOROUGH = Cycle((chebyshev_weights(4, 0.5), *_COARSER), rough=0.13, smooth=0.002, each=0.045)
+_QUICK = chebyshev_weights(3, 0.7), *_COARSER
+_THOROUGH = chebyshev_weights(4, 0.5), *_COARSER
+# From the cheapest on.
+OPEN = (
+    Cycle(_LIGHT, rough=0.35, smooth=0.003, each=0.2),
+    Cycle(_QUICK, rough=0.25, smooth=0.0025, each=0.08),
+    Cycle(_THOROUGH, rough=0.13, smooth=0.002, each=0.045),
+)
+# Among walls each is followed by a step to where the residual is least, and that is measured.
+WALLED = (
+    Cycle(_LIGHT, rough=0.3, smooth=0.003, each=0.25),
+    Cycle(_QUICK, rough=0.2, smooth=0.0025, each=0.2),
+    Cycle(_THOROUGH, rough=0.16, smooth=0.002, each=0.1, twice=2),
+)
+# A cycle that leaves more than this part has met a wall that takes second visits.
+POOR = 0.35
+# And if these leave more, there is no more to be had: a source in a closed pocket.
+STALLED = 0.9
+
+
+def cheapest(cycles: tuple[Cycle, ...], whole: float, rough: float) -> tuple[Cycle, int]:
+    """The kind of cycle, of these, and the number of them that leave little enough at the least cost."""
+    plans = ((cycle, number) for number in range(1, MOST_CYCLES) for cycle in cycles)
+    enough = ((cycle, number) for cycle, number in plans if cycle.left(whole, rough, number) <= WANTED_LEFT)
+    return next(enough, (cycles[-1], MOST_CYCLES))
 
 
 class Level:
@@ -106,10 +123,11 @@ class Pressure:
     """The projection u <- u - grad p with lap p = div u - s, and no flow through the edges and the solid cells.
 
     What is kept on the GPU is p / h, in lengths / s, so that only the source needs the size of a cell. Each cycle
-    solves for a correction to what the cycles before it left, so that float32 sets no floor to the divergence; where
-    there are solids it is scaled to leave the least, so that no mask can make the divergence grow. Without solids a
-    level of some 60 x 60 cells is solved exactly. A flow changes little from step to step: the trend of the last
-    pressures mostly leaves so little that one cycle is enough; what a start leaves, and so their number, is measured.
+    solves for a correction to what the cycles before it left, so that float32 sets no floor to the divergence. A flow
+    changes little from step to step: the trend of the last pressures mostly leaves so little that one cycle is enough.
+    Without solids a level of some 60 x 60 cells is solved exactly, and the kind of cycle and their number follow from
+    what the start leaves. Among solids each cycle is taken so as to leave the least, so that no mask can make the
+    divergence grow, and they end when little enough is left.
 
     Args:
         device: the device.
@@ -132,10 +150,13 @@ class Pressure:
         separable = next(level for level in self._levels if Separable.is_worth(level.size))
         self._separable_level = separable
         self._separable = Separable(device, separable.span, separable.size)
-        self._base, self._last, self._change = (
-            device.double_field(blocks, 4, f"pressure {name}") for name in ("base", "last", "change")
+        self._base, self._last, self._change, self._way, self._applied_way = (
+            device.double_field(blocks, 4, f"pressure {name}")
+            for name in ("base", "last", "change", "way", "applied way")
         )
         self._applied = device.field(blocks, 4, "pressure applied")
+        self._products = device.field(blocks, 4, "pressure products")
+        self._add_products = Reduction(device, blocks, 4, "sum")
         # While a velocity is projected, what is wanted of its divergence and where; then the pressure's gradient.
         self._across, self._down = (device.field(blocks, 4, f"pressure {name}") for name in ("across", "down"))
         self._squares = device.field(blocks, 4, "pressure squares")
@@ -150,7 +171,9 @@ class Pressure:
         """Free the textures."""
         for item in (*self._levels, *self._sums, self._inverse, self._separable, self._base, self._last, self._change):
             item.release()
-        for item in (self._applied, self._across, self._down, self._squares, self._add_squares):
+        for item in (self._way, self._applied_way, self._applied, self._products, self._add_products):
+            item.release()
+        for item in (self._across, self._down, self._squares, self._add_squares):
             item.release()
 
     # -- what goes in and comes out ---------------------------------------------------------------------------------
@@ -160,7 +183,6 @@ class Pressure:
         shader, levels = self.device.pass_, self._levels
         self._has_solids = solid is not None
         self._variant: dict[str, Any] = {} if self._has_solids else {"OPEN": 1}
-        self._cycle = self._cycle_for(1.0, 1.0)
         finest = levels[0]
         everywhere = solid or self.device.field(self.size, 1, "no solids", "f1")
         shader("pressure/open_faces.frag")((finest.left, finest.up, finest.far), solid=everywhere)
@@ -194,19 +216,16 @@ class Pressure:
             The number of cycles.
         """
         finest = self._levels[0]
-        at_rest, expected = self._try_expected(velocity.read, source)
-        is_warm = warm and QUICK.left_by_one(*expected) <= 1.5 * QUICK.left_by_one(*at_rest)
+        norm, at_rest, expected = self._try_expected(velocity.read, source)
+        light = WALLED[0] if self._has_solids else OPEN[0]
+        is_warm = warm and light.left(*expected) <= 1.5 * light.left(*at_rest)
         if not is_warm:
             self._take_divergence(velocity.read, source)
-        self._cycle = self._cycle_for(*(expected if is_warm else at_rest))
-        cycles = cycles or self._cycle.count(*(expected if is_warm else at_rest))
-        for cycle in range(cycles):
-            self._solve(0)
-            if self._has_solids:
-                self._scale_and_subtract(finest)
-            elif cycle < cycles - 1:
-                self._subtract_laplacian(finest, finest.pressure.read)
-            self._keep_correction(cycle + is_warm)
+        start = expected if is_warm else at_rest
+        if self._has_solids:
+            cycles = self._cycle_among_walls(norm, start, cycles, before=int(is_warm))
+        else:
+            cycles = self._cycle_in_the_open(start, cycles, before=int(is_warm))
         if cycles + is_warm < 2:
             self._change.read.clear()
         pass_ = self.device.pass_
@@ -272,17 +291,44 @@ class Pressure:
             expected |= {"source": self._across, "sums": self._dot(self._across, self._down)}
         self._draw("divergence", target, finest, defines, velocity=velocity, **expected)
 
-    def _try_expected(self, velocity: Field, source: Field | None) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Start from the pressure expected; what is left from rest, and there: of all and of the rough. Waits."""
+    def _try_expected(
+        self, velocity: Field, source: Field | None
+    ) -> tuple[float, tuple[float, float], tuple[float, float]]:
+        """Start from the pressure expected, and wait for what that leaves.
+
+        Returns:
+            The norm of the divergence, and the parts of it, of all and of the rough, that there are at rest and there.
+        """
         self._take_divergence(velocity, source, expected=self._base.read)
         squares = self._add_squares(self._squares)
         whole, rough, left, left_rough = np.sqrt(np.maximum(squares, 0.0) / (squares[0] or 1.0)).tolist()
-        return (whole, rough), (left, left_rough)
+        return sqrt(squares[0]), (whole, rough), (left, left_rough)
 
-    def _cycle_for(self, whole: float, rough: float) -> Cycle:
-        if self._has_solids:
-            return WALLED
-        return QUICK if QUICK.count(whole, rough) == 1 else THOROUGH
+    def _cycle_in_the_open(self, start: tuple[float, float], cycles: int | None, before: int) -> int:
+        """So many cycles, or as many as do; see `_keep_correction` for `before`."""
+        self._kind, number = (OPEN[-1], cycles) if cycles else cheapest(OPEN, *start)
+        for cycle in range(number):
+            self._solve(0)
+            if cycle < number - 1:
+                self._subtract_laplacian(self._levels[0], self._levels[0].pressure.read)
+            self._keep_correction(before + cycle)
+        return number
+
+    def _cycle_among_walls(self, norm: float, start: tuple[float, float], cycles: int | None, before: int) -> int:
+        """The same among solids, where what a cycle leaves depends on their shape: it is measured; waits each time."""
+        light, quick, thorough = WALLED
+        self._kind = thorough if cycles else light if light.left(*start) <= WANTED_LEFT else quick
+        left, wanted = start[0] * norm, WANTED_LEFT * norm
+        for cycle in range(cycles or MOST_CYCLES):
+            self._solve(0)
+            last, left = left, self._step_along(self._levels[0], is_first=cycle == 0)
+            self._keep_correction(before + cycle)
+            if cycles:
+                continue
+            if left <= wanted or (self._kind is thorough and left > STALLED * last):
+                return cycle + 1
+            self._kind = thorough if left > POOR * last else light if light.each * left <= wanted else quick
+        return cycles or MOST_CYCLES
 
     def _solve(self, number: int) -> None:
         """One cycle from a level down: from a zero guess, the `pressure` that roughly accounts for its `residual`."""
@@ -300,7 +346,7 @@ class Pressure:
             coarser.residual.read, residual=level.residual.read, links=level.links
         )
         self._solve(number + 1)
-        if self._has_solids and number < TWICE and coarser is not self._levels[-1]:
+        if number < self._kind.twice and coarser is not self._levels[-1]:
             coarser.kept, coarser.pressure.read = coarser.pressure.read, coarser.kept
             self._subtract_laplacian(coarser, coarser.kept)
             self._solve(number + 1)
@@ -309,7 +355,7 @@ class Pressure:
         pass_("pressure/prolong.frag", **self._variant)(
             pressure.read, coarse=coarser.pressure.read, links=level.links, span=level.span
         )
-        for weight in self._cycle.sweeps[min(number, len(self._cycle.sweeps) - 1)]:
+        for weight in self._kind.sweeps[min(number, len(self._kind.sweeps) - 1)]:
             self._draw("smooth", pressure.write, level,
                        pressure=pressure.read, residual=level.residual.read, weight=weight)  # fmt: skip
             pressure.swap()
@@ -319,16 +365,36 @@ class Pressure:
         self._draw("residual", level.residual.write, level, pressure=correction, residual=level.residual.read)
         level.residual.swap()
 
-    def _scale_and_subtract(self, level: Level) -> None:
-        """Scale a level's `pressure` p to leave least of its residual r, by r . A p / A p . A p, and subtract that."""
-        pressure, residual, applied = level.pressure, level.residual, self._applied
-        self._draw("residual", applied, level, {"ONLY_LAPLACIAN": 1}, pressure=pressure.read)
-        sums = self._dot(residual.read, applied)
-        pass_ = self.device.pass_("pressure/add_scaled.frag")
-        pass_(residual.write, a=residual.read, b=applied, sums=sums, factors=(1.0, -1.0))
-        pass_(pressure.write, a=pressure.read, b=pressure.read, sums=sums, factors=(0.0, 1.0))
-        residual.swap()
-        pressure.swap()
+    def _step_along(self, level: Level, is_first: bool) -> float:
+        """Replace a level's `pressure` by what leaves the least residual, along it and the way of the step before.
+
+        One step of the generalised conjugate residual method: Eisenstat, Elman and Schultz, SIAM J. Numer. Anal. 20
+        (1983). No step makes the residual larger, whatever the walls do to a cycle.
+
+        Returns:
+            The norm of what is left; waits for the GPU.
+        """
+        pressure, residual = level.pressure, level.residual
+        first: dict[str, Any] = {"FIRST": 1} if is_first else {}
+        before: dict[str, Any] = {} if is_first else {"before": self._applied_way.read}
+        self._draw("residual", (self._applied, self._products), level, {"PRODUCTS": 1, **first},
+                   pressure=pressure.read, residual=residual.read, **before)  # fmt: skip
+        along, length2, shared, left2 = self._add_products(self._products).tolist()
+        beta = 0.0
+        if not is_first:
+            before["way"] = self._way.read
+            # Unless there is nothing new in it.
+            if length2 * self._way_length2 - shared**2 > 1e-5 * length2 * self._way_length2:
+                beta = shared / self._way_length2
+        self._way_length2 = length2 - beta * shared
+        alpha = along / self._way_length2 if self._way_length2 > 0.0 else 0.0
+        self.device.pass_("pressure/step.frag", **first)(
+            (pressure.write, residual.write, self._way.write, self._applied_way.write),
+            alpha=alpha, beta=beta, z=pressure.read, applied=self._applied, residual=residual.read, **before,
+        )  # fmt: skip
+        for pair in (pressure, residual, self._way, self._applied_way):
+            pair.swap()
+        return sqrt(max(left2 - alpha * along, 0.0))
 
     def _keep_correction(self, before: int) -> None:
         """Make the correction part of the pressure: the base, or the change, or added to it, after `before` others."""

@@ -9,6 +9,7 @@ import numpy as np
 from solver.context import Device
 from solver.field import Field
 
+_SIDE = 8  # texels along the blocks that become one
 _SMALL = 16  # this many texels across are cheaper to read back than to shrink again
 
 
@@ -27,13 +28,13 @@ class Reduction:
         self._shrink = device.pass_("reduce/shrink.frag", **({"SUM": 1} if kind == "sum" else {}))
         self._levels: list[Field] = []
         while max(size) > _SMALL:
-            size = -(-size[0] // 4), -(-size[1] // 4)
+            size = -(-size[0] // _SIDE), -(-size[1] // _SIDE)
             self._levels.append(device.field(size, components, f"{kind} {size[0]} x {size[1]}"))
 
     def shrink(self, field: Field) -> Field:
         """A field of at most 16 x 16 texels with the same result, for stages that go on without reading it back."""
         for level in self._levels:
-            self._shrink(level, field=field)
+            self._shrink(level, field=field, side=_SIDE)
             field = level
         return field
 

@@ -1,24 +1,24 @@
-// Shrink: one texel of the result from each block of 4 x 4, the largest value of each channel or their sum.
-// u_field: any texels; its size need not be a multiple of 4. Define SUM for the sum, else the largest.
-// reads: 16
+// Shrink: one texel of the result from each square block, the largest value of each channel or their sum.
+// u_field: any texels; its size need not be a multiple of a block's. u_side: texels along a block. Define SUM for the sum,
+// else the largest.
+// reads: 64
 uniform sampler2D u_field;
+uniform int u_side;
 layout(location = 0) out vec4 out_value;
 
 void main() {
-    ivec2 corner = 4 * ivec2(gl_FragCoord.xy), last = textureSize(u_field, 0) - 1;
+    ivec2 corner = u_side * ivec2(gl_FragCoord.xy), end = min(corner + u_side, textureSize(u_field, 0));
 #ifdef SUM
     out_value = vec4(0.0);
 #else
     out_value = texelFetch(u_field, corner, 0);
 #endif
-    for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i) {
-            ivec2 place = corner + ivec2(i, j);
+    for (int y = corner.y; y < end.y; ++y)
+        for (int x = corner.x; x < end.x; ++x) {
 #ifdef SUM
-            // Beyond the edge there is nothing to add.
-            out_value += all(lessThanEqual(place, last)) ? texelFetch(u_field, place, 0) : vec4(0.0);
+            out_value += texelFetch(u_field, ivec2(x, y), 0);
 #else
-            out_value = max(out_value, texelFetch(u_field, min(place, last), 0));
+            out_value = max(out_value, texelFetch(u_field, ivec2(x, y), 0));
 #endif
         }
 }
