@@ -15,7 +15,7 @@ from solver.field import Field
 from solver.grid import Grid
 from solver.multigrid import Pressure
 from solver.params import FluidParams
-from solver.viscosity import Viscosity
+from solver.viscosity import Pair, Viscosity
 
 # A force field on the grid's faces, and its time law integrated over the tick (seconds).
 Force = tuple[Field, float]
@@ -80,6 +80,7 @@ class Fluid:
         self._solids_changed = True
         self._solids_of: np.ndarray | None = None
         self._coefficients_of: object = None
+        self._packed: Pair | None = None  # w3 between the stages of a step
         self._viscosity_solver = Viscosity(device, grid.size)
         self._pressure_solver = Pressure(device, grid.size)
 
@@ -93,7 +94,7 @@ class Fluid:
         self.add_force(forces)
         self.advect(dt)
         with self._watching_diffusion():
-            self.diffuse(dt)
+            self.diffuse(dt, unpack=steer is not None or self.measuring)
         if steer is not None:
             steer()
         with self._watching_projection():
@@ -130,22 +131,29 @@ class Fluid:
             advect(self.velocity.write, departing=self._departing, trace=self._trace, decay=decay, **walls)
             self.velocity.swap()
 
-    def diffuse(self, dt: float) -> None:
-        """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled."""
+    def diffuse(self, dt: float, unpack: bool = True) -> None:
+        """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled.
+
+        Without `unpack` w3 stays as the viscous solver packs it, for the projection, and `velocity` is w2 until then.
+        """
         with self.device.stage("diffuse"):
             key = (dt, self.params.walls)
             if key != self._coefficients_of:
                 self._viscosity_solver.set_coefficients(self.viscosity, self.solid, dt, self.params.walls)
                 self._coefficients_of = key
-            self._viscosity_solver.diffuse(self.velocity)
+            if unpack:
+                self._viscosity_solver.diffuse(self.velocity)
+            else:
+                self._packed = self._viscosity_solver.solve(self.velocity.read)
 
     def project(self) -> None:
         """w4 = w3 - grad q with lap q = div w3 - source: divergence-free but for the brushes' sources."""
         with self.device.stage("project"):
             self._take_up_solids()
             source = self.source if self._has_source else None
+            packed, self._packed = self._packed, None
             self._pressure_solver.project(
-                self.velocity, self.params.pressure_cycles, source, warm=True, carried=self._carried
+                self.velocity, self.params.pressure_cycles, source, warm=True, carried=self._carried, packed=packed
             )
             if self._has_source:
                 self.source.clear()

@@ -16,6 +16,7 @@ from solver.separable import Separable
 
 if TYPE_CHECKING:
     from solver.context import Device
+    from solver.viscosity import Pair
 
 # A level of no more blocks of 2 x 2 cells than this is solved directly, by a dense matrix.
 DIRECT_BLOCKS = 64
@@ -202,6 +203,7 @@ class Pressure:
         source: Field | None = None,
         warm: bool = False,
         carried: DoubleField | None = None,
+        packed: Pair | None = None,
     ) -> int:
         """Make `velocity` free of divergence, or its divergence equal to the source's; writes and swaps.
 
@@ -211,16 +213,18 @@ class Pressure:
             source: wanted divergence at cells, 1 / s; its mean over the fluid is taken off: nothing leaves the grid.
             warm: start from the pressure that the last two let expect, unless that is worse than to start from rest.
             carried: gradients at MAC faces, lengths / s, replaced by their mean with that of this pressure.
+            packed: the velocity to be made so, as the viscous solver packs it, instead of what `velocity` holds.
 
         Returns:
             The number of cycles.
         """
         finest = self._levels[0]
-        norm, at_rest, expected = self._try_expected(velocity.read, source)
+        given: dict[str, Any] = packed.inputs() if packed else {"velocity": velocity.read}
+        norm, at_rest, expected = self._try_expected(given, source)
         light = WALLED[0] if self._has_solids else OPEN[0]
         is_warm = warm and light.left(*expected) <= 1.5 * light.left(*at_rest)
         if not is_warm:
-            self._take_divergence(velocity.read, source)
+            self._take_divergence(given, source)
         start = expected if is_warm else at_rest
         if self._has_solids:
             cycles = self._cycle_among_walls(norm, start, cycles, before=int(is_warm))
@@ -233,14 +237,15 @@ class Pressure:
             (self._across, self._down, self._last.write, self._base.write),
             base=self._base.read, change=self._change.read, before=self._last.read, trend=float(is_warm),
         )  # fmt: skip
-        inputs: dict[str, Any] = {"velocity": velocity.read, "across": self._across, "down": self._down}
+        inputs: dict[str, Any] = {**given, "across": self._across, "down": self._down}
+        variant = {**self._variant, **_packing(given)}
         if self._has_solids:
             inputs |= {"left": finest.left, "up": finest.up}
         if carried is None:
-            pass_("pressure/subtract_gradient.frag", **self._variant)(velocity.write, **inputs)
+            pass_("pressure/subtract_gradient.frag", **variant)(velocity.write, **inputs)
         else:
             targets = velocity.write, carried.write
-            pass_("pressure/subtract_gradient.frag", CARRY=1, **self._variant)(targets, carried=carried.read, **inputs)
+            pass_("pressure/subtract_gradient.frag", CARRY=1, **variant)(targets, carried=carried.read, **inputs)
             carried.swap()
         for pair in (velocity, self._last, self._base):
             pair.swap()
@@ -262,7 +267,7 @@ class Pressure:
 
     def divergence_norm(self, velocity: Field) -> float:
         """Root mean square divergence of a MAC velocity over all cells, 1 / s; waits for the GPU."""
-        self._take_divergence(velocity, None)
+        self._take_divergence({"velocity": velocity}, None)
         residual = self._levels[0].residual.read
         squares = float(self._dot(residual, residual).get()[0, 0, 1])
         return sqrt(squares / (self.size[0] * self.size[1])) / self.h
@@ -277,10 +282,10 @@ class Pressure:
         pass_ = self.device.pass_(f"pressure/{shader}.frag", **self._variant, **whole, **(defines or {}))
         pass_(target, **(level.faces if self._has_solids else {"span": level.span}), **inputs)
 
-    def _take_divergence(self, velocity: Field, source: Field | None, **expected: Any) -> None:
+    def _take_divergence(self, given: dict[str, Any], source: Field | None, **expected: Any) -> None:
         """The right-hand side of the finest level; less what is `expected`, with the squares of both."""
         finest = self._levels[0]
-        defines: dict[str, Any] = {}
+        defines = _packing(given)
         target: Target = finest.residual.read
         if expected:
             defines["EXPECTED"] = 1
@@ -289,17 +294,17 @@ class Pressure:
             defines["WITH_SOURCE"] = 1
             self._draw("gather_source", (self._across, self._down), finest, source=source, scale=self.h)
             expected |= {"source": self._across, "sums": self._dot(self._across, self._down)}
-        self._draw("divergence", target, finest, defines, velocity=velocity, **expected)
+        self._draw("divergence", target, finest, defines, **given, **expected)
 
     def _try_expected(
-        self, velocity: Field, source: Field | None
+        self, given: dict[str, Any], source: Field | None
     ) -> tuple[float, tuple[float, float], tuple[float, float]]:
         """Start from the pressure expected, and wait for what that leaves.
 
         Returns:
             The norm of the divergence, and the parts of it, of all and of the rough, that there are at rest and there.
         """
-        self._take_divergence(velocity, source, expected=self._base.read)
+        self._take_divergence(given, source, expected=self._base.read)
         squares = self._add_squares(self._squares)
         whole, rough, left, left_rough = np.sqrt(np.maximum(squares, 0.0) / (squares[0] or 1.0)).tolist()
         return sqrt(squares[0]), (whole, rough), (left, left_rough)
@@ -413,6 +418,11 @@ class Pressure:
         for larger, smaller in pairwise(self._sums):
             self.device.pass_("pressure/add_up.frag")(smaller, sums=larger)
         return self._sums[-1]
+
+
+def _packing(given: dict[str, Any]) -> dict[str, Any]:
+    """The variant of a pass for a velocity that is given on MAC faces, or packed."""
+    return {} if "velocity" in given else {"PACKED": 1}
 
 
 def _cells(blocks: np.ndarray, size: tuple[int, int]) -> np.ndarray:

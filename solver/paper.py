@@ -49,7 +49,7 @@ class PaperFluid(Fluid):
             advect(self.velocity.write, velocity=self.velocity.read, dt_over_h=dt / self.grid.h, decay=decay)
             self.velocity.swap()
 
-    def diffuse(self, dt: float) -> None:
+    def diffuse(self, dt: float, unpack: bool = True) -> None:
         with self.device.stage("diffuse"):
             self._before.copy_from(self.velocity.read)
             sweep = self.device.pass_("paper/diffuse.frag", **self._wall_defines())

@@ -240,7 +240,12 @@ class Viscosity:
         return self.levels[min(self.plan.grids, len(self.levels) - 1)]
 
     def diffuse(self, velocity: DoubleField) -> None:
-        """Replace the velocity on MAC faces (lengths / s) by the solution.
+        """Replace the velocity on MAC faces (lengths / s) by the solution; see `solve`."""
+        self.device.pass_("viscosity/store.frag")(velocity.write, **self.solve(velocity.read).inputs())
+        velocity.swap()
+
+    def solve(self, velocity: Field) -> Pair:
+        """The solution for a velocity on MAC faces, packed, in lengths / s; valid until the next solve.
 
         By conjugate gradients from rest, first along v* and what the last step made of its v*, or by one correction to
         a part of v*: where little changes the rest of the work goes into the change, so that a steady state stays one,
@@ -248,15 +253,12 @@ class Viscosity:
         """
         right = v_star = self.levels[0].right
         if self.plan.steps:
-            self._load(velocity.read, v_star, self._resting_walls)
+            self._load(velocity, v_star, self._resting_walls)
             if self._walls != self._resting_walls:
                 right = self._residuals[-1]
-                self._load(velocity.read, right, self._walls)
-            solution = self._conjugate_gradients(v_star, right)
-        else:
-            solution = self._smoothed(velocity.read)
-        self.device.pass_("viscosity/store.frag")(velocity.write, **solution.inputs())
-        velocity.swap()
+                self._load(velocity, right, self._walls)
+            return self._conjugate_gradients(v_star, right)
+        return self._smoothed(velocity)
 
     def _load(self, velocity: Field, target: Pair, walls: dict[str, Any]) -> None:
         finest = self.levels[0]
