@@ -74,7 +74,7 @@ def stroke(studio: Studio, each: Callable[[Callable[[], None]], None]) -> None:
 def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
     """The rows of one grid."""
     studio = Studio(device, grid=cells)
-    jacobi = Jacobi(device, studio.editor.session.replay.grid)
+    jacobi = Jacobi(device, studio.editor.session.replay.grid, pairs=1)
     walls: list[float] = []
     works: list[float] = []
     units: list[float] = []
@@ -137,7 +137,7 @@ def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
         number = f"{passes[name] / count:.0f} passes" if name in STAGES else ""
         row = f"{'    ' if inner else '  '}{name}", f"{mean:.2f}", f"{mean / unit:.1f}"
         table.add_row("", *row, f"{spent[name] / whole_frame:.0%}", number)
-    jacobi.pair.release()
+    jacobi.release()
     studio.close()
 
 

@@ -58,6 +58,10 @@ class Jacobi:
                 self.vertices.render(moderngl.TRIANGLES, vertices=3)
                 pair.swap()
 
+    def release(self) -> None:
+        for pair in self.pairs:
+            pair.release()
+
 
 def brushes(grid: Grid, seed: int = 1) -> np.ndarray:
     """A velocity of a few brush impulses, not divergence-free, as the projection meets it while someone paints."""
