@@ -1,4 +1,4 @@
-"""The pressure of a grid without solids, solved exactly: along x and y its equation falls apart into waves."""
+"""Grids without solids, solved exactly: along x and y the equations fall apart into waves."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Separable:
     @staticmethod
     def is_worth(size: tuple[int, int]) -> bool:
         """True if a grid of so many blocks is small enough."""
-        return size[0] * size[1] * (size[0] + size[1]) <= LARGEST
+        return _products(size) <= LARGEST
 
     def solve(self, residual: Field, pressure: Field) -> None:
         """The `pressure` that accounts for all of `residual`, both at blocks."""
@@ -58,6 +58,82 @@ class Separable:
             field.release()
         self._half.release()
         self._waves.release()
+
+
+class ViscousWaves:
+    """Solves the viscous step for one viscosity in a box with free-slip walls.
+
+    There sines along the normal and cosines across it carry u and v, and the step couples u and v of one wave only:
+    four products with small matrices, and 2 x 2 equations between them.
+
+    Args:
+        device: the device.
+        box: (nx, ny) cells between the walls.
+        texels: of the packed faces, without their ring (see shaders/viscosity/block.glsl).
+    """
+
+    def __init__(self, device: Device, box: tuple[int, int], texels: tuple[int, int]) -> None:
+        self.device = device
+        self._region = (1, 1, *texels)
+        self._box = box
+        self._matrices: list[tuple[Field, Field]] = []
+        sines, cosines = zip(*(_sines_and_cosines(*lengths) for lengths in zip(box, texels, strict=True)), strict=True)
+        # Across and down, and back: of u and of v.
+        for u, v in (
+            (sines[0], cosines[0]),
+            (cosines[1], sines[1]),
+            (cosines[1].T, sines[1]),
+            (sines[0], cosines[0].T),
+        ):
+            self._matrices.append((device.upload(_blocks(u), "waves of u"), device.upload(_blocks(v), "waves of v")))
+        ringed = texels[0] + 2, texels[1] + 2
+        self._half, self._waves = (
+            tuple(device.field(ringed, 4, f"viscous {name} {component}") for component in "uv")
+            for name in ("halfway", "waves")
+        )
+
+    @staticmethod
+    def is_worth(texels: tuple[int, int]) -> bool:
+        """True if a grid of so many texels is small enough."""
+        return _products(texels) <= LARGEST
+
+    def solve(self, right: tuple[Field, Field], faces: tuple[Field, Field], stiffness: float) -> None:
+        """The `faces` that the step of `stiffness` dt mu / h^2 makes of `right`, packed faces (u, v) both."""
+        across = self.device.pass_("viscosity/waves.frag")
+        down = self.device.pass_("viscosity/waves.frag", DOWN=1)
+        solved = self.device.pass_("viscosity/waves.frag", DOWN=1, SOLVE=1)
+        step = {"stiffness": stiffness, "box": self._box}
+        half, waves = self._half, self._waves
+        for pass_, source, target, (u, v), inputs in zip(
+            (across, solved, down, across), (right, half, waves, half), (half, waves, half, faces), self._matrices,
+            ({}, step, {}, {}), strict=True,
+        ):  # fmt: skip
+            pass_(target, region=self._region, u=source[0], v=source[1], matrix_u=u, matrix_v=v, **inputs)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return sum(field.nbytes for pair in (*self._matrices, self._half, self._waves) for field in pair)
+
+    def release(self) -> None:
+        """Free the textures."""
+        for pair in (*self._matrices, self._half, self._waves):
+            for field in pair:
+                field.release()
+
+
+def _products(size: tuple[int, int]) -> int:
+    return size[0] * size[1] * (size[0] + size[1])
+
+
+def _sines_and_cosines(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
+    """Orthonormal waves between walls: rows of sines at `count` left faces and of cosines at centres, zero-padded."""
+    wave, place = np.arange(count)[:, None], np.arange(count)
+    sines = np.sqrt(2.0 / count) * np.sin(np.pi * wave * place / count)
+    cosines = np.sqrt(2.0 / count) * np.cos(np.pi * wave * (place + 0.5) / count)
+    cosines[0] = np.sqrt(1.0 / count)
+    padding = (0, 2 * texels - count)
+    return np.pad(sines, padding), np.pad(cosines, padding)
 
 
 def _waves(span: float, blocks: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

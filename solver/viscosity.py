@@ -14,6 +14,7 @@ from solver.field import DoubleField, Field
 from solver.params import Walls
 from solver.passes import Region
 from solver.reduce import Reduction
+from solver.separable import ViscousWaves
 from solver.stiff_parts import StiffParts
 
 # Texels (of 2 x 2 cells) of the coarsest grid, on which the inverse matrix is at hand.
@@ -169,6 +170,12 @@ class Viscosity:
         while not self.levels or not self.levels[-1].is_coarsest:
             self.levels.append(Level(device, size, len(self.levels), self.size))
             size = -(-size[0] // 2), -(-size[1] // 2)
+        # Between free-slip walls one viscosity is solved exactly on a much finer grid than any other.
+        self._exact_level = self._wave_level = next(
+            (level for level in self.levels[1:] if ViscousWaves.is_worth(level.texels)), self.levels[-1]
+        )
+        self._waves = ViscousWaves(device, self._wave_level.box, self._wave_level.texels)
+        self._has_waves = False
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
         finest = self.levels[0]
@@ -212,7 +219,9 @@ class Viscosity:
             level.use(least / 4.0**level.depth if is_uniform else None, self._slip)
         if not is_uniform:
             self._draw_coefficients({"viscosity": viscosity, "solid": solid, "dt_over_h2": dt_over_h2})
-        if self._last is self.levels[-1]:
+        self._has_waves = is_uniform and not self._slip
+        self._exact_level = self._wave_level if self._has_waves else self.levels[-1]
+        if self._last is self._exact_level and not self._has_waves:
             entries = box_entries if is_uniform else packed_entries
             self._inverse.set(inverse_matrix(*entries(self._last)))
         self._stiff_parts.count = 0
@@ -237,7 +246,7 @@ class Viscosity:
     @property
     def _last(self) -> Level:
         """The coarsest grid that is visited."""
-        return self.levels[min(self.plan.grids, len(self.levels) - 1)]
+        return self.levels[min(self.plan.grids, self._exact_level.depth)]
 
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution; see `solve`."""
@@ -445,7 +454,7 @@ class Viscosity:
         rights = [level.right for level in levels]
         for fine, coarser in zip(rights, levels[1:], strict=False):
             self._restrict(fine, coarser, coarser.right)
-        if last is not self.levels[-1]:
+        if last is not self._exact_level:
             self._start(last, rights[-1], last.faces.write, self._weights(last)[0])
             last.faces.swap()
         self._cycle(last, rights[-1], begun=True)
@@ -467,7 +476,7 @@ class Viscosity:
 
     def _cycle(self, level: Level, right: Pair, begun: bool = False) -> None:
         """One multigrid cycle for A faces = right, from the level's iterate, or, `begun`, on from its first sweep."""
-        if level is self.levels[-1]:
+        if level is self._exact_level:
             self._solve_exactly(right)
             return
         weights = self._weights(level)
@@ -534,7 +543,7 @@ class Viscosity:
 
     def _restrict(self, residual: Pair, coarser: Level, target: Pair, begin: bool = False) -> None:
         """The residual on the coarser grid; with `begin`, where that is not solved exactly, the first sweep too."""
-        if not begin or coarser is self.levels[-1]:
+        if not begin or coarser is self._exact_level:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
             restrict(target.fields, region=coarser.region, **residual.inputs(), **coarser.open)
             return
@@ -560,7 +569,11 @@ class Viscosity:
         finer.faces.swap()
 
     def _solve_exactly(self, right: Pair) -> None:
-        level = self.levels[-1]
+        level = self._exact_level
+        if self._has_waves:
+            self._waves.solve(right.fields, level.faces.write.fields, level.matrix["stiffness"])
+            level.faces.swap()
+            return
         exact = self.device.pass_("viscosity/exact.frag")
         exact(
             level.faces.write.fields,
@@ -609,7 +622,7 @@ class Viscosity:
         for level in self.levels:
             fields += [level.cells, *level.packed.values(), *level.right.fields]
         fields += [self._inverse, self._products, self._change_products, self._weighed]
-        others = self._sum, self._change_sum, self._weights_sum, self._stiff_parts
+        others = self._sum, self._change_sum, self._weights_sum, self._stiff_parts, self._waves
         return sum(thing.nbytes for thing in (*fields, *others))
 
     def release(self) -> None:
@@ -627,6 +640,7 @@ class Viscosity:
             self._sum,
             self._weighed,
             self._weights_sum,
+            self._waves,
             self._stiff_parts,
         ):
             item.release()

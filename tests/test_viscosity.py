@@ -354,3 +354,26 @@ def test_strokes_over_a_stiff_disc_end_where_exact_steps_would(device: Device) -
         warp.release()
     moved = np.linalg.norm(maps[True], axis=-1).mean()
     assert np.linalg.norm(maps[False] - maps[True], axis=-1).mean() < 0.05 * moved
+
+
+@pytest.mark.parametrize("size", [(64, 48), (61, 40), (37, 90), (512, 8)])
+@pytest.mark.parametrize("viscosity", [3.0, 500.0])
+def test_one_viscosity_is_solved_exactly_on_a_coarser_grid(
+    device: Device, size: tuple[int, int], viscosity: float
+) -> None:
+    solver = Step(device, np.full((size[1], size[0]), viscosity)).solver
+    level = solver._exact_level
+    assert level.depth >= 1
+    rng = np.random.default_rng(7)
+    for field in level.right.fields:
+        field.set(rng.standard_normal((field.size[1], field.size[0], 4)))
+    # What open faces keep of it.
+    solver._residual_of(level, level.faces.read, level.right, level.faces.write)
+    right = level.faces.write.fields
+    for target, source in zip(level.right.fields, right, strict=True):
+        target.copy_from(source)
+    wanted = np.stack([field.get() for field in right])
+    solver._solve_exactly(level.right)
+    solver._residual_of(level, level.faces.read, level.right, level.faces.write)
+    left = np.stack([field.get() for field in level.faces.write.fields])
+    assert np.linalg.norm(left) <= 2e-5 * np.linalg.norm(wanted)
