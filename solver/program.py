@@ -14,6 +14,8 @@ _READS = re.compile(r"^//\s*reads:\s*(\d+)", re.MULTILINE)
 # Mesa: "0:12(5): error: ..."; NVIDIA: "0(12) : error ...".
 _LOG_LINE = re.compile(r"\b0(?::(\d+)\(\d+\)|\((\d+)\))")
 
+_UNIFORM = re.compile(r"^uniform (float|vec[234]) (u_\w+);", re.MULTILINE)
+
 FULL_SCREEN_VERTEX = "lib/full_screen.vert"
 
 
@@ -63,6 +65,34 @@ def declared_reads(path: str) -> int:
     return int(match.group(1)) if match else 0
 
 
+def _carried(vertex: str, fragment: str) -> tuple[str, str]:
+    """Both shaders, the uniforms of the fragment shader handed over in flat varyings, up to four numbers in each.
+
+    For every number of a uniform that a fragment shader reads, llvmpipe (Mesa 22.3) spends some twenty instructions on
+    each group of fragments, as if each of them read another one; a flat varying costs one, and holds the very same
+    number. The line after `#version` is new in both.
+    """
+    places: dict[str, tuple[str, str]] = {}
+    filled: list[int] = []
+    for kind, name in dict.fromkeys(_UNIFORM.findall(fragment)):
+        count = 1 if kind == "float" else int(kind[-1])
+        slot = next((slot for slot, numbers in enumerate(filled) if numbers + count <= 4), len(filled))
+        filled += [0] * (slot + 1 - len(filled))
+        places[name] = kind, f"v_uniforms_{slot}.{'xyzw'[filled[slot] : filled[slot] + count]}"
+        filled[slot] += count
+    if not places:
+        return vertex, fragment
+    varyings = f"flat {{}} vec4 {', '.join(f'v_uniforms_{slot}' for slot in range(len(filled)))};"
+    uniforms = " ".join(f"uniform {kind} {name};" for name, (kind, _) in places.items())
+    handed_over = " ".join(f"{place} = {name};" for name, (_, place) in places.items())
+    vertex = vertex.replace("void main() {", f"void main() {{ {handed_over}", 1)
+    fragment = _UNIFORM.sub(lambda found: f"#define {found[2]} {places[found[2]][1]}", fragment)
+    return (
+        vertex.replace("\n", f"\n{uniforms} {varyings.format('out')}\n", 1),
+        fragment.replace("\n", f"\n{varyings.format('in')}\n", 1),
+    )
+
+
 def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, object]) -> moderngl.Program:
     """The program of a fragment shader: over the whole screen, or with the vertex shader of the same name beside it.
 
@@ -72,6 +102,9 @@ def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, obj
     own = fragment.replace(".frag", ".vert")
     vertex_source, _ = assemble(own if shader_exists(own) else FULL_SCREEN_VERTEX, {})
     source, table = assemble(fragment, defines)
+    if not shader_exists(own):
+        vertex_source, source = _carried(vertex_source, source)
+        table = table[: source.count("\n") - len(table)] + table
 
     def place(match: re.Match[str]) -> str:
         line = int(match.group(1) or match.group(2))

@@ -27,12 +27,38 @@ def test_stage_states_its_texel_reads(stage: str) -> None:
     assert re.search(r"^// reads: \d+", read_shader(stage), re.MULTILINE), f"{stage} lacks a line `// reads: N`"
 
 
-def test_error_names_file_and_line(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = '#include "lib/cubic.glsl"\nout vec4 c;\nvoid main() {\n    c = nonsense;\n}\n'
+@pytest.mark.parametrize("line", ["", "uniform float u_amount;\n"], ids=["no uniform", "a uniform"])
+def test_error_names_file_and_line(device: Device, monkeypatch: pytest.MonkeyPatch, line: str) -> None:
+    source = f'#include "lib/cubic.glsl"\n{line}out vec4 c;\nvoid main() {{\n    c = nonsense;\n}}\n'
     real = read_shader
     monkeypatch.setattr("solver.program.read_shader", lambda path: source if path == "broken.frag" else real(path))
-    with pytest.raises(ShaderError, match=r"shaders/broken\.frag:4"):
+    with pytest.raises(ShaderError, match=rf"shaders/broken\.frag:{5 if line else 4}"):
         compile_program(device.ctx, "broken.frag", {})
+
+
+def test_every_number_of_every_uniform_arrives(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = """uniform float u_a;
+uniform vec3 u_b;
+#ifdef MORE
+uniform vec2 u_c;
+#endif
+uniform vec4 u_d;
+uniform float u_e;
+uniform int u_f;
+layout(location = 0) out vec4 out_a;
+layout(location = 1) out vec4 out_b;
+layout(location = 2) out vec4 out_c;
+void main() { out_a = vec4(u_a, u_b); out_b = vec4(u_c, u_e, u_f); out_c = u_d; }
+"""
+    real = read_shader
+    monkeypatch.setattr("solver.program.read_shader", lambda path: source if path == "whole.frag" else real(path))
+    targets = [device.field((5, 3), 4) for _ in range(3)]
+    numbers = np.random.default_rng(0).standard_normal(11).astype(np.float32)
+    a, b, c, d, e = np.split(numbers, [1, 4, 6, 10])
+    device.pass_("whole.frag", MORE=1)(targets, a=a[0], b=tuple(b), c=tuple(c), d=tuple(d), e=e[0], f=-7)
+    found = np.concatenate([target.get() for target in targets], axis=-1)
+    wanted = np.concatenate([a, b, c, e, np.array([-7], np.float32), d])
+    np.testing.assert_array_equal(found, np.broadcast_to(wanted, found.shape))
 
 
 def test_missing_include_is_named() -> None:
