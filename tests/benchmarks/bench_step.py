@@ -88,19 +88,32 @@ def relative_divergence(fluid: Fluid, before: float) -> float:
     return float(np.linalg.norm(fluid.divergence().astype(np.float64))) / before
 
 
-def median_times(device: Device, jobs: dict[str, tuple[Callable[[], None], int]], rounds: int) -> dict[str, float]:
-    """Milliseconds of one call of each job, so many of which are timed together: the median of rounds in turns."""
-    times: dict[str, list[float]] = {name: [] for name in jobs}
+def median_times(
+    device: Device, unit: Callable[[], None], jobs: dict[str, tuple[Callable[[], None], int]], rounds: int
+) -> tuple[float, dict[str, tuple[float, float]]]:
+    """Milliseconds of the unit; of one call of each job, and that in units: medians of rounds in which they take turns.
+
+    So many calls of a job are timed together, the unit right before and after them, as the machine's speed drifts.
+    """
+
+    def timed(job: Callable[[], None], calls: int) -> float:
+        device.ctx.finish()
+        start = time.perf_counter()
+        for _ in range(calls):
+            job()
+        device.ctx.finish()
+        return (time.perf_counter() - start) / calls * 1e3
+
+    units: list[float] = []
+    times: dict[str, list[tuple[float, float]]] = {name: [] for name in jobs}
     for number in range(rounds + 1):
-        for name, (job, batch) in jobs.items():
-            device.ctx.finish()
-            start = time.perf_counter()
-            for _ in range(batch):
-                job()
-            device.ctx.finish()
+        for name, (job, calls) in jobs.items():
+            before, taken, after = timed(unit, 1), timed(job, calls), timed(unit, 1)
             if number:  # the first round warms up
-                times[name].append((time.perf_counter() - start) / batch * 1e3)
-    return {name: statistics.median(values) for name, values in times.items()}
+                units += [before, after]
+                times[name].append((taken, 2.0 * taken / (before + after)))
+    medians = {name: tuple(np.median(rows, axis=0).tolist()) for name, rows in times.items()}
+    return statistics.median(units), medians
 
 
 def numpy_jacobi(sweeps: int, rhs: np.ndarray) -> None:
@@ -146,7 +159,7 @@ def step_rows(device: Device, cells: int, rounds: int, table: Table) -> None:
         "painted mask, contrast 1e5": (Fluid, painted(grid, 1e-4, 1e5)),
         "the paper's scheme, 40 + 40 Jacobi": (PaperFluid, 1e-3),
     }
-    jobs: dict[str, tuple[Callable[[], None], int]] = {"J": (jacobi.ten, 1)}
+    jobs: dict[str, tuple[Callable[[], None], int]] = {}
     fluids: dict[str, Fluid] = {}
     for name, (kind, viscosity) in cases.items():
         fluid = kind(device, grid)
@@ -161,17 +174,18 @@ def step_rows(device: Device, cells: int, rounds: int, table: Table) -> None:
 
         fluids[name] = fluid
         jobs[name] = step, BATCH if kind is Fluid else 2
-    measured = median_times(device, jobs, rounds)
-    unit = measured.pop("J") / (10 * len(jacobi.pairs))
+    unit, measured = median_times(device, jacobi.ten, jobs, rounds)
+    sweeps = 10 * len(jacobi.pairs)
+    unit /= sweeps
     reads = f"{5 * cells**2 / 1e6:.2f}"
     table.add_row(f"{cells}²", "J: one five-point Jacobi pass", f"{unit:.3f}", "1.0", "1", reads)
-    for name, milliseconds in measured.items():
+    for name, (milliseconds, ratio) in measured.items():
         fluid = fluids[name]
         device.timings.take()
         device.timings.enabled = True
-        step, batch = jobs[name]
+        job, batch = jobs[name]
         for _ in range(batch):
-            step()
+            job()
         passes, reads, writes = (
             {stage: count / batch for stage, count in book.items()}
             for book in (device.timings.passes, device.timings.texel_reads, device.timings.texel_writes)
@@ -184,7 +198,7 @@ def step_rows(device: Device, cells: int, rounds: int, table: Table) -> None:
             "",
             name,
             f"{milliseconds:.2f}",
-            f"{milliseconds / unit:.1f}",
+            f"{ratio * sweeps:.1f}",
             f"{sum(passes.values()):.1f}",
             f"{sum(reads.values()) / 1e6:.2f}",
             f"{traffic:.0f}",
