@@ -22,8 +22,10 @@ MOST_SAMPLES = 8
 _TAPS = {"nearest": 1, "bilinear": 2, "catmull-rom": 4}
 _REACH = 2  # pixels that the taps reach beyond a place
 _KINDS = {np.dtype(np.uint8): ("f1", 255.0), np.dtype(np.uint16): ("nu2", 65535.0), np.dtype(np.float32): ("f4", 0.0)}
+_WORDS = {"f1": np.uint32, "nu2": np.uint64}  # that hold four values of it
 _SWIZZLES = {1: "RRR1", 2: "RRRG", 3: "RGB1", 4: "RGBA"}
 _TARGET_COMPONENTS = {1: 1, 2: 2, 3: 4, 4: 4}  # targets of three components are not promised by GL
+_WIDENED = 1 << 17  # pixels that are given a fourth value at once
 _SMALLEST_TILE = 16  # pixels of the picture, were there no map
 _BLOCK = 64  # pixels along a block of the result that is drawn by a shader of its own kind; as llvmpipe's tiles
 
@@ -459,7 +461,7 @@ class Sampler:
         kind, _ = _KINDS[job.picture.dtype]
         least = (width, height) if room is None else (max(width, room[0]), max(height, room[1]))
         raw = self._texture("raw", least, job.channels, kind, exact=room is None)
-        raw.write(np.ascontiguousarray(pixels), viewport=(0, 0, width, height))
+        _write(raw, np.ascontiguousarray(pixels))
         if job.is_prepared:
             prepared = self._field("prepared", raw.size, 4, "f4")
             defines: dict[str, object] = {"LINEAR_LIGHT": 1} if job.is_curved else {}
@@ -486,18 +488,19 @@ class Sampler:
             self._fields[role] = self.device.field(size, components, f"sampling, {role}", dtype)
         return self._fields[role]
 
-    def _texture(self, role: str, size: tuple[int, int], components: int, dtype: str, exact: bool) -> moderngl.Texture:
+    def _texture(self, role: str, size: tuple[int, int], channels: int, dtype: str, exact: bool) -> moderngl.Texture:
         """The texture kept for `role`, of that size or larger; not a field, as it need not be drawn into."""
         kept, kind = self._textures.get(role, (None, ()))
         enough = kept is not None and (kept.size == size or (not exact and min(np.subtract(kept.size, size)) >= 0))
-        if kept is None or kind != (components, dtype) or not enough:
+        if kept is None or kind != (channels, dtype) or not enough:
             if kept is not None:
                 kept.release()
+            components = 4 if channels == 3 and dtype in _WORDS else channels
             texture = self.device.ctx.texture(size, components, dtype=dtype, alignment=1)
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             texture.repeat_x = texture.repeat_y = False
-            texture.swizzle = _SWIZZLES[components]
-            self._textures[role] = texture, (components, dtype)
+            texture.swizzle = _SWIZZLES[channels]
+            self._textures[role] = texture, (channels, dtype)
         return self._textures[role][0]
 
 
@@ -510,6 +513,25 @@ def apply(
         return sampler.apply(warp, picture, size, how)
     finally:
         sampler.release()
+
+
+def _write(texture: moderngl.Texture, pixels: np.ndarray) -> None:
+    """Write contiguous pixels into the top left corner of a texture of as many components, or of four for three."""
+    height, width, channels = pixels.shape
+    if texture.components == channels:
+        texture.write(pixels, viewport=(0, 0, width, height))
+        return
+    # A driver widens pixels of three values one by one. Here each is copied together with the first value of the next,
+    # which takes half the time; nobody looks at that value. Some rows at a time stay in the cache.
+    rows = max(1, _WIDENED // width)
+    wide = np.empty((rows, width, 4), pixels.dtype)
+    words = wide.reshape(-1).view(_WORDS[texture.dtype])
+    for top in range(0, height, rows):
+        some = pixels[top : top + rows]
+        count = len(some) * width - 1
+        words[:count] = np.ndarray(count, words.dtype, some, strides=(3 * pixels.itemsize,))
+        wide.reshape(-1, 4)[count, :3] = some[-1, -1]
+        texture.write(wide[: len(some)], viewport=(0, top, width, len(some)))
 
 
 def _rectangles(mask: np.ndarray) -> np.ndarray:
