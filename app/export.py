@@ -501,13 +501,15 @@ def looked_up(
     alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
     check: called with every band; may raise, as `Progress.check` does.
     """
-    opaque = pixels.shape[2] in (1, 3)
-    given = with_alpha(pixels) if alpha and opaque and how.edges == "transparent" else pixels
     result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)
+    if not alpha or pixels.shape[2] in (2, 4) or how.edges != "transparent":
+        for _ in sampler.bands(warp, pixels, size, how, result):
+            check()
+        return result
     top = 0
-    for band in sampler.bands(warp, given, size, how):
+    for band in sampler.bands(warp, with_alpha(pixels), size, how):
         check()
-        if given is not pixels and result.shape[2] == pixels.shape[2] and (band[..., -1] < opaque_value(band)).any():
+        if result.shape[2] == pixels.shape[2] and (band[..., -1] < opaque_value(band)).any():
             result = with_alpha(result)
         result[top : top + len(band)] = band[..., : result.shape[2]]
         top += len(band)
