@@ -36,7 +36,7 @@ from solver.context import Device
 
 ROUNDS = 3
 RATE = 30
-ENDINGS = (".mp4", ".mov", ".%04d.png", ".webm")
+ENDINGS = (".mp4", ".mov", ".%04d.png", ".webm", ".gif")
 
 
 def encode(path: Path, frames: Iterable[np.ndarray]) -> None:
