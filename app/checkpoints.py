@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 from app.recipe import Recipe
 from solver.context import Device
@@ -20,7 +21,7 @@ class State:
     fields: tuple[Field, ...]
     warp: MapState
 
-    @property
+    @cached_property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
         return sum(field.nbytes for field in self.fields) + self.warp.nbytes

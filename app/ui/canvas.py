@@ -22,6 +22,9 @@ FORCE_COLOUR = (1.0, 0.87, 0.2)
 RESTING = 0.5  # how strong a force is shown while it does not act
 GRID_LINES = 24.0
 
+Pixels = tuple[int, int, int, int]
+"""Left, top, right, bottom."""
+
 
 class Canvas:
     """The canvas of one picture.
@@ -64,9 +67,12 @@ class Canvas:
         palette: Palette,
         scale: float,
     ) -> None:
-        """Draw into `target`, `height` pixels high, what of the picture lies on the canvas."""
+        """Draw the canvas into `target`, `height` pixels high: what of the picture lies on it, and the ground."""
         density, rect = viewport.density, viewport.rect
         visible = _common(rect, viewport.canvas)
+        seen = (0, 0, 0, 0) if visible is None else _in_pixels(visible, density)
+        for strip in _around(seen, _in_pixels(viewport.canvas, density)):
+            target.clear(*palette.ground, viewport=_from_below(strip, height))
         if visible is None:
             return
         replay = session.replay
@@ -98,11 +104,8 @@ class Canvas:
             defines["FORCES"] = 1
             inputs |= {"force": force, "room": room, "force_arrow": FORCE_ARROW * scale * density}
             inputs |= {"forces_opacity": state.overlays["forces"].opacity, "force_colour": FORCE_COLOUR}
-        # One pixel more or less of a picture between pixels is nobody's; no pixel twice is what counts.
-        left, top = round(visible.x * density), round(visible.y * density)
-        right, bottom = round(visible.right * density), round(visible.bottom * density)
         before = target.viewport
-        target.viewport = (left, height - bottom, right - left, bottom - top)
+        target.viewport = _from_below(seen, height)
         draw = self.device.pass_("view/canvas.frag", **defines)
         draw.draw_into(target, ("displacement", "viscosity", "solid", "velocity", "force", "room"), **inputs)
         target.viewport = before
@@ -206,6 +209,27 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
     alpha = pixels[..., 3:].astype(np.uint16)
     colours = ((pixels[..., :3] * alpha + 127) // 255).astype(np.uint8)
     return np.ascontiguousarray(np.concatenate([colours, pixels[..., 3:]], axis=2))
+
+
+def _in_pixels(rect: Rect, density: float) -> Pixels:
+    """A rectangle of points in whole pixels: one more or less is nobody's; none twice is what counts."""
+    return tuple(round(side * density) for side in (rect.x, rect.y, rect.right, rect.bottom))
+
+
+def _from_below(pixels: Pixels, height: int) -> Pixels:
+    """Pixels as GL counts them: x, y from below, width, height."""
+    left, top, right, bottom = pixels
+    return left, height - bottom, right - left, bottom - top
+
+
+def _around(inner: Pixels, outer: Pixels) -> list[Pixels]:
+    """What of `outer` is not `inner`, which lies within it or is empty: clearing less than all of it is cheaper."""
+    left, top, right, bottom = inner
+    if right <= left or bottom <= top:
+        return [outer]
+    x0, y0, x1, y1 = outer
+    strips = [(x0, y0, x1, top), (x0, bottom, x1, y1), (x0, top, left, bottom), (right, top, x1, bottom)]
+    return [strip for strip in strips if strip[0] < strip[2] and strip[1] < strip[3]]
 
 
 def _common(a: Rect, b: Rect) -> Rect | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +31,7 @@ from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
 from app.ui.state import LARGEST, SMALLEST, State
-from app.ui.viewport import Rect, Viewport
+from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
 from solver.context import Device
 
@@ -182,6 +183,7 @@ class Editor:
             density: pixels a point of the events' coordinates.
             scale: of the interface, as the screen asks for; the preferences' own comes on top.
         """
+        begun = time.perf_counter()
         with self.clock.measure("frame"):
             self._lay_out((size[0] / density, size[1] / density), density, scale)
             self._hear(events)
@@ -191,7 +193,7 @@ class Editor:
             self._draw(target, size, dt, events)
         self.clock.frame_done()
         if self.quality.is_measuring:
-            self.quality.warm_up()
+            self.quality.warm_up(begun)
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
@@ -266,7 +268,6 @@ class Editor:
         target.viewport = (0, 0, *size)
         # Clearing is many times cheaper than the same rectangles drawn by imgui, which blends every pixel.
         target.clear(*self.ui.palette.panel)
-        target.clear(*self.ui.palette.ground, viewport=self._in_pixels(self.layout.canvas, size[1]))
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         points, by_keys = (size[0] / self.ui.density, size[1] / self.ui.density), bool(self.dialogs) or self._popup_open
@@ -290,13 +291,6 @@ class Editor:
         self._popup_open = imgui.is_popup_open("", anywhere)
         with self.clock.measure("interface"):
             self.host.end(target)
-
-    def _in_pixels(self, rect: Rect, height: int) -> tuple[int, int, int, int]:
-        """A rectangle as GL counts: x, y from below, width, height."""
-        density = self.ui.density
-        left, top = round(rect.x * density), round(rect.y * density)
-        right, bottom = round(rect.right * density), round(rect.bottom * density)
-        return left, height - bottom, right - left, bottom - top
 
     def _draw_dialog(self) -> None:
         self.files.poll()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from imgui_bundle import imgui
@@ -116,13 +116,22 @@ def draw(
     target: imgui.ImDrawList, name: str, x: float, y: float, size: float, colour: int, weight: float = 1.6
 ) -> None:
     """Draw an icon into the square of `size` with its top left corner at (x, y)."""
-    k = size / 24
-    lines, dots = _shape(name)
-    for points, closed in lines:
-        places: list[Any] = [imgui.ImVec2(x + px * k, y + py * k) for px, py in points]
+    lines, dots = _placed(name, x, y, size)
+    weight *= size / 24
+    for places, closed in lines:
         if closed and name in FILLED:
             target.add_convex_poly_filled(places, colour)
-        flags = imgui.ImDrawFlags_.closed if closed else 0
-        target.add_polyline(places, colour, weight * k, int(flags))
-    for px, py, radius in dots:
-        target.add_circle_filled(imgui.ImVec2(x + px * k, y + py * k), radius * k, colour)
+        target.add_polyline(places, colour, weight, int(imgui.ImDrawFlags_.closed) if closed else 0)
+    for place, radius in dots:
+        target.add_circle_filled(place, radius, colour)
+
+
+@lru_cache(maxsize=512)
+def _placed(
+    name: str, x: float, y: float, size: float
+) -> tuple[list[tuple[list[Any], bool]], list[tuple[imgui.ImVec2, float]]]:
+    """The lines and dots of an icon on the screen: most are where they were a frame ago."""
+    k = size / 24
+    lines, dots = _shape(name)
+    placed = [([imgui.ImVec2(x + px * k, y + py * k) for px, py in points], closed) for points, closed in lines]
+    return placed, [(imgui.ImVec2(x + px * k, y + py * k), radius * k) for px, py, radius in dots]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
+from statistics import median_low
 from typing import TYPE_CHECKING
 
 from app.replay import Replay
@@ -12,12 +14,44 @@ from app.ui.files import fresh_recipe
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-GRIDS = (96, 128, 192, 256, 384)
+GRIDS = (96, 128, 160, 192, 256, 384)
 PATIENCE = 1.5  # seconds below the wanted rate before something is done about it
 WANTED = 30.0  # frames a second while painting
-ROOM = 10.0  # milliseconds of a frame that are not the simulation's
-TRIALS = 6  # ticks
-FIRST = 256  # cells, of the grid that the machine is measured on
+SPARE = 0.15  # of a frame, for what comes now and then: checkpoints, looks at the map, other programs
+TRIALS = (256, 128)  # cells, of the grids that the machine is measured on
+TICKS = 8  # on each of them
+FAST = 4.0  # milliseconds; a tick that takes less may be made 60 times a second
+
+
+@dataclass(frozen=True)
+class Speed:
+    """What a frame of painting takes on this machine, in milliseconds.
+
+    Attributes:
+        fixed: of a tick, on whatever grid: many passes cost the same on any.
+        growing: of a tick on a grid of `TRIALS[0]`, in proportion to its cells.
+        drawing: of the canvas and the interface.
+    """
+
+    fixed: float
+    growing: float
+    drawing: float
+
+    @classmethod
+    def of(cls, fine: float, coarse: float, drawing: float) -> Speed:
+        """From what a tick takes on the two grids of `TRIALS`."""
+        share = (TRIALS[1] / TRIALS[0]) ** 2
+        growing = max(fine - coarse, 0.0) / (1 - share)
+        return cls(max(fine - growing, 0.0), growing, drawing)
+
+    def tick(self, grid: int) -> float:
+        return self.fixed + self.growing * (grid / TRIALS[0]) ** 2
+
+    @property
+    def best_grid(self) -> int:
+        """The finest grid on which painting reaches the wanted rate, with something to spare."""
+        room = (1 - SPARE) * 1e3 / WANTED - self.drawing
+        return max((grid for grid in GRIDS if self.tick(grid) <= room), default=GRIDS[0])
 
 
 class Quality:
@@ -29,9 +63,10 @@ class Quality:
         self._pending = False
         self._limit = GRIDS[-1]
         self._frames = 0
-        self._measured: float | None = None
+        self._speed: Speed | None = None
         self._trial: Replay | None = None
-        self._spent: list[float] = []
+        self._spent: list[list[float]] = []  # milliseconds of the ticks on each grid of `TRIALS` so far
+        self._drawing: list[float] = []
 
     def opened(self) -> None:
         """Something new is open; an untouched picture is given the grid that this machine does well on."""
@@ -40,44 +75,51 @@ class Quality:
         # Who has undone everything may want it back: what can be redone was made on the grid as it is.
         history = session.document.history
         fresh = len(history.entries) == 1 and history.recipe.edited(picture=None) == fresh_recipe()
-        if self._measured is None or not self.editor.state.auto_quality or not fresh:
+        if self._speed is None or not self.editor.state.auto_quality or not fresh:
             return
-        grid = self.best_grid(self._measured)
-        grid = min(grid, self._limit)
-        fast = self._measured * (grid / FIRST) ** 2 < 4
-        session.begin_with(grid=grid, dt=1 / 60 if fast else 1 / 30)
-
-    @staticmethod
-    def best_grid(milliseconds: float) -> int:
-        """The finest grid that leaves `ROOM` in a frame, where a tick on `FIRST` takes `milliseconds`."""
-        good = [grid for grid in GRIDS if milliseconds * (grid / FIRST) ** 2 <= 1e3 / WANTED - ROOM]
-        return max(good, default=GRIDS[0])
+        grid = min(self._speed.best_grid, self._limit)
+        session.begin_with(grid=grid, dt=1 / 60 if self._speed.tick(grid) < FAST else 1 / 30)
 
     @property
     def is_measuring(self) -> bool:
-        return self.editor.state.auto_quality and self._measured is None
+        return self.editor.state.auto_quality and self._speed is None
 
-    def warm_up(self) -> None:
-        """After the first frames, a tick a frame: compile what the first stroke needs, and measure this machine."""
+    def warm_up(self, begun: float) -> None:
+        """After the first frames, a tick a frame: compile what the first stroke needs, and measure this machine.
+
+        `begun`: when the frame was, on `time.perf_counter`.
+        """
         self._frames += 1
-        session = self.editor.session
+        session, finish = self.editor.session, self.editor.device.ctx.finish
         if self._frames < 2 or session.is_moving:
             return
+        finish()
+        self._drawing.append((time.perf_counter() - begun) * 1e3)
         if self._trial is None:
-            stroke = Stroke(tool="push", radius=0.15, samples=((0, 0.4, 0.5, 1.0), (TRIALS, 0.5, 0.5, 1.0)))
-            fluid = session.recipe.fluid.model_copy(update={"grid": FIRST})
-            recipe = session.recipe.edited(stroke=(stroke,), change=(), fluid=fluid)
-            self._trial = Replay(self.editor.device, recipe, session.pictures, budget=0)
+            self._trial = self._new_trial(TRIALS[len(self._spent)])
+            self._spent.append([])
         start = time.perf_counter()
         self._trial.advance()
-        self.editor.device.ctx.finish()
-        self._spent.append((time.perf_counter() - start) * 1e3)
-        if len(self._spent) == TRIALS:
-            self._trial.release()
-            self._trial = None
-            # The first ones compile; the quickest is the one that nobody else's work has slowed down.
-            self._measured = min(self._spent[2:])
+        self._trial.warp.composed(1)
+        finish()
+        self._spent[-1].append((time.perf_counter() - start) * 1e3)
+        if len(self._spent[-1]) < TICKS:
+            return
+        self._trial.release()
+        self._trial = None
+        if len(self._spent) == len(TRIALS):
+            # The first ones compile.
+            fine, coarse = (median_low(ticks[2:]) for ticks in self._spent)
+            self._speed = Speed.of(fine, coarse, median_low(self._drawing[2:]))
             self.opened()
+
+    def _new_trial(self, grid: int) -> Replay:
+        """A push of which the picture on the canvas knows nothing."""
+        session = self.editor.session
+        stroke = Stroke(tool="push", radius=0.15, samples=((0, 0.4, 0.5, 1.0), (TICKS, 0.52, 0.5, 1.0)))
+        fluid = session.recipe.fluid.model_copy(update={"grid": grid})
+        recipe = session.recipe.edited(stroke=(stroke,), change=(), fluid=fluid)
+        return Replay(self.editor.device, recipe, session.pictures, budget=0)
 
     def look(self, dt: float) -> None:
         """Watch the rate while the person paints; a coarser grid is taken when the stroke is finished.
@@ -90,7 +132,7 @@ class Quality:
         if editor.session.is_painting:
             # A hiccup, such as a shader that is compiled, is no slow machine.
             if dt < 0.25:
-                slow = dt > 1.2 / WANTED
+                slow = dt > 1.1 / WANTED
                 self._slow_for = min(max(self._slow_for + (dt if slow else -dt), 0.0), 3.0)
             self._pending = self._pending or self._slow_for > PATIENCE
         elif self._pending and not editor.session.is_moving and not editor.session.document.history.can_redo:

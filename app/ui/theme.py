@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 
@@ -76,6 +77,7 @@ LIGHT = Palette(
 PALETTES = {"dark": DARK, "light": LIGHT}
 
 
+@lru_cache(maxsize=4096)
 def packed(colour: Colour, alpha: float = 1.0) -> int:
     """A colour as the draw lists take it."""
     r, g, b, a = (round(min(max(part, 0.0), 1.0) * 255) for part in (*colour[:3], colour[3] * alpha))

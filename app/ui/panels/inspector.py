@@ -16,7 +16,7 @@ from app.ui.widgets import Slid, Ui
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-GRIDS = (128, 192, 256, 384)
+GRIDS = (128, 160, 192, 256, 384)
 EDGES = ("clamp", "mirror", "wrap", "transparent", "black")
 WALLS = ("free-slip", "no-slip")
 
