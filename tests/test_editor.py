@@ -1080,6 +1080,44 @@ def test_sliders_take_a_typed_number_and_their_default(robot: Robot, feel: str) 
     assert value() == pytest.approx(1.25)
 
 
+def type_viscosity(robot: Robot, number: str) -> None:
+    """Ctrl+click the viscosity's slider and type a number, without Enter."""
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    robot.mods = Mods(ctrl=True)
+    robot.click(rect.x + 120, rect.y + 111)
+    robot.mods = Mods()
+    robot.key("ctrl+a")
+    robot.type(number)
+    robot.frame(count=2)
+    assert robot.editor._is_typing
+
+
+def test_saving_takes_the_number_that_is_being_typed(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / f"work{projects.SUFFIX}"
+    project = robot.editor.session.project
+    robot.editor.session.saved(replace(project, path=path))
+    type_viscosity(robot, "0.75")
+    robot.key("ctrl+s")
+    robot.frame(count=3)
+    assert load_any(path).recipe.fluid.viscosity == pytest.approx(0.75)
+    assert names(robot) == ["Open", "Viscosity"]
+    assert not robot.editor.is_dirty
+    assert not robot.editor._is_typing
+
+
+def test_shortcuts_of_files_work_while_a_number_is_typed_and_undo_stays_the_fields_own(robot: Robot) -> None:
+    type_viscosity(robot, "0.75")
+    robot.key("ctrl+z")
+    robot.frame(count=2)
+    assert robot.editor._is_typing
+    assert "Viscosity" not in names(robot)
+    robot.key("p")
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    assert isinstance(robot.editor.dialogs[-1], ExportDialog)
+
+
 # Automatic quality ----------------------------------------------------------------------------------------------------
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
+from imgui_bundle.imgui import internal
 
 from app.errors import UserError
 from app.project import Project
@@ -77,6 +78,7 @@ class Editor:
         self._styled: tuple[object, ...] = ()
         self._held_by_imgui = False
         self._popup_open = False
+        self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken
         self.placeholder: Session | None = None
         self._sessions: list[tuple[Session, Canvas]] = []
         self._index = -1
@@ -233,7 +235,7 @@ class Editor:
             case Key(key, down, mods, repeat):
                 if key == "\\":
                     self.state.before = down and not self._is_typing
-                if down and not self._is_typing and not self.dialogs:
+                if down and not self.dialogs:
                     self._key(key, mods.chord(key), repeat)
                 if not self.dialogs and not self._is_typing:
                     self.hand.hear(event)
@@ -252,7 +254,10 @@ class Editor:
         # Space is also held to pan, so that it plays only once it is let go.
         if action is None or key == "space" or (repeat and not action.repeats):
             return
-        self.do(action.name)
+        if not self._is_typing:
+            self.do(action.name)
+        elif action.group == "File":
+            self._once_typed.append(action.name)
 
     def do(self, name: str) -> None:
         """Do one of the actions, if it can be done now."""
@@ -272,6 +277,9 @@ class Editor:
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         points, by_keys = (size[0] / self.ui.density, size[1] / self.ui.density), bool(self.dialogs) or self._popup_open
         self.host.begin(points, self.ui.density, dt, events, by_keys)
+        if self._once_typed:
+            # The field is left, as if by Enter, so that what was typed is taken before it is saved.
+            internal.clear_active_id()
         try:
             with self.clock.measure("panels"):
                 panels.draw(self.ui, self)
@@ -282,6 +290,9 @@ class Editor:
                 self.files.draw(self.ui, self.layout.canvas)
                 self.messages.draw(self.ui, self.layout.canvas, dt)
                 self._draw_dialog()
+            names, self._once_typed = self._once_typed, []
+            for name in names:
+                self.do(name)
         except UserError as error:
             self.messages.warn(str(error))
         io = imgui.get_io()
