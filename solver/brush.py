@@ -117,8 +117,8 @@ class Brush:
         """Add what the fluid lacks of a motion, `headway` times.
 
         With `warp`, the picture's map, a push lets slip what has come a long way with it already.
-        With `yielding` it spares what is thicker than the fluid at the tip, and what is frozen: for the last touch
-        before the projection, which viscosity does not spread any more.
+        With `yielding` it spares what is thicker than the fluid at the tip, and does less the more of the brush lies on
+        what is frozen: for the last touch before the projection, which viscosity does not spread any more.
         """
         h, tip = fluid.grid.h, motion.tip
         at = (tip.end[0] / h, tip.end[1] / h)

@@ -175,6 +175,27 @@ def test_a_moderate_push_does_not_fold(session: Session, feel: Feel, radius: flo
     assert statistics.displacement_max > 0.15
 
 
+def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Session) -> None:
+    session.set_grid(128)
+    session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    frozen = Press(BrushSettings(0.07, 0.6), False, session.extent, session.dt)
+    session.press(TOOL["freeze"], frozen, 0.67, 0.37)
+    for k in range(1, 9):
+        session.move(0.67, 0.37 + 0.016 * k)
+        session.advance(1)
+    session.release()
+    session.settle()
+    session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.45, 0.5)
+    for k in range(1, 15):
+        session.move(0.45 + 0.015 * k, 0.5 - 0.004 * k)
+        session.advance(1)
+    session.release()
+    session.settle()
+    statistics = session.replay.warp.statistics()
+    assert statistics.displacement_max > 0.05
+    assert statistics.folds == 0
+
+
 @pytest.mark.parametrize("feel", [HONEY, PUTTY], ids=lambda feel: feel.name)
 @pytest.mark.parametrize(
     "ways",

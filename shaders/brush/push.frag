@@ -7,7 +7,7 @@
 // without end becomes thinner than a cell, and the map folds there.
 // u_motion: the fluid's motion at the brush, from probe; u_carried: the warp map's displacement there, lengths;
 // u_brush_velocity: lengths / s.
-// reads: 2, and 24 when YIELDING
+// reads: 2, and 36 when YIELDING
 #include "lib/brush.glsl"
 #include "lib/yielding.glsl"
 uniform sampler2D u_motion;
@@ -39,7 +39,7 @@ float grip() {
 void main() {
     vec2 cell = floor(gl_FragCoord.xy);
     vec4 motion = texelFetch(u_motion, ivec2(0), 0);
-    vec2 force = u_headway * u_strength * (grip() * u_brush_velocity - motion.xy);
+    vec2 force = u_headway * u_strength * leeway() * (grip() * u_brush_velocity - motion.xy);
     float corner = stream(cell, force, motion.w);
     vec2 velocity = vec2(stream(cell + vec2(0.0, 1.0), force, motion.w) - corner,
                          corner - stream(cell + vec2(1.0, 0.0), force, motion.w));

@@ -1,6 +1,6 @@
 // Twirl: make the fluid under the brush turn at a rate, drawn with additive blending: dv = headway domega g(r) (-y, x).
 // u_motion: the fluid's motion at the brush, from probe; u_rate: wanted rotation, rad / s, positive clockwise.
-// reads: 1, and 16 when YIELDING
+// reads: 1, and 32 when YIELDING
 #include "lib/brush.glsl"
 #include "lib/yielding.glsl"
 uniform sampler2D u_motion;
@@ -17,7 +17,7 @@ vec2 spin(vec2 cell, float rate, float viscosity) {
 void main() {
     vec2 cell = floor(gl_FragCoord.xy);
     vec4 motion = texelFetch(u_motion, ivec2(0), 0);
-    float rate = u_headway * (u_rate > 0.0 ? max(u_rate - motion.z, 0.0) : min(u_rate - motion.z, 0.0));
+    float rate = u_headway * leeway() * (u_rate > 0.0 ? max(u_rate - motion.z, 0.0) : min(u_rate - motion.z, 0.0));
     vec2 velocity = vec2(spin(cell + vec2(0.0, 0.5), rate, motion.w).x, spin(cell + vec2(0.5, 0.0), rate, motion.w).y);
     out_velocity = velocity * vec2(greaterThan(cell, vec2(0.5)));
 }
