@@ -213,7 +213,8 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
 
 def _in_pixels(rect: Rect, density: float) -> Pixels:
     """A rectangle of points in whole pixels: one more or less is nobody's; none twice is what counts."""
-    return tuple(round(side * density) for side in (rect.x, rect.y, rect.right, rect.bottom))
+    left, top, right, bottom = (round(side * density) for side in (rect.x, rect.y, rect.right, rect.bottom))
+    return left, top, right, bottom
 
 
 def _from_below(pixels: Pixels, height: int) -> Pixels:

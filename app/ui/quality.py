@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 GRIDS = (96, 128, 160, 192, 256, 384)
 PATIENCE = 1.5  # seconds below the wanted rate before something is done about it
 WANTED = 30.0  # frames a second while painting
-# Of a frame: painting takes a tenth more than what is measured, by checkpoints, looks at the map and a longer recipe, and
-# other programs want their part.
+# Of a frame: painting takes a tenth more than what is measured, by checkpoints, looks at the map and a longer recipe;
+# and other programs want their part.
 SPARE = 0.2
 TRIALS = (256, 128)  # cells, of the grids that the machine is measured on
 TICKS = 8  # on each of them
