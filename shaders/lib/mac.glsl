@@ -22,11 +22,15 @@ vec2 mac_velocity(sampler2D velocity, vec2 p) {
     return vec2(dot(u, vec4(ux * uy.x, ux * uy.y)), dot(v, vec4(vx * vy.x, vx * vy.y))) + moved;
 }
 
-// Velocity at the centre of the cell at p (in cells): the mean of opposite faces. 3 reads.
+// Velocity at the centre of the cell at p (in cells), the mean of opposite faces: of its own, and of those to the right
+// and below, which are at rest where they are the grid's edge.
+vec2 mac_centre(vec2 own, vec2 beyond, vec2 p, vec2 size) { return 0.5 * (own + beyond * vec2(lessThan(p + 1.0, size))); }
+
+// The same, from the field. 3 reads.
 vec2 mac_centre(sampler2D velocity, vec2 p) {
     vec2 size = vec2(textureSize(velocity, 0)), texel = 1.0 / size, uv = p * texel;
     vec2 beyond = vec2(texture(velocity, uv + vec2(texel.x, 0.0)).r, texture(velocity, uv + vec2(0.0, texel.y)).g);
-    return 0.5 * (texture(velocity, uv).rg + beyond * vec2(lessThan(p + 1.0, size)));
+    return mac_centre(texture(velocity, uv).rg, beyond, p, size);
 }
 
 // Where the fluid at position p (in cells) was `dt_over_h` ago: second-order (midpoint) backtrace, kept in the grid.

@@ -14,10 +14,13 @@ layout(location = 1) out vec4 out_departing;
 
 void main() {
     vec2 p = gl_FragCoord.xy;
-    out_displacement = mac_backtrace(u_velocity, p, mac_centre(u_velocity, p), u_dt_over_h) - p;
 #ifdef DEPART
-    vec2 texel = 1.0 / vec2(textureSize(u_velocity, 0)), here = p * texel, right = vec2(here.x + texel.x, here.y);
-    out_departing = vec4(texture(u_velocity, here).rg - texture(u_carried, here).rg,
-                         texture(u_velocity, right).rg - texture(u_carried, right).rg);
+    vec2 size = vec2(textureSize(u_velocity, 0)), texel = 1.0 / size, here = p * texel, right = vec2(here.x + texel.x, here.y);
+    vec2 own = texture(u_velocity, here).rg, beside = texture(u_velocity, right).rg;
+    out_departing = vec4(own - texture(u_carried, here).rg, beside - texture(u_carried, right).rg);
+    vec2 centre = mac_centre(own, vec2(beside.x, texture(u_velocity, vec2(here.x, here.y + texel.y)).g), p, size);
+#else
+    vec2 centre = mac_centre(u_velocity, p);
 #endif
+    out_displacement = mac_backtrace(u_velocity, p, centre, u_dt_over_h) - p;
 }
