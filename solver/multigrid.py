@@ -56,9 +56,13 @@ class Cycle:
     each: float
     twice: int = 0
 
-    def left(self, whole: float, rough: float, cycles: int = 1) -> float:
-        """What so many cycles leave of the whole divergence and its rough part."""
-        return (self.rough * rough + self.smooth * whole) * self.each ** (cycles - 1)
+    def left(self, whole: float, rough: float, cycles: int = 1, is_warm: bool = False) -> float:
+        """What so many cycles leave of the whole divergence and its rough part, from rest or from a warm start.
+
+        What is left at a warm start is what such cycles before were worst at, and so is this one.
+        """
+        first = self.rough * rough + self.smooth * whole
+        return max(first, self.each * whole if is_warm else 0.0) * self.each ** (cycles - 1)
 
 
 _LIGHT = chebyshev_weights(2, 0.6), chebyshev_weights(3, 0.35), chebyshev_weights(4, 0.25)
@@ -68,8 +72,8 @@ _THOROUGH = chebyshev_weights(4, 0.5), *_COARSER
 # From the cheapest on.
 OPEN = (
     Cycle(_LIGHT, rough=0.35, smooth=0.003, each=0.2),
-    Cycle(_QUICK, rough=0.25, smooth=0.0025, each=0.08),
-    Cycle(_THOROUGH, rough=0.13, smooth=0.002, each=0.045),
+    Cycle(_QUICK, rough=0.25, smooth=0.0025, each=0.1),
+    Cycle(_THOROUGH, rough=0.17, smooth=0.002, each=0.05),
 )
 # Among walls each is followed by a step to where the residual is least, and that is measured.
 WALLED = (
@@ -83,10 +87,10 @@ POOR = 0.35
 STALLED = 0.9
 
 
-def cheapest(cycles: tuple[Cycle, ...], whole: float, rough: float) -> tuple[Cycle, int]:
+def cheapest(cycles: tuple[Cycle, ...], whole: float, rough: float, is_warm: bool = False) -> tuple[Cycle, int]:
     """The kind of cycle, of these, and the number of them that leave little enough at the least cost."""
     plans = ((cycle, number) for number in range(1, MOST_CYCLES) for cycle in cycles)
-    enough = ((cycle, number) for cycle, number in plans if cycle.left(whole, rough, number) <= WANTED_LEFT)
+    enough = ((cycle, number) for cycle, number in plans if cycle.left(whole, rough, number, is_warm) <= WANTED_LEFT)
     return next(enough, (cycles[-1], MOST_CYCLES))
 
 
@@ -311,7 +315,7 @@ class Pressure:
 
     def _cycle_in_the_open(self, start: tuple[float, float], cycles: int | None, before: int) -> int:
         """So many cycles, or as many as do; see `_keep_correction` for `before`."""
-        self._kind, number = (OPEN[-1], cycles) if cycles else cheapest(OPEN, *start)
+        self._kind, number = (OPEN[-1], cycles) if cycles else cheapest(OPEN, *start, bool(before))
         for cycle in range(number):
             self._solve(0)
             if cycle < number - 1:
