@@ -160,25 +160,20 @@ class Pressure:
             for name in ("base", "last", "change", "way", "applied way")
         )
         self._applied = device.field(blocks, 4, "pressure applied")
-        self._products = device.field(blocks, 4, "pressure products")
-        self._add_products = Reduction(device, blocks, 4, "sum")
-        # While a velocity is projected, what is wanted of its divergence and where; then the pressure's gradient.
+        # While a velocity is projected, the first holds what is wanted of its divergence; then the pressure's gradient.
         self._across, self._down = (device.field(blocks, 4, f"pressure {name}") for name in ("across", "down"))
-        self._squares = device.field(blocks, 4, "pressure squares")
-        self._add_squares = Reduction(device, blocks, 4, "sum")
-        self._sums: list[Field] = []
-        while blocks != (1, 1) or not self._sums:
-            blocks = ((blocks[0] + 7) // 8, (blocks[1] + 7) // 8)
-            self._sums.append(device.field(blocks, 2, "pressure sums"))
+        # What is summed over the grid, block by block, and read back at once.
+        self._products = device.field(blocks, 4, "pressure products")
+        self._add_up = Reduction(device, blocks, 4, "sum")
         self.set_solids(None)
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self._levels, *self._sums, self._inverse, self._separable, self._base, self._last, self._change):
+        for item in (*self._levels, self._inverse, self._separable, self._base, self._last, self._change):
             item.release()
-        for item in (self._way, self._applied_way, self._applied, self._products, self._add_products):
+        for item in (self._way, self._applied_way, self._applied, self._products, self._add_up):
             item.release()
-        for item in (self._across, self._down, self._squares, self._add_squares):
+        for item in (self._across, self._down):
             item.release()
 
     # -- what goes in and comes out ---------------------------------------------------------------------------------
@@ -272,8 +267,7 @@ class Pressure:
     def divergence_norm(self, velocity: Field) -> float:
         """Root mean square divergence of a MAC velocity over all cells, 1 / s; waits for the GPU."""
         self._take_divergence({"velocity": velocity}, None)
-        residual = self._levels[0].residual.read
-        squares = float(self._dot(residual, residual).get()[0, 0, 1])
+        squares = float((self._levels[0].residual.read.get().astype(np.float64) ** 2).sum())
         return sqrt(squares / (self.size[0] * self.size[1])) / self.h
 
     # -- the solve --------------------------------------------------------------------------------------------------
@@ -293,11 +287,12 @@ class Pressure:
         target: Target = finest.residual.read
         if expected:
             defines["EXPECTED"] = 1
-            target = finest.residual.read, self._squares
+            target = finest.residual.read, self._products
         if source is not None:
             defines["WITH_SOURCE"] = 1
-            self._draw("gather_source", (self._across, self._down), finest, source=source, scale=self.h)
-            expected |= {"source": self._across, "sums": self._dot(self._across, self._down)}
+            self._draw("gather_source", (self._across, self._products), finest, source=source, scale=self.h)
+            total, cells, *_ = self._add_up(self._products).tolist()
+            expected |= {"source": self._across, "mean": total / max(cells, 1.0)}
         self._draw("divergence", target, finest, defines, **given, **expected)
 
     def _try_expected(
@@ -309,7 +304,7 @@ class Pressure:
             The norm of the divergence, and the parts of it, of all and of the rough, that there are at rest and there.
         """
         self._take_divergence(given, source, expected=self._base.read)
-        squares = self._add_squares(self._squares)
+        squares = self._add_up(self._products)
         whole, rough, left, left_rough = np.sqrt(np.maximum(squares, 0.0) / (squares[0] or 1.0)).tolist()
         return sqrt(squares[0]), (whole, rough), (left, left_rough)
 
@@ -388,7 +383,7 @@ class Pressure:
         before: dict[str, Any] = {} if is_first else {"before": self._applied_way.read}
         self._draw("residual", (self._applied, self._products), level, {"PRODUCTS": 1, **first},
                    pressure=pressure.read, residual=residual.read, **before)  # fmt: skip
-        along, length2, shared, left2 = self._add_products(self._products).tolist()
+        along, length2, shared, left2 = self._add_up(self._products).tolist()
         beta = 0.0
         if not is_first:
             before["way"] = self._way.read
@@ -415,13 +410,6 @@ class Pressure:
         else:
             self.device.pass_("pressure/add.frag")(self._change.write, a=self._change.read, b=pressure.read)
             self._change.swap()
-
-    def _dot(self, a: Field, b: Field) -> Field:
-        """The scalar products (a . b, b . b) in one texel, as `lib/quotient.glsl` takes them."""
-        self.device.pass_("pressure/dot_products.frag")(self._sums[0], a=a, b=b)
-        for larger, smaller in pairwise(self._sums):
-            self.device.pass_("pressure/add_up.frag")(smaller, sums=larger)
-        return self._sums[-1]
 
 
 def _packing(given: dict[str, Any]) -> dict[str, Any]:

@@ -2,12 +2,11 @@
 //   r = u_right - u_left + v_down - v_up  [- (s - mean)]          sum over open faces of (p' - p) = r
 // in:  u_velocity   MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/block.glsl packs it
 //      u_left, u_up, u_far, u_span   faces
-// With WITH_SOURCE: u_source, h s at blocks, lengths / s; u_sums, whose quotient is its mean over the fluid.
+// With WITH_SOURCE: u_source, h s at blocks, lengths / s; u_mean, its mean over the fluid.
 // With EXPECTED: u_expected, a pressure / h at blocks, lengths / s, that is subtracted: r - A p; and a second output.
 // out: r at blocks, lengths / s;  squares: R of r, G of r - A p, over the block
 // reads: 16
 #include "lib/block_faces.glsl"
-#include "lib/quotient.glsl"
 
 #ifdef PACKED
 uniform sampler2D u_u;
@@ -17,7 +16,7 @@ uniform sampler2D u_velocity;
 #endif
 #ifdef WITH_SOURCE
 uniform sampler2D u_source;
-uniform sampler2D u_sums;
+uniform float u_mean;
 #endif
 
 layout(location = 0) out vec4 out_residual;
@@ -61,7 +60,7 @@ void main() {
     read_faces(left, right, up, down);
     out_residual = f.right * right - f.left * left + f.down * down - f.up * up;
 #ifdef WITH_SOURCE
-    out_residual -= texture(u_source, v_uv) - quotient(u_sums) * live(f);
+    out_residual -= texture(u_source, v_uv) - u_mean * live(f);
 #endif
 #ifdef EXPECTED
     out_squares.xy = squares(out_residual);
