@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from solver.context import Device
     from solver.field import Field
+    from solver.passes import Pass
+
+    Faces = tuple[Field, Field]  # of u and of v
 
 # Products of blocks that one solve is worth; a finer grid is left to multigrid.
 LARGEST = 65536
@@ -76,19 +79,15 @@ class ViscousWaves:
         self.device = device
         self._region = (1, 1, *texels)
         self._box = box
-        self._matrices: list[tuple[Field, Field]] = []
-        sines, cosines = zip(*(_sines_and_cosines(*lengths) for lengths in zip(box, texels, strict=True)), strict=True)
-        # Across and down, and back: of u and of v.
-        for u, v in (
-            (sines[0], cosines[0]),
-            (cosines[1], sines[1]),
-            (cosines[1].T, sines[1]),
-            (sines[0], cosines[0].T),
-        ):
-            self._matrices.append((device.upload(_blocks(u), "waves of u"), device.upload(_blocks(v), "waves of v")))
+        across, down = (_sines_and_cosines(*lengths) for lengths in zip(box, texels, strict=True))
+        # Of u and of v: across, down, and back again.
+        products = (across[0], across[1]), (down[1], down[0]), (down[1].T, down[0]), (across[0], across[1].T)
+        self._matrices = [
+            (device.upload(_blocks(u), "waves of u"), device.upload(_blocks(v), "waves of v")) for u, v in products
+        ]
         ringed = texels[0] + 2, texels[1] + 2
         self._half, self._waves = (
-            tuple(device.field(ringed, 4, f"viscous {name} {component}") for component in "uv")
+            (device.field(ringed, 4, f"viscous {name} u"), device.field(ringed, 4, f"viscous {name} v"))
             for name in ("halfway", "waves")
         )
 
@@ -97,18 +96,20 @@ class ViscousWaves:
         """True if a grid of so many texels is small enough."""
         return _products(texels) <= LARGEST
 
-    def solve(self, right: tuple[Field, Field], faces: tuple[Field, Field], stiffness: float) -> None:
+    def solve(self, right: Faces, faces: Faces, stiffness: float) -> None:
         """The `faces` that the step of `stiffness` dt mu / h^2 makes of `right`, packed faces (u, v) both."""
         across = self.device.pass_("viscosity/waves.frag")
         down = self.device.pass_("viscosity/waves.frag", DOWN=1)
         solved = self.device.pass_("viscosity/waves.frag", DOWN=1, SOLVE=1)
-        step = {"stiffness": stiffness, "box": self._box}
-        half, waves = self._half, self._waves
-        for pass_, source, target, (u, v), inputs in zip(
-            (across, solved, down, across), (right, half, waves, half), (half, waves, half, faces), self._matrices,
-            ({}, step, {}, {}), strict=True,
-        ):  # fmt: skip
-            pass_(target, region=self._region, u=source[0], v=source[1], matrix_u=u, matrix_v=v, **inputs)
+        there, there_down, back_down, back = self._matrices
+        self._draw(across, self._half, right, there)
+        self._draw(solved, self._waves, self._half, there_down, stiffness=stiffness, box=self._box)
+        self._draw(down, self._half, self._waves, back_down)
+        self._draw(across, faces, self._half, back)
+
+    def _draw(self, pass_: Pass, target: Faces, source: Faces, matrices: Faces, **inputs: Any) -> None:
+        u, v = source
+        pass_(target, region=self._region, u=u, v=v, matrix_u=matrices[0], matrix_v=matrices[1], **inputs)
 
     @property
     def nbytes(self) -> int:
