@@ -273,7 +273,7 @@ class Replay:
                 self._apply_masks()
         self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
         with self.device.stage("warp map"):
-            self.warp.advance(self.fluid.velocity.read, dt * part)
+            self.warp.follow(self.fluid, dt * part)
         if self.density is not None:
             self.density.advance(self.fluid.faces(), self.grid, dt * part)
 

@@ -4,7 +4,7 @@
 >>> with Device.headless() as device:
 ...     fluid, warp = Fluid(device, Grid(64, 48)), WarpMap(device, Grid(64, 48))
 ...     fluid.step(1 / 60)
-...     warp.advance(fluid.faces(), 1 / 60)
+...     warp.follow(fluid, 1 / 60)
 """
 
 from importlib import import_module

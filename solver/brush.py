@@ -124,7 +124,8 @@ class Brush:
         at = (tip.end[0] / h, tip.end[1] / h)
         reach = max(0.25 * tip.radius / h, 0.5)
         probe = self.device.pass_("brush/probe.frag")
-        probe(self._motion, velocity=fluid.faces(), viscosity=fluid.viscosity, at=at, reach=reach, h=h)
+        probe(self._motion, velocity=fluid.faces(), impulse=fluid.impulse, viscosity=fluid.viscosity,
+              at=at, reach=reach, h=h)  # fmt: skip
         if warp is not None:
             width, height = fluid.grid.extent
             warp.probe(self._carried, (tip.start[0] / width, tip.start[1] / height))

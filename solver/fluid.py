@@ -17,6 +17,9 @@ from solver.multigrid import Pressure
 from solver.params import FluidParams
 from solver.viscosity import Pair, Viscosity
 
+# Cells along the edges of what departs that depend on the walls.
+RIM = 3
+
 # A force field on the grid's faces, and its time law integrated over the tick (seconds).
 Force = tuple[Field, float]
 
@@ -60,6 +63,7 @@ class Fluid:
         params: walls, drag, cycles; may be replaced between steps.
 
     Attributes:
+        impulse: what brushes have drawn on MAC faces for the next step, lengths / s.
         measuring: let every step leave its `residuals`; it changes no result, and is slow.
     """
 
@@ -71,16 +75,21 @@ class Fluid:
         self.viscosity = device.field(grid.size, 1, "viscosity")
         self.solid = device.field(grid.size, 1, "solid", "f1")
         self.source = device.field(grid.size, 1, "divergence source")
+        self.impulse = device.field(grid.size, 2, "impulse")
         self._trace = device.field(grid.size, 2, "trace")
-        self._departing = device.field(grid.size, 4, "departing velocity")
+        # Two cells more on every side, for what walls make of the velocity there.
+        self._departing = device.field((grid.nx + 4, grid.ny + 4), 4, "departing velocity")
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         self.measuring = False
         self.residuals = Residuals()
+        self._has_impulse = False
         self._has_source = False
+        self._traced_dt: float | None = None  # of what `_trace` holds for the velocity as it is
+        self._is_diffused = False  # between diffusion and projection: w3 is in place
         self._solids_changed = True
         self._solids_of: np.ndarray | None = None
         self._coefficients_of: object = None
-        self._packed: Pair | None = None  # w3 between the stages of a step
+        self._packed: Pair | None = None  # w2, then w3, between the stages of a step
         self._viscosity_solver = Viscosity(device, grid.size)
         self._pressure_solver = Pressure(device, grid.size)
 
@@ -93,58 +102,96 @@ class Fluid:
         """
         self.add_force(forces)
         self.advect(dt)
-        with self._watching_diffusion():
-            self.diffuse(dt, unpack=steer is not None or self.measuring)
+        self.diffuse(dt, unpack=steer is not None or self.measuring)
+        if self.measuring:
+            self.residuals = Residuals(viscous_residual=self._viscous_residual())
         if steer is not None:
+            self._is_diffused = True
             steer()
+            self._is_diffused = False
         with self._watching_projection():
             self.project()
+        self._traced_dt = None
 
     def add_force(self, forces: Iterable[Force]) -> None:
-        """w1 = w0 + dt f, f the sum of the forces; brushes have drawn theirs into w0 already."""
-        with self.device.stage("add force"):
-            add = self.device.pass_("stages/add_force.frag")
-            for force, impulse in forces:
-                if impulse != 0.0:
-                    add(self.velocity.read, add=True, force=force, impulse=impulse)
-
-    def add_impulse(self, draw: Callable[[Field], None]) -> None:
-        """Let `draw` add a change of velocity, lengths / s, to the field of MAC faces it is handed."""
-        with self.device.stage("add force"):
-            draw(self.velocity.read)
-
-    def advect(self, dt: float) -> None:
-        """w2(x) = w1(x - dt w1(x)): second-order backtrace, cubic interpolation; drag acts on the way.
+        """w1 = w0 + dt f, f the sum of the forces and of what brushes have drawn; laid out to be advected.
 
         Half the last pressure gradient is subtracted where the fluid departs, so that with the projection, where it
         arrives, pressure acts along the path by the trapezoidal rule: second order in time, where the paper's splitting
         is first order and dissipates (it takes dt^2 |grad p|^2 of energy a step). Xiu and Karniadakis, J. Comput. Phys.
         172 (2001), treat such schemes.
         """
+        with self.device.stage("add force"):
+            acting = [(force, impulse) for force, impulse in forces if impulse != 0.0]
+            if self._has_impulse or len(acting) > 1:
+                add = self.device.pass_("stages/add_force.frag")
+                for force, impulse in acting:
+                    add(self.impulse, add=True, force=force, impulse=impulse)
+                acting, self._has_impulse = [(self.impulse, 1.0)], True
+            inputs: dict[str, Any] = {"velocity": self.velocity.read, "carried": self._carried.read}
+            defines: dict[str, Any] = {}
+            for force, impulse in acting:
+                inputs |= {"force": force, "impulse": impulse}
+                defines = {"FORCE": 1}
+            width, height = self._departing.size
+            inside = (RIM, RIM, width - 2 * RIM, height - 2 * RIM)
+            around = [(0, 0, width, RIM), (0, height - RIM, width, RIM)]
+            around += [(x, RIM, RIM, height - 2 * RIM) for x in (0, width - RIM)]
+            self.device.pass_("stages/depart.frag", **defines)(self._departing, region=inside, **inputs)
+            edges = self.device.pass_("stages/depart.frag", EDGES=1, **defines, **self._wall_defines())
+            edges(self._departing, region=around, **inputs, **self._wall_inputs())
+            self._forget_impulse()
+
+    def add_impulse(self, draw: Callable[[Field], None]) -> None:
+        """Let `draw` add a change of velocity, lengths / s, to the field of MAC faces it is handed.
+
+        It acts in the next step, with the forces; on w3 while a step is being steered.
+        """
+        with self.device.stage("add force"):
+            if self._is_diffused:
+                draw(self.velocity.read)
+            else:
+                draw(self.impulse)
+                self._has_impulse = True
+
+    def advect(self, dt: float) -> None:
+        """w2(x) = w1(x - dt w0(x)): second-order backtrace, cubic interpolation; drag acts on the way.
+
+        Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has
+        just been carried by it, so that the trace is there already.
+        """
+        trace = self.trace(dt)
+        self._take_up_masks(dt)
         with self.device.stage("advect"):
-            walls, dt_over_h = self._wall_inputs(), dt / self.grid.h
-            trace = self.device.pass_("stages/trace.frag", DEPART=1, **self._wall_defines())
-            trace((self._trace, self._departing), velocity=self.velocity.read, carried=self._carried.read,
-                  dt_over_h=dt_over_h, **walls)  # fmt: skip
-            advect = self.device.pass_("stages/advect.frag", **self._wall_defines())
+            self._packed = self._viscosity_solver.given
+            packing = self._viscosity_solver.packing
+            advect = self.device.pass_("stages/advect.frag", **packing.defines)
             decay = math.exp(-self.params.drag * dt)
-            advect(self.velocity.write, departing=self._departing, trace=self._trace, decay=decay, **walls)
-            self.velocity.swap()
+            advect(self._packed.fields, region=packing.region, departing=self._departing, trace=trace, decay=decay,
+                   **packing.open)  # fmt: skip
+
+    def trace(self, dt: float) -> Field:
+        """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, (u, v) cells.
+
+        Valid until the velocity changes.
+        """
+        if dt != self._traced_dt:
+            with self.device.stage("trace"):
+                trace = self.device.pass_("stages/trace.frag", **self._wall_defines())
+                trace(self._trace, velocity=self.faces(), dt_over_h=dt / self.grid.h, **self._wall_inputs())
+            self._traced_dt = dt
+        return self._trace
 
     def diffuse(self, dt: float, unpack: bool = True) -> None:
         """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled.
 
-        Without `unpack` w3 stays as the viscous solver packs it, for the projection, and `velocity` is w2 until then.
+        Without `unpack` w3 stays as the viscous solver packs it, for the projection, and `velocity` is w0 until then.
         """
         with self.device.stage("diffuse"):
-            key = (dt, self.params.walls)
-            if key != self._coefficients_of:
-                self._viscosity_solver.set_coefficients(self.viscosity, self.solid, dt, self.params.walls)
-                self._coefficients_of = key
+            self._packed = self._viscosity_solver.solve()
             if unpack:
-                self._viscosity_solver.diffuse(self.velocity)
-            else:
-                self._packed = self._viscosity_solver.solve(self.velocity.read)
+                self._viscosity_solver.unpack(self._packed, self.velocity.read)
+                self._packed = None
 
     def project(self) -> None:
         """w4 = w3 - grad q with lap q = div w3 - source: divergence-free but for the brushes' sources."""
@@ -158,6 +205,7 @@ class Fluid:
             if self._has_source:
                 self.source.clear()
                 self._has_source = False
+            self._traced_dt = None
 
     # -- what is put in ---------------------------------------------------------------------------------------------
 
@@ -227,17 +275,6 @@ class Fluid:
         return Motion(float(0.5 * (speed**2).sum() * self.grid.h**2), float(speed.max()))
 
     @contextmanager
-    def _watching_diffusion(self) -> Iterator[None]:
-        if not self.measuring:
-            yield
-            return
-        before = self.device.field(self.grid.size, 2, "velocity before diffusion")
-        before.copy_from(self.velocity.read)
-        yield
-        self.residuals = Residuals(viscous_residual=self._viscous_residual(before))
-        before.release()
-
-    @contextmanager
     def _watching_projection(self) -> Iterator[None]:
         if not self.measuring:
             yield
@@ -251,8 +288,8 @@ class Fluid:
     def _divergence_norm(self, wanted: np.ndarray) -> float:
         return float(np.sqrt(np.mean((self.divergence().astype(np.float64) - wanted) ** 2)))
 
-    def _viscous_residual(self, before: Field) -> float | None:
-        return self._viscosity_solver.residual_norm(before, self.velocity.read)
+    def _viscous_residual(self) -> float | None:
+        return self._viscosity_solver.residual_norm(self.velocity.read)
 
     # -- checkpoints ------------------------------------------------------------------------------------------------
 
@@ -265,6 +302,8 @@ class Fluid:
         """Go back to copies of `state()` taken earlier."""
         for field, saved in zip(self.state(), state, strict=True):
             field.copy_from(saved)
+        self._traced_dt = None
+        self._forget_impulse()
         self.masks_changed()
 
     def clear_velocity(self) -> None:
@@ -276,15 +315,30 @@ class Fluid:
         """Free the textures."""
         for item in (self.velocity, self.viscosity, self.solid, self.source):
             item.release()
-        for item in (self._trace, self._departing, self._carried):
+        for item in (self.impulse, self._trace, self._departing, self._carried):
             item.release()
         self._viscosity_solver.release()
         self._pressure_solver.release()
 
+    def _forget_impulse(self) -> None:
+        if self._has_impulse:
+            self.impulse.clear()
+            self._has_impulse = False
+
     def _forget_last_step(self) -> None:
+        self._forget_impulse()
+        self._traced_dt = None
         self._carried.read.clear()
         self._viscosity_solver.forget()
         self._pressure_solver.forget()
+
+    def _take_up_masks(self, dt: float) -> None:
+        """Hand viscosity and solid cells to the viscous solver, if they or the step are other ones."""
+        key = (dt, self.params.walls)
+        if key != self._coefficients_of:
+            with self.device.stage("diffuse"):
+                self._viscosity_solver.set_coefficients(self.viscosity, self.solid, dt, self.params.walls)
+            self._coefficients_of = key
 
     def _take_up_solids(self) -> None:
         """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""

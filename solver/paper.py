@@ -86,6 +86,7 @@ class PaperFluid(Fluid):
     def set_velocity(self, array: np.ndarray) -> None:
         """Set the velocity at cell centres from (ny, nx, 2)."""
         self.velocity.read.set(np.asarray(array, np.float32))
+        self._forget_last_step()
 
     def faces(self) -> Field:
         self.device.pass_("paper/to_faces.frag", **self._wall_defines())(self._faces, velocity=self.velocity.read)
@@ -103,7 +104,7 @@ class PaperFluid(Fluid):
     def pressure(self) -> np.ndarray:
         return self._pressure.read.get()
 
-    def _viscous_residual(self, before: Field) -> float | None:
+    def _viscous_residual(self) -> float | None:
         return None
 
     def release(self) -> None:
@@ -123,6 +124,9 @@ class PaperWarpMap(WarpMap):
 
     def hold(self, solid: Field) -> None:
         """Nothing: the paper's map is what its scheme makes of it."""
+
+    def follow(self, fluid: Fluid, dt: float) -> None:
+        self.advance(fluid.velocity.read, dt)
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity at cell centres, such as `PaperFluid.velocity.read`."""

@@ -91,6 +91,15 @@ class Pair:
         self.v.release()
 
 
+@dataclass(frozen=True)
+class Packing:
+    """What a pass needs to draw packed faces: where, its defines, and the inputs that tell the open ones."""
+
+    region: Region
+    defines: dict[str, Any]
+    open: dict[str, Any]
+
+
 class DoublePair:
     """A ping-pong of pairs: `read`, `write` and `swap()`."""
 
@@ -165,7 +174,7 @@ class Viscosity:
         self.size = size
         self.plan = Plan()
         self._slip: dict[str, Any] = {}
-        self._walls: dict[str, Any] = {}
+        self._wall_speed: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
         self.levels: list[Level] = []
         while not self.levels or not self.levels[-1].is_coarsest:
             self.levels.append(Level(device, size, len(self.levels), self.size))
@@ -203,7 +212,7 @@ class Viscosity:
     def set_coefficients(self, viscosity: Field, solid: Field, dt: float, walls: Walls) -> None:
         """Take up another viscosity (cells, lengths^2 / s), solid cells (1 = solid), time step (s) or walls."""
         self._slip = {"NO_SLIP": 1} if walls.slip == "none" else {}
-        self._walls = {"wall_speed": walls.speed} if any(walls.speed) and self._slip else self._resting_walls
+        self._wall_speed = walls.speed if self._slip else (0.0, 0.0, 0.0, 0.0)
         dt_over_h2 = dt * max(self.size) ** 2
         frozen, scaled = solid.get() > 0, viscosity.get() * np.float32(dt_over_h2)
         some_frozen = bool(frozen.any())
@@ -238,7 +247,7 @@ class Viscosity:
         stage = "viscosity/coefficients.frag"
         for level in self.levels:
             self.device.pass_(stage)(level.cells, **inputs)
-            pack = self.device.pass_("viscosity/pack.frag", **self._slip)
+            pack = self.device.pass_("viscosity/pack_cells.frag", **self._slip)
             # One more row and column than the region, for the nodes on the far walls.
             pack(list(level.packed.values()), region=(1, 1, *level.cells.size), cells=level.cells)
             inputs, stage = {"cells": level.cells}, "viscosity/coarsen.frag"
@@ -248,44 +257,56 @@ class Viscosity:
         """The coarsest grid that is visited."""
         return self.levels[min(self.plan.grids, self._exact_level.depth)]
 
+    @property
+    def given(self) -> Pair:
+        """v*, packed, which is to be drawn here before `solve`: see `packing`."""
+        return self.levels[0].right
+
+    @property
+    def packing(self) -> Packing:
+        """How a pass draws packed faces, once the coefficients are set."""
+        finest = self.levels[0]
+        return Packing(finest.region, {"UNIFORM": 1} if "UNIFORM" in finest.defines else {}, finest.open)
+
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution; see `solve`."""
-        self.device.pass_("viscosity/store.frag")(velocity.write, **self.solve(velocity.read).inputs())
-        velocity.swap()
+        self._pack(velocity.read, self.given)
+        self.unpack(self.solve(), velocity.read)
 
-    def solve(self, velocity: Field) -> Pair:
-        """The solution for a velocity on MAC faces, packed, in lengths / s; valid until the next solve.
+    def solve(self) -> Pair:
+        """The solution for what is `given`, packed, in lengths / s; valid until the next solve.
 
         By conjugate gradients from rest, first along v* and what the last step made of its v*, or by one correction to
         a part of v*: where little changes the rest of the work goes into the change, so that a steady state stays one,
         and where v* is damped away nothing is left of it.
         """
-        right = v_star = self.levels[0].right
+        right = self._right_hand_side()
         if self.plan.steps:
-            self._load(velocity, v_star, self._resting_walls)
-            if self._walls != self._resting_walls:
-                right = self._residuals[-1]
-                self._load(velocity, right, self._walls)
-            return self._conjugate_gradients(v_star, right)
-        return self._smoothed(velocity)
-
-    def _load(self, velocity: Field, target: Pair, walls: dict[str, Any]) -> None:
-        finest = self.levels[0]
-        load = self.device.pass_("viscosity/load.frag", **finest.defines)
-        load(target.fields, region=finest.region, velocity=velocity, **finest.matrix, **walls)
-
-    def _smoothed(self, velocity: Field) -> Pair:
-        """v* after sweeps alone, or after one correction on the coarser grids."""
-        finest = self.levels[0]
-        right = v_star = self._residuals[0]
-        self._load(velocity, right, self._walls)
-        if self._walls != self._resting_walls:
-            v_star = finest.faces.read
-            self._load(velocity, v_star, self._resting_walls)
+            return self._conjugate_gradients(self.given, right)
         if self.plan.grids:
-            return self._corrected(v_star, right)
-        self._smooth(finest, right, self._weights(finest), start=v_star)
+            return self._corrected(self.given, right)
+        finest = self.levels[0]
+        self._smooth(finest, right, self._weights(finest), start=self.given)
         return finest.faces.read
+
+    def unpack(self, faces: Pair, velocity: Field) -> None:
+        """Packed faces as a velocity on MAC faces."""
+        self.device.pass_("viscosity/unpack.frag")(velocity, **faces.inputs())
+
+    def _pack(self, velocity: Field, target: Pair) -> None:
+        packing = self.packing
+        pack = self.device.pass_("viscosity/pack.frag", **packing.defines)
+        pack(target.fields, region=packing.region, velocity=velocity, **packing.open)
+
+    def _right_hand_side(self) -> Pair:
+        """v*, and what walls that move drag along."""
+        if not any(self._wall_speed):
+            return self.given
+        finest, right = self.levels[0], self._residuals[-1]
+        drag = self.device.pass_("viscosity/drag.frag", **finest.defines)
+        drag(right.fields, region=finest.region, wall_speed=self._wall_speed, cells=self.size, **self.given.inputs(),
+             **finest.matrix)  # fmt: skip
+        return right
 
     # -- conjugate gradients ----------------------------------------------------------------------------------------
 
@@ -407,7 +428,7 @@ class Viscosity:
     def _corrected(self, v_star: Pair, right: Pair) -> Pair:
         """A part of v*, corrected once: on the coarser grids, and face by face for what these do not carry."""
         finest, coarser = self.levels[:2]
-        residual, weights = finest.right, self._weights(finest, 1 + self.plan.sweeps[0])
+        residual, weights = self._residuals[0], self._weights(finest, 1 + self.plan.sweeps[0])
         self._residual_of(finest, v_star, right, residual)
         self._restrict(residual, coarser, coarser.right)
         part = self._part_of(right, coarser)
@@ -596,21 +617,16 @@ class Viscosity:
 
     # -- statistics -------------------------------------------------------------------------------------------------
 
-    def residual_norm(self, before: Field, after: Field) -> float:
-        """|v* - A v| / |v*|, both velocities on MAC faces: v* before and v after the step; waits for the GPU."""
-        finest = self.levels[0]
-        self._load(before, finest.right, self._walls)
-        self._load(after, finest.faces.read, self._resting_walls)
-        self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0])
+    def residual_norm(self, after: Field) -> float:
+        """|v* - A v| / |v*|, v* what is `given`, v a velocity on MAC faces; waits for the GPU."""
+        finest, right = self.levels[0], self._right_hand_side()
+        self._pack(after, finest.faces.read)
+        self._residual_of(finest, finest.faces.read, right, self._residuals[0])
         wanted, left = (
             math.sqrt(sum(float((field.get().astype(np.float64) ** 2).sum()) for field in pair.fields))
-            for pair in (finest.right, self._residuals[0])
+            for pair in (right, self._residuals[0])
         )
         return left / wanted if wanted else 0.0
-
-    @property
-    def _resting_walls(self) -> dict[str, Any]:
-        return {"wall_speed": (0.0, 0.0, 0.0, 0.0)} if self._slip else {}
 
     @property
     def nbytes(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from solver.forward import ForwardMap
 from solver.grid import Grid
 from solver.points import draw_at
 from solver.reduce import Reduction
+
+if TYPE_CHECKING:
+    from solver.fluid import Fluid
 
 Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
@@ -100,20 +103,19 @@ class WarpMap:
 
     # -- moving it --------------------------------------------------------------------------------------------------
 
+    def follow(self, fluid: Fluid, dt: float) -> None:
+        """Carry the map one step by a fluid, which traces its own next step the same way: second-order backtrace."""
+        self.advance_traced(fluid.trace(dt))
+
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
-        advance = self.device.pass_("warp/advance.frag", VELOCITY=1)
-        h = self.grid.h
-        advance(self._near.write, displacement=self._near.read, velocity=velocity, dt_over_h=dt / h, h=h)
-        self._advanced()
+        self.device.pass_("stages/trace.frag")(self._trace, velocity=velocity, dt_over_h=dt / self.grid.h)
+        self.advance_traced(self._trace)
 
     def advance_traced(self, trace: Field) -> None:
         """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
         advance = self.device.pass_("warp/advance.frag")
         advance(self._near.write, displacement=self._near.read, trace=trace, h=self.grid.h)
-        self._advanced()
-
-    def _advanced(self) -> None:
         self._near.swap()
         self._steps += 1
         self._changed()

@@ -84,13 +84,13 @@ def trace(faces: Faces, dt_over_h: float, **walls: object) -> np.ndarray:
     return np.stack([np.clip(x - dt_over_h * u, 0, nx) - x, np.clip(y - dt_over_h * v, 0, ny) - y], axis=-1)
 
 
-def advect(faces: Faces, dt_over_h: float, carried: Faces | float = 0.0, **walls: object) -> np.ndarray:
-    """Semi-Lagrangian advection of a MAC velocity, less what is carried with it, by itself, cubic.
+def advect(faces: Faces, dt_over_h: float, added: Faces | float = 0.0, **walls: object) -> np.ndarray:
+    """Semi-Lagrangian advection of a MAC velocity, and what is added to it where it departs, by the velocity: cubic.
 
     Departures of faces are means of the cells'.
     """
     back = trace(faces, dt_over_h, **walls)
-    u, v = padded_faces(faces - carried, **walls)  # type: ignore[arg-type]
+    u, v = padded_faces(faces + added, **walls)  # type: ignore[arg-type]
     ny, nx = faces.shape[:2]
     column, row = np.meshgrid(np.arange(nx), np.arange(ny))
     left = np.concatenate([back[:, :1], back[:, :-1]], axis=1)

@@ -12,7 +12,9 @@ from scipy import ndimage
 
 import reference
 from solver.context import Device
+from solver.fluid import Fluid
 from solver.grid import Grid
+from solver.params import FluidParams, Walls
 
 SIZES = [(8, 8), (33, 17), (64, 48), (31, 64)]
 WALLS = [(False, (0.0, 0.0, 0.0, 0.0)), (True, (0.3, -0.2, 1.0, 0.5))]
@@ -34,21 +36,26 @@ def test_trace_and_advect(
 ) -> None:
     faces = reference.smooth_velocity(nx, ny, seed=nx, cells=5 if courant < 1 else 20)
     carried = reference.smooth_velocity(nx, ny, seed=nx + 1)
-    velocity, back, after = device.upload(faces), device.field((nx, ny), 2), device.field((nx, ny), 2)
+    force = reference.smooth_velocity(nx, ny, seed=nx + 2)
+    velocity, back = device.upload(faces), device.field((nx, ny), 2)
     defines, inputs = wall_inputs(no_slip, speed)
     device.pass_("stages/trace.frag", **defines)(back, velocity=velocity, dt_over_h=courant, **inputs)
     traced = reference.trace(faces, courant, no_slip=no_slip, speed=speed)
     assert relative(back.get(), traced) < 1e-4
-    departing = device.field((nx, ny), 4)
-    depart = device.pass_("stages/trace.frag", DEPART=1, **defines)
-    depart((back, departing), velocity=velocity, carried=device.upload(carried), dt_over_h=courant, **inputs)
-    assert relative(back.get(), traced) < 1e-4
-    advect = device.pass_("stages/advect.frag", **defines)
-    advect(after, departing=departing, trace=back, decay=0.5, **inputs)
-    wanted = 0.5 * reference.advect(faces, courant, carried, no_slip=no_slip, speed=speed)
-    assert relative(after.get(), wanted) < 1e-4
-    assert (after.get()[:, 0, 0] == 0).all()
-    assert (after.get()[0, :, 1] == 0).all()
+    fluid = Fluid(device, Grid(nx, ny), FluidParams(walls=Walls("none" if no_slip else "free", speed), drag=0.5))
+    fluid.set_velocity(faces)
+    fluid._carried.read.set(carried)
+    dt = courant * fluid.grid.h
+    fluid.add_force([(device.upload(force), 0.3)])
+    fluid.advect(dt)
+    assert fluid._packed is not None
+    fluid._viscosity_solver.unpack(fluid._packed, fluid.velocity.read)
+    after = fluid.velocity.read.get()
+    wanted = reference.advect(faces, courant, 0.3 * force - carried, no_slip=no_slip, speed=speed) * np.exp(-0.5 * dt)
+    assert relative(after, wanted) < 1e-4
+    assert (after[:, 0, 0] == 0).all()
+    assert (after[0, :, 1] == 0).all()
+    fluid.release()
 
 
 def test_add_force_and_source(device: Device) -> None:
@@ -59,7 +66,6 @@ def test_add_force_and_source(device: Device) -> None:
 
 
 def test_masks_compose(device: Device) -> None:
-    from solver.fluid import Fluid
     from solver.masks import LEAST_VISCOSITY, Masks
 
     grid = Grid(12, 9)

@@ -270,7 +270,7 @@ def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> N
         fluid.set_velocity(0.3 * vortex_faces(grid, 0.0))
         for _ in range(20):
             fluid.step(1 / 60)
-            warp.advance(fluid.faces(), 1 / 60)
+            warp.follow(fluid, 1 / 60)
         found.append((warp.statistics(), warp.read()))
     (free, free_map), (held, held_map) = found
     assert held.folds == free.folds == 0

@@ -23,14 +23,11 @@ vec2 mac_velocity(sampler2D velocity, vec2 p) {
 }
 
 // Velocity at the centre of the cell at p (in cells), the mean of opposite faces: of its own, and of those to the right
-// and below, which are at rest where they are the grid's edge.
-vec2 mac_centre(vec2 own, vec2 beyond, vec2 p, vec2 size) { return 0.5 * (own + beyond * vec2(lessThan(p + 1.0, size))); }
-
-// The same, from the field. 3 reads.
+// and below, which are at rest where they are the grid's edge. 3 reads.
 vec2 mac_centre(sampler2D velocity, vec2 p) {
     vec2 size = vec2(textureSize(velocity, 0)), texel = 1.0 / size, uv = p * texel;
     vec2 beyond = vec2(texture(velocity, uv + vec2(texel.x, 0.0)).r, texture(velocity, uv + vec2(0.0, texel.y)).g);
-    return mac_centre(texture(velocity, uv).rg, beyond, p, size);
+    return 0.5 * (texture(velocity, uv).rg + beyond * vec2(lessThan(p + 1.0, size)));
 }
 
 // Where the fluid at position p (in cells) was `dt_over_h` ago: second-order (midpoint) backtrace, kept in the grid.

@@ -5,7 +5,8 @@
 //                             along itself at speed U.
 // Define NO_SLIP for the latter; u_wall_speed holds U of the left, right, top and bottom wall, lengths / s.
 // Textures are clamped to the edge, and what is looked up lies in the grid, so a pair of faces reaches one beyond an edge
-// at most, where the clamp finds the image by itself; four of them reach two beyond, and their weights are folded back.
+// at most, where the clamp finds the image by itself. What is read by fours reaches two beyond, and is laid out with the
+// images in place: see `image_normal`.
 
 #ifdef NO_SLIP
 uniform vec4 u_wall_speed;
@@ -28,28 +29,18 @@ vec2 wall_tangential(vec2 weights, float first, float count, vec2 speed, out flo
     return weights * (1.0 + (IMAGE - 1.0) * beyond);
 }
 
-// Four weights w of faces -1 ... 2 around `corner` by the near wall, tangential: -1 counts as 0 and -2 as 1.
-vec4 fold_tangential(vec4 w, float corner) {
-    float near = float(corner == 0.0), beyond = float(corner < 0.0);
-    return vec4(w.x * (1.0 - near - beyond), w.y * (1.0 - beyond) + IMAGE * near * w.x, w.zw + IMAGE * beyond * w.yx);
+// The normal face whose image the one at `index` is, of `count` between and on the walls, and what it counts there.
+float image_normal(float index, float count, out float sign) {
+    float image = abs(index);
+    image = min(image, 2.0 * count - image);
+    sign = image == 0.0 || image == count ? 0.0 : index == image ? 1.0 : -1.0;
+    return image;
 }
 
-// The same, normal: -1 counts as minus 1; -2 hardly weighs anything and is left out.
-vec4 fold_normal(vec4 w, float corner) {
-    float near = float(corner == 0.0), beyond = float(corner < 0.0);
-    return vec4(w.x * (1.0 - near - beyond), w.y * (1.0 - beyond), w.z - near * w.x, w.w - beyond * w.y);
-}
-
-// Weights of four normal faces, from `corner` - 1 on.
-vec4 wall_normal(vec4 weights, float corner, float count) {
-    weights = fold_normal(fold_normal(weights, corner).wzyx, count - 1.0 - corner).wzyx;
-    return weights * vec4(lessThan(abs(2.0 * corner + vec4(-2.0, 0.0, 2.0, 4.0) - count), vec4(count)));
-}
-
-// Weights of four tangential faces, from `corner` - 1 on; `added` as above.
-vec4 wall_tangential(vec4 weights, float corner, float count, vec2 speed, out float added) {
-    vec4 index = corner + vec4(-1.0, 0.0, 1.0, 2.0);
-    added = (1.0 - IMAGE) * (speed.x * dot(weights, vec4(lessThan(index, vec4(0.0))))
-                           + speed.y * dot(weights, vec4(greaterThan(index, vec4(count - 1.0)))));
-    return fold_tangential(fold_tangential(weights, corner).wzyx, count - 2.0 - corner).wzyx;
+// The same of a tangential one, which counts `sign` times and `added`.
+float image_tangential(float index, float count, vec2 speed, out float sign, out float added) {
+    bool before = index < 0.0, after = index >= count;
+    sign = before || after ? IMAGE : 1.0;
+    added = (1.0 - IMAGE) * (before ? speed.x : after ? speed.y : 0.0);
+    return before ? -1.0 - index : after ? 2.0 * count - 1.0 - index : index;
 }

@@ -20,7 +20,7 @@ struct Faces { vec4 u, v; };
 struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below, open_u, open_v; };
 
 #ifdef UNIFORM
-// K of the nodes in a column (or row) over that of the inner ones; see pack.frag.
+// K of the nodes in a column (or row) over that of the inner ones; see pack_cells.frag.
 vec4 at_walls(vec4 place, float far) {
 #ifdef NO_SLIP
     const float wall = 2.0;

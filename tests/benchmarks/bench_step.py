@@ -170,7 +170,7 @@ def step_rows(device: Device, cells: int, rounds: int, table: Table) -> None:
         def step(fluid: Fluid = fluid, warp: WarpMap = warp) -> None:
             fluid.step(dt, [(force, 1e-3)])
             with device.stage("warp map"):
-                warp.advance(fluid.faces(), dt)
+                warp.follow(fluid, dt)
 
         fluids[name] = fluid
         jobs[name] = step, BATCH if kind is Fluid else 2
