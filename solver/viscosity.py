@@ -430,8 +430,7 @@ class Viscosity:
         finest, coarser = self.levels[:2]
         residual, weights = self._residuals[0], self._weights(finest, 1 + self.plan.sweeps[0])
         self._residual_of(finest, v_star, right, residual)
-        self._restrict(residual, coarser, coarser.right)
-        part = self._part_of(right, coarser)
+        part = self._part_of(right, residual)
         self._nested_grids()
         # The part of it that the coarser grid does carry is not to be added face by face once more.
         k = self._largest
@@ -453,19 +452,20 @@ class Viscosity:
         self._smooth(finest, right, weights[1:])
         return finest.faces.read
 
-    def _part_of(self, right: Pair, coarser: Level) -> Field:
-        """Make the coarser grid's residual that of the part of v* that is of least energy; that part, one texel."""
-        wanted, damped = coarser.faces.write, coarser.faces.read
-        self._restrict(right, coarser, wanted)
-        inputs = {**wanted.inputs(), **coarser.right.inputs("r_")}
-        self.device.pass_("viscosity/weigh.frag")(self._weighed, region=coarser.region, **inputs)
+    def _part_of(self, right: Pair, residual: Pair) -> Field:
+        """The part of v* that is of least energy on the next coarser grid, one texel; what it leaves is `right` there."""
+        coarser = self.levels[1]
+        wanted, left, damped = coarser.faces.write, coarser.right, coarser.faces.read
+        restrict = self.device.pass_("viscosity/restrict.frag", WEIGHED=1, **coarser.defines)
+        restrict(left.fields + wanted.fields + (self._weighed,), region=coarser.region, **residual.inputs(),
+                 **right.inputs("right_"), **coarser.open)  # fmt: skip
         factors = self.device.pass_("viscosity/gradients.frag")
         products = self._weights_sum.shrink(self._weighed)
         factors(self._factors.write, products=products, before=self._factors.read, step=0)
         self._factors.swap()
         damp = self.device.pass_("viscosity/damp.frag")
-        damp(damped.fields, region=coarser.region, part=self._factors.read, **inputs)
-        coarser.right, coarser.faces.read = damped, coarser.right
+        damp(damped.fields, region=coarser.region, part=self._factors.read, **wanted.inputs(), **left.inputs("r_"))
+        coarser.right, coarser.faces.read = damped, left
         return self._factors.read
 
     def _nested_grids(self) -> None:

@@ -4,7 +4,9 @@
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a pinned neighbour.
 // With START a second pair of outputs, the first damped Jacobi sweep on it from rest: u_weight D^-1 times it.
-// reads: 29
+// With WEIGHED that of v* and, as a second pair, of the right-hand side b it was of, u_right_u, u_right_v; and texel by
+// texel the scalar products b . b and b . A v*, by which gradients.frag tells which part of v* to keep.
+// reads: 29, and 53 when WEIGHED
 uniform sampler2D u_u;
 uniform sampler2D u_v;
 #include "viscosity/block.glsl"
@@ -13,6 +15,13 @@ uniform float u_weight;
 in vec2 v_uv;
 layout(location = 2) out vec4 out_start_u;
 layout(location = 3) out vec4 out_start_v;
+#endif
+#ifdef WEIGHED
+uniform sampler2D u_right_u;
+uniform sampler2D u_right_v;
+layout(location = 2) out vec4 out_right_u;
+layout(location = 3) out vec4 out_right_v;
+layout(location = 4) out vec4 out_products;
 #endif
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -45,8 +54,16 @@ void main() {
     const vec2 x = vec2(1.0, 0.0), y = vec2(0.0, 1.0);
     // The first of this texel's fine texels, past the ring.
     vec2 p = (2.0 * here + 1.5) * fine_texel, fx = x * fine_texel, fy = y * fine_texel;
-    out_u = gather(u_u, p, fx, fy, false, open_u(here - y), open_u(here), open_u(here + y));
-    out_v = gather(u_v, p, fy, fx, true, open_v(here - x).xzyw, open_v(here).xzyw, open_v(here + x).xzyw).xzyw;
+    vec4 left = open_v(here - x).xzyw, above = open_u(here - y), open_here_u = open_u(here);
+    vec4 open_here_v = open_v(here).xzyw, right = open_v(here + x).xzyw, below = open_u(here + y);
+    out_u = gather(u_u, p, fx, fy, false, above, open_here_u, below);
+    out_v = gather(u_v, p, fy, fx, true, left, open_here_v, right).xzyw;
+#ifdef WEIGHED
+    out_right_u = gather(u_right_u, p, fx, fy, false, above, open_here_u, below);
+    out_right_v = gather(u_right_v, p, fy, fx, true, left, open_here_v, right).xzyw;
+    float wanted = dot(out_right_u, out_right_u) + dot(out_right_v, out_right_v);
+    out_products = vec4(wanted, wanted - dot(out_right_u, out_u) - dot(out_right_v, out_v), 0.0, 0.0);
+#endif
 #ifdef START
     Faces inverse = inverse_diagonal(v_uv);
     out_start_u = u_weight * inverse.u * out_u;
