@@ -171,7 +171,7 @@ class Fluid:
                    **packing.open)  # fmt: skip
 
     def trace(self, dt: float) -> Field:
-        """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, (u, v) cells.
+        """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells.
 
         Valid until the velocity changes.
         """

@@ -39,6 +39,7 @@ class Pass:
         self._vertices = device.ctx.vertex_array(self.program, [])
         self._uniforms: dict[str, moderngl.Uniform] = {}
         self._units: dict[str, int] = {}
+        self._numbers: dict[str, object] = {}  # what the uniforms that are no textures hold
         for name in self.program:
             member = self.program[name]
             if isinstance(member, moderngl.Uniform):
@@ -115,8 +116,9 @@ class Pass:
             value.texture.use(self._units[name])
         elif isinstance(value, moderngl.Texture):
             value.use(self._units[name])
-        else:
+        elif self._numbers.get(name) != value:
             uniform.value = value  # pyright: ignore[reportAttributeAccessIssue]
+            self._numbers[name] = value
 
 
 def _clipped(region: Region | list[Region], size: tuple[int, int]) -> list[Region]:

@@ -60,10 +60,12 @@ def plan_for(least: float, largest: float) -> Plan:
         return Plan(grids=0, steps=0, sweeps=(2, 0))
     if largest <= 3.0 * least:
         grids = max(1, math.ceil(math.log(largest / LEAST_VISITED, 4.0)))
+        # A second sweep halves the error of the change where that is small; from 3 on it hardly tells.
+        sweeps = 2 if largest <= 3.0 else 1
         if largest <= 5.0:
-            return Plan(grids=grids, nested=0, steps=0, sweeps=(2, 4))
+            return Plan(grids=grids, nested=0, steps=0, sweeps=(sweeps, 4))
         if largest <= 50.0:
-            return Plan(grids=grids, nested=1, steps=0, sweeps=(2, 2))
+            return Plan(grids=grids, nested=1, steps=0, sweeps=(sweeps, 2))
         return Plan(grids=grids, nested=2, steps=0, sweeps=(1, 2))
     if largest <= 300.0 * least:
         return Plan(tolerance=0.03)
@@ -436,7 +438,8 @@ class Viscosity:
         k = self._largest
         carried = weights[0] * (1.0 + 1.5 * k) / (1.0 + 6.0 * k)
         self._start(coarser, coarser.right, coarser.faces.read, -carried, add=True)
-        finish = self.device.pass_("viscosity/prolong.frag", CORRECT=1, **finest.defines)
+        dragged: dict[str, Any] = {} if right is v_star else {"DRAGGED": 1}
+        finish = self.device.pass_("viscosity/prolong.frag", CORRECT=1, **dragged, **finest.defines)
         finish(
             finest.faces.write.fields,
             region=finest.region,
@@ -445,7 +448,7 @@ class Viscosity:
             **v_star.inputs(),
             **residual.inputs("r_"),
             part=part,
-            **right.inputs("right_"),
+            **(right.inputs("right_") if dragged else {}),
             **finest.matrix,
         )
         finest.faces.swap()
@@ -453,7 +456,7 @@ class Viscosity:
         return finest.faces.read
 
     def _part_of(self, right: Pair, residual: Pair) -> Field:
-        """The part of v* that is of least energy on the next coarser grid, one texel; what it leaves is `right` there."""
+        """The part of v* that has least energy on the next coarser grid, one texel; what it leaves is `right` there."""
         coarser = self.levels[1]
         wanted, left, damped = coarser.faces.write, coarser.right, coarser.faces.read
         restrict = self.device.pass_("viscosity/restrict.frag", WEIGHED=1, **coarser.defines)
@@ -474,8 +477,8 @@ class Viscosity:
         levels = self.levels[1 : last.depth + 1]
         rights = [level.right for level in levels]
         for fine, coarser in zip(rights, levels[1:], strict=False):
-            self._restrict(fine, coarser, coarser.right)
-        if last is not self._exact_level:
+            self._restrict(fine, coarser, coarser.right, begin=coarser is last)
+        if len(levels) == 1 and last is not self._exact_level:
             self._start(last, rights[-1], last.faces.write, self._weights(last)[0])
             last.faces.swap()
         self._cycle(last, rights[-1], begun=True)

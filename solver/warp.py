@@ -88,8 +88,9 @@ class WarpMap:
         self._trace = device.field(grid.size, 2, "warp map, trace")
         self._largest = device.field(grid.size, 4, "warp map, largest distortion")
         self._total = device.field(grid.size, 4, "warp map, total distortion")
-        self._steepness = device.field(grid.size, 1, "warp map, steepness")
-        self._find_steepest = Reduction(device, grid.size, 1, "max")
+        half = -(-grid.nx // 2), -(-grid.ny // 2)
+        self._steepness = device.field(half, 1, "warp map, steepness")
+        self._find_steepest = Reduction(device, half, 1, "max")
         self._find_largest = Reduction(device, grid.size, 4, "max")
         self._find_total = Reduction(device, grid.size, 4, "sum")
         self._scratch = self._trace, self._steepness, self._largest, self._total

@@ -3,7 +3,8 @@
 // f = P e + D^-1 (b - P b_coarse).
 // u_coarse_u, u_coarse_v: coarse faces e; u_u, u_v: the iterate, or b; u_coarse_right_u, u_coarse_right_v: b_coarse;
 // With CORRECT, u_u, u_v are v*, of which only the part u_part is taken (at most 1), and a damped Jacobi sweep is made on
-// it: u_r_u, u_r_v: the residual of all of v*; u_right_u, u_right_v: the right-hand side b; u_weight: of the sweep.
+// it: u_r_u, u_r_v: the residual of all of v*; u_weight: of the sweep; with DRAGGED u_right_u, u_right_v: the right-hand
+// side, where it is not v* itself.
 // Linear along the face's normal; 3/4 and 1/4 of the two nearest across it. A coarse face that is exactly zero is
 // pinned (or at rest, which makes no difference): at free-slip walls the other one then counts whole.
 // reads: 12
@@ -21,6 +22,8 @@ uniform float u_weight;
 uniform sampler2D u_r_u;
 uniform sampler2D u_r_v;
 uniform sampler2D u_part;
+#endif
+#ifdef DRAGGED
 uniform sampler2D u_right_u;
 uniform sampler2D u_right_v;
 #endif
@@ -67,14 +70,14 @@ void main() {
     v = inverse.v * (v - spread(u_coarse_right_v, p, y, x, true, odd.y, odd.x).xzyw);
 #endif
 #ifdef CORRECT
-    vec4 r_u = texture(u_r_u, v_uv), r_v = texture(u_r_v, v_uv);
+#ifdef DRAGGED
+    vec4 right_u = texture(u_right_u, v_uv), right_v = texture(u_right_v, v_uv);
+#else
+    vec4 right_u = u, right_v = v;
+#endif
     float part = min(texelFetch(u_part, ivec2(0), 0).x, 1.0);
-    u *= part;
-    v *= part;
-    r_u = mix(texture(u_right_u, v_uv), r_u, part);
-    r_v = mix(texture(u_right_v, v_uv), r_v, part);
-    u += u_weight * inverse.u * r_u;
-    v += u_weight * inverse.v * r_v;
+    u = part * u + u_weight * inverse.u * mix(right_u, texture(u_r_u, v_uv), part);
+    v = part * v + u_weight * inverse.v * mix(right_v, texture(u_r_v, v_uv), part);
 #endif
     out_u = u + open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
     out_v = v + open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
