@@ -225,7 +225,7 @@ class Recipe(Model):
         """
         path = Path(path)
         try:
-            text = path.read_text("utf-8")
+            text = path.read_text("utf-8-sig")  # some editors put a mark before the text
         except FileNotFoundError:
             raise UserError(f"{path} does not exist") from None
         except IsADirectoryError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from datetime import date, time
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -159,6 +160,10 @@ def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseMode
         return f"{table}{key}: {fault['msg']}"
     bounds = {name: f"{bound:g}" if isinstance(bound, float) else bound for name, bound in context.items()}
     but = f", not {_shown(given)}" if kind != "too_short" or given else ", and is empty"
+    if kind == "tuple_type" and isinstance(given, dict) and not table:
+        but += f"; begin each with [[{key}]]"
+    if kind == "literal_error" and " or " not in context["expected"]:
+        wanted = "{expected}"
     return f"{table}{key!r} must be {wanted.format(**bounds)}{but}"
 
 
@@ -172,6 +177,8 @@ def _shown(value: Any) -> str:
         shown = f"a list of {len(value)}"
     elif isinstance(value, dict):
         shown = "a table"
+    elif isinstance(value, (date, time)):
+        shown = str(value)
     return shown if len(shown) <= 40 else f"{shown[:37]}..."
 
 

@@ -123,6 +123,9 @@ def test_save_and_load(tmp_path: Path):
         ("[fluid]\nwalls = true", "'fluid.walls' must be one of 'free-slip' or 'no-slip', not true"),
         ("fluid = 3", "'fluid' must be a table, not 3"),
         ("stroke = 3", "'stroke' must be a list, not 3"),
+        ("[force]\nkind = 'vortex'", "line 1: 'force' must be a list, not a table; begin each with [[force]]"),
+        ("version = 0", "'version' must be 1, not 0"),
+        ("duration = 2020-01-01", "'duration' must be a number, not 2020-01-01"),
         ("version = 2", "of version 2, and this fluidwarp reads recipes up to version 1"),
         ("duration = 1\nduration = 2", "the same key is given twice"),
         ("duration = ", "not valid TOML"),
@@ -146,6 +149,12 @@ def test_faults_are_told_in_a_sentence(text: str, words: str):
     assert len(message.splitlines()) == 1
     assert "pydantic" not in message
     assert "input" not in message.lower()
+
+
+def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
+    """As Windows' Notepad sets it."""
+    (tmp_path / "a.toml").write_text("duration = 2.0\n", "utf-8-sig")
+    assert Recipe.load(tmp_path / "a.toml").duration == 2
 
 
 def test_files_that_are_none(tmp_path: Path):
