@@ -13,11 +13,13 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -255,22 +257,36 @@ def _opened(name: str) -> Opened:
 
 # Processes ----------------------------------------------------------------------------------------------------------
 
-_wish: Any = None
+_wish = threading.Event()
 
 
-def _begin(wish: Any) -> None:
-    """In a new worker: Ctrl+C reaches every process of a terminal, and what it means is for the first to say."""
-    global _wish
-    _wish = wish
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(wish, os.getppid()), daemon=True).start()
+def _begin(life: Connection) -> None:
+    """In a new worker; `life` has something to read, or its end, when it is to stop, or when nobody is left to tell it.
+
+    No `Event` of multiprocessing: setting one waits for all that wait for it, also for a worker that was killed.
+    """
+    signal.signal(signal.SIGTERM, lambda *_: _end_now())
+    threading.Thread(target=_end_with, args=(life,), daemon=True).start()
 
 
-def _end_with(wish: Any, parent: int) -> None:
-    """End this worker in the middle of its work, if it is to stop and does not, or if nobody is left to tell it."""
-    while not wish.wait(LOOK):
-        if os.getppid() != parent:
-            break
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Keep Ctrl+C, which reaches every process of a terminal, from all processes that are started in the block.
+
+    They inherit what this thread has blocked, while for itself it only waits until the block ends; a handler that a
+    process sets for itself would come too late for one that is still being started.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with(life: Connection) -> None:
+    """End this worker in the middle of its work, if it is to stop and does not soon do so."""
+    life.poll(None)
+    _wish.set()
     time.sleep(GRACE)
     _end_now()
 
@@ -287,10 +303,10 @@ def _perform_here(task: Task) -> Outcome:
 def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress: Progress) -> None:
     # A forked process would share this one's GL, which no driver survives.
     context = multiprocessing.get_context("spawn")
-    wish = context.Event()
+    theirs, ours = context.Pipe(duplex=False)
     waiting = deque((task, 1) for task in tasks)
     while waiting:
-        pool = ProcessPoolExecutor(jobs, context, _begin, (wish,))
+        pool = ProcessPoolExecutor(jobs, context, _begin, (theirs,))
         running: dict[Future[Outcome], tuple[Task, int]] = {}
         try:
             while waiting or running:
@@ -300,7 +316,8 @@ def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress
                     if any(attempt > 1 for _, attempt in running.values()):
                         break
                     task, attempt = waiting.popleft()
-                    running[pool.submit(_perform_here, task)] = task, attempt
+                    with _deaf_children():
+                        running[pool.submit(_perform_here, task)] = task, attempt
                 done, _ = wait(running, LOOK, FIRST_COMPLETED)
                 progress.check()
                 for future in done:
@@ -314,7 +331,9 @@ def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress
                 else:
                     report(Outcome(task.label, DIED))
         except BaseException:
-            wish.set()
+            ours.close()
+            for child in multiprocessing.active_children():  # one that is still being started does not listen yet
+                child.terminate()
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
@@ -362,13 +381,20 @@ class _Child:
             self._process.kill()
 
 
+def _end_after(parent: int) -> None:
+    """End this process when that one has ended."""
+    while os.getppid() == parent:
+        time.sleep(LOOK)
+    _end_now()
+
+
 def serve() -> None:
     """Do the tasks that come by standard input, until there are no more or nobody is left to hear of them."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # nothing else may get among the answers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: _end_now())
-    threading.Thread(target=_end_with, args=(threading.Event(), os.getppid()), daemon=True).start()
+    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
     while True:
         try:
             task = pickle.load(sys.stdin.buffer)

@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from app import batch, files, states
 from app.batch import Edits, Outcome, Task, perform, run_batch, spread
 from app.errors import Cancelled, UserError
 from app.pictures import Picture, read_picture, write_picture
-from app.progress import Progress
+from app.progress import INTERRUPTED, Progress
 from app.replay import Replay
 from solver.context import Device
 
@@ -177,6 +179,55 @@ def test_the_command_line(folder: Path):
     ran = fluidwarp("p2.png", "-o", "out")
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
     assert (folder / "out/p2.png").is_file()
+
+
+def at_work(folder: Path) -> subprocess.Popen[str]:
+    """Four pictures in two processes, each of which takes a minute; a session of its own, as a terminal's job is."""
+    (folder / "a.toml").write_text(RECIPE.replace("duration = 0.2", "duration = 200"))
+    words = ["render", "a.toml", "p0.png", "p1.png", "p2.png", "p3.png", "-o", "{name}.mp4", "--jobs", "2"]
+    return subprocess.Popen(
+        [sys.executable, "-m", "app", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def workers(of: subprocess.Popen[str]) -> list[int]:
+    """The processes that it has started to work in."""
+    children = Path(f"/proc/{of.pid}/task/{of.pid}/children").read_text().split()
+    return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def wait_until(true: Callable[[], object]) -> None:
+    asked = time.monotonic()
+    while not true():
+        assert time.monotonic() < asked + 60
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", ["starting", "working", "a worker was killed"])
+def test_stopping_all_processes_at_once(folder: Path, number: signal.Signals, moment: str):
+    """As Ctrl+C and a scheduler do, at any time: one line, and nothing half-written."""
+    job = at_work(folder)
+    before = {*contents(folder)}
+    wait_until(lambda: workers(job))
+    if moment != "starting":
+        wait_until(lambda: len({*contents(folder)} - before) == 2)
+    if moment == "a worker was killed":
+        killed = workers(job)
+        os.kill(killed[0], signal.SIGKILL)
+        wait_until(lambda: workers(job) and not {*workers(job)} & {*killed})  # their pictures are begun anew
+    os.killpg(job.pid, number)
+    _, told = job.communicate(timeout=30)
+    assert job.returncode == INTERRUPTED
+    assert told == "fluidwarp: cancelled; 0 of 4 pictures are written, nothing is half-written\n"
+    left = {*contents(folder)} - before
+    assert all(name.startswith(".") for name in left)
+    assert len(left) <= (moment == "a worker was killed")  # what is killed outright cannot clean up after itself
 
 
 # A cluster ----------------------------------------------------------------------------------------------------------
