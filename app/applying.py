@@ -110,7 +110,8 @@ class Application:
             check_no_codec(self.output, self.codec)
         maps.check_map(self.maps.path)
         writable(self.output)
-        check_kept(self.source, self.output)
+        for source in (self.source, self.maps.path):
+            check_kept(source, self.output)
 
     def run(self, device: Device, progress: Progress) -> None:
         """Do it; nothing is left behind if it is cancelled or fails.

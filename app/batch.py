@@ -30,6 +30,7 @@ from app.files import abandon, cannot_write, check_kept
 from app.opening import CLIP_ENDINGS, Opened, open_recipe
 from app.pictures import FORMATS, MAX_PIXELS
 from app.progress import GRACE, INTERRUPTED, Progress, never
+from app.project import picture_names
 from app.recipe import Recipe
 from solver.context import Device
 
@@ -105,12 +106,29 @@ class Task:
         output, stats = (path and named(path, self.picture) for path in (self.output, self.stats))
         return replace(self, output=output, stats=stats, maps=maps)
 
+    @property
+    def written(self) -> list[Path]:
+        """The names of all that it writes."""
+        return [path for path in (self.output, self.stats, self.maps and self.maps.path) if path is not None]
+
+    def check_names(self, read: Sequence[Path]) -> None:
+        """Raise `UserError` if two of its outputs are one file, or one of them is among the files `read`."""
+        seen: set[str] = set()
+        for path in self.written:
+            for source in read:
+                check_kept(source, path)
+            real = os.path.realpath(path)
+            if real in seen:
+                raise UserError(f"{path} cannot hold two results; give --output, --map and --stats different names")
+            seen.add(real)
+
     def job(self, opened: Opened | None = None) -> Job:
         """The job, with its picture read. Raises `UserError`."""
         opened = opened or _opened(self.recipe)
         file = opened.source_file(self.picture)
-        if file is not None and self.output is not None:
-            check_kept(file, self.output)
+        own = opened.recipe if self.picture is None else opened.recipe.edited(picture=None)
+        read = [Path(opened.label), *(opened.folder / name for name in picture_names(own))]
+        self.check_names(read if file is None else [*read, file])
         source = opened.source(self.picture, self.max_pixels)
         return Job(
             self.edits.applied(opened.recipe),
@@ -146,7 +164,7 @@ def spread(task: Task, pictures: Sequence[Path]) -> list[Task]:
     Raises:
         UserError: if two would be written to the same file, or one to where it is read from.
     """
-    recipe = str(Path(task.recipe).absolute()) if Path(task.recipe).exists() else task.recipe
+    recipe = str(Path(task.recipe).absolute()) if os.path.exists(task.recipe) else task.recipe
     output = task.output
     folder = output if NAME not in str(output) else None
     if folder is not None and folder.suffix and not folder.is_dir():
@@ -178,15 +196,18 @@ def _ending(picture: Path) -> str:
 
 
 def _check_apart(tasks: Sequence[Task]) -> None:
-    seen: dict[Path, Path | None] = {}
+    """Raise `UserError` if two would be written to one file, or one to where any is read from."""
+    pictures = {os.path.realpath(task.picture): task.picture for task in tasks if task.picture is not None}
+    seen: dict[str, Path | None] = {}
     for task in tasks:
-        if task.output is None:
-            continue
-        if task.output in seen:
-            raise UserError(f"{seen[task.output]} and {task.picture} would both become {task.output}; rename one")
-        if task.picture is not None:
-            check_kept(task.picture, task.output)
-        seen[task.output] = task.picture
+        task.check_names([] if task.picture is None else [task.picture])
+        for path in task.written:
+            real = os.path.realpath(path)
+            if real in pictures:
+                raise UserError(f"{pictures[real]} would be replaced by what {task.picture} becomes; rename one")
+            if real in seen:
+                raise UserError(f"{seen[real]} and {task.picture} would both become {path}; rename one")
+            seen[real] = task.picture
 
 
 def named(path: Path, picture: Path) -> Path:

@@ -80,7 +80,7 @@ def start(
 
 @cli.command()
 def edit(
-    file: Annotated[Optional[Path], typer.Argument(help="A picture, a recipe or a project.")] = None,  # noqa: UP045
+    file: Annotated[Optional[Path], typer.Argument(help="A picture, a recipe or a project.", readable=False)] = None,  # noqa: UP045
 ) -> None:
     """Open the editor: push the picture about with the mouse."""
     try:
@@ -89,6 +89,8 @@ def edit(
         raise UserError(f"the window cannot be loaded ({error}); `fluidwarp doctor` says what is missing", 2) from None
     run(file)
 
+
+# Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
 
 MaxPixels = Annotated[int, typer.Option(help="Refuse larger pictures, clips and maps.")]
 Bits = Annotated[Optional[int], typer.Option(help="8, 16 or 32 bits a channel, instead of the picture's own.")]  # noqa: UP045
@@ -108,17 +110,23 @@ MapOverscan = Annotated[Optional[int], typer.Option("--overscan", help="MAP's pi
 @cli.command()
 def render(
     recipe: Annotated[
-        str, typer.Argument(help="A recipe (.toml) or project, or the name of a recipe that comes with fluidwarp.")
+        str,
+        typer.Argument(
+            metavar="RECIPE", help="A recipe (.toml) or project, or the name of a recipe that comes with fluidwarp."
+        ),
     ],
     pictures: Annotated[
         Optional[list[Path]],  # noqa: UP045
-        typer.Argument(help="Pictures or clips instead of the recipe's own."),
+        typer.Argument(metavar="PICTURE", help="Pictures or clips instead of the recipe's own.", readable=False),
     ] = None,
     output: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--output", "-o", metavar="OUT", help="What to write; its ending says how. Default: out.png"),
     ] = None,
-    image: Annotated[Optional[Path], typer.Option("--image", "-i", help="The picture or clip to warp.")] = None,  # noqa: UP045
+    image: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--image", "-i", help="The picture or clip to warp.", readable=False),
+    ] = None,
     stats: Annotated[Optional[Path], typer.Option(help="Write numbers about every frame, as JSON.")] = None,  # noqa: UP045
     map_: Annotated[
         Optional[Path],  # noqa: UP045
@@ -177,6 +185,8 @@ def render(
     if output is None and map_ is None:
         output = Path("out.png")
     maps = MapOutput(map_, "offsets" if offsets else "st", forward, overscan, map_size) if map_ else None
+    if maps is None and (forward or offsets or overscan or map_size):
+        raise UserError("--forward, --offsets, --overscan and --map-size say what --map writes; give its name too")
     given = [*([image] if image else []), *(pictures or [])]
     task = batch.Task(
         recipe,
@@ -220,10 +230,11 @@ def _render_one(task: Task, opened: Opened) -> None:
     from app.progress import on_terminal
     from solver.context import Device
 
-    job = task.job(opened)
-    job.check()
-    with on_terminal(job.target.name, job.recipe.ticks) as progress, Device.headless() as device:
-        report = run(device, job, progress)
+    with on_terminal(task.written[0].name, None) as progress:
+        job = task.job(opened)  # a large picture takes its time too
+        job.check()
+        with Device.headless() as device:
+            report = run(device, job, progress)
     for notice in (*report.notices, *([report.verdict] if report.verdict else [])):
         print(f"fluidwarp: {notice}", file=sys.stderr)
 
@@ -254,16 +265,21 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     except Cancelled:
         _fail(f"cancelled; {written} of {len(tasks)} pictures are written, nothing is half-written", INTERRUPTED)
     if failures:
-        raise UserError(f"{failures} of {len(tasks)} pictures failed; all others are written")
+        others = "all others are written" if failures < len(tasks) else "none is written"
+        raise UserError(f"{failures} of {len(tasks)} pictures failed; {others}")
 
 
 @cli.command()
 def apply(
     map_: Annotated[
         Path,
-        typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: one for each frame."),
+        typer.Argument(
+            metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: one for each frame.", readable=False
+        ),
     ],
-    picture: Annotated[Path, typer.Argument(help="The picture or clip to warp by it.")],
+    picture: Annotated[
+        Path, typer.Argument(metavar="PICTURE", help="The picture or clip to warp by it.", readable=False)
+    ],
     output: Output,
     kind: MapKind = None,
     grid: StGrid = None,
@@ -315,7 +331,10 @@ def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | 
 @cli.command()
 def convert(
     map_: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: a sequence.")
+        Path,
+        typer.Argument(
+            metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: a sequence.", readable=False
+        ),
     ],
     output: Output,
     offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in OUT, instead of an ST map.")] = False,

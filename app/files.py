@@ -71,21 +71,24 @@ def writable(path: str | os.PathLike[str]) -> Path:
     Call it before a long job, so that a slip in the name costs no time. Raises `UserError`.
     """
     target = Path(os.path.realpath(path))  # through a link: the link stays, the file behind it is replaced
-    if target.is_dir():
-        raise UserError(f"Cannot write {path}: it is a folder; give the name of a file in it.")
-    if target.exists() and not target.is_file():
-        raise UserError(f"Cannot write {path}: it is no ordinary file; give another name.")
-    if not target.parent.is_dir():
-        raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")
+    try:
+        if target.is_dir():
+            raise UserError(f"Cannot write {path}: it is a folder; give the name of a file in it.")
+        if target.exists() and not target.is_file():
+            raise UserError(f"Cannot write {path}: it is no ordinary file; give another name.")
+        if not target.parent.is_dir():
+            raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")
+    except OSError as error:  # a name that is too long, a folder that cannot be looked into
+        raise cannot_write(path, error) from None
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise UserError(f"Cannot write {path}: {MENDS[errno.EACCES]}.")
     return target
 
 
 def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> None:
-    """Make sure that what is made of `source` does not take its place. Raises `UserError`."""
+    """Make sure that what is made of `source`, or about it, does not take its place. Raises `UserError`."""
     if os.path.realpath(source) == os.path.realpath(output):
-        raise UserError(f"{source} would be replaced by its own result; choose another --output")
+        raise UserError(f"{source} would be replaced by its own result; choose another name")
 
 
 def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:

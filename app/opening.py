@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from contextlib import closing
 from dataclasses import dataclass
 from importlib import resources
@@ -11,7 +12,7 @@ from pathlib import Path
 from app.errors import UserError
 from app.pictures import FORMATS, MAX_PIXELS, OTHERS, Picture, read_picture
 from app.project import Project, is_project, load
-from app.recipe import Recipe
+from app.recipe import FINEST_GRID, Recipe
 from app.video import Clip, read_clip
 from solver.grid import SMALLEST_GRID
 
@@ -56,6 +57,8 @@ def check_picture(picture: Picture, cells: int) -> None:
         raise UserError(f"{size}; a side must have at least {SMALLEST_SIDE}, so enlarge or crop it")
     if cells * shorter < (SMALLEST_GRID - 0.5) * longer:
         needed = math.ceil(SMALLEST_GRID * longer / shorter)
+        if needed > FINEST_GRID:
+            raise UserError(f"{size}, too narrow for any grid; crop it")
         raise UserError(f"{size}, too narrow for a grid of {cells}; use --grid {needed} or more, or crop it")
 
 
@@ -111,7 +114,7 @@ def open_recipe(name: str) -> Opened:
     if path.suffix.lower() in PICTURE_ENDINGS:
         example = next(iter(shipped_recipes()), "RECIPE")
         raise UserError(f"{name} is a picture and not a recipe; try: fluidwarp render {example} {name} -o out.png")
-    if not path.exists() and path.suffix == "":
+    if not os.path.exists(path) and path.suffix == "":
         known = shipped_recipes()
         if name not in known:
             raise UserError(f"{name} does not exist; recipes that come with fluidwarp: {', '.join(known) or 'none'}")

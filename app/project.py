@@ -135,7 +135,7 @@ def _read(path: Path, archive: zipfile.ZipFile) -> Project:
     recipe = Recipe.parse(archive.read(RECIPE).decode(), f"the recipe in {path}")
     if recipe.picture is None:
         raise ValueError
-    held = [name for name in _picture_names(recipe) if name in names]
+    held = [name for name in picture_names(recipe) if name in names]
     embedded = recipe.picture in names
     if not embedded:
         source = path.parent / recipe.picture
@@ -154,7 +154,7 @@ def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
     """The recipe with the names its pictures get in the archive, and their bytes."""
     files: dict[str, bytes] = {}
     new_names: dict[str, str] = {}
-    for name in _picture_names(project.recipe):
+    for name in picture_names(project.recipe):
         inside = name if _is_plain(name) else Path(name).name
         while inside in files or inside in (RECIPE, FORMAT):
             inside = f"_{inside}"
@@ -174,7 +174,7 @@ def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
 def _referring(project: Project, path: Path) -> Recipe:
     """The recipe with names of pictures that start from the folder of `path`."""
     names = {}
-    for name in _picture_names(project.recipe):
+    for name in picture_names(project.recipe):
         target = (project.folder / name).resolve()
         if not target.exists():
             raise UserError(f"Cannot refer to {target}: it is gone; keep the picture in the project instead")
@@ -191,7 +191,7 @@ def _is_plain(name: str) -> bool:
     return not place.is_absolute() and ".." not in place.parts and "\\" not in name and ":" not in name
 
 
-def _picture_names(recipe: Recipe) -> list[str]:
+def picture_names(recipe: Recipe) -> list[str]:
     """The names of all pictures of a recipe, its own first."""
     found = [recipe.picture] if recipe.picture else []
 

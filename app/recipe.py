@@ -19,6 +19,7 @@ from app.strokes import Change, Stroke
 
 VERSION = 1
 MOST_TICKS = 1_000_000
+FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
 
 Seconds = Annotated[float, Field(ge=0, le=100_000)]
@@ -38,7 +39,7 @@ class FluidSettings(Model):
     """
 
     solver: Literal["mac", "paper"] = "mac"
-    grid: Annotated[int, Field(ge=8, le=4096)] = 256
+    grid: Annotated[int, Field(ge=8, le=FINEST_GRID)] = 256
     dt: Annotated[float, Field(gt=0, le=10)] = 1 / 60
     viscosity: Annotated[float, Field(ge=0, le=1000)] = 0.001
     drag: Annotated[float, Field(ge=0, le=1000)] = 0.0

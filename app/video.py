@@ -110,12 +110,16 @@ def _sound_codec(told: str) -> str | None:
 
 def _banner(file: Path) -> str:
     """What ffmpeg says of a file it opens; imageio-ffmpeg brings no ffprobe."""
-    if file.is_dir():
-        raise UserError(f"Cannot read {file}: it is a folder; give the name of a video.")
-    if not file.exists():
-        raise UserError(f"Cannot read {file}: there is no such file; check the name.")
-    if file.stat().st_size == 0:
-        raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
+    try:
+        if file.is_dir():
+            raise UserError(f"Cannot read {file}: it is a folder; give the name of a video.")
+        if file.stat().st_size == 0:
+            raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
+        file.open("rb").close()
+    except FileNotFoundError:
+        raise UserError(f"Cannot read {file}: there is no such file; check the name.") from None
+    except OSError as error:
+        raise UserError(f"Cannot read {file}: {error.strerror}.") from None
     command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}"]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     return done.stderr.decode("utf-8", "replace")

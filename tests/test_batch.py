@@ -97,6 +97,7 @@ def test_names_of_the_results(tmp_path: Path):
         ("out", ["a/x.png", "b/x.png"], "would both become"),
         (".", ["x.png", "y.png"], "replaced by its own result"),
         ("x.png", ["a.png", "b.png"], "{name}"),
+        ("{name}-w.png", ["a.png", "a-w.png"], "a-w.png would be replaced by what a.png becomes"),
     ],
 )
 def test_names_that_cannot_be(
@@ -110,6 +111,11 @@ def test_names_that_cannot_be(
 def test_one_file_of_numbers_for_many_pictures_is_refused(tmp_path: Path):
     with pytest.raises(UserError, match=r"put \{name\} into its name"):
         spread(Task("coffee", Edits(), None, tmp_path, stats=tmp_path / "s.json"), [Path("a.png"), Path("b.png")])
+
+
+def test_numbers_of_two_pictures_in_one_file_are_refused(tmp_path: Path):
+    with pytest.raises(UserError, match="would both become"):
+        spread(Task("coffee", Edits(), None, tmp_path, stats=tmp_path / "{name}.json"), [Path("a.png"), Path("a.jpg")])
 
 
 # One after the other, and in processes ------------------------------------------------------------------------------

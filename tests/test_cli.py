@@ -165,6 +165,7 @@ BAD = {
     "no picture": (["a.toml", "-i", "a.toml", "-o", "x.png"], "a.toml"),
     "1 x 1": (["a.toml", "-i", "dot.png", "-o", "x.png"], "1 x 1 pixels"),
     "1 x 5000": (["a.toml", "-i", "line.png", "-o", "x.png"], "1 x 5000 pixels"),
+    "too narrow for any": (["a.toml", "-i", "thread.png", "-o", "x.png"], "too narrow for any grid; crop it"),
     "too narrow": (["a.toml", "-i", "strip.png", "-o", "x.png"], "--grid 160"),
     "unknown ending": (["a.toml", "-o", "x.xyz"], "x.xyz"),
     "no ending": (["a.toml", "-o", "x"], "Cannot write x"),
@@ -173,6 +174,13 @@ BAD = {
     "stats nowhere": (["a.toml", "-o", "x.png", "--stats", "none/s.json"], "none"),
     "onto its source": (["a.toml", "-i", "cat.png", "-o", "cat.png"], "cat.png would be replaced by its own result"),
     "onto the recipe's picture": (["a.toml", "-o", "sub.png/../cat.png"], "would be replaced by its own result"),
+    "numbers onto the result": (["a.toml", "-o", "x.png", "--stats", "x.png"], "x.png cannot hold two results"),
+    "numbers onto the recipe": (["a.toml", "--stats", "a.toml"], "a.toml would be replaced by its own result"),
+    "map onto the first map": (["map.toml", "--map", "m.exr"], "m.exr would be replaced by its own result"),
+    "map without a name": (["a.toml", "-o", "x.exr", "--forward"], "say what --map writes"),
+    "too long": (["a.toml", "-o", "x" * 300 + ".png"], "the name is too long"),
+    "too long to be read": (["a.toml", "-i", "x" * 300 + ".mp4", "-o", "x.png"], "File name too long"),
+    "too long a recipe": (["x" * 300 + ".toml", "-o", "x.png"], "File name too long"),
     "states in a file": (["a.toml", "-o", "x.png", "--states", "cat.png"], "a file of this name is in the way"),
     "no place for a folder": (["a.toml", "cat.png", "-o", "cat.png/sub"], "a part of its path is a file"),
     "two of one name": (["a.toml", "cat.png", "cat.png", "-o", "new"], "would both become"),
@@ -203,9 +211,10 @@ def test_bad_input_is_told_in_a_sentence(
         "type": '[fluid]\ngrid = "64"',
         "radius": f"{point}radius = 0",
         "newer": "version = 99",
+        "map": 'picture = "cat.png"\nmap = "m.exr"',
     }.items():
         (folder / f"{name}.toml").write_text(text)
-    for name, shape in {"dot": (1, 1, 3), "line": (5000, 1, 3), "strip": (400, 20, 3)}.items():
+    for name, shape in {"dot": (1, 1, 3), "line": (5000, 1, 3), "strip": (400, 20, 3), "thread": (6000, 8, 3)}.items():
         write_picture(folder / f"{name}.png", Picture(np.zeros(shape, np.uint8)))
     (folder / "cut.png").write_bytes((folder / "cat.png").read_bytes()[:60])
     (folder / "cat.bin").write_bytes(bytes(range(256)))
