@@ -104,7 +104,7 @@ StGrid = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option("--grid", help="Where MAP's 0 and 1 lie, if it does not say: centres, corners or pixels."),
 ]
-MapOverscan = Annotated[Optional[int], typer.Option("--overscan", help="MAP's pixels beyond each side.")]  # noqa: UP045
+MapOverscan = Annotated[Optional[int], typer.Option("--overscan", min=0, help="MAP's pixels beyond each side.")]  # noqa: UP045
 
 
 @cli.command()

@@ -15,7 +15,7 @@ import numpy as np
 from app.animation import sequence_writer
 from app.errors import UserError
 from app.files import replacing
-from app.pictures import MAX_PIXELS, exr_channels, read_exr, read_picture, write_exr
+from app.pictures import MAX_PIXELS, check_size, exr_channels, read_exr, read_picture, write_exr
 from app.progress import never
 
 Kind = Literal["st", "offsets"]
@@ -198,7 +198,10 @@ def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Ki
             displacement = cropped(displacement)
             with temporary.open("wb") as stream:
                 if suffix == ".npy":
-                    np.save(stream, displacement.values.astype(np.float32))
+                    values = np.ascontiguousarray(displacement.values, np.float32)
+                    # not np.save, which on a full disk loses the reason
+                    np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(values))
+                    stream.write(values.data)
                 else:
                     stream.write(FLO_MAGIC.tobytes())
                     stream.write(np.array([displacement.width, displacement.height], np.int32).tobytes())
@@ -272,6 +275,7 @@ def read_map(
     suffix = Path(path).suffix.lower()
     if suffix in (".flo", ".npy"):
         offsets = _read_flo(Path(path)) if suffix == ".flo" else _read_npy(Path(path))
+        check_size(Path(path), offsets.shape[1], offsets.shape[0], max_pixels)
         _check_finite(path, offsets)
         if suffix == ".npy":
             return Displacement(offsets)
@@ -322,8 +326,8 @@ def _read_npy(file: Path) -> np.ndarray:
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error
     if not isinstance(values, np.ndarray) or values.ndim != 3 or values.shape[2] != 2 or values.dtype.kind != "f":
-        shape = getattr(values, "shape", ())
-        raise UserError(f"Cannot read {file}: a map is a float array (height, width, 2), this one is {shape}.")
+        kind = f"{getattr(values, 'dtype', 'of several')} {getattr(values, 'shape', 'arrays')}"
+        raise UserError(f"Cannot read {file}: a map is a float array (height, width, 2), this one is {kind}.")
     if 0 in values.shape:
         raise UserError(f"Cannot read {file}: the array {values.shape} is empty.")
     return values

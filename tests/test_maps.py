@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 import struct
 from pathlib import Path
 from typing import Any
@@ -270,7 +271,12 @@ def test_what_is_no_map(tmp_path: Path):
     with pytest.raises(UserError, match="its channels Y are no map"):
         read_map(tmp_path / "a.exr")
     np.save(tmp_path / "a.npy", np.zeros((4, 4, 3), np.float32))
-    with pytest.raises(UserError, match=r"a map is a float array \(height, width, 2\), this one is \(4, 4, 3\)"):
+    with pytest.raises(
+        UserError, match=r"a map is a float array \(height, width, 2\), this one is float32 \(4, 4, 3\)"
+    ):
+        read_map(tmp_path / "a.npy")
+    np.save(tmp_path / "a.npy", np.zeros((4, 4, 2), np.int32))
+    with pytest.raises(UserError, match=r"this one is int32 \(4, 4, 2\)"):
         read_map(tmp_path / "a.npy")
     np.save(tmp_path / "a.npy", np.array([{}]), allow_pickle=True)
     with pytest.raises(UserError, match="no NumPy array"):
@@ -280,8 +286,10 @@ def test_what_is_no_map(tmp_path: Path):
     write_map(tmp_path / "b.tif", identity(8, 8))
     with pytest.raises(UserError, match="an overscan of 4 leaves nothing"):
         read_map(tmp_path / "b.tif", overscan=4)
-    with pytest.raises(UserError, match="more than the limit of 10"):
-        read_map(tmp_path / "b.tif", max_pixels=10)
+    for name in ("b.tif", "b.exr", "b.flo", "b.npy"):
+        write_map(tmp_path / name, identity(8, 8))
+        with pytest.raises(UserError, match="more than the limit of 10"):
+            read_map(tmp_path / name, max_pixels=10)
 
 
 @pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
@@ -300,6 +308,20 @@ def test_a_full_disk_leaves_the_earlier_map(tmp_path: Path, monkeypatch: pytest.
         write_map(path, swirl(80, 80))
     assert path.read_bytes() == before
     assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
+def test_a_disk_that_fills_up_in_the_middle(tmp_path: Path, ending: str):
+    """A part is taken, and the rest is not."""
+    path = tmp_path / f"a{ending}"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        with pytest.raises(UserError, match=f"Cannot write {path}: the file grows larger than this disk allows"):
+            write_map(path, Displacement(np.random.default_rng(0).random((80, 80, 2), np.float32)))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
 
 
 def test_offsets_there_and_back():
