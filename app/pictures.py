@@ -26,6 +26,8 @@ PNG_LEVEL = 4  # on photographs as small as zlib's 6 within 1 %, in half the tim
 ORIENTATION, DESCRIPTION, EXIF_IFD, GPS_IFD = 0x0112, 0x010E, 0x8769, 0x8825
 # description, make, model, software, date, artist, copyright: what of a TIFF's first directory is not about its layout
 TIFF_TEXTS = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
+# Descriptions in which tifffile, ImageJ and OME keep the shape, which readers believe and a result would belie.
+LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -428,6 +430,8 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
             exif.load_from_fp(stream)
             for code in set(exif) - {*TIFF_TEXTS, ORIENTATION, EXIF_IFD, GPS_IFD}:
                 del exif[code]
+            if LAYOUT.match(str(exif.get(DESCRIPTION, ""))):
+                del exif[DESCRIPTION]
             encoded = _upright_exif(exif)
         except Exception:  # damaged metadata must not cost the picture
             encoded = None

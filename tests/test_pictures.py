@@ -252,6 +252,18 @@ def test_compressed_tiffs_of_16_bits(tmp_path: Path, compression: str):
     np.testing.assert_array_equal(read_picture(tmp_path / "a.tif").pixels, pixels)
 
 
+@pytest.mark.parametrize("writer", [{}, {"imagej": True}, {"ome": True}])
+def test_a_description_of_the_layout_is_not_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture, writer: dict):
+    """It tells the size of the picture as it was, and tifffile takes it for the result's."""
+    tifffile.imwrite(tmp_path / "a.tif", smooth(1)[..., 0], **writer)
+    picture = read_picture(tmp_path / "a.tif")
+    write_picture(tmp_path / "b.tif", picture.with_pixels(picture.pixels[::2, ::2]))
+    with tifffile.TiffFile(tmp_path / "b.tif") as made:
+        assert made.pages.first.description == ""
+        assert made.series[0].shape == picture.pixels[::2, ::2, 0].shape
+    assert not caplog.records
+
+
 def test_odd_tiffs(tmp_path: Path):
     path = tmp_path / "a.tif"
     rgb = noise(3, np.uint8)
