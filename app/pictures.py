@@ -21,6 +21,7 @@ from app.errors import UserError
 from app.files import replacing
 
 MAX_PIXELS = 400_000_000
+MOST_TEXT = 64 * 2**20  # bytes of a profile or text in a PNG, unpacked
 PNG_LEVEL = 4  # on photographs as small as zlib's 6 within 1 %, in half the time
 
 ORIENTATION, DESCRIPTION, EXIF_IFD, GPS_IFD = 0x0112, 0x010E, 0x8769, 0x8825
@@ -256,9 +257,10 @@ def check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
 
 
 def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
-    from PIL import Image
+    from PIL import Image, PngImagePlugin
 
     Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; ours is in check_size
+    PngImagePlugin.MAX_TEXT_CHUNK = MOST_TEXT  # 1 MiB of its own is less than some profiles have
     with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
         check_size(file, *image.size, max_pixels)
         icc = image.info.get("icc_profile")

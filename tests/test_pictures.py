@@ -252,6 +252,17 @@ def test_compressed_tiffs_of_16_bits(tmp_path: Path, compression: str):
     np.testing.assert_array_equal(read_picture(tmp_path / "a.tif").pixels, pixels)
 
 
+def test_a_large_profile_in_a_png_is_kept_and_a_bomb_refused(tmp_path: Path):
+    profile = cmyk_profile()[:16] + b"RGB " + cmyk_profile()[20:]
+    large = profile + np.random.default_rng(0).bytes(2_000_000)
+    write_picture(tmp_path / "a.png", Picture(smooth(3), icc=large))
+    assert read_picture(tmp_path / "a.png").icc == large
+    write_picture(tmp_path / "b.png", Picture(smooth(3), icc=profile + bytes(100_000_000)))
+    assert (tmp_path / "b.png").stat().st_size < 200_000
+    with pytest.raises(UserError, match=r"b\.png: .*too large"):
+        read_picture(tmp_path / "b.png")
+
+
 @pytest.mark.parametrize("writer", [{}, {"imagej": True}, {"ome": True}])
 def test_a_description_of_the_layout_is_not_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture, writer: dict):
     """It tells the size of the picture as it was, and tifffile takes it for the result's."""
