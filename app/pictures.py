@@ -589,7 +589,8 @@ def _encode_png(picture: Picture) -> bytes:
     from PIL.PngImagePlugin import PngInfo, putchunk
 
     pixels = np.ascontiguousarray(picture.pixels)
-    encoded = imagecodecs.png_encode(pixels if pixels.shape[2] > 1 else pixels[..., 0], level=PNG_LEVEL)
+    # a view, so that its parts are no copies: of a large picture each would take a hundred megabytes
+    encoded = memoryview(imagecodecs.png_encode(pixels if pixels.shape[2] > 1 else pixels[..., 0], level=PNG_LEVEL))
     extra = PngInfo()
     if picture.icc:
         extra.add(b"iCCP", b"ICC Profile\0\0" + zlib.compress(picture.icc))
