@@ -15,7 +15,11 @@ from pathlib import Path
 import app
 
 PATIENCE = 30  # seconds
-LIBRARIES = ("moderngl", "glfw", "imgui-bundle", "numpy", "pillow", "imageio", "imageio-ffmpeg", "pydantic")
+MISSING = "missing"
+LIBRARIES = (
+    *("moderngl", "glfw", "imgui-bundle", "numpy", "pydantic"),
+    *("pillow", "imagecodecs", "tifffile", "openexr", "imageio", "imageio-ffmpeg"),
+)
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,10 @@ class Finding:
 def examine() -> Iterator[Finding]:
     """Look at everything, one thing after another; the GL is tried in processes of its own, which may die of it."""
     yield Finding("Python", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
-    yield Finding("libraries", ", ".join(f"{name} {_version(name)}" for name in LIBRARIES))
+    versions = {name: _version(name) for name in LIBRARIES}
+    missing = " ".join(name for name, version in versions.items() if version == MISSING)
+    found = ", ".join(f"{name} {version}" for name, version in versions.items())
+    yield Finding("libraries", found, f"pip install {missing}" if missing else "", vital=True)
     yield from _headless()
     yield _window()
     yield _encoder()
@@ -52,7 +59,7 @@ def _version(name: str) -> str:
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
-        return "missing"
+        return MISSING
 
 
 def _headless() -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
+from app import cli, doctor
 from app.export import Job, run
 from app.pictures import Picture, read_picture, write_picture
 from app.progress import Progress
@@ -142,6 +142,13 @@ def test_doctor(folder: Path):
     assert ran.returncode == 0
     assert "OpenGL" in ran.stdout
     assert "no display" in ran.stdout
+
+
+def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(doctor, "LIBRARIES", ("numpy", "no-such-library"))
+    found = next(finding for finding in doctor.examine() if finding.name == "libraries")
+    assert found.vital
+    assert found.mend == "pip install no-such-library"
 
 
 # -- what does not ----------------------------------------------------------------------------------------------------
