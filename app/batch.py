@@ -124,7 +124,7 @@ class Task:
 
     def job(self, opened: Opened | None = None) -> Job:
         """The job, with its picture read. Raises `UserError`."""
-        opened = opened or _opened(self.recipe)
+        opened = opened or _opened(self.recipe, self.max_pixels)
         file = opened.source_file(self.picture)
         own = opened.recipe if self.picture is None else opened.recipe.edited(picture=None)
         read = [Path(opened.label), *(opened.folder / name for name in picture_names(own))]
@@ -272,8 +272,8 @@ def perform(task: Task, cancel: Callable[[], bool] = never) -> Outcome:
 
 
 @lru_cache(maxsize=4)
-def _opened(name: str) -> Opened:
-    return open_recipe(name)
+def _opened(name: str, max_pixels: int) -> Opened:
+    return open_recipe(name, max_pixels)
 
 
 # Processes ----------------------------------------------------------------------------------------------------------

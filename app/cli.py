@@ -142,7 +142,10 @@ def render(
     grid: Annotated[Optional[int], typer.Option(help="Cells along the longer side.")] = None,  # noqa: UP045
     solver: Annotated[Optional[str], typer.Option(help="mac or paper.")] = None,  # noqa: UP045
     duration: Annotated[Optional[float], typer.Option(help="Seconds to simulate.")] = None,  # noqa: UP045
-    fps: Annotated[Optional[float], typer.Option(help="Frames per second of an animation.")] = None,  # noqa: UP045
+    fps: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(help="Frames per second of a picture's animation; a clip keeps its own."),
+    ] = None,
     quality: Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")] = None,  # noqa: UP045
     start: Annotated[Optional[float], typer.Option("--from", help="First second of an animation.")] = None,  # noqa: UP045
     end: Annotated[Optional[float], typer.Option("--to", help="Last second.")] = None,  # noqa: UP045
@@ -174,7 +177,7 @@ def render(
     from app.export import MapOutput
     from app.opening import open_recipe
 
-    opened = open_recipe(recipe)
+    opened = open_recipe(recipe, max_pixels)
     tables = {
         "fluid": {"grid": grid, "solver": solver},
         "output": {"size": size, "fps": fps, "quality": quality},

@@ -104,8 +104,10 @@ def shipped_recipes() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def open_recipe(name: str) -> Opened:
+def open_recipe(name: str, max_pixels: int = MAX_PIXELS) -> Opened:
     """The recipe in a file or a project, or the one of this name that comes with fluidwarp.
+
+    max_pixels: of the picture in a project.
 
     Raises:
         UserError: if there is none, naming those that there are.
@@ -120,6 +122,6 @@ def open_recipe(name: str) -> Opened:
             raise UserError(f"{name} does not exist; recipes that come with fluidwarp: {', '.join(known) or 'none'}")
         path = known[name]
     if is_project(path):
-        project = load(path)
+        project = load(path, max_pixels)
         return Opened(project.recipe, project.folder, str(path), project)
     return Opened(Recipe.load(path), path.parent, str(path))

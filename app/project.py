@@ -11,7 +11,7 @@ from typing import Any
 
 from app.errors import UserError
 from app.files import replacing
-from app.pictures import Picture, read_picture
+from app.pictures import MAX_PIXELS, Picture, read_picture
 from app.recipe import Recipe
 from app.schema import plain
 
@@ -20,6 +20,7 @@ RECIPE = "recipe.toml"
 FORMAT = "format.txt"
 VERSION = 1
 MOST_BYTES = 4 * 2**30
+MOST_TEXT = 128 * 2**20  # bytes of a recipe: strokes of a day
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,8 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
     return Project(recipe, read_picture(source), source.read_bytes(), path.parent)
 
 
-def load(path: str | os.PathLike[str]) -> Project:
-    """The project in a file.
+def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
+    """The project in a file, if its picture has no more than `max_pixels`.
 
     Raises:
         UserError: if it is none, is cut short, or was written by a newer fluidwarp.
@@ -95,7 +96,7 @@ def load(path: str | os.PathLike[str]) -> Project:
     path = Path(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            return _read(path, archive)
+            return _read(path, archive, max_pixels)
     except FileNotFoundError:
         raise UserError(f"{path} does not exist") from None
     except UserError:
@@ -122,8 +123,10 @@ def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) 
     return replace(project, path=path, embedded=embedded)
 
 
-def _read(path: Path, archive: zipfile.ZipFile) -> Project:
+def _read(path: Path, archive: zipfile.ZipFile, max_pixels: int) -> Project:
     names = set(archive.namelist())
+    if max(archive.getinfo(name).file_size for name in (FORMAT, RECIPE)) > MOST_TEXT:
+        raise UserError(f"{path} holds a recipe of more than {MOST_TEXT >> 20} MB; get it again")
     words = archive.read(FORMAT).decode().split()
     if words[:2] != ["fluidwarp", "project"]:
         raise ValueError
@@ -139,7 +142,8 @@ def _read(path: Path, archive: zipfile.ZipFile) -> Project:
     embedded = recipe.picture in names
     if not embedded:
         source = path.parent / recipe.picture
-        return Project(recipe, read_picture(source), source.read_bytes(), path.parent, path, embedded=False)
+        picture = read_picture(source, max_pixels)
+        return Project(recipe, picture, source.read_bytes(), path.parent, path, embedded=False)
     if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
         raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")
     keeper = tempfile.TemporaryDirectory(prefix="fluidwarp-", ignore_cleanup_errors=True)
@@ -147,7 +151,12 @@ def _read(path: Path, archive: zipfile.ZipFile) -> Project:
     for name in held:
         archive.extract(name, folder)  # which lets nothing out of the folder
     data = archive.read(recipe.picture)
-    return Project(recipe, read_picture(folder / recipe.picture), data, folder, path, keeper=keeper)
+    source = folder / recipe.picture
+    try:
+        picture = read_picture(source, max_pixels)
+    except UserError as error:  # the temporary folder is nobody's business
+        raise UserError(str(error).replace(str(source), f"{recipe.picture} in {path}")) from None
+    return Project(recipe, picture, data, folder, path, keeper=keeper)
 
 
 def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:

@@ -77,6 +77,22 @@ def test_a_project_cut_short_says_so(made: Project, tmp_path: Path, part: float)
         projects.load(path)
 
 
+def test_a_bomb_is_refused_before_it_is_unpacked(made: Project, tmp_path: Path) -> None:
+    path = tmp_path / "work.fluidwarp"
+    projects.save(made, path)
+    with pytest.raises(UserError, match=rf"photo\.png in {path}: .* are more than the limit of 10;"):
+        projects.load(path, max_pixels=10)
+    assert projects.load(path, max_pixels=10_000).picture.width == made.picture.width
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("format.txt", "fluidwarp project 1\n")
+        with archive.open("recipe.toml", "w") as stream:
+            for _ in range(200):
+                stream.write(b"#" * 2**20)
+    assert path.stat().st_size < 2**20
+    with pytest.raises(UserError, match=r"work\.fluidwarp holds a recipe of more than 128 MB"):
+        projects.load(path)
+
+
 def test_a_full_disk_leaves_the_old_file(made: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "work.fluidwarp"
     projects.save(made, path)
