@@ -113,9 +113,10 @@ def open_recipe(name: str, max_pixels: int = MAX_PIXELS) -> Opened:
         UserError: if there is none, naming those that there are.
     """
     path = Path(name)
-    if path.suffix.lower() in PICTURE_ENDINGS:
+    if path.suffix.lower() in (*PICTURE_ENDINGS, *CLIP_ENDINGS):
+        kind, out = ("clip", "out.mp4") if path.suffix.lower() in CLIP_ENDINGS else ("picture", "out.png")
         example = next(iter(shipped_recipes()), "RECIPE")
-        raise UserError(f"{name} is a picture and not a recipe; try: fluidwarp render {example} {name} -o out.png")
+        raise UserError(f"{name} is a {kind} and not a recipe; try: fluidwarp render {example} {name} -o {out}")
     if not os.path.exists(path) and path.suffix == "":
         known = shipped_recipes()
         if name not in known:

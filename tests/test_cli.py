@@ -167,6 +167,7 @@ BAD = {
     "no such recipe": (["b.toml", "-o", "x.png"], "b.toml does not exist"),
     "no such name": (["nonesuch", "-o", "x.png"], "nonesuch does not exist; recipes that come with fluidwarp"),
     "a picture as recipe": (["cat.png", "-o", "x.png"], "cat.png is a picture and not a recipe"),
+    "a clip as recipe": (["a.mov", "-o", "x.mp4"], "a.mov is a clip and not a recipe"),
     "no such picture": (["a.toml", "-i", "dog.png", "-o", "x.png"], "dog.png"),
     "truncated picture": (["a.toml", "-i", "cut.png", "-o", "x.png"], "cut.png"),
     "no picture": (["a.toml", "-i", "a.toml", "-o", "x.png"], "a.toml"),
