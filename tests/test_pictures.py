@@ -552,7 +552,7 @@ def test_noise_fits_into_a_jpeg(tmp_path: Path, quality: int) -> None:
 # Formats we only read -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ending", [".tga", ".ppm", ".pcx", ".sgi", ".qoi", ".dds", ".jp2"])
+@pytest.mark.parametrize("ending", [".bmp", ".tga", ".ppm", ".pcx", ".sgi", ".qoi", ".dds", ".jp2"])
 def test_other_programs_formats_are_read(tmp_path: Path, ending: str):
     """Written by Pillow, read through imageio, exactly."""
     y, x = np.mgrid[0:48, 0:64]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from app.errors import UserError
 from app.opening import shipped_recipes
-from app.recipe import Recipe
+from app.recipe import Density, FluidSettings, Output, Playback, Recipe
 from app.strokes import Change, Dab, Stroke
 
 FULL = """
@@ -155,6 +156,32 @@ def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
     """As Windows' Notepad sets it."""
     (tmp_path / "a.toml").write_text("duration = 2.0\n", "utf-8-sig")
     assert Recipe.load(tmp_path / "a.toml").duration == 2
+
+
+@pytest.mark.parametrize("page", ["README.md", "assets/guide/README.md"])
+def test_examples_of_the_documentation_are_recipes(page: str):
+    text = (Path(__file__).parent.parent / page).read_text("utf-8")
+    examples = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert examples
+    for example in examples:
+        assert Recipe.parse(example, page) != Recipe()
+
+
+def test_the_guide_names_what_holds_where_a_key_is_left_out():
+    text = (Path(__file__).parent.parent / "assets/guide/README.md").read_text("utf-8")
+    written = Recipe.parse(re.findall(r"```toml\n(version.*?)```", text, re.DOTALL)[-1])
+    own = written.edited(
+        name="",
+        picture=None,
+        map=None,
+        duration=1.0,
+        time=written.time.model_copy(update={"end": None}),
+        output=written.output.model_copy(update={"size": None}),
+    )
+    assert own == Recipe()
+    named = re.findall(r"^(\w+) = ", text, re.MULTILINE)
+    for model in (FluidSettings, Playback, Output, Density):
+        assert set(model.model_fields) - {"sweeps"} <= set(named)
 
 
 def test_files_that_are_none(tmp_path: Path):
