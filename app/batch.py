@@ -292,12 +292,12 @@ def _begin(life: Connection) -> None:
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Keep Ctrl+C, which reaches every process of a terminal, from all processes that are started in the block.
+    """Keep Ctrl+C and a hang-up, which reach every process of a terminal, from those that are started in the block.
 
     They inherit what this thread has blocked, while for itself it only waits until the block ends; a handler that a
     process sets for itself would come too late for one that is still being started.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     try:
         yield
     finally:
@@ -327,7 +327,8 @@ def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress
     theirs, ours = context.Pipe(duplex=False)
     waiting = deque((task, 1) for task in tasks)
     while waiting:
-        pool = ProcessPoolExecutor(jobs, context, _begin, (theirs,))
+        with _deaf_children():  # the pool starts a process of its own, which keeps its books
+            pool = ProcessPoolExecutor(jobs, context, _begin, (theirs,))
         running: dict[Future[Outcome], tuple[Task, int]] = {}
         try:
             while waiting or running:

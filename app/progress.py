@@ -9,12 +9,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 from app.errors import Cancelled
 from app.files import abandon
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Ctrl+C, a scheduler's, and that the terminal was closed, where the system knows it
+SIGNALS = tuple(number for number in signal.Signals if number.name in ("SIGINT", "SIGTERM", "SIGHUP"))
 GRACE = 0.2  # seconds that a job has to notice Ctrl+C between two of its steps
 INTERRUPTED = 130
 
@@ -64,13 +65,19 @@ class Progress:
 def leave() -> None:
     """End this process in the middle of whatever it is doing, with nothing half-written left."""
     abandon()
-    print("fluidwarp: cancelled; nothing half-written is left", file=sys.stderr, flush=True)
+    with suppress(OSError):  # the terminal may be gone
+        print("fluidwarp: cancelled; nothing half-written is left", file=sys.stderr, flush=True)
     os._exit(INTERRUPTED)
+
+
+def heeded(number: signal.Signals) -> bool:
+    """False for a hang-up under `nohup`, which is to go on."""
+    return number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN
 
 
 @contextmanager
 def interruptible(at_once: Callable[[], None] | None = None) -> Iterator[Callable[[], bool]]:
-    """Turn Ctrl+C and SIGTERM into a wish to stop while the block runs; yields the callable that answers it.
+    """Turn Ctrl+C, SIGTERM and SIGHUP into a wish to stop while the block runs; yields the callable that answers it.
 
     at_once: called in a thread if the block has not ended soon after the wish: some steps cannot be interrupted.
     A second Ctrl+C interrupts at once. Outside the main thread, where signals do not arrive, it does nothing.
@@ -91,7 +98,7 @@ def interruptible(at_once: Callable[[], None] | None = None) -> Iterator[Callabl
     with ExitStack() as stack:
         if at_once is not None:
             stack.enter_context(_watchdog(wish, at_once))
-        for number in SIGNALS:
+        for number in filter(heeded, SIGNALS):
             stack.callback(signal.signal, number, signal.signal(number, ask))
         yield wish.is_set
 

@@ -87,6 +87,18 @@ def test_ctrl_c_stops_within_half_a_second():
     assert job.wait() == 0
 
 
+def test_a_hang_up_stops_too_but_not_under_nohup():
+    before = signal.getsignal(signal.SIGHUP)
+    try:
+        for handler, stops in ((signal.SIG_DFL, True), (signal.SIG_IGN, False)):
+            signal.signal(signal.SIGHUP, handler)
+            with interruptible() as cancel:
+                os.kill(os.getpid(), signal.SIGHUP)
+                assert cancel() is stops
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_signals_are_given_back():
     before = signal.getsignal(signal.SIGINT)
     with interruptible() as cancel:
