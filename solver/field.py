@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from solver.context import Device
 
-_NUMPY = {"f1": np.uint8, "nu2": np.uint16, "f2": np.float16, "f4": np.float32}
+_NUMPY = {"f1": np.uint8, "nu2": np.uint16, "u4": np.uint32, "f2": np.float16, "f4": np.float32}
 
 
 class FieldError(ValueError):
@@ -25,7 +25,7 @@ class Field:
         size: (width, height) in texels, each from 1 to the GL's limit.
         components: 1-4.
         label: its name in errors and in a frame debugger.
-        dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1) or "f2".
+        dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1), "u4" (whole numbers) or "f2".
     """
 
     def __init__(self, device: Device, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:

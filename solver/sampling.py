@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, prod, sqrt
 from typing import Any, Literal
 
@@ -122,6 +123,11 @@ class _Job:
         return self.how.quality == "nearest" or self.how.samples == 1
 
     @property
+    def is_paired(self) -> bool:
+        """True if two neighbours in x are drawn at once, packed as two whole numbers of four bytes each."""
+        return self.picture.dtype == np.uint8 and self.channels >= 3
+
+    @property
     def zoom(self) -> tuple[float, float]:
         """Pixels of the picture to a pixel of the result."""
         return self.source_size[0] / self.size[0], self.source_size[1] / self.size[1]
@@ -175,6 +181,7 @@ class _Job:
             "DITHER": dither and kind == "f1" and self.how.quality != "nearest",
             "OPAQUE": not self.has_alpha,
             "GREY_ALPHA": self.channels == 2,
+            "PAIRED": self.is_paired,
         }
         values: dict[str, object] = {name: 1 for name, wanted in flags.items() if wanted}
         least, most = self.pairs
@@ -293,7 +300,7 @@ class Sampler:
     def _tile(self, size: tuple[int, int]) -> tuple[int, int]:
         """(width, height) of the tiles of a result: all alike."""
         width, height = (ceil(side / ceil(side / most)) for side, most in zip(size, self.tile, strict=True))
-        return width, height
+        return width + width % 2, height  # so that no pair is torn apart
 
     def _room(self, job: _Job, tile: tuple[int, int]) -> tuple[int, int]:
         """(width, height) of the textures for pieces of the picture: what a tile turned by any angle needs.
@@ -308,14 +315,17 @@ class Sampler:
         """Draw one tile of the result into the field "result", from the whole picture or by pieces that fit `room`."""
         left, top, right, bottom = tile
         lattice = self._spread(job, tile)
-        kind, _ = _KINDS[job.picture.dtype]
-        self._field("result", (right - left, bottom - top), _TARGET_COMPONENTS[job.channels], kind)
+        if job.is_paired:
+            self._field("result", ((right - left + 1) // 2, bottom - top), 2, "u4")
+        else:
+            kind, _ = _KINDS[job.picture.dtype]
+            self._field("result", (right - left, bottom - top), _TARGET_COMPONENTS[job.channels], kind)
         if room is None:
             self._look_up(job, lattice, (left, top), (0, 0, right - left, bottom - top), None)
         else:
-            places = lattice.get()
-            places *= np.array(job.longer, np.float32)
             more = 0 if job.is_single else 1
+            places = lattice.get().reshape(lattice.height, -1, 2)[:, : right - left + more]
+            places *= np.array(job.longer, np.float32)
             places[..., 0] += (np.arange(left, right + more) * job.zoom[0])[None, :]
             places[..., 1] += (np.arange(top, bottom + more) * job.zoom[1])[:, None]
             self._draw_pieces(job, lattice, places, (left, top), (0, 0, right - left, bottom - top), room)
@@ -335,14 +345,15 @@ class Sampler:
         size = _size(piece)
         fits = self._fits(size)
         unwarped = max(width * max(job.zoom[0], 1), height * max(job.zoom[1], 1))
-        is_smallest = unwarped <= _SMALLEST_TILE or width == height == 1
+        is_smallest = unwarped <= _SMALLEST_TILE or (width <= 2 and height == 1)
         if is_smallest and not fits:
             raise SamplingError(
                 f"the map tears a patch of {width} x {height} pixels over {size[0]} x {size[1]} pixels of the picture"
             )
         if not is_smallest and (size[0] > room[0] or size[1] > room[1]):
-            if width >= height:
-                halves = (x, y, width // 2, height), (x + width // 2, y, width - width // 2, height)
+            if width >= height and width > 2:
+                left = width // 4 * 2 or 2  # no pair is torn apart
+                halves = (x, y, left, height), (x + left, y, width - left, height)
             else:
                 halves = (x, y, width, height // 2), (x, y + height // 2, width, height - height // 2)
             # Where the map is torn, both halves may need what the whole does.
@@ -358,18 +369,21 @@ class Sampler:
         left, top, right, bottom = tile
         more, shift = (0, 0.5) if job.is_single else (1, 0.0)
         width, height = right - left + more, bottom - top + more
-        source = job.displacement
-        key = (*job.key, job.size, job.is_single, tile)
+        source, components, defines = job.displacement, 2, {}
+        if job.is_paired:
+            width, components, defines = (right - left + 1) // 2 + more, 4, {"PAIRED": 1}
+        key = (*job.key, job.size, job.is_single, job.is_paired, tile)
         if key == self._spread_for:  # the same map over a film or a batch of pictures
             return self._fields["lattice"]
         self._spread_for = key
-        rows = self._field("along x", (width, source.height), 2, "f4")
-        lattice = self._field("lattice", (width, height), 2, "f4")
+        rows = self._field("along x", (width, source.height), components, "f4")
+        lattice = self._field("lattice", (width, height), components, "f4")
         scale_x, scale_y = source.width / job.size[0], source.height / job.size[1]
-        self.device.pass_("sampling/spread.frag", ALONG_X=1)(
+        self.device.pass_("sampling/spread.frag", ALONG_X=1, **defines)(
             rows, displacement=source, first=left + shift, scale=scale_x
         )
-        self.device.pass_("sampling/spread.frag")(lattice, displacement=rows, first=top + shift, scale=scale_y)
+        along_y = self.device.pass_("sampling/spread.frag", **defines)
+        along_y(lattice, displacement=rows, first=top + shift, scale=scale_y)
         return lattice
 
     def _look_up(
@@ -393,9 +407,12 @@ class Sampler:
             defines = job.defines(whole=piece is None, places=kind // 2, inside=kind % 2 == 1)
             blocks = _rectangles(shown == kind) * _BLOCK
             blocks[:, :2] += np.array((left // _BLOCK, top // _BLOCK)) * _BLOCK - origin
+            regions = [_overlap(block, region) for block in blocks.tolist()]
+            if job.is_paired:
+                regions = [(x // 2, y, (width + 1) // 2, height) for x, y, width, height in regions]
             self.device.pass_("sampling/look_up.frag", **defines)(
                 target,
-                region=[_overlap(block, region) for block in blocks.tolist()],
+                region=regions,
                 source=self._fields["prepared"] if job.is_prepared else raw,
                 raw=raw,
                 displacement=lattice,
@@ -471,12 +488,25 @@ class Sampler:
     def _take(self, job: _Job, target: np.ndarray) -> None:
         """Read the field "result" into an array."""
         field = self._fields["result"]
-        within = target.shape[1], target.shape[0]
-        settings: dict[str, Any] = {"components": job.channels, "dtype": field.dtype, "alignment": 1}
+        height, width, channels = target.shape
+        if job.is_paired:
+            read = partial(field.framebuffer.read_into, components=2, dtype="u4", alignment=1)
+            if channels == 4 and target.flags.c_contiguous and field.size == (width // 2, height):
+                read(target)
+                return
+            # Some rows at a time stay in the cache.
+            rows = min(height, max(1, _WIDENED // width))
+            wide = np.empty((rows, 2 * field.width, 4), target.dtype)
+            for top in range(0, height, rows):
+                some = target[top : top + rows]
+                read(wide, viewport=(0, top, field.width, len(some)))
+                _narrow(wide[: len(some), :width], some)
+            return
+        settings: dict[str, Any] = {"components": channels, "dtype": field.dtype, "alignment": 1}
         if target.flags.c_contiguous:
-            field.framebuffer.read_into(target, within, **settings)
+            field.framebuffer.read_into(target, (width, height), **settings)
         else:
-            data = field.framebuffer.read(within, **settings)
+            data = field.framebuffer.read((width, height), **settings)
             target[...] = np.frombuffer(data, target.dtype).reshape(target.shape)
 
     def _field(self, role: str, size: tuple[int, int], components: int, dtype: str) -> Field:
@@ -532,6 +562,18 @@ def _write(texture: moderngl.Texture, pixels: np.ndarray) -> None:
         words[:count] = np.ndarray(count, words.dtype, some, strides=(3 * pixels.itemsize,))
         wide.reshape(-1, 4)[count, :3] = some[-1, -1]
         texture.write(wide[: len(some)], viewport=(0, top, width, len(some)))
+
+
+def _narrow(wide: np.ndarray, pixels: np.ndarray) -> None:
+    """Copy pixels (h, w, 4) of bytes into an array of as many values, or of three."""
+    height, width, channels = pixels.shape
+    if channels == 4 or not pixels.flags.c_contiguous or not wide.flags.c_contiguous:
+        pixels[...] = wide[..., :channels]
+        return
+    # Whole words, one row after the other: the fourth value of each is overwritten by the next.
+    count = height * width - 1
+    np.ndarray(count, np.uint32, pixels, strides=(3,))[...] = wide.reshape(-1).view(np.uint32)[:count]
+    pixels[-1, -1] = wide[-1, -1, :3]
 
 
 def _rectangles(mask: np.ndarray) -> np.ndarray:

@@ -82,7 +82,8 @@ def test_bilinear_agrees_with_opencv(device: Device, size: tuple[int, int]) -> N
 def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
     warp = GivenMap(device, waves((230, 150), 0.2))
     whole, tiled = Sampler(device), Sampler(device, whole=12_000, tile=(64, 50))
-    for picture in (noise((150, 230, 3), "8"), noise((150, 230, 2), "16"), noise((150, 230), "float")):
+    kinds = noise((150, 230, 3), "8"), noise((150, 231, 4), "8"), noise((150, 230, 2), "16"), noise((150, 230), "float")
+    for picture in kinds:
         for size in (None, (301, 190)):
             how = Sampling(edges=edges)  # type: ignore[arg-type]
             wanted = whole.apply(warp, picture, size, how)

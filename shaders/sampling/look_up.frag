@@ -8,13 +8,14 @@
 // premultiplied where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels, or at their centres with SINGLE defined;
 // u_texel, u_next: size of a texel of the picture and of the displacement, 0-1;
-// u_pixel: the result's pixel of the first fragment; u_zoom: pixels of the picture to a pixel of the result;
+// u_pixel: the result's pixel of the first fragment, or the first of its two; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
 // Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places; ONE place,
 // and SINGLE where there is one everywhere; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
 // OPAQUE if there is no alpha; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
-// GREY_ALPHA.
+// GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
+// they have in common is done once, and a software rasteriser waits for the pixels of both at the same time.
 // reads: 30
 #ifndef TAPS
 #define TAPS 4
@@ -36,7 +37,11 @@ uniform vec2 u_longer;
 uniform vec2 u_middle;
 uniform vec2 u_half;
 uniform float u_outside;
+#ifdef PAIRED
+layout(location = 0) out uvec2 out_colors;
+#else
 layout(location = 0) out vec4 out_color;
+#endif
 
 // A component that is never read costs nothing.
 #ifdef OPAQUE
@@ -167,12 +172,16 @@ COLOR one_place(vec2 whole, vec2 place) {
 // Deterministic noise in 0-1 that is even over every small neighbourhood (Jimenez 2014, interleaved gradient noise).
 float even_noise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
 
-vec2 displacement(int i, int j) {
-    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) * u_next).rg * u_longer;
-}
+// The displacement at the corners of a pixel of the result: upper left and right, lower left and right; at its centre
+// where there is one place everywhere. In the picture's pixels.
+#ifdef SINGLE
+#define CORNERS vec2
+#else
+#define CORNERS mat4x2
+#endif
 
-void main() {
-    vec2 pixel = floor(gl_FragCoord.xy) + u_pixel;
+// The result's pixel.
+vec4 look_up(vec2 pixel, CORNERS at) {
 #ifdef ZOOMED
     vec2 zoom = u_zoom, whole = floor(pixel * zoom), rest = pixel * zoom - whole;
 #else
@@ -180,9 +189,9 @@ void main() {
     vec2 whole = pixel;
 #endif
 #ifdef SINGLE
-    vec2 centre = rest + 0.5 * zoom + displacement(0, 0);
+    vec2 centre = rest + 0.5 * zoom + at;
 #else
-    vec2 a = displacement(0, 0), b = displacement(1, 0), c = displacement(0, 1), d = displacement(1, 1);
+    vec2 a = at[0], b = at[1], c = at[2], d = at[3];
     vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d);
 #endif
 #ifdef ONE
@@ -231,7 +240,7 @@ void main() {
     color.rgb = linear_to_srgb(color.rgb);
 #endif
 #ifdef DITHER
-    color.rgb = floor(color.rgb * 255.0 + even_noise(pixel)) / 255.0;
+    color.rgb = min(floor(color.rgb * 255.0 + even_noise(pixel)), 255.0) / 255.0;
 #endif
 #if defined(PREPARED) && !defined(ZOOMED)
     // Moved by whole pixels, and above all not at all: the very values of the picture.
@@ -244,5 +253,49 @@ void main() {
 #ifdef GREY_ALPHA
     color.g = color.a;
 #endif
-    out_color.PARTS = color;
+#ifdef OPAQUE
+    return vec4(color, 1.0);
+#else
+    return color;
+#endif
 }
+
+#ifdef PAIRED
+// Four values of 0-1 as bytes.
+uint in_a_word(vec4 color) {
+    ivec4 codes = ivec4(color * 255.0 + 0.5);
+    return uint(codes.r | codes.g << 8 | codes.b << 16 | codes.a << 24);
+}
+
+vec4 displacements(float i, float j) {
+    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) * u_next) * u_longer.xyxy;
+}
+
+void main() {
+    vec2 left = floor(gl_FragCoord.xy) * vec2(2.0, 1.0) + u_pixel, right = left + vec2(1.0, 0.0);
+#ifdef SINGLE
+    vec4 at = displacements(0.0, 0.0);
+    vec4 first = look_up(left, at.xy), second = look_up(right, at.zw);
+#else
+    vec4 upper = displacements(0.0, 0.0), lower = displacements(0.0, 1.0);
+    vec2 upper_right = displacements(1.0, 0.0).xy, lower_right = displacements(1.0, 1.0).xy;
+    vec4 first = look_up(left, CORNERS(upper, lower));
+    vec4 second = look_up(right, CORNERS(upper.zw, upper_right, lower.zw, lower_right));
+#endif
+    out_colors = uvec2(in_a_word(first), in_a_word(second));
+}
+#else
+vec2 displacement(float i, float j) {
+    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) * u_next).rg * u_longer;
+}
+
+void main() {
+    vec2 pixel = floor(gl_FragCoord.xy) + u_pixel;
+#ifdef SINGLE
+    out_color = look_up(pixel, displacement(0.0, 0.0));
+#else
+    out_color = look_up(pixel, CORNERS(displacement(0.0, 0.0), displacement(1.0, 0.0),
+                                       displacement(0.0, 1.0), displacement(1.0, 1.0)));
+#endif
+}
+#endif
