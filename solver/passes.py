@@ -13,7 +13,7 @@ from solver.program import ShaderError, assemble, compile_program, declared_read
 if TYPE_CHECKING:
     from solver.context import Device
 
-GL_SAMPLER_2D = 0x8B5E
+GL_SAMPLERS = 0x8B5E, 0x8DD2  # sampler2D, usampler2D
 
 Target = Field | Sequence[Field]
 Region = tuple[int, int, int, int]
@@ -44,7 +44,7 @@ class Pass:
             member = self.program[name]
             if isinstance(member, moderngl.Uniform):
                 self._uniforms[name] = member
-                if member.gl_type == GL_SAMPLER_2D:  # pyright: ignore[reportAttributeAccessIssue]
+                if member.gl_type in GL_SAMPLERS:  # pyright: ignore[reportAttributeAccessIssue]
                     self._units[name] = member.value = len(self._units)
 
     def __call__(

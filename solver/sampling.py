@@ -119,6 +119,11 @@ class _Job:
         return self.how.quality != "nearest" and (self.is_curved or self.has_alpha)
 
     @property
+    def is_packed(self) -> bool:
+        """True if a texel of what is prepared holds two neighbours in x, 16 bits a colour: enough for bytes."""
+        return self.is_prepared and self.is_curved and self.picture.dtype == np.uint8 and self.channels == 3
+
+    @property
     def is_single(self) -> bool:
         return self.how.quality == "nearest" or self.how.samples == 1
 
@@ -175,6 +180,7 @@ class _Job:
             "SINGLE": self.is_single,
             "ONE": places == 0,
             "PREPARED": self.is_prepared,
+            "PACKED": self.is_packed,
             "LINEAR_LIGHT": self.is_curved and self.is_prepared,
             "CODES": levels > 0,  # of 8 or 16 bits, and so neither infinite nor NaN
             "CLAMPED": levels > 0 and self.how.quality == "catmull-rom",  # the only one that overshoots
@@ -397,6 +403,7 @@ class Sampler:
         """Draw a region of a tile from a piece of the picture, or from all of it."""
         raw, _ = self._textures["raw"]
         target, classes = self._fields["result"], self._classify(job)
+        source = self._fields["prepared"].texture if job.is_prepared else raw
         extent = piece or (0, 0, *job.source_size)
         opaque = job.how.edges == "black" or not job.has_alpha
         left, top = region[0] + origin[0], region[1] + origin[1]
@@ -413,10 +420,11 @@ class Sampler:
             self.device.pass_("sampling/look_up.frag", **defines)(
                 target,
                 region=regions,
-                source=self._fields["prepared"] if job.is_prepared else raw,
+                source=source,
                 raw=raw,
                 displacement=lattice,
-                texel=(1 / raw.width, 1 / raw.height),
+                texel=(1 / source.width, 1 / source.height),
+                raw_texel=(1 / raw.width, 1 / raw.height),
                 next=lattice.texel,
                 corner=extent[:2],
                 extent=(extent[2] - extent[0], extent[3] - extent[1]),
@@ -480,10 +488,13 @@ class Sampler:
         raw = self._texture("raw", least, job.channels, kind, exact=room is None)
         _write(raw, np.ascontiguousarray(pixels))
         if job.is_prepared:
-            prepared = self._field("prepared", raw.size, 4, "f4")
             defines: dict[str, object] = {"LINEAR_LIGHT": 1} if job.is_curved else {}
+            more = 0
+            if job.is_packed:
+                defines["PACKED"], more = 1, 1
+            prepared = self._field("prepared", (raw.width + more, raw.height), 4, "u4" if job.is_packed else "f4")
             prepare = self.device.pass_("sampling/prepare.frag", **defines)
-            prepare(prepared, region=(0, 0, width, height), picture=raw)
+            prepare(prepared, region=(0, 0, width + more, height), picture=raw, count=(width, height))
 
     def _take(self, job: _Job, target: np.ndarray) -> None:
         """Read the field "result" into an array."""

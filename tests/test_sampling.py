@@ -135,7 +135,8 @@ def test_no_precision_is_lost_across_a_wide_picture(device: Device) -> None:
     np.testing.assert_allclose(found[:, 11800:11900], found[:, 100:200], atol=1e-6)
 
 
-def test_chart_beside_many_samples(device: Device) -> None:
+@pytest.mark.parametrize("channels", [1, 3])
+def test_chart_beside_many_samples(device: Device, channels: int) -> None:
     """Twirl and compression of a hard chart: 42 dB against 24 x 24 samples in linear light."""
     n = 256
     x, y = np.meshgrid((np.arange(n) + 0.5) / n - 0.5, (np.arange(n) + 0.5) / n - 0.5)
@@ -143,17 +144,27 @@ def test_chart_beside_many_samples(device: Device) -> None:
     star, plate = np.sin(36 * angle) > 0, 0.5 + 0.5 * np.cos(90 * np.pi * radius**2)
     checks, rings = (np.floor(x * 32) + np.floor(y * 32)) % 2, np.sin(40 * np.pi * radius) > 0
     value = np.where(y < 0, np.where(x < 0, star, plate), np.where(x < 0, checks, rings))
-    picture = np.round(255 * value).astype(np.uint8)
+    picture = np.repeat(np.round(255 * value).astype(np.uint8)[..., None], channels, axis=2)
     turn, squeeze = 3 * np.exp(-((radius / 0.25) ** 2)), 1 + 1.5 * np.exp(-((radius / 0.3) ** 2))
     u, v = np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y
     warp = GivenMap(device, np.stack([squeeze * u - x, squeeze * v - y], axis=-1))
     # One place for each pixel of a result 24 times as wide and high: nothing of how many samples are chosen, and where.
     light = srgb_to_linear(picture / 255.0).astype(np.float32)
     many = Sampler(device).apply(warp, light, (24 * n, 24 * n), Sampling(edges="clamp", samples=1))
-    mean = many.reshape(n, 24, n, 24).mean(axis=(1, 3), dtype=np.float64)
+    mean = many.reshape(n, 24, n, 24, channels).mean(axis=(1, 3), dtype=np.float64)
     wanted = 255 * np.clip(linear_to_srgb(mean), 0, 1)
     found = Sampler(device).apply(warp, picture, how=Sampling(edges="clamp"))
     assert 10 * np.log10(255**2 / np.mean((found - wanted) ** 2)) > 42
+
+
+@pytest.mark.parametrize("quality", ["catmull-rom", "bilinear"])
+def test_colours_of_8_bits_are_mixed_as_finely_as_those_of_16(device: Device, quality: str) -> None:
+    """Their light is held in fewer bits, also where it is dark; nothing but the rounding at the end may show."""
+    warp, how = GivenMap(device, waves((300, 200), 0.05)), Sampling(quality, "clamp", dither=False)  # type: ignore[arg-type]
+    for picture in (noise((200, 300, 3), "8"), noise((200, 300, 3), "8") // 16):
+        found = Sampler(device).apply(warp, picture, how=how)
+        wanted = Sampler(device).apply(warp, picture.astype(np.uint16) * 257, how=how) / 257
+        assert np.abs(found - wanted).max() < 0.53
 
 
 def test_colour_of_transparent_pixels_does_not_bleed(device: Device) -> None:

@@ -5,9 +5,10 @@
 // Blocks of one class are drawn at a time (classify.frag), as a software rasteriser goes through every branch.
 //
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels;
-// premultiplied where PREPARED is defined, else as it is; u_raw: with PREPARED, the picture as it is;
+// premultiplied where PREPARED is defined, two neighbours in a texel where PACKED is (prepare.frag), else as it is;
+// u_raw: with PREPARED, the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels, or at their centres with SINGLE defined;
-// u_texel, u_next: size of a texel of the picture and of the displacement, 0-1;
+// u_texel, u_raw_texel, u_next: size of a texel of both and of the displacement, 0-1;
 // u_pixel: the result's pixel of the first fragment, or the first of its two; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
@@ -24,10 +25,15 @@
 #endif
 #include "lib/srgb.glsl"
 #include "lib/apart.glsl"
+#ifdef PACKED
+uniform usampler2D u_source;
+#else
 uniform sampler2D u_source;
+#endif
 uniform sampler2D u_raw;
 uniform sampler2D u_displacement;
 uniform vec2 u_texel;
+uniform vec2 u_raw_texel;
 uniform vec2 u_next;
 uniform vec2 u_corner;
 uniform vec2 u_extent;
@@ -62,6 +68,22 @@ layout(location = 0) out vec4 out_color;
 #endif
 
 #define AT(x, y) texture(u_source, vec2(x, y)).PARTS
+
+// What is added up over pixels: of two neighbours at a time, where a texel of the source holds both.
+#ifdef PACKED
+const float UNIT = 1.0 / 65535.0, LEFT = 1.0;
+const int STRIDE = 2;
+#define EXTENT (u_extent + vec2(1.0, 0.0))
+COLOR weighed(float x, float y, float weight, float next) {
+    uvec3 both = texture(u_source, vec2(x, y)).rgb;
+    return weight * COLOR(ivec3(both & 0xffffu)) + next * COLOR(ivec3(both >> 16u));
+}
+#else
+const float UNIT = 1.0, LEFT = 0.0;
+const int STRIDE = 1;
+#define EXTENT u_extent
+COLOR weighed(float x, float y, float weight, float next) { return weight * AT(x, y); }
+#endif
 
 // For two places, and for x and y of each: 1 within the bounds of the picture, 0 beyond them.
 vec4 within(vec2 a, vec2 b) {
@@ -114,16 +136,19 @@ COLOR four_places(vec2 whole, vec2 middle, vec2 apart, float correlation) {
     vec2 cell = floor(middle - apart - float(TAPS / 2) + 0.5), first = whole - CORNER + cell;
     vec2 low = middle - apart - cell - float(TAPS / 2) + 0.5, high = low + 2.0 * apart;
     vec4 there = within(whole + middle - apart, whole + middle + apart);
-    float x[BLOCK] = coordinates(first.x, u_extent.x, u_texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, u_texel.y);
+    float x[BLOCK] = coordinates(first.x + LEFT, EXTENT.x, u_texel.x), y[BLOCK] = coordinates(first.y, EXTENT.y, u_texel.y);
     float mean_x[BLOCK], odd_x[BLOCK], mean_y[BLOCK], odd_y[BLOCK];
     both(low.x, high.x, there.xz, mean_x, odd_x);
     both(low.y, high.y, there.yw, mean_y, odd_y);
     COLOR sum = COLOR(0.0);
     for (int j = 0; j < BLOCK; ++j) {
         float odd = correlation * odd_y[j];
-        for (int i = 0; i < BLOCK; ++i)
-            sum += (mean_y[j] * mean_x[i] + odd * odd_x[i]) * AT(x[i], y[j]);
+        for (int i = 0; i < BLOCK; i += STRIDE) {
+            float next = i + 1 < BLOCK ? mean_y[j] * mean_x[i + 1] + odd * odd_x[i + 1] : 0.0;
+            sum += weighed(x[i], y[j], mean_y[j] * mean_x[i] + odd * odd_x[i], next);
+        }
     }
+    sum *= UNIT;
 #ifdef BOUNDED
     vec2 some = there.xy + there.zw, odds = there.zw - there.xy;
     float part = 0.25 * (some.x * some.y + correlation * odds.x * odds.y);
@@ -143,16 +168,21 @@ COLOR one_place(vec2 whole, vec2 place) {
     COLOR sum = AT(only.x, only.y);
 #elif TAPS == 2
     vec2 cell = floor(place - 0.5), f = place - 0.5 - cell, first = whole - CORNER + cell;
-    vec2 a = WITHIN(first + 0.5, u_extent) * u_texel, b = WITHIN(first + 1.5, u_extent) * u_texel;
+    vec2 a = WITHIN(first + vec2(LEFT, 0.0) + 0.5, EXTENT) * u_texel, b = WITHIN(first + 1.5, EXTENT) * u_texel;
+#ifdef PACKED
+    COLOR sum = UNIT * mix(weighed(a.x, a.y, 1.0 - f.x, f.x), weighed(a.x, b.y, 1.0 - f.x, f.x), f.y);
+#else
     COLOR sum = mix(mix(AT(a.x, a.y), AT(b.x, a.y), f.x), mix(AT(a.x, b.y), AT(b.x, b.y), f.x), f.y);
+#endif
 #else
     vec2 cell = floor(place - 1.5), first = whole - CORNER + cell;
-    float x[BLOCK] = coordinates(first.x, u_extent.x, u_texel.x), y[BLOCK] = coordinates(first.y, u_extent.y, u_texel.y);
+    float x[BLOCK] = coordinates(first.x + LEFT, EXTENT.x, u_texel.x), y[BLOCK] = coordinates(first.y, EXTENT.y, u_texel.y);
     float wx[TAPS] = weights(place.x - 1.5 - cell.x), wy[TAPS] = weights(place.y - 1.5 - cell.y);
     COLOR sum = COLOR(0.0);
     for (int j = 0; j < TAPS; ++j)
-        for (int i = 0; i < TAPS; ++i)
-            sum += wy[j] * wx[i] * AT(x[i], y[j]);
+        for (int i = 0; i < TAPS; i += STRIDE)
+            sum += weighed(x[i], y[j], wy[j] * wx[i], wy[j] * wx[min(i + 1, TAPS - 1)]);
+    sum *= UNIT;
 #endif
 #ifdef BOUNDED
     vec2 beyond = abs(whole + place - u_middle) - u_half;
@@ -247,7 +277,7 @@ vec4 look_up(vec2 pixel, CORNERS at) {
     vec2 nearest = floor(centre), same = whole - CORNER + nearest + 0.5;
     bool copied = shifted && all(lessThan(abs(centre - nearest - 0.5), vec2(1.0 / 1024.0)))
                && all(greaterThan(same, vec2(0.0))) && all(lessThan(same, u_extent));
-    COLOR value = texture(u_raw, same * u_texel).PARTS;
+    COLOR value = texture(u_raw, same * u_raw_texel).PARTS;
     color = copied ? value : color;
 #endif
 #ifdef GREY_ALPHA
