@@ -15,6 +15,11 @@ from solver.warp import WarpMap
 
 Point = tuple[float, float]
 
+# Of the lattice on which a push looks at the map: texels along the brush's radius, and along the lattice, which reaches
+# one beyond the brush on either side.
+FINE = 8
+AROUND = 2 * (FINE + 1) + 1
+
 # Of a brush's hardness, for a push: all that the core of its stream function moves has to flow back beside it, and with
 # little room left there it would do so many times faster than the brush moves. With .3 a stroke of Putty folds there.
 HARDEST_PUSH = 0.15
@@ -55,27 +60,33 @@ class Tip:
 class Push:
     """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it.
 
-    `grip` is the part of its own speed that the tip gives to the fluid, however long it leads it.
+    `grip` is the part of its own speed that the tip gives to the fluid, however long it leads it; `patience` the part of
+    the strain that a push may put on the picture at which it slips.
     """
 
     tip: Tip
     dt: float
     strength: float = 1.0
     grip: float = 1.0
+    patience: float = 1.0
 
     @property
     def shader(self) -> str:
         return "brush/push.frag"
 
-    def inputs(self, carried: Field) -> dict[str, Any]:
+    @property
+    def velocity(self) -> Point:
+        """What it gives to the fluid: against the drag at the whole speed, and no stronger than along it."""
         (x0, y0), (x1, y1) = self.tip.start, self.tip.end
-        # Against the drag at the whole speed, and no stronger than along it.
         speed = (self.grip if self.strength > 0 else -self.grip) / self.dt
+        return (x1 - x0) * speed, (y1 - y0) * speed
+
+    def inputs(self, grip: Field) -> dict[str, Any]:
         return {
-            "brush_velocity": ((x1 - x0) * speed, (y1 - y0) * speed),
+            "brush_velocity": self.velocity,
             "strength": abs(self.strength),
             "hardness": HARDEST_PUSH * min(max(self.tip.hardness, 0.0), 1.0),
-            "carried": carried,
+            "grip": grip,
         }
 
 
@@ -90,7 +101,7 @@ class Twirl:
     def shader(self) -> str:
         return "brush/twirl.frag"
 
-    def inputs(self, carried: Field) -> dict[str, Any]:
+    def inputs(self, grip: Field) -> dict[str, Any]:
         return {"rate": self.rate}
 
 
@@ -104,7 +115,8 @@ class Brush:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._motion = device.field((1, 1), 4, "motion at the brush")
-        self._carried = device.field((1, 1), 2, "displacement at the brush")
+        self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
+        self._grip = device.field((1, 1), 1, "grip of the brush")
 
     def lead(
         self,
@@ -116,7 +128,8 @@ class Brush:
     ) -> None:
         """Add what the fluid lacks of a motion, `headway` times.
 
-        With `warp`, the picture's map, a push lets slip what has come a long way with it already.
+        With `warp`, the picture's map, a push lets slip what has come a long way with it already, and what it would
+        stretch too far.
         With `yielding` it spares what is thicker than the fluid at the tip, and does less the more of the brush lies on
         what is frozen: for the last touch before the projection, which viscosity does not spread any more.
         """
@@ -126,16 +139,32 @@ class Brush:
         probe = self.device.pass_("brush/probe.frag")
         probe(self._motion, velocity=fluid.faces(), impulse=fluid.impulse, viscosity=fluid.viscosity,
               at=at, reach=reach, h=h)  # fmt: skip
-        if warp is not None:
-            width, height = fluid.grid.extent
-            warp.probe(self._carried, (tip.start[0] / width, tip.start[1] / height))
-        else:
-            self._carried.clear()
+        if isinstance(motion, Push):
+            self._find_grip(motion, warp)
         region = tip.region(fluid.grid)
-        inputs = tip.inputs(fluid.grid) | motion.inputs(self._carried) | {"motion": self._motion, "headway": headway}
+        inputs = tip.inputs(fluid.grid) | motion.inputs(self._grip) | {"motion": self._motion, "headway": headway}
         masks = {"viscosity": fluid.viscosity, "solid": fluid.solid} if yielding else {}
         paint = self.device.pass_(motion.shader, **({"YIELDING": 1} if yielding else {}))
         fluid.add_impulse(lambda faces: paint(faces, add=True, region=region, **masks, **inputs))
+
+    def _find_grip(self, push: Push, warp: WarpMap | None) -> None:
+        """How firmly a push holds what it has carried and stretched already; without a map, as firmly as it can."""
+        if warp is None:
+            self._grip.clear(1.0)
+            return
+        width, height = warp.extent
+        x, y = (min(max(at, 0.0), far) for at, far in zip(push.tip.start, warp.extent, strict=True))
+        step = push.tip.radius / FINE
+        warp.probe(self._around, (x / width, y / height), (step / width, step / height))
+        self.device.pass_("brush/grip.frag")(
+            self._grip,
+            around=self._around,
+            brush_velocity=push.velocity,
+            radius=push.tip.radius,
+            patience=push.patience,
+            place=(x, y),
+            extent=warp.extent,
+        )
 
     def push(self, fluid: Fluid, tip: Tip, dt: float, strength: float = 1.0) -> None:
         """Carry the fluid under the tip along; see `Push`."""
@@ -154,4 +183,5 @@ class Brush:
 
     def release(self) -> None:
         self._motion.release()
-        self._carried.release()
+        self._around.release()
+        self._grip.release()

@@ -278,11 +278,11 @@ class WarpMap:
             self.device, points, self.grid.extent, "warp/compose.frag", self._held_defines(), **self._parts()
         )
 
-    def probe(self, target: Field, place: tuple[float, float]) -> None:
-        """Draw the displacement at one place, 0-1 of the domain, into a field of one texel."""
-        origin = place[0] - 0.5, place[1] - 0.5
+    def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:
+        """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the domain."""
+        origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
         compose = self.device.pass_("warp/compose.frag", **self._held_defines())
-        compose(target, **self._parts(), origin=origin, step=(1.0, 1.0))
+        compose(target, **self._parts(), origin=origin, step=step)
 
     @cached_property
     def forward(self) -> ForwardMap:

@@ -13,7 +13,7 @@ import pytest
 from app import project as projects
 from app.export import Job, run
 from app.pictures import read_picture
-from app.presets import FEELS, HONEY, PUTTY, Feel
+from app.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.progress import Progress
 from app.session import REST, Session
 from app.tools import TOOL, TOOLS, BrushSettings, Press
@@ -173,6 +173,34 @@ def test_a_moderate_push_does_not_fold(session: Session, feel: Feel, radius: flo
     statistics = pushed(session, BrushSettings(radius, hardness), 0.35, 0.02)
     assert statistics.folds == 0
     assert statistics.displacement_max > 0.15
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.15])
+@pytest.mark.parametrize("feel", FEELS, ids=lambda feel: feel.name)
+def test_the_same_push_made_again_and_again_slips_and_does_not_fold(
+    session: Session, feel: Feel, radius: float
+) -> None:
+    session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+    brush, moved = BrushSettings(radius), []
+    for _ in range(6):
+        statistics = pushed(session, brush, 0.35, 0.02)
+        assert statistics.folds == 0
+        moved.append(statistics.displacement_max)
+    assert moved[0] > 0.15
+    assert moved[-1] - moved[-2] < 0.1 * moved[0]
+    # Back to where it came from it pushes as at first.
+    before = session.replay.warp.read()
+    pushed(session, brush, 0.65, -0.02)
+    assert np.abs(session.replay.warp.read() - before).max() > moved[0]
+
+
+def test_a_long_fast_push_of_water_does_not_fold(session: Session) -> None:
+    session.change(WATER.name, viscosity=WATER.viscosity, drag=WATER.drag)
+    for hardness in (0.0, 1.0):
+        statistics = pushed(session, BrushSettings(0.15, hardness), 0.3, 0.03)
+        assert statistics.folds == 0
+        assert statistics.displacement_max > 0.2
+        session.undo()
 
 
 def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Session) -> None:

@@ -3,15 +3,12 @@
 //   r from the nearest point of the path
 // the discrete curl of a stream function at the nodes, so exactly divergence-free; at the path dv = dF
 // (regularised dipole; numerics of brushes as in de Goes and James 2017 for the fluid limit).
-// grip: 1 for what lies where it was, and less the more radii it has come with the brush already: what is drawn out
-// without end becomes thinner than a cell, and the map folds there.
-// u_motion: the fluid's motion at the brush, from probe; u_carried: the warp map's displacement there, lengths;
-// u_brush_velocity: lengths / s.
+// u_motion: the fluid's motion at the brush, from probe; u_grip: from grip; u_brush_velocity: lengths / s.
 // reads: 2, and 36 when YIELDING
 #include "lib/brush.glsl"
 #include "lib/yielding.glsl"
 uniform sampler2D u_motion;
-uniform sampler2D u_carried;
+uniform sampler2D u_grip;
 uniform vec2 u_brush_velocity;
 uniform float u_strength;
 uniform float u_headway;
@@ -23,23 +20,11 @@ float stream(vec2 node, vec2 force, float viscosity) {
     return brush_falloff(length(r)) * (force.x * r.y - force.y * r.x) * yielding(node, viscosity);
 }
 
-const float FIRM = 0.5;  // radii that something is carried before the grip loosens
-const float LEAST = 0.5;
-
-float grip() {
-    vec2 back = texelFetch(u_carried, ivec2(0), 0).rg / u_radius;
-    float far = length(back), speed = length(u_brush_velocity);
-    if (far * speed == 0.0) return 1.0;
-    // What is pushed back to where it came from is held as firmly as at first.
-    float along = 1.0 - smoothstep(0.0, 1.0, dot(back, u_brush_velocity) / (far * speed));
-    float beyond = max(far * along - FIRM, 0.0);
-    return mix(LEAST, 1.0, 1.0 / (1.0 + 2.0 * beyond * beyond));
-}
-
 void main() {
     vec2 cell = floor(gl_FragCoord.xy);
     vec4 motion = texelFetch(u_motion, ivec2(0), 0);
-    vec2 force = u_headway * u_strength * leeway() * (grip() * u_brush_velocity - motion.xy);
+    float grip = texelFetch(u_grip, ivec2(0), 0).r;
+    vec2 force = u_headway * u_strength * leeway() * (grip * u_brush_velocity - motion.xy);
     float corner = stream(cell, force, motion.w);
     vec2 velocity = vec2(stream(cell + vec2(0.0, 1.0), force, motion.w) - corner,
                          corner - stream(cell + vec2(1.0, 0.0), force, motion.w));

@@ -1,0 +1,72 @@
+// Grip: the part of its own speed that a push gives to the fluid, into a single texel: 1 for what lies as it lay in the
+// picture, less the more radii it has come with the brush already and the more the push would stretch what is stretched
+// several times over. Drawn out without end, it would become thinner than a cell, and the map fold there.
+//   dC/dt = -(grad v)^T C - C grad v,  C = J^T J,  J = I + grad D:  growth = -2 (C : grad v) / tr C for the brush's own
+//   flow v = curl (g (F x r)), F a unit, so in e-folds of C a radius of the way; strain = sqrt(tr C / 2) growth where
+//   that is positive, in the mean over the brush of its fourth power.
+// What is pushed back to where it came from becomes shorter again, and is held as firmly as at first.
+// u_around: the warp map's displacement on a lattice around the brush, longer sides, its texels 1 / FINE of the radius
+// apart, the middle one at u_place (longer sides); u_extent: width and height of the domain, longer sides.
+// u_brush_velocity: lengths / s; u_patience: the part of that strain at which it slips, 0-1.
+// reads: 1157
+uniform sampler2D u_around;
+uniform vec2 u_brush_velocity;
+uniform float u_radius;
+uniform float u_patience;
+uniform vec2 u_place;
+uniform vec2 u_extent;
+layout(location = 0) out float out_grip;
+
+const int FINE = 8;
+const float FIRM = 0.5;  // radii that something is carried before the grip loosens
+const float LEAST = 0.5; // of it, by the way alone
+const vec2 STRAIN = vec2(4.0, 5.25); // where a push of all patience begins to slip, and gives nothing
+
+vec2 displacement(ivec2 node) { return texelFetch(u_around, node + FINE + 1, 0).rg / u_radius; }
+
+float by_way(vec2 back, vec2 ahead) {
+    float far = length(back);
+    if (far == 0.0) return 1.0;
+    float along = 1.0 - smoothstep(0.0, 1.0, dot(back, ahead) / far);
+    float beyond = max(far * along - FIRM, 0.0);
+    return mix(LEAST, 1.0, 1.0 / (1.0 + 2.0 * beyond * beyond));
+}
+
+// The flow of a soft brush at r, in radii: curl of its falloff times ahead x r.
+vec2 flow(vec2 r, vec2 ahead) {
+    float w = max(1.0 - dot(r, r), 0.0);
+    return w * w * (w * ahead + 6.0 * (ahead.x * r.y - ahead.y * r.x) * vec2(-r.y, r.x));
+}
+
+float strain(ivec2 node, vec2 ahead) {
+    const vec2 e = vec2(1.0 / float(FINE), 0.0);
+    const float scale = 0.5 * float(FINE);
+    vec2 r = vec2(node) * e.x;
+    vec2 jx = vec2(1.0, 0.0) + scale * (displacement(node + ivec2(1, 0)) - displacement(node - ivec2(1, 0)));
+    vec2 jy = vec2(0.0, 1.0) + scale * (displacement(node + ivec2(0, 1)) - displacement(node - ivec2(0, 1)));
+    vec2 vx = scale * (flow(r + e.xy, ahead) - flow(r - e.xy, ahead));
+    vec2 vy = scale * (flow(r + e.yx, ahead) - flow(r - e.yx, ahead));
+    float xx = dot(jx, jx), xy = dot(jx, jy), yy = dot(jy, jy);
+    float growth = -2.0 * (xx * vx.x + xy * (vx.y + vy.x) + yy * vy.y) / max(xx + yy, 1e-6);
+    return sqrt(0.5 * (xx + yy)) * max(growth, 0.0);
+}
+
+float by_strain(vec2 ahead) {
+    float sum = 0.0, count = 0.0;
+    for (int j = -FINE; j <= FINE; ++j)
+        for (int i = -FINE; i <= FINE; ++i) {
+            vec2 r = vec2(i, j) / float(FINE), place = u_place + r * u_radius;
+            bool inside = all(greaterThan(place, vec2(0.0))) && all(lessThan(place, u_extent));
+            if (dot(r, r) >= 1.0 || !inside) continue;
+            float here = strain(ivec2(i, j), ahead);
+            sum += here * here * here * here;
+            count += 1.0;
+        }
+    return 1.0 - smoothstep(u_patience * STRAIN.x, u_patience * STRAIN.y, sqrt(sqrt(sum / max(count, 1.0))));
+}
+
+void main() {
+    float speed = length(u_brush_velocity);
+    vec2 ahead = u_brush_velocity / max(speed, 1e-9);
+    out_grip = speed == 0.0 ? 1.0 : by_way(displacement(ivec2(0)), ahead) * by_strain(ahead);
+}
