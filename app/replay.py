@@ -44,8 +44,8 @@ MOST_HEADWAY = 20.0
 # How a push slips: radii of its path that it holds fast, and the part of its speed that it gives in the end.
 FIRM = 0.7
 LOOSEST = 0.3
-# How much it strains before it slips: at the beginning of a stroke, as part of the most; by a brush of how many cells along
-# its radius; and how much less for every radius that the fluid will go on without it, after the first.
+# How much it strains before it slips: at the beginning of a stroke, as part of the most; by a brush of how many cells
+# along its radius; and how much less for every radius that the fluid will go on without it, after the first.
 START = 0.66
 MANY_CELLS = 16
 COASTING = 2.5
@@ -484,11 +484,11 @@ def grip(far: float) -> float:
 
 
 def patience(settings: FluidSettings, tip: Tip, h: float, far: float) -> float:
-    """How much of the strain that a push may put on the picture it puts on it before it slips, `far` radii after it began.
+    """The part of the most strain at which a push slips, `far` radii after it began.
 
-    All that a stroke strains by itself it may; one that begins where the picture is strained already slips soon. So does
-    a brush of few cells, because what it draws out is sooner thinner than one, and one in a fluid that will go on by
-    itself for more than the brush's radius, because then there is no brush to slip.
+    All that a stroke strains by itself it may; one that begins where the picture is strained already slips soon. So
+    does a brush of few cells, because what it draws out is sooner thinner than one, and one in a fluid that will go on
+    by itself for about the brush's radius, because then there is no brush to slip.
     """
     speed = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1]) / settings.dt
     # The rate at which the fluid comes to rest: drag's, and viscosity's on a brush's own motion, as in `headway`.

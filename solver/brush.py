@@ -60,8 +60,8 @@ class Tip:
 class Push:
     """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it.
 
-    `grip` is the part of its own speed that the tip gives to the fluid, however long it leads it; `patience` the part of
-    the strain that a push may put on the picture at which it slips.
+    `grip` is the part of its own speed that the tip gives to the fluid, however long it leads it; `patience` the part
+    of the strain that a push may put on the picture at which it slips.
     """
 
     tip: Tip
@@ -116,6 +116,7 @@ class Brush:
         self.device = device
         self._motion = device.field((1, 1), 4, "motion at the brush")
         self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
+        self._leeway = device.field((1, 1), 1, "leeway of the brush")
         self._grip = device.field((1, 1), 1, "grip of the brush")
 
     def lead(
@@ -131,7 +132,7 @@ class Brush:
         With `warp`, the picture's map, a push lets slip what has come a long way with it already, and what it would
         stretch too far.
         With `yielding` it spares what is thicker than the fluid at the tip, and does less the more of the brush lies on
-        what is frozen: for the last touch before the projection, which viscosity does not spread any more.
+        what is thicker or frozen: for the last touch before the projection, which viscosity does not spread any more.
         """
         h, tip = fluid.grid.h, motion.tip
         at = (tip.end[0] / h, tip.end[1] / h)
@@ -143,7 +144,17 @@ class Brush:
             self._find_grip(motion, warp)
         region = tip.region(fluid.grid)
         inputs = tip.inputs(fluid.grid) | motion.inputs(self._grip) | {"motion": self._motion, "headway": headway}
-        masks = {"viscosity": fluid.viscosity, "solid": fluid.solid} if yielding else {}
+        masks = {}
+        if yielding:
+            masks = {"viscosity": fluid.viscosity, "leeway": self._leeway}
+            leeway = self.device.pass_("brush/leeway.frag")
+            leeway(
+                self._leeway,
+                motion=self._motion,
+                viscosity=fluid.viscosity,
+                solid=fluid.solid,
+                **tip.inputs(fluid.grid),
+            )
         paint = self.device.pass_(motion.shader, **({"YIELDING": 1} if yielding else {}))
         fluid.add_impulse(lambda faces: paint(faces, add=True, region=region, **masks, **inputs))
 
@@ -185,3 +196,4 @@ class Brush:
         self._motion.release()
         self._around.release()
         self._grip.release()
+        self._leeway.release()

@@ -225,6 +225,32 @@ def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Sessi
 
 
 @pytest.mark.parametrize("feel", [HONEY, PUTTY], ids=lambda feel: feel.name)
+def test_a_push_into_something_a_thousand_times_thicker_does_not_fold_at_its_border(
+    session: Session, feel: Feel
+) -> None:
+    session.set_grid(128)
+    session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+    thick = Press(BrushSettings(0.07, 1.0), False, session.extent, session.dt)
+    session.press(TOOL["thicken"], thick, 0.67, 0.37)
+    for k in range(1, 25):
+        session.move(0.67, 0.37 + 0.128 * k / 24)
+        session.advance(1)
+    session.release()
+    session.settle()
+    viscosity = session.replay.fluid.viscosity.get()
+    assert viscosity.max() > 1000 * viscosity.min()
+    session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.35, 0.5)
+    for k in range(1, 15):
+        session.move(0.35 + 0.45 * k / 14, 0.5)
+        session.advance(1)
+    session.release()
+    session.settle()
+    statistics = session.replay.warp.statistics()
+    assert statistics.folds == 0
+    assert statistics.displacement_max > 0.15
+
+
+@pytest.mark.parametrize("feel", [HONEY, PUTTY], ids=lambda feel: feel.name)
 @pytest.mark.parametrize(
     "ways",
     [

@@ -4,7 +4,7 @@
 // the discrete curl of a stream function at the nodes, so exactly divergence-free; at the path dv = dF
 // (regularised dipole; numerics of brushes as in de Goes and James 2017 for the fluid limit).
 // u_motion: the fluid's motion at the brush, from probe; u_grip: from grip; u_brush_velocity: lengths / s.
-// reads: 2, and 36 when YIELDING
+// reads: 2, and 19 when YIELDING
 #include "lib/brush.glsl"
 #include "lib/yielding.glsl"
 uniform sampler2D u_motion;

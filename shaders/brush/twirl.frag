@@ -1,6 +1,6 @@
 // Twirl: make the fluid under the brush turn at a rate, drawn with additive blending: dv = headway domega g(r) (-y, x).
 // u_motion: the fluid's motion at the brush, from probe; u_rate: wanted rotation, rad / s, positive clockwise.
-// reads: 1, and 32 when YIELDING
+// reads: 1, and 10 when YIELDING
 #include "lib/brush.glsl"
 #include "lib/yielding.glsl"
 uniform sampler2D u_motion;
