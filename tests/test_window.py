@@ -242,7 +242,7 @@ def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Pat
     desk.save(work)
 
     def viscosity() -> float:
-        """As it is in the project, saved now; while the number is still being typed, Ctrl+S is none of ours."""
+        """As it is in the project, saved now; saving takes it."""
         desk.insist(lambda: desk.key("ctrl+s"), lambda: desk.title() == "work - fluidwarp", "it to be saved")
         return projects.load(work).recipe.fluid.viscosity
 
@@ -260,6 +260,40 @@ def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Pat
 
     desk.insist(type_number, lambda: viscosity() == pytest.approx(1.25), "the number to be taken")
     desk.insist(click_twice, lambda: viscosity() == pytest.approx(0.03), "the default to be taken")
+
+
+def test_keys_of_files_work_while_a_number_is_typed(desk: Desk, tmp_path: Path) -> None:
+    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
+    write_picture(picture, pattern())
+    desk.open(picture)
+    desk.save(work)
+
+    def type_number(text: str) -> None:
+        """Type it, and leave it so."""
+        hold, let_go = ("keydown", "ctrl", "sleep", "0.2"), ("sleep", "0.2", "keyup", "ctrl", "sleep", "0.5")
+        desk.do("mousemove", "1128", "159", "sleep", "0.3", *hold, "click", "1", *let_go)
+        desk.key("ctrl+a")
+        desk.type(text)
+
+    def save() -> None:
+        type_number("1.25")
+        desk.key("ctrl+s")
+        time.sleep(1)
+
+    desk.insist(save, lambda: projects.load(work).recipe.fluid.viscosity == 1.25, "the number to be saved")
+    assert desk.title() == "work - fluidwarp"
+    desk.drag((400, 400), (520, 400))
+    desk.until(lambda: desk.title() == "work * - fluidwarp", "the push to be recorded")
+
+    def export() -> None:
+        type_number("0.5")
+        desk.key("ctrl+e")
+        time.sleep(1.5)
+        desk.key("Return")
+
+    desk.insist(export, (tmp_path / "work warped.png").exists, "the export")
+    desk.insist(lambda: desk.key("ctrl+s"), lambda: desk.title() == "work - fluidwarp", "it to be saved")
+    assert projects.load(work).recipe.change[-1].viscosity == 0.5
 
 
 # Where in a window of 1280 x 800 the export dialog has its kinds and, for each of them, its formats.
