@@ -48,7 +48,7 @@ LOOSEST = 0.3
 # along its radius; and how much less for every radius that the fluid will go on without it, after the first.
 START = 0.66
 MANY_CELLS = 16
-COASTING = 2.5
+COASTING = 4.0
 
 # What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
 FARTHEST = 2.0

@@ -199,7 +199,7 @@ def test_a_long_fast_push_of_water_does_not_fold(session: Session) -> None:
     for hardness in (0.0, 1.0):
         statistics = pushed(session, BrushSettings(0.15, hardness), 0.3, 0.03)
         assert statistics.folds == 0
-        assert statistics.displacement_max > 0.2
+        assert statistics.displacement_max > 0.15  # more than its radius
         session.undo()
 
 
