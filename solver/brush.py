@@ -118,6 +118,7 @@ class Brush:
         self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
         self._leeway = device.field((1, 1), 1, "leeway of the brush")
         self._grip = device.field((1, 1), 1, "grip of the brush")
+        self._gripping: Push | None = None
 
     def lead(
         self,
@@ -140,8 +141,10 @@ class Brush:
         probe = self.device.pass_("brush/probe.frag")
         probe(self._motion, velocity=fluid.faces(), impulse=fluid.impulse, viscosity=fluid.viscosity,
               at=at, reach=reach, h=h)  # fmt: skip
-        if isinstance(motion, Push):
+        # The map does not change before the last touch of the same push.
+        if isinstance(motion, Push) and motion is not self._gripping:
             self._find_grip(motion, warp)
+            self._gripping = motion
         region = tip.region(fluid.grid)
         inputs = tip.inputs(fluid.grid) | motion.inputs(self._grip) | {"motion": self._motion, "headway": headway}
         masks = {}
