@@ -47,7 +47,7 @@ LOOSEST = 0.3
 # How much it strains before it slips: at the beginning of a stroke, as part of the most; by a brush of how many cells
 # along its radius; and how much less for every radius that the fluid will go on without it, after the first.
 START = 0.66
-MANY_CELLS = 16
+MANY_CELLS = 12
 COASTING = 4.0
 
 # What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
