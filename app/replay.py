@@ -44,9 +44,9 @@ MOST_HEADWAY = 20.0
 # How a push slips: radii of its path that it holds fast, and the part of its speed that it gives in the end.
 FIRM = 0.7
 LOOSEST = 0.3
-# How much it strains before it slips: at the beginning of a stroke, as part of the most; in how many radii of its way as
-# much is added; and how much less for every radius that the fluid will go on without it, after the first. Found by making
-# the same push again and again, with all feels and brushes of 9 to 20 cells: none of them folds, or hardly.
+# How much it strains before it slips: at the beginning of a stroke, as part of the most; in how many radii of its way
+# as much is added; and how much less for every radius that the fluid will go on without it, after the first. Found by
+# making the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
 START = 0.68
 MORE = 6.0
 COASTING = 4.0
