@@ -394,3 +394,7 @@ def doctor() -> None:
     console.print(table)
     if failed:
         raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    main()

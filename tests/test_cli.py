@@ -76,6 +76,15 @@ def test_a_picture_twice_is_the_same_bytes(folder: Path):
     assert (after != before).any()
 
 
+@pytest.mark.parametrize("module", ["app", "app.cli"])
+def test_both_modules_are_the_command(folder: Path, module: str):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", module, "render", "none.toml"]
+    ran = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert ran.returncode != 0
+    assert "none.toml does not exist" in ran.stderr
+
+
 def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path):
     assert fluidwarp(folder, "render", "a.toml", "-o", "end.png").returncode == 0
     ran = fluidwarp(folder, "render", "a.toml", "-o", "f.%02d.png", "--stats", "s.json")
