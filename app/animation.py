@@ -17,7 +17,7 @@ import numpy as np
 from app import ffmpeg
 from app.errors import Cancelled, UserError
 from app.files import cannot_write, replacing, replacing_many, temporary_beside, temporary_file
-from app.pictures import Picture, picture_format, to_bits, write_picture
+from app.pictures import FORMATS, Picture, check_picture_output, picture_format, to_bits, write_picture
 from app.progress import never
 from app.video import sound_codec
 
@@ -157,6 +157,10 @@ def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1, cod
     if is_sequence(path):
         if "%" in NUMBER.sub("", Path(path).name, count=1):
             raise UserError(f"Cannot write {path}: a sequence's name holds one number, as in name.%04d.png.")
+        suffix = Path(path).suffix.lower()
+        if suffix in ANIMATIONS and suffix not in FORMATS:
+            mend = f"end in one of {' '.join(FORMATS)}, or leave out the number for one {suffix}"
+            raise UserError(f"Cannot write {path}: a sequence's files are pictures; {mend}.")
         picture_format(path)
         if codec is not None:
             raise UserError(f"Cannot write {path}: a sequence of pictures has no codec; leave out --codec.")
@@ -172,8 +176,22 @@ def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1, cod
         raise UserError(f"Cannot write {path}: GIF shows at most 50 frames a second; lower the rate or use .apng.")
 
 
-def check_no_codec(path: str | os.PathLike[str], codec: str | None) -> None:
-    """Raise `UserError` if a codec is asked for in a still picture."""
+def check_output(
+    path: str | os.PathLike[str],
+    *,
+    animated: bool = False,
+    fps: float | Fraction = 1,
+    codec: str | None = None,
+    bits: int | None = None,
+) -> None:
+    """Raise `UserError` if there is no format for `path`, as an animation if `animated` or so named, else a still."""
+    if animated or is_animation(path):
+        check_animation(path, fps, codec)
+        return
+    if Path(path).suffix.lower() not in FORMATS:
+        endings = f"a picture's name must end in one of {' '.join(FORMATS)}, an animation's in {' '.join(ANIMATIONS)}"
+        raise UserError(f"Cannot write {path}: {endings}.")
+    check_picture_output(path, bits)
     if codec is not None:
         raise UserError(f"Cannot write {path}: a picture has no codec; leave out --codec, or write a video.")
 

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from app import maps
-from app.animation import NUMBER, animation_writer, check_animation, check_no_codec, is_animation, is_sequence
+from app.animation import NUMBER, animation_writer, check_output, is_animation, is_sequence
 from app.errors import UserError
 from app.export import longer_side, looked_up
 from app.files import check_kept, writable
 from app.maps import Displacement, Kind, cropped, read_map
 from app.opening import Source, open_source
-from app.pictures import MAX_PIXELS, check_picture_output, picture_format, write_picture
+from app.pictures import MAX_PIXELS, picture_format, write_picture
 from app.progress import Progress
 from app.threads import ahead, behind
 from solver.context import Device
@@ -103,11 +103,7 @@ class Application:
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written. Raises `UserError`."""
-        if is_animation(self.output):
-            check_animation(self.output, self.fps, self.codec)
-        else:
-            check_picture_output(self.output, self.bits)
-            check_no_codec(self.output, self.codec)
+        check_output(self.output, fps=self.fps, codec=self.codec, bits=self.bits)
         maps.check_map(self.maps.path)
         writable(self.output)
         for source in (self.source, self.maps.path):

@@ -18,8 +18,7 @@ import numpy as np
 from app.animation import (
     FrameWriter,
     animation_writer,
-    check_animation,
-    check_no_codec,
+    check_output,
     frame_order,
     is_animation,
     is_sequence,
@@ -30,7 +29,7 @@ from app.errors import UserError
 from app.files import cannot_write, replacing, writable
 from app.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.opening import check_picture
-from app.pictures import Picture, check_picture_output, picture_format, write_picture
+from app.pictures import Picture, picture_format, write_picture
 from app.progress import Progress
 from app.recipe import Recipe
 from app.replay import Replay
@@ -131,11 +130,8 @@ class Job:
             UserError: naming the file and the mend.
         """
         check_picture(self.picture, self.recipe.fluid.grid)
-        if self.output is not None and self.is_animation:
-            check_animation(self.output, self.rate, self.codec)
-        elif self.output is not None:
-            check_picture_output(self.output, self.bits)
-            check_no_codec(self.output, self.codec)
+        if self.output is not None:
+            check_output(self.output, animated=self.animated, fps=self.rate, codec=self.codec, bits=self.bits)
         if self.maps is not None:
             check_map(self.maps.path)
             if self.maps.is_sequence and not self.has_frames:

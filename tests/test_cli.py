@@ -186,6 +186,8 @@ BAD = {
     "too narrow": (["a.toml", "-i", "strip.png", "-o", "x.png"], "--grid 160"),
     "unknown ending": (["a.toml", "-o", "x.xyz"], "x.xyz"),
     "no ending": (["a.toml", "-o", "x"], "Cannot write x"),
+    "an unknown video": (["a.toml", "-o", "x.avi"], ".exr, an animation's in .mp4"),
+    "a sequence of videos": (["a.toml", "-o", "x.%04d.mp4"], "leave out the number for one .mp4"),
     "no such folder": (["a.toml", "-o", "none/x.png"], "none"),
     "a folder": (["a.toml", "-o", "sub.png"], "it is a folder"),
     "stats nowhere": (["a.toml", "-o", "x.png", "--stats", "none/s.json"], "none"),
