@@ -7,6 +7,7 @@ import functools
 import os
 import re
 import select
+import signal
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -144,14 +145,28 @@ class Ffmpeg:
 
     def failure(self) -> UserError:
         """What its complaints mean for the user."""
-        if os.strerror(errno.ENOSPC) in self._said():
-            return cannot_write(self._label, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
-        reason = self.complaint() or f"it ended with status {self._process.returncode}"
+        said, status = self._said(), self._process.returncode
+        for number in (errno.ENOSPC, errno.EFBIG):
+            if os.strerror(number) in said or (number == errno.EFBIG and status == -signal.SIGXFSZ):
+                return cannot_write(self._label, OSError(number, os.strerror(number)))
+        if status is not None and status < 0:
+            killed = f"ffmpeg was killed ({signal_name(-status)}), perhaps for want of memory"
+            mend = "try again with fewer programs running, or a smaller size"
+            return UserError(f"Cannot {self._doing} {self._label}: {killed}; {mend}.")
+        reason = self.complaint() or f"it ended with status {status}"
         return UserError(f"Cannot {self._doing} {self._label}: ffmpeg says: {reason}.")
 
     def _said(self) -> str:
         self._complaints.seek(0)
         return self._complaints.read().decode("utf-8", "replace")
+
+
+def signal_name(number: int) -> str:
+    """Such as SIGKILL."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # a real-time signal
+        return f"signal {number}"
 
 
 def run(arguments: Sequence[str], label: str, *, doing: str = "write", cancel: Callable[[], bool] = never) -> None:

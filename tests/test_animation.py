@@ -405,6 +405,21 @@ def test_an_encoder_that_dies_is_quoted(tmp_path: Path, monkeypatch: pytest.Monk
     assert contents(tmp_path) == ["dying"]
 
 
+def test_an_encoder_that_is_killed_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """By the system, for want of memory as a rule; and by its own write beyond the largest file that is allowed."""
+    real, wrapper = ffmpeg.executable(), tmp_path / "wrapper"
+    monkeypatch.setattr(ffmpeg, "executable", lambda: str(wrapper))
+    for script, message in {
+        "head -c 100000 >/dev/null\nkill -KILL $$": r"ffmpeg was killed \(SIGKILL\), perhaps for want of memory; try",
+        f'ulimit -f 8\nexec {real} "$@"': "the file grows larger than this disk allows; choose another folder",
+    }.items():
+        wrapper.write_text(f"#!/bin/sh\n{script}\n")
+        wrapper.chmod(0o755)
+        with pytest.raises(UserError, match=rf"^Cannot write .*a\.mkv: {message}"):
+            save(tmp_path / "a.mkv", 100)
+    assert contents(tmp_path) == ["wrapper"]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str):
     def link(path: Path) -> Path:
