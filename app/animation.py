@@ -329,7 +329,8 @@ def _sound(
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
     length = [] if frames is None else ["-t", f"{float(frames / rate):.6f}"]
-    chosen = ("copy",) if codec in container.sound else container.encoder
+    # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
+    chosen = ("copy", "-copypriorss:a", "0") if codec in container.sound else container.encoder
     return [*begin, *length, "-i", f"file:{sound}"], ["-map", "1:a:0", "-c:a", *chosen]
 
 

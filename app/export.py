@@ -316,7 +316,7 @@ class _Export:
             self.progress.total += frames
 
     def _writer(self) -> AbstractContextManager[FrameWriter]:
-        job, output, first = self.job, self.recipe.output, self.job.part[0]
+        job, output, (first, last) = self.job, self.recipe.output, self.job.part
         assert job.output is not None
         return animation_writer(
             job.output,
@@ -327,6 +327,7 @@ class _Export:
             bits=job.bits,
             sound=job.clip.path if job.clip and job.clip.sound else None,
             sound_from=float(first / job.rate),
+            frames=None if last is None else last + 1 - first,
             first=first,
             like=job.picture.stripped() if job.strip else job.picture,
             cancel=self.progress.cancel,

@@ -146,6 +146,29 @@ def test_a_part_of_a_clip(device: Device, clip: Path, tmp_path: Path):
         assert (tmp_path / f"part.{number:02d}.png").read_bytes() == (tmp_path / f"f.{number:02d}.png").read_bytes()
 
 
+def test_a_part_of_a_clip_has_its_part_of_the_sound(device: Device, tmp_path: Path):
+    """A clip whose sound rises in pitch: that of frames 4-8 is of their 0.4 s, up to the encoder's blocks."""
+    source, rising = tmp_path / "rising.mkv", "aevalsrc=sin(2*PI*(500+1000*t)*t):d=2:s=44100"
+    command = [ffmpeg.executable(), "-v", "error", "-f", "lavfi", "-i", f"testsrc=s={WIDTH}x{HEIGHT}:r=25/2:d=2"]
+    subprocess.run([*command, "-f", "lavfi", "-i", rising, "-c:v", "ffv1", "-c:a", "flac", str(source)], check=True)
+    for ending in (".mkv", ".mp4"):
+        render(device, WHIRL, source, tmp_path / f"part{ending}", part=(4, 8))
+        heard, whole = (sound(path) for path in (tmp_path / f"part{ending}", source))
+        assert len(heard) / 44100 == pytest.approx(5 / 12.5, abs=0.05), ending
+        assert float(probe(tmp_path / f"part{ending}")["video"]["start_time"]) == pytest.approx(0, abs=0.03)
+        # where a window from the middle of the part lies in the whole
+        window = heard[len(heard) // 2 :][:2048]
+        offsets = np.arange(0, len(whole) - 2048, 16)
+        likeness = [whole[offset : offset + 2048] @ window for offset in offsets]
+        assert (offsets[np.argmax(likeness)] - len(heard) // 2) / 44100 == pytest.approx(4 / 12.5, abs=0.03), ending
+
+
+def sound(path: Path) -> np.ndarray:
+    """The samples of a file's sound, 44,100 a second."""
+    command = [ffmpeg.executable(), "-v", "error", "-i", str(path), "-map", "0:a", "-ac", "1", "-ar", "44100"]
+    return np.frombuffer(subprocess.run([*command, "-f", "f32le", "-"], capture_output=True, check=True).stdout, "f4")
+
+
 def test_a_clip_through_a_still_map(device: Device, clip: Path, picture: Path, tmp_path: Path):
     render(device, WHIRL, picture, None, maps=MapOutput(tmp_path / "m.exr"))
     apply(device, tmp_path / "m.exr", clip, tmp_path / "f.%02d.png")
