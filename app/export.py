@@ -5,8 +5,8 @@ from __future__ import annotations
 import errno
 import gc
 import json
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import chain, count, groupby, islice, pairwise, repeat
@@ -272,7 +272,7 @@ class _Export:
                 take_map = stack.enter_context(behind(stack.enter_context(writer)))
             if job.clip is not None:
                 clip_frames = job.clip.read_frames(self.progress.cancel, self.pictures.notice)
-                source = stack.enter_context(ahead(islice(clip_frames, first, until)))
+                source = stack.enter_context(ahead(part_of(clip_frames, first, until)))
                 self._expect(len(range(job.clip.frames or len(shown))[first:until]))
                 # Once the fluid has come to its end, the clip goes on with the last warp.
                 positions = islice(chain(shown, repeat(shown[-1])), first, None)
@@ -431,6 +431,23 @@ class _Export:
             "stopped": verdict,
             "frames": self.numbers,
         }
+
+
+def part_of(
+    frames: Generator[np.ndarray, None, None], first: int, until: int | None
+) -> Generator[np.ndarray, None, None]:
+    """The frames of a clip from `first` to before `until`, or to its end.
+
+    Raises:
+        UserError: if it ends before the first.
+    """
+    number = -1
+    with closing(frames):
+        for number, frame in enumerate(islice(frames, until)):
+            if number >= first:
+                yield frame
+    if 0 <= number < first:
+        raise UserError(f"the clip has the frames 0-{number}, and none from {first} on")
 
 
 def held(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]:

@@ -142,6 +142,12 @@ def test_a_part_of_a_clip(device: Device, clip: Path, tmp_path: Path):
     render(device, WHIRL, clip, tmp_path / "f.%02d.png")
     render(device, WHIRL, clip, tmp_path / "part.%02d.png", part=(4, 6))
     assert files(tmp_path, "part") == ["part.04.png", "part.05.png", "part.06.png"]
+    render(device, WHIRL, clip, tmp_path / "last.%02d.png", part=(8, None))
+    assert files(tmp_path, "last") == ["last.08.png"]
+    for first in (9, 100):
+        with pytest.raises(UserError, match=rf"^the clip has the frames 0-8, and none from {first} on$"):
+            render(device, WHIRL, clip, tmp_path / "none.%02d.png", part=(first, None))
+    assert files(tmp_path, "none") == []
     for number in (4, 5, 6):
         assert (tmp_path / f"part.{number:02d}.png").read_bytes() == (tmp_path / f"f.{number:02d}.png").read_bytes()
 
