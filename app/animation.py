@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ import numpy as np
 
 from app import ffmpeg
 from app.errors import Cancelled, UserError
-from app.files import cannot_write, replacing, replacing_many, temporary_beside, temporary_file
+from app.files import NUMBER, cannot_write, is_sequence, replacing, replacing_many, temporary_beside, temporary_file
 from app.pictures import FORMATS, Picture, check_picture_output, picture_format, to_bits, write_picture
 from app.progress import never
 from app.video import sound_codec
@@ -25,8 +24,6 @@ T = TypeVar("T")
 
 FrameWriter = Callable[[np.ndarray], None]
 """Takes a frame (h, w, c): uint8 or uint16 sRGB, or float32 linear light, all of one kind in one animation."""
-
-NUMBER = re.compile(r"%(0\d+)?d")
 
 # What players take a video for. The filters set the tags: the frames' own overrule those given to the encoder.
 BT709 = (
@@ -137,11 +134,6 @@ ANIMATIONS = {
     ".apng": Container("APNG", {"apng": _apng}),
     ".webp": Container("animated WebP", {"webp": _webp}),
 }
-
-
-def is_sequence(path: str | os.PathLike[str]) -> bool:
-    """Whether `path` numbers its files, as `name.%04d.png` does."""
-    return NUMBER.search(Path(path).name) is not None
 
 
 def is_animation(path: str | os.PathLike[str]) -> bool:

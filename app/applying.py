@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -13,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from app import maps
-from app.animation import NUMBER, animation_writer, check_output, is_animation, is_sequence
+from app.animation import animation_writer, check_output, is_animation
 from app.errors import UserError
 from app.export import longer_side, looked_up
-from app.files import check_kept, writable
+from app.files import check_kept, is_sequence, number_in, writable
 from app.maps import Displacement, Kind, cropped, read_map
 from app.opening import Source, open_source
 from app.pictures import MAX_PIXELS, picture_format, write_picture
@@ -53,24 +52,14 @@ class MapSource:
         """
         if not self.is_sequence:
             return {0: self.path}
-        before, after = (
-            re.escape(self.path.name[: self._number.start()]),
-            re.escape(self.path.name[self._number.end() :]),
-        )
         try:
-            names = [(re.fullmatch(rf"{before}(\d+){after}", file.name), file) for file in self.path.parent.iterdir()]
+            numbers = [(number_in(self.path, file.name), file) for file in self.path.parent.iterdir()]
         except OSError as error:
             raise UserError(f"Cannot read {self.path}: {error.strerror}.") from None
-        numbered = sorted((int(match[1]), file) for match, file in names if match)
+        numbered = sorted((number, file) for number, file in numbers if number is not None)
         if not numbered:
             raise UserError(f"Cannot read {self.path}: there is no such file; check the name.")
         return dict(numbered)
-
-    @property
-    def _number(self) -> re.Match[str]:
-        found = NUMBER.search(self.path.name)
-        assert found is not None
-        return found
 
     def read(self) -> Iterator[Displacement]:
         """The maps, one after the other. Raises `UserError`."""
@@ -106,7 +95,7 @@ class Application:
         check_output(self.output, fps=self.fps, codec=self.codec, bits=self.bits)
         maps.check_map(self.maps.path)
         writable(self.output)
-        for source in (self.source, self.maps.path):
+        for source in (self.source, *self.maps.files().values()):
             check_kept(source, self.output)
 
     def run(self, device: Device, progress: Progress) -> None:
@@ -237,8 +226,9 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
     """
     maps.check_map(output)
     writable(output)
-    check_kept(source.path, output)
     files = source.files()
+    for file in files.values():
+        check_kept(file, output)
     progress.total = len(files)
     if is_sequence(output) != source.is_sequence:
         raise UserError(f"{source.path} and {output} must both be sequences, or neither")

@@ -26,7 +26,7 @@ from typing import Any
 from app.animation import ANIMATIONS
 from app.errors import Cancelled, UserError
 from app.export import Job, MapOutput, run
-from app.files import abandon, cannot_write, check_kept
+from app.files import abandon, cannot_write, check_kept, is_sequence, takes_place
 from app.opening import CLIP_ENDINGS, Opened, open_recipe
 from app.pictures import FORMATS, MAX_PIXELS
 from app.progress import GRACE, INTERRUPTED, Progress, never
@@ -203,8 +203,10 @@ def _check_apart(tasks: Sequence[Task]) -> None:
         task.check_names([] if task.picture is None else [task.picture])
         for path in task.written:
             real = os.path.realpath(path)
-            if real in pictures:
-                raise UserError(f"{pictures[real]} would be replaced by what {task.picture} becomes; rename one")
+            replaced = [real] if real in pictures else pictures if is_sequence(real) else []
+            for other in replaced:
+                if takes_place(real, other):
+                    raise UserError(f"{pictures[other]} would be replaced by what {task.picture} becomes; rename one")
             if real in seen:
                 raise UserError(f"{seen[real]} and {task.picture} would both become {path}; rename one")
             seen[real] = task.picture

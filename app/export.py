@@ -21,12 +21,11 @@ from app.animation import (
     check_output,
     frame_order,
     is_animation,
-    is_sequence,
     reordered,
 )
 from app.checkpoints import DEFAULT_BUDGET
 from app.errors import UserError
-from app.files import cannot_write, replacing, writable
+from app.files import cannot_write, is_sequence, replacing, writable
 from app.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.opening import check_picture
 from app.pictures import Picture, picture_format, write_picture

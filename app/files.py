@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import shutil
 import threading
@@ -26,6 +27,8 @@ MENDS = {
     errno.EFBIG: "the file grows larger than this disk allows; choose another folder or a smaller size",
 }
 
+
+NUMBER = re.compile(r"%(0\d+)?d")
 
 _undoing: list[Callable[[], object]] = []
 _moving = threading.Lock()
@@ -85,9 +88,34 @@ def writable(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def is_sequence(path: str | os.PathLike[str]) -> bool:
+    """Whether `path` numbers its files, as `name.%04d.png` does."""
+    return NUMBER.search(Path(path).name) is not None
+
+
+def number_in(pattern: str | os.PathLike[str], name: str) -> int | None:
+    """What stands in a file's name where the sequence `pattern` has its %d; None if it is none of its files."""
+    wanted = Path(pattern).name
+    found = NUMBER.search(wanted)
+    if found is None:
+        return None
+    match = re.fullmatch(rf"{re.escape(wanted[: found.start()])}(\d+){re.escape(wanted[found.end() :])}", name)
+    return int(match[1]) if match else None
+
+
+def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:
+    """Whether writing `output`, a file or all the files of a sequence, can replace `source`; both are real paths."""
+    folder, name = os.path.split(source)
+    if os.path.dirname(output) != folder:
+        return False
+    pattern = os.path.basename(output)
+    number = number_in(pattern, name)
+    return name == (pattern if number is None else NUMBER.sub(lambda found: found[0] % number, pattern, count=1))
+
+
 def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> None:
     """Make sure that what is made of `source`, or about it, does not take its place. Raises `UserError`."""
-    if os.path.realpath(source) == os.path.realpath(output):
+    if takes_place(os.path.realpath(output), os.path.realpath(source)):
         raise UserError(f"{source} would be replaced by its own result; choose another name")
 
 

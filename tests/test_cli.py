@@ -193,6 +193,12 @@ BAD = {
     "stats nowhere": (["a.toml", "-o", "x.png", "--stats", "none/s.json"], "none"),
     "onto its source": (["a.toml", "-i", "cat.png", "-o", "cat.png"], "cat.png would be replaced by its own result"),
     "onto the recipe's picture": (["a.toml", "-o", "sub.png/../cat.png"], "would be replaced by its own result"),
+    "a sequence onto its source": (
+        ["a.toml", "-i", "cat.0003.png", "-o", "./cat.%04d.png"], "cat.0003.png would be replaced by its own result"
+    ),
+    "a sequence onto another's": (
+        ["a.toml", "cat.png", "cat.0003.png", "-o", "{name}.%04d.png"], "cat.0003.png would be replaced by what cat.png"
+    ),
     "numbers onto the result": (["a.toml", "-o", "x.png", "--stats", "x.png"], "x.png cannot hold two results"),
     "numbers onto the recipe": (["a.toml", "--stats", "a.toml"], "a.toml would be replaced by its own result"),
     "map onto the first map": (["map.toml", "--map", "m.exr"], "m.exr would be replaced by its own result"),
@@ -235,6 +241,7 @@ def test_bad_input_is_told_in_a_sentence(
         (folder / f"{name}.toml").write_text(text)
     for name, shape in {"dot": (1, 1, 3), "line": (5000, 1, 3), "strip": (400, 20, 3), "thread": (6000, 8, 3)}.items():
         write_picture(folder / f"{name}.png", Picture(np.zeros(shape, np.uint8)))
+    (folder / "cat.0003.png").write_bytes((folder / "cat.png").read_bytes())
     (folder / "cut.png").write_bytes((folder / "cat.png").read_bytes()[:60])
     (folder / "cat.bin").write_bytes(bytes(range(256)))
     (folder / "sub.png").mkdir()

@@ -18,6 +18,7 @@ from app.applying import Application, MapSource, converted, inverted
 from app.batch import Edits, Task
 from app.errors import Cancelled, UserError
 from app.export import Job, MapOutput, displacement, run
+from app.files import takes_place
 from app.gallery import sharpness, spline_warp
 from app.maps import Displacement, cropped, read_map, to_st, write_map
 from app.opening import open_source
@@ -291,7 +292,18 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
         render(device, 'map = "m.npy"\n' + WHIRL, picture, tmp_path / "out.png")
     with pytest.raises(UserError, match="'map' warps coordinates"):
         Recipe.parse('map = "m.npy"\nmode = "density"')
-    (tmp_path / "m.npy").unlink()
+    with pytest.raises(UserError, match=r"m\.npy would be replaced by its own result"):
+        converted(MapSource(tmp_path / "m.npy"), tmp_path / "m.npy", "st", False, Progress())
+    (tmp_path / "m.npy").rename(tmp_path / "m.02.npy")
+    for pattern in ("m.%02d.npy", "m.%d.npy"):  # the same file is read by both, and replaced by one
+        maps = MapSource(tmp_path / pattern)
+        with pytest.raises(UserError, match=r"m\.02\.npy would be replaced by its own result"):
+            converted(maps, tmp_path / "m.%02d.npy", "st", False, Progress())
+    assert takes_place("/a/f.%03d.png", "/a/f.012.png")
+    assert takes_place("/a/f.%d.png", "/a/f.12.png")
+    for other in ("/a/f.12.png", "/a/f.0012.png", "/a/f.png", "/b/f.012.png", "/a/f.012.jpg"):
+        assert not takes_place("/a/f.%03d.png", other)
+    (tmp_path / "m.02.npy").unlink()
     assert files(tmp_path, "") == before
 
 
