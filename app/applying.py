@@ -21,6 +21,7 @@ from app.opening import Source, open_source
 from app.pictures import MAX_PIXELS, picture_format, write_picture
 from app.progress import Progress
 from app.threads import ahead, behind
+from app.timeline import frame_rate
 from solver.context import Device
 from solver.field import FieldError
 from solver.grid import Grid
@@ -135,7 +136,7 @@ class Application:
         with ExitStack() as stack:
             writer = animation_writer(
                 self.output,
-                clip.fps if clip else self.fps,
+                clip.fps if clip else frame_rate(self.fps),
                 codec=self.codec,
                 crf=round(45 - 0.3 * self.quality),
                 quality=self.quality,

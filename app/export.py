@@ -35,7 +35,7 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.states import StoredStates
 from app.threads import ahead, behind
-from app.timeline import Sentinel, Timeline, frame_positions
+from app.timeline import Sentinel, Timeline, frame_positions, frame_rate
 from app.video import Clip
 from solver.context import Device
 from solver.sampling import GivenMap, Sampler, Sampling, SamplingError
@@ -120,7 +120,7 @@ class Job:
     @property
     def rate(self) -> Fraction:
         """Frames per second."""
-        return self.clip.fps if self.clip else Fraction(self.recipe.output.fps).limit_denominator(1001)
+        return self.clip.fps if self.clip else frame_rate(self.recipe.output.fps)
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written.

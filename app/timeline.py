@@ -32,6 +32,15 @@ class Timeline:
         return tick * self.dt
 
 
+def frame_rate(fps: float) -> Fraction:
+    """A rate that was given as a decimal; of 23.976, 29.97, 47.952, 59.94 and 119.88 the NTSC rate, as 24000/1001."""
+    for whole in (24, 30, 48, 60, 120):
+        exact = Fraction(whole * 1000, 1001)
+        if round(float(exact), 3) == round(fps, 3):
+            return exact
+    return Fraction(fps).limit_denominator(1001)
+
+
 def frame_positions(timeline: Timeline, playback: Playback, fps: float) -> list[Fraction]:
     """The position in ticks of every distinct frame of an animation, forwards in time.
 

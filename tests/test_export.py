@@ -186,6 +186,19 @@ def test_a_clip_through_a_still_map(device: Device, clip: Path, picture: Path, t
     assert {"video", "audio"} == set(probe(tmp_path / "out.mkv"))
 
 
+@pytest.mark.parametrize(
+    ("fps", "exact"),
+    [("23.976", "24000/1001"), ("29.97", "30000/1001"), ("47.952", "48000/1001"), ("59.94", "60000/1001"),
+     ("119.88", "120000/1001"), ("23.98", "1199/50"), ("12.5", "25/2"), ("25", "25/1")],
+)  # fmt: skip
+def test_the_rates_of_ntsc_are_exact(device: Device, picture: Path, tmp_path: Path, fps: str, exact: str):
+    recipe = WHIRL.replace("fps = 10", f"fps = {fps}").replace("duration = 0.4", "duration = 0.1")
+    render(device, recipe, picture, tmp_path / "out.mp4", maps=MapOutput(tmp_path / "m.%03d.npy"))
+    assert probe(tmp_path / "out.mp4")["video"]["r_frame_rate"] == exact
+    apply(device, tmp_path / "m.%03d.npy", picture, tmp_path / "again.mp4", fps=float(fps))
+    assert probe(tmp_path / "again.mp4")["video"]["r_frame_rate"] == exact
+
+
 # Maps ---------------------------------------------------------------------------------------------------------------
 
 
