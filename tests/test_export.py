@@ -320,6 +320,29 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
     assert files(tmp_path, "") == before
 
 
+def test_what_is_opaque_stays_so(device: Device, tmp_path: Path):
+    """To the last bit of a float, whatever is mixed; and what is transparent anywhere gets an alpha channel."""
+    light = Picture(scene().astype(np.float32) / 255)
+    write_picture(tmp_path / "light.exr", light)
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    clear = np.where((x - 48) ** 2 + (y - 32) ** 2 < 100, 0.25, 1).astype(np.float32)
+    write_picture(tmp_path / "hole.exr", Picture(np.dstack([light.pixels, clear])))
+    for size in (96, 47, 150):
+        bounded = WHIRL.replace('edges = "clamp"', 'edges = "transparent"') + f"size = {size}\n"
+        render(device, bounded, tmp_path / "light.exr", tmp_path / "out.exr")
+        assert not read_picture(tmp_path / "out.exr").has_alpha
+        render(device, bounded, tmp_path / "hole.exr", tmp_path / "out.exr")
+        alpha = read_picture(tmp_path / "out.exr").pixels[..., 3]
+        assert alpha.min() < 0.3
+        assert (alpha == 1).mean() > 0.85
+        assert not ((alpha > 1 - 1e-5) & (alpha < 1)).any()
+    outward = np.zeros((HEIGHT, WIDTH, 2), np.float32)
+    outward[..., 0] = 0.2
+    write_map(tmp_path / "out.npy", Displacement(outward))
+    Application(MapSource(tmp_path / "out.npy"), tmp_path / "light.exr", tmp_path / "out.exr").run(device, Progress())
+    assert (read_picture(tmp_path / "out.exr").pixels[:, -10:, 3] == 0).all()
+
+
 # Two ends of a stream -----------------------------------------------------------------------------------------------
 
 

@@ -262,6 +262,8 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #if defined(PREPARED) && !defined(OPAQUE)
     color.a = clamp(color.a, 0.0, 1.0);
     color.rgb = color.a > 0.0 ? color.rgb / color.a : vec3(0.0);
+    // The weights add up to 1 but for their rounding, less than a millionth: what is opaque stays so.
+    color.a = color.a > 1.0 - 1e-5 ? 1.0 : color.a;
 #endif
 #ifdef CLAMPED
     color = clamp(color, 0.0, 1.0);
