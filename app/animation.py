@@ -95,7 +95,7 @@ def _webp(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
 
 @dataclass(frozen=True)
 class Container:
-    """A kind of animation file: its options by codec, whether sides must be even, and the sound it carries.
+    """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
     is turned into the first one, by `encoder`.
@@ -106,6 +106,7 @@ class Container:
     even: bool = False
     sound: tuple[str, ...] = ()
     encoder: tuple[str, ...] = ()
+    passes: int = 1
 
     def encoding(self, codec: str | None) -> Encoding:
         return self.codecs[codec or next(iter(self.codecs))]
@@ -130,7 +131,7 @@ ANIMATIONS = {
         sound=("pcm_s16le", "pcm_s24le", "aac"),
         encoder=("pcm_s16le",),
     ),
-    ".gif": Container("GIF", {"gif": _ffv1}),  # by way of a lossless file, see _gif_writer
+    ".gif": Container("GIF", {"gif": _ffv1}, passes=2),  # by way of a lossless file, see _gif_writer
     ".apng": Container("APNG", {"apng": _apng}),
     ".webp": Container("animated WebP", {"webp": _webp}),
 }
@@ -140,6 +141,11 @@ def is_animation(path: str | os.PathLike[str]) -> bool:
     """Whether the name alone asks for more than one frame; `.webp` does not, it may be a still."""
     suffix = Path(path).suffix.lower()
     return is_sequence(path) or (suffix in ANIMATIONS and suffix != ".webp")
+
+
+def passes(path: str | os.PathLike[str]) -> int:
+    """How many times each frame of an animation is gone through until it is written."""
+    return 1 if is_sequence(path) else ANIMATIONS[Path(path).suffix.lower()].passes
 
 
 def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1, codec: str | None = None) -> None:
@@ -204,6 +210,7 @@ def animation_writer(
     first: int = 0,
     like: Picture | None = None,
     cancel: Callable[[], bool] = never,
+    passed: Callable[[int], None] = lambda frames: None,
 ) -> Iterator[FrameWriter]:
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
@@ -214,6 +221,7 @@ def animation_writer(
     sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
     like: the picture whose profile and metadata the pictures of a sequence get.
     cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
+    passed: hears of frames that a later pass has gone through, after all were given, in formats that have `passes`.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
     """
     check_animation(path, fps, codec)
@@ -230,7 +238,7 @@ def animation_writer(
     rate = Fraction(fps).limit_denominator(100_000)
     with replacing(path) as temporary:
         if container.name == "GIF":
-            with _gif_writer(temporary, str(path), rate, loops, cancel) as write:
+            with _gif_writer(temporary, str(path), rate, loops, cancel, passed) as write:
                 yield write
             return
         sound_in, sound_out = _sound(container, sound, rate, frames, sound_from)
@@ -328,28 +336,30 @@ def _sound(
 
 @contextmanager
 def _gif_writer(
-    temporary: Path, label: str, rate: Fraction, loops: int, cancel: Callable[[], bool]
+    temporary: Path,
+    label: str,
+    rate: Fraction,
+    loops: int,
+    cancel: Callable[[], bool],
+    passed: Callable[[int], None],
 ) -> Iterator[FrameWriter]:
     """Frames into a lossless file first: a palette of all colours needs all frames, which may not fit in memory."""
-    alpha = False
     name = temporary_beside(temporary.with_suffix(".mkv"))
     with temporary_file(name) as spool, temporary_file(name.with_suffix(".png")) as palette:
-        with _Video(spool, label, _ffv1, rate, cancel=cancel) as video:
 
-            def write(frame: np.ndarray) -> None:
-                nonlocal alpha
-                alpha = frame.shape[2] in (2, 4)
-                video.write(to_bits(frame, 8))
+        def with_palette(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+            generate = f"{SIX_BITS},palettegen=stats_mode=full:reserve_transparent={int(alpha)}"
+            first = ["-vf", generate, "-update", "1", f"file:{palette}"]
+            return [*first, "-map", "0:v:0", *_ffv1(alpha, bits, crf, loops)]
 
-            yield write
+        with _Video(spool, label, with_palette, rate, cancel=cancel) as video:
+            yield lambda frame: video.write(to_bits(frame, 8))
             video.finish()
-        source = ["-i", f"file:{spool}"]
-        generate = f"{SIX_BITS},palettegen=stats_mode=full:reserve_transparent={int(alpha)}"
-        ffmpeg.run([*source, "-vf", generate, "-update", "1", f"file:{palette}"], label, cancel=cancel)
         use = ["-lavfi", "paletteuse=dither=sierra2_4a:diff_mode=rectangle"]
         # ffmpeg counts repetitions, and -1 means none
         repeat = ["-loop", str(loops - 1 if loops > 1 else -1 if loops == 1 else 0)]
-        ffmpeg.run([*source, "-i", f"file:{palette}", *use, *repeat, f"file:{temporary}"], label, cancel=cancel)
+        files = ["-i", f"file:{spool}", "-i", f"file:{palette}"]
+        ffmpeg.run([*files, *use, *repeat, f"file:{temporary}"], label, cancel=cancel, passed=passed)
 
 
 @contextmanager

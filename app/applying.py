@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from app import maps
-from app.animation import animation_writer, check_output, is_animation
+from app.animation import animation_writer, check_output, is_animation, passes
 from app.errors import UserError
-from app.export import longer_side, looked_up
+from app.export import longer_side, looked_up, steps_for
 from app.files import check_kept, is_sequence, number_in, writable
 from app.maps import Displacement, Kind, cropped, read_map
 from app.opening import Source, open_source
@@ -106,6 +106,7 @@ class Application:
             UserError: if a map has other proportions than the picture, or anything cannot be read or written.
         """
         self.check()
+        progress.enter("reading")
         animated = is_animation(self.output)
         source = open_source(self.source, self.maps.max_pixels)
         if animated != (self.maps.is_sequence or source.clip is not None):
@@ -113,13 +114,21 @@ class Application:
             mend = "write f.%04d.png or .mp4" if not animated else "write a picture, such as out.png"
             given = "several maps or a clip" if not animated else "one map and one picture"
             raise UserError(f"Cannot write {self.output}: {given} do not make {what}; {mend}.")
-        with Applier(device, self.edges, progress.check) as applier:
+        with Applier(device, self.edges) as applier:
             if animated:
                 self._write_frames(applier, source, progress)
             else:
-                pixels = applier.warped(next(self.maps.read()), source.picture.pixels, self._size(source), self._alpha)
-                picture = source.picture.with_pixels(pixels)
+                size = self._size(source)
+                steps = steps_for(size)
+                progress.total = 2 * steps
+                heard, given = progress.parts(steps, size[1]), next(self.maps.read())
+                progress.enter("")
+                picture = source.picture.with_pixels(
+                    applier.warped(given, source.picture.pixels, size, self._alpha, heard)
+                )
+                progress.enter("writing")
                 write_picture(self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip)
+                progress.count(steps)
 
     @property
     def _alpha(self) -> bool:
@@ -131,7 +140,9 @@ class Application:
 
     def _write_frames(self, applier: Applier, source: Source, progress: Progress) -> None:
         clip = source.clip
-        progress.total = clip.frames if clip else len(self.maps.files())
+        frames = clip.frames if clip else len(self.maps.files())
+        progress.total = frames and frames * passes(self.output)
+        progress.enter("")
         size, like = self._size(source), source.picture.stripped() if self.strip else source.picture
         with ExitStack() as stack:
             writer = animation_writer(
@@ -144,6 +155,7 @@ class Application:
                 sound=clip.path if clip and clip.sound else None,
                 like=like,
                 cancel=progress.cancel,
+                passed=progress.advance,
             )
             write = stack.enter_context(behind(stack.enter_context(writer)))
             given_maps = self.maps.read()
@@ -152,15 +164,16 @@ class Application:
                 frames = stack.enter_context(ahead(clip.read_frames(progress.cancel)))
                 given_maps = _staying(given_maps)
             for given, pixels in zip(given_maps, frames, strict=False):
-                write(applier.warped(given, pixels, size, self._alpha))
+                write(applier.warped(given, pixels, size, self._alpha, lambda rows: progress.check()))
                 progress.advance()
+            progress.enter("writing")
 
 
 class Applier:
     """Looks pictures up through given maps; keeps the last map on the GPU, as most stay for many frames."""
 
-    def __init__(self, device: Device, edges: Edges, check: Callable[[], None]) -> None:
-        self._device, self._check = device, check
+    def __init__(self, device: Device, edges: Edges) -> None:
+        self._device = device
         self._edges: Edges = edges
         self._sampler = Sampler(device)
         self._given: Displacement | None = None
@@ -174,8 +187,10 @@ class Applier:
         if self._map is not None:
             self._map.release()
 
-    def warped(self, given: Displacement, pixels: np.ndarray, size: tuple[int, int], alpha: bool) -> np.ndarray:
-        """The pixels looked up through the map, in another size; for `alpha` see `looked_up`."""
+    def warped(
+        self, given: Displacement, pixels: np.ndarray, size: tuple[int, int], alpha: bool, heard: Callable[[int], None]
+    ) -> np.ndarray:
+        """The pixels looked up through the map, in another size; for `alpha` and `heard` see `looked_up`."""
         try:
             if given is not self._given or self._map is None:
                 if self._map is not None:
@@ -184,7 +199,7 @@ class Applier:
                 values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
                 self._map, self._given = GivenMap(self._device, values), given
             how = Sampling(edges=self._edges)
-            return looked_up(self._sampler, self._map, pixels, size, how, alpha, self._check)
+            return looked_up(self._sampler, self._map, pixels, size, how, alpha, heard)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
 

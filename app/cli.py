@@ -234,8 +234,10 @@ def _render_one(task: Task, opened: Opened) -> None:
     from solver.context import Device
 
     with on_terminal(task.written[0].name, None) as progress:
-        job = task.job(opened)  # a large picture takes its time too
+        progress.enter("reading")  # a large picture takes its time too
+        job = task.job(opened)
         job.check()
+        progress.enter("")
         with Device.headless() as device:
             report = run(device, job, progress)
     for notice in (*report.notices, *([report.verdict] if report.verdict else [])):

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, ExitStack, closing, contextmanage
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import chain, count, groupby, islice, pairwise, repeat
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from app.animation import (
     check_output,
     frame_order,
     is_animation,
+    passes,
     reordered,
 )
 from app.checkpoints import DEFAULT_BUDGET
@@ -42,6 +44,7 @@ from solver.sampling import GivenMap, Sampler, Sampling, SamplingError
 from solver.warp import WarpMap
 
 POINTS_AT_ONCE = 1_000_000  # of a map
+PIXELS_A_STEP = 100_000  # whose look-up, or writing as PNG, takes about as long on a CPU as a step on 256 cells
 
 
 @dataclass(frozen=True)
@@ -224,28 +227,44 @@ class _Export:
     def run(self) -> Report:
         recipe, job = self.recipe, self.job
         watched = not self.sentinel.is_idle
-        self.progress.total = recipe.ticks * (2 if watched and job.has_frames else 1)
+        runs, stills = 2 if watched and job.has_frames else 1, self._steps_for_stills()
+        self.progress.total = runs * recipe.ticks + stills
         verdict = self._run_until_stopped() if watched else None
         end = self.replay.tick if watched else recipe.ticks
+        self.progress.total = runs * end + stills
         if job.has_frames:
-            count = self._write_frames(shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate)))
+            count = self._write_frames(shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate)), end)
         else:
             self._go_to(Fraction(end))
             if job.output is not None:
-                frame = self._frame(job.picture.pixels)
+                steps = steps_for(self.size)
+                frame = self._frame(job.picture.pixels, self.progress.parts(steps, self.size[1]))
                 picture = job.picture.with_pixels(frame)
-                self.progress.check()
+                self.progress.enter("writing")
                 write_picture(job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip)
+                self.progress.count(steps)
             self._note(0, Fraction(end))
             count = 1
         if job.maps is not None and not job.maps.is_sequence:
-            write_map(job.maps.path, self._map(job.maps), job.maps.kind)
+            self.progress.enter("making the map")
+            found = self._map(job.maps)
+            self.progress.advance(steps_for((found.width, found.height)))
+            self.progress.enter("writing the map")
+            write_map(job.maps.path, found, job.maps.kind)
+            self.progress.count(steps_for((found.width, found.height)))
         if job.stats is not None:
             with replacing(job.stats) as temporary:
                 temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
         if self.states is not None:
             self.states.keep(last=True)  # where the next part begins
         return Report(count, end, verdict, tuple(self.pictures.notices))
+
+    def _steps_for_stills(self) -> int:
+        """What the last picture and the last map count as, looked up and written."""
+        job = self.job
+        sizes = [self.size] if job.output is not None and not job.has_frames else []
+        sizes += [self._map_size(job.maps)] if job.maps is not None and not job.maps.is_sequence else []
+        return sum(2 * steps_for(size) for size in sizes)
 
     def _run_until_stopped(self) -> str | None:
         """Simulate until a stop condition fires, or to the end; says which fired."""
@@ -257,27 +276,28 @@ class _Export:
 
     # -- frames -----------------------------------------------------------------------------------------------------
 
-    def _write_frames(self, shown: list[Fraction]) -> int:
+    def _write_frames(self, shown: list[Fraction], end: int) -> int:
         """Write the frames, each warped by the map at its position in `shown`; says how many there were."""
         job, (first, last) = self.job, self.job.part
         if job.clip is None and first >= len(shown):
             raise UserError(f"the animation has the frames 0-{len(shown) - 1}, and none from {first} on")
         until = None if last is None else last + 1
         wanted = shown[first:until]
+        self.progress.expect(ceil(max(wanted, default=shown[-1])) - end)
         with ExitStack() as stack:
-            take_map = None
+            take_map, times = None, passes(job.output) if job.output is not None else 1
             if job.maps is not None and job.maps.is_sequence:
                 writer = map_writer(job.maps.path, job.maps.kind, first=first, cancel=self.progress.cancel)
                 take_map = stack.enter_context(behind(stack.enter_context(writer)))
             if job.clip is not None:
                 clip_frames = job.clip.read_frames(self.progress.cancel, self.pictures.notice)
                 source = stack.enter_context(ahead(part_of(clip_frames, first, until)))
-                self._expect(len(range(job.clip.frames or len(shown))[first:until]))
+                self.progress.expect(len(range(job.clip.frames or len(shown))[first:until]) * times)
                 # Once the fluid has come to its end, the clip goes on with the last warp.
                 positions = islice(chain(shown, repeat(shown[-1])), first, None)
                 frames = self._frames(zip(count(first), positions, strict=False), source, take_map)
             else:
-                self._expect(len(wanted))
+                self.progress.expect(len(wanted) * times)
                 frames = self._frames_of_picture(wanted, take_map)
             write = None
             if job.output is not None:
@@ -288,6 +308,7 @@ class _Export:
                     write(frame)
                 written += 1
                 self.progress.advance()
+            self.progress.enter("writing")  # what the encoder still holds, and what it does with all frames
         if job.maps is not None and not job.maps.is_sequence:
             self._go_to(max(wanted, default=shown[-1]))
         return written
@@ -309,11 +330,6 @@ class _Export:
         goes_back = any(later < earlier for earlier, later in pairwise(order))
         return reordered(frames, order, self.job.output.parent) if goes_back else held(frames, order)
 
-    def _expect(self, frames: int) -> None:
-        """Count the frames as work too, now that their number is known."""
-        if self.progress.total is not None:
-            self.progress.total += frames
-
     def _writer(self) -> AbstractContextManager[FrameWriter]:
         job, output, (first, last) = self.job, self.recipe.output, self.job.part
         assert job.output is not None
@@ -330,6 +346,7 @@ class _Export:
             first=first,
             like=job.picture.stripped() if job.strip else job.picture,
             cancel=self.progress.cancel,
+            passed=self.progress.advance,
         )
 
     def _frames(
@@ -365,15 +382,19 @@ class _Export:
         self.replay.seek(position)
         self._position = position
 
-    def _frame(self, pixels: np.ndarray) -> np.ndarray:
+    def _frame(self, pixels: np.ndarray, heard: Callable[[int], None] | None = None) -> np.ndarray:
+        """The pixels warped by the map as it is; for `heard` see `looked_up`."""
+        heard = heard or (lambda rows: self.progress.check())
         if self.replay.density is not None:
-            return self._density_frame(self.replay.density.get())
+            frame = self._density_frame(self.replay.density.get())
+            heard(len(frame))
+            return frame
         # The frames of an animation are all of one kind, and most of its formats have no alpha.
         alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
         with self.device.stage("sample picture"):
             how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
             try:
-                return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, self.progress.check)
+                return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, heard)
             except SamplingError as error:
                 raise UserError(f"The map cannot be applied: {error}.") from None
 
@@ -390,8 +411,10 @@ class _Export:
             still.release()
 
     def _map(self, wanted: MapOutput) -> Displacement:
-        size = self.size if wanted.size is None else longer_side(self.size, wanted.size)
-        return displacement(self.replay, size, wanted.overscan, wanted.forward, self.progress.check)
+        return displacement(self.replay, self._map_size(wanted), wanted.overscan, wanted.forward, self.progress.check)
+
+    def _map_size(self, wanted: MapOutput) -> tuple[int, int]:
+        return self.size if wanted.size is None else longer_side(self.size, wanted.size)
 
     def _advance(self) -> None:
         self.replay.advance()
@@ -507,26 +530,31 @@ def looked_up(
     size: tuple[int, int],
     how: Sampling,
     alpha: bool,
-    check: Callable[[], None],
+    heard: Callable[[int], None],
 ) -> np.ndarray:
     """The pixels (h, w, c) looked up through a map, in bands, so that little more than the result is in memory.
 
     alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
-    check: called with every band; may raise, as `Progress.check` does.
+    heard: called with the number of rows in every band; may raise, as `Progress.check` does.
     """
     result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)
     if not alpha or pixels.shape[2] in (2, 4) or how.edges != "transparent":
-        for _ in sampler.bands(warp, pixels, size, how, result):
-            check()
+        for band in sampler.bands(warp, pixels, size, how, result):
+            heard(len(band))
         return result
     top = 0
     for band in sampler.bands(warp, with_alpha(pixels), size, how):
-        check()
+        heard(len(band))
         if result.shape[2] == pixels.shape[2] and (band[..., -1] < opaque_value(band)).any():
             result = with_alpha(result)
         result[top : top + len(band)] = band[..., : result.shape[2]]
         top += len(band)
     return result
+
+
+def steps_for(size: tuple[int, int]) -> int:
+    """How many steps of a job looking up a still of this size counts as; writing it counts as many again."""
+    return max(1, size[0] * size[1] // PIXELS_A_STEP)
 
 
 def longer_side(size: tuple[int, int], longest: int) -> tuple[int, int]:

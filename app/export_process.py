@@ -17,6 +17,7 @@ class ExportProcess:
     Attributes:
         job: what is done.
         part: how much of it is done, 0-1.
+        state: what is being done beside the work itself, as "writing"; or "".
         is_done: it has ended, well or not.
         error: why it failed, as a sentence; "" if it did not.
         cancelled: it was stopped.
@@ -25,6 +26,7 @@ class ExportProcess:
     def __init__(self, job: Job) -> None:
         self.job = job
         self.part = 0.0
+        self.state = ""
         self.is_done = False
         self.error = ""
         self.cancelled = False
@@ -43,6 +45,8 @@ class ExportProcess:
                 kind, value = self._pipe.recv()
                 if kind == "part":
                     self.part = value
+                elif kind == "state":
+                    self.state = value
                 else:
                     self.is_done = True
                     self.error = value if kind == "error" else ""
@@ -73,7 +77,7 @@ def _work(job: Job, pipe: Connection, wish: Any) -> None:
 
     try:
         with Device.headless() as device:
-            run(device, job, Progress(report=report, cancel=wish.is_set))
+            run(device, job, Progress(None, report, wish.is_set, lambda state: pipe.send(("state", state))))
         pipe.send(("done", ""))
     except Cancelled:
         pipe.send(("cancelled", ""))

@@ -169,7 +169,21 @@ def signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def run(arguments: Sequence[str], label: str, *, doing: str = "write", cancel: Callable[[], bool] = never) -> None:
-    """Run ffmpeg to its end; raises `UserError` or `Cancelled`."""
-    with Ffmpeg(arguments, label, doing=doing, cancel=cancel) as process:
-        process.finish()
+def run(
+    arguments: Sequence[str],
+    label: str,
+    *,
+    doing: str = "write",
+    cancel: Callable[[], bool] = never,
+    passed: Callable[[int], None] = lambda frames: None,
+) -> None:
+    """Run ffmpeg to its end; `passed` hears of frames that it has put out. Raises `UserError` or `Cancelled`."""
+    with Ffmpeg(["-progress", "pipe:1", *arguments], label, doing=doing, cancel=cancel) as process:
+        frames, line = 0, b""
+        for byte in process.blocks(1):
+            line += byte
+            if byte == b"\n":
+                if found := re.match(rb"frame=\s*(\d+)", line):
+                    passed(int(found[1]) - frames)
+                    frames = int(found[1])
+                line = b""

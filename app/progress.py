@@ -28,7 +28,8 @@ def never() -> bool:
 class Progress:
     """Counts the steps of a job; `report(done, total)` hears of each, `cancel()` answers whether to stop.
 
-    The window passes its own two callbacks; the command line uses `on_terminal`.
+    `tell(state)` hears what is being done: "writing" and the like, where a step takes long; "" is the work itself.
+    The window passes its own callbacks; the command line uses `on_terminal`.
     """
 
     def __init__(
@@ -36,12 +37,24 @@ class Progress:
         total: int | None = None,
         report: Callable[[int, int | None], None] = lambda done, total: None,
         cancel: Callable[[], bool] = never,
+        tell: Callable[[str], None] = lambda state: None,
     ) -> None:
-        self.total = total
+        self._total = total
         self.done = 0
         self.cancel = cancel
         self._report = report
+        self._tell = tell
         self._started = time.monotonic()
+
+    @property
+    def total(self) -> int | None:
+        """How many steps there are, or None while that is not known; `report` hears of another."""
+        return self._total
+
+    @total.setter
+    def total(self, total: int | None) -> None:
+        self._total = total
+        self._report(self.done, total)
 
     def check(self) -> None:
         """Raise `Cancelled` if the user wants to stop."""
@@ -51,8 +64,33 @@ class Progress:
     def advance(self, steps: int = 1) -> None:
         """Count `steps` as done; raises `Cancelled` if the user wants to stop."""
         self.check()
+        self.count(steps)
+
+    def count(self, steps: int) -> None:
+        """Count `steps` as done, whatever the user wants: what they made is finished."""
         self.done += steps
         self._report(self.done, self.total)
+
+    def expect(self, steps: int) -> None:
+        """Count `steps` more, or less, as what there is to do, if that is known at all."""
+        if self.total is not None:
+            self.total += steps
+
+    def enter(self, state: str) -> None:
+        """Say what is being done from now on; raises `Cancelled` if the user wants to stop."""
+        self.check()
+        self._tell(state)
+
+    def parts(self, steps: int, count: int) -> Callable[[int], None]:
+        """A function that hears how many more of `count` parts are done, and advances by their share of `steps`."""
+        heard = 0
+
+        def hear(more: int) -> None:
+            nonlocal heard
+            before, heard = heard, heard + more
+            self.advance(heard * steps // count - before * steps // count)
+
+        return hear
 
     @property
     def seconds_left(self) -> float | None:
@@ -150,4 +188,11 @@ def on_terminal(description: str, total: int | None, at_once: Callable[[], None]
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
             task = bars.add_task(description, total=total)
-            yield Progress(total, lambda done, total: bars.update(task, completed=done, total=total), cancel)
+
+            def report(done: int, total: int | None) -> None:
+                bars.update(task, completed=done, total=total)
+
+            def tell(state: str) -> None:
+                bars.update(task, description=f"{description}: {state}" if state else description)
+
+            yield Progress(total, report, cancel, tell)

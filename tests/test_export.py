@@ -279,6 +279,71 @@ def test_a_recipe_begins_with_a_map(device: Device, picture: Path, tmp_path: Pat
     assert Recipe.parse(Recipe.parse(still).text()) == Recipe.parse(still)
 
 
+# How far it is ------------------------------------------------------------------------------------------------------
+
+
+class Heard:
+    """What a job says of how far it is: (done, total) after every step, and the states in between."""
+
+    def __init__(self) -> None:
+        self.steps: list[tuple[int, int | None]] = []
+        self.states: list[str] = []
+        self.progress = Progress(None, lambda done, total: self.steps.append((done, total)), tell=self.states.append)
+
+    def check(self) -> None:
+        """It never goes back, has a total, and ends with it."""
+        done = [done for done, _ in self.steps]
+        assert done == sorted(done)
+        assert done[-1] == self.steps[-1][1]
+
+
+def test_a_large_still_says_how_far_it_is(
+    device: Device, picture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Band by band while it is looked up, and that it is being written; by a recipe and by a map."""
+    monkeypatch.setattr("app.export.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
+    monkeypatch.setattr("app.applying.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
+    maps = MapOutput(tmp_path / "m.exr", size=96)
+    job = Job(Recipe.parse(WHIRL + "size = 1500"), read_picture(picture), tmp_path, tmp_path / "out.png", maps=maps)
+    heard = Heard()
+    run(device, job, heard.progress)
+    heard.check()
+    bands = [done for done, _ in heard.steps if 20 < done <= 35]  # 1.5 million pixels after 20 steps
+    assert len(bands) == 8
+    assert heard.steps[-1] == (20 + 2 * 15 + 2, 20 + 2 * 15 + 2)
+    assert heard.states == ["writing", "making the map", "writing the map"]
+    again = Heard()
+    Application(MapSource(tmp_path / "m.exr"), picture, tmp_path / "again.png", size=1500).run(device, again.progress)
+    again.check()
+    assert [done for done, _ in again.steps] == [0, 1, 3, 5, 7, 9, 11, 13, 15, 30]
+    assert again.states == ["reading", "", "writing"]
+
+
+@pytest.mark.parametrize(("name", "passes"), [("out.mp4", 1), ("out.gif", 2), ("out.%02d.png", 1)])
+def test_an_animation_says_how_far_it_is(
+    device: Device, picture: Path, clip: Path, tmp_path: Path, name: str, passes: int
+):
+    """Also in the pass over all frames that a GIF takes after the last of them; a part, and a simulation that stops."""
+    stop = "[stop]\ndisplacement_above = 0.02\n"
+    for recipe, part, steps in (
+        (WHIRL, (0, None), 20 + 5 * passes),
+        (WHIRL, (1, 2), 10 + 2 * passes),  # a frame every 5 ticks
+        (WHIRL + stop, (0, None), None),
+    ):
+        heard = Heard()
+        job = Job(Recipe.parse(recipe), read_picture(picture), tmp_path, tmp_path / name, part=part)
+        report = run(device, job, heard.progress)
+        heard.check()
+        assert heard.steps[-1][0] == (steps or 2 * report.ticks + report.frames * passes)
+        assert report.ticks == 20 or steps is None
+        assert heard.states == ["writing"]
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    again = Heard()
+    Application(MapSource(tmp_path / "m.npy"), clip, tmp_path / name).run(device, again.progress)
+    again.check()
+    assert again.steps[-1][0] == 9 * passes
+
+
 # What cannot be -----------------------------------------------------------------------------------------------------
 
 

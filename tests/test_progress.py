@@ -25,8 +25,9 @@ from app.progress import on_terminal
 try:
     with on_terminal("Rendering", int(sys.argv[1])) as progress:
         print("started", flush=True)
-        for _ in range(int(sys.argv[1])):
+        for step in range(int(sys.argv[1])):
             time.sleep(0.01)
+            progress.enter("writing" if step > 20 else "")
             progress.advance()
     print("finished")
 except Cancelled:
@@ -51,6 +52,25 @@ def test_progress_reports_and_stops():
     assert len(heard) == 2
 
 
+def test_parts_of_a_step_add_up_to_it():
+    heard: list[int] = []
+    progress = Progress(10, lambda done, total: heard.append(done))
+    progress.advance(3)
+    progress.expect(7)
+    hear = progress.parts(7, 4)
+    for _ in range(4):
+        hear(1)
+    assert heard == [3, 3, 4, 6, 8, 10]
+    assert progress.total == 17
+    wish = threading.Event()
+    wish.set()
+    progress.cancel = wish.is_set
+    with pytest.raises(Cancelled):
+        progress.enter("writing")
+    progress.count(7)  # what is finished is finished
+    assert progress.done == 17
+
+
 def test_it_is_silent_when_piped():
     done = subprocess.run([sys.executable, "-c", JOB, "5"], capture_output=True, cwd=ROOT, check=True)
     assert (done.stdout, done.stderr) == (b"started\nfinished\n", b"")
@@ -71,7 +91,8 @@ def test_a_terminal_sees_a_bar_with_the_time_left():
         pass
     os.close(ours)
     assert job.wait() == 0
-    assert b"Rendering" in seen
+    assert b"Rendering " in seen
+    assert b"Rendering: writing" in seen
     assert b"/60" in seen
     assert b"0:00:0" in seen
 

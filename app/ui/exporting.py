@@ -310,7 +310,8 @@ class Exports:
             return
         with ui.floating("exporting", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
             imgui.begin_group()
-            ui.text(f"Exporting {process.job.target.name}", size=14)
+            state = f": {process.state}" if process.state else ""
+            ui.text(f"Exporting {process.job.target.name}{state}", size=14)
             corner, width = imgui.get_cursor_screen_pos(), ui.px(280)
             lines = imgui.get_window_draw_list()
             high = ImVec2(corner.x + width, corner.y + ui.px(5))
