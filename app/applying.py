@@ -153,6 +153,7 @@ class Application:
                 quality=self.quality,
                 bits=self.bits,
                 sound=clip.path if clip and clip.sound else None,
+                sound_from=clip.late if clip else 0.0,
                 like=like,
                 cancel=progress.cancel,
                 passed=progress.advance,

@@ -341,7 +341,7 @@ class _Export:
             quality=output.quality,
             bits=job.bits,
             sound=job.clip.path if job.clip and job.clip.sound else None,
-            sound_from=float(first / job.rate),
+            sound_from=float(first / job.rate) + (job.clip.late if job.clip else 0),
             frames=None if last is None else last + 1 - first,
             first=first,
             like=job.picture.stripped() if job.strip else job.picture,

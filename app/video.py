@@ -23,7 +23,8 @@ class Clip:
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
     rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
-    sound: name of its first sound track's codec, None if silent. bits: 8, or 16 for what has more than 8.
+    sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
+    as a rule after its sound; 0 where an older ffmpeg does not tell. bits: 8, or 16 for what has more than 8.
     """
 
     path: Path
@@ -33,6 +34,7 @@ class Clip:
     frames: int | None
     rotation: int
     sound: str | None
+    late: float
     bits: int
     alpha: bool
     decoder: tuple[str, ...]
@@ -75,6 +77,9 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
     aspect = re.search(r"SAR (\d+):(\d+)", video)
     square = aspect is None or aspect.group(1) == aspect.group(2)
     filters = f"scale={'iw' if square else 'iw*sar'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
+    late = _late(told, video)
+    if late:  # or the first frame would be shown from the sound's start on
+        filters = f"setpts=PTS-{late}/TB,{filters}"
     width, height, fps = _shown(file, filters)
     check_size(file, width, height, max_pixels)
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
@@ -85,9 +90,10 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
         width=width,
         height=height,
         fps=fps,
-        frames=max(1, round(seconds * fps)) if seconds is not None else None,
+        frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
         rotation=round(-float(rotation.group(1))) % 360 if rotation else 0,
         sound=_sound_codec(told),
+        late=late,
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
         alpha=alpha,
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
@@ -106,6 +112,12 @@ def sound_codec(path: str | os.PathLike[str]) -> str | None:
 def _sound_codec(told: str) -> str | None:
     found = re.search(r"Stream #0.*: Audio: (\w+)", told)
     return found.group(1) if found else None
+
+
+def _late(told: str, video: str) -> float:
+    """Seconds that a video stream starts after its file does."""
+    file, stream = re.search(r"Duration: .*, start: (-?[\d.]+)", told), re.search(r", start (-?[\d.]+)", video)
+    return max(0.0, round(float(stream.group(1)) - float(file.group(1)), 6)) if file and stream else 0.0
 
 
 def _banner(file: Path) -> str:

@@ -6,6 +6,7 @@ import json
 import subprocess
 from fractions import Fraction
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -168,6 +169,30 @@ def test_a_part_of_a_clip_has_its_part_of_the_sound(device: Device, tmp_path: Pa
         offsets = np.arange(0, len(whole) - 2048, 16)
         likeness = [whole[offset : offset + 2048] @ window for offset in offsets]
         assert (offsets[np.argmax(likeness)] - len(heard) // 2) / 44100 == pytest.approx(4 / 12.5, abs=0.03), ending
+
+
+@pytest.mark.parametrize("late", [0.025, 1.0])
+def test_a_clip_whose_frames_begin_after_its_sound(device: Device, tmp_path: Path, late: float):
+    """No frame of it comes twice, and the sound stays with the frames: it beeps from the third frame on."""
+    source = tmp_path / "late.mkv"
+    command = [ffmpeg.executable(), "-v", "error", "-itsoffset", str(late), "-f", "lavfi"]
+    command += ["-i", f"testsrc=s={WIDTH}x{HEIGHT}:r=25:d=0.4", "-f", "lavfi", "-i"]
+    beeps = f"aevalsrc=gte(t\\,{late + 3 / 25})*sin(3000*t):d={late + 0.4}:s=44100"
+    subprocess.run([*command, beeps, "-c:v", "ffv1", "-c:a", "flac", str(source)], check=True)
+    read = read_clip(source)
+    assert read.frames == 10
+    shown = list(read.read_frames())
+    assert len(shown) == 10
+    assert all((one != other).any() for one, other in pairwise(shown))
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    render(device, WHIRL, source, tmp_path / "out.mkv")
+    apply(device, tmp_path / "m.npy", source, tmp_path / "again.mkv")
+    for name in ("out.mkv", "again.mkv"):
+        starts = probe(tmp_path / name)
+        assert starts["video"]["nb_read_frames"] == "10"
+        silent = np.flatnonzero(np.abs(sound(tmp_path / name)) > 0.1)[0] / 44100
+        begins = float(starts["audio"]["start_time"]) - float(starts["video"]["start_time"])
+        assert begins + silent == pytest.approx(3 / 25, abs=0.03)  # up to a block of what is copied
 
 
 def sound(path: Path) -> np.ndarray:
