@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from math import ceil, prod, sqrt
 from typing import Any, Literal
 
@@ -118,10 +118,12 @@ class _Job:
     def is_prepared(self) -> bool:
         return self.how.quality != "nearest" and (self.is_curved or self.has_alpha)
 
-    @property
+    @cached_property
     def is_packed(self) -> bool:
-        """True if a texel of what is prepared holds two neighbours in x, 16 bits a colour: enough for bytes."""
-        return self.is_prepared and self.is_curved and self.picture.dtype == np.uint8 and self.channels == 3
+        """True if a texel of what is prepared holds two neighbours in x, 16 bits a colour: enough for opaque bytes."""
+        if not (self.is_prepared and self.is_curved and self.picture.dtype == np.uint8 and self.channels >= 3):
+            return False
+        return self.channels == 3 or bool((self.picture[..., 3] == 255).all())
 
     @property
     def is_single(self) -> bool:

@@ -75,8 +75,8 @@ const float UNIT = 1.0 / 65535.0, LEFT = 1.0;
 const int STRIDE = 2;
 #define EXTENT (u_extent + vec2(1.0, 0.0))
 COLOR weighed(float x, float y, float weight, float next) {
-    uvec3 both = texture(u_source, vec2(x, y)).rgb;
-    return weight * COLOR(ivec3(both & 0xffffu)) + next * COLOR(ivec3(both >> 16u));
+    uvec4 both = texture(u_source, vec2(x, y));
+    return weight * vec4(ivec4(both & 0xffffu)).PARTS + next * vec4(ivec4(both >> 16u)).PARTS;
 }
 #else
 const float UNIT = 1.0, LEFT = 0.0;
@@ -260,10 +260,10 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #endif
 
 #if defined(PREPARED) && !defined(OPAQUE)
-    color.a = clamp(color.a, 0.0, 1.0);
+    // The weights add up to 1 but for their rounding, less than a millionth: what is opaque stays so, in the very colours
+    // that it has without an alpha channel.
+    color.a = color.a > 1.0 - 1e-5 ? 1.0 : max(color.a, 0.0);
     color.rgb = color.a > 0.0 ? color.rgb / color.a : vec3(0.0);
-    // The weights add up to 1 but for their rounding, less than a millionth: what is opaque stays so.
-    color.a = color.a > 1.0 - 1e-5 ? 1.0 : color.a;
 #endif
 #ifdef CLAMPED
     color = clamp(color, 0.0, 1.0);

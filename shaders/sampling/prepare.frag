@@ -18,11 +18,11 @@ vec4 prepared(ivec2 pixel) {
 uniform vec2 u_count;
 layout(location = 0) out uvec4 out_colors;
 
-uvec3 codes(int x, int y) { return uvec3(ivec3(prepared(ivec2(clamp(x, 0, int(u_count.x) - 1), y)).rgb * 65535.0 + 0.5)); }
+uvec4 codes(int x, int y) { return uvec4(ivec4(prepared(ivec2(clamp(x, 0, int(u_count.x) - 1), y)) * 65535.0 + 0.5)); }
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    out_colors = uvec4(codes(pixel.x - 1, pixel.y) | codes(pixel.x, pixel.y) << 16u, 0u);
+    out_colors = codes(pixel.x - 1, pixel.y) | codes(pixel.x, pixel.y) << 16u;
 }
 #else
 layout(location = 0) out vec4 out_color;
