@@ -19,7 +19,7 @@ PATIENCE = 1.5  # seconds below the wanted rate before something is done about i
 WANTED = 30.0  # frames a second while painting
 # Of a frame: painting takes a tenth more than what is measured, by checkpoints, looks at the map and a longer recipe;
 # and other programs want their part.
-SPARE = 0.2
+SPARE = 0.3
 TRIALS = (256, 128)  # cells, of the grids that the machine is measured on
 TICKS = 8  # on each of them
 FAST = 4.0  # milliseconds; a tick that takes less may be made 60 times a second
