@@ -32,7 +32,7 @@ def wall_inputs(no_slip: bool, speed: tuple[float, ...]) -> tuple[dict[str, Any]
 @pytest.mark.parametrize(("nx", "ny"), SIZES)
 @pytest.mark.parametrize("courant", [0.4, 3.0])
 def test_trace_and_advect(
-    device: Device, nx: int, ny: int, no_slip: bool, speed: tuple[float, ...], courant: float
+    device: Device, nx: int, ny: int, no_slip: bool, speed: tuple[float, float, float, float], courant: float
 ) -> None:
     faces = reference.smooth_velocity(nx, ny, seed=nx, cells=5 if courant < 1 else 20)
     carried = reference.smooth_velocity(nx, ny, seed=nx + 1)
