@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
 import queue
@@ -11,15 +10,11 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +24,7 @@ from app.export import Job, MapOutput, run
 from app.files import abandon, cannot_write, check_kept, is_sequence, takes_place
 from app.opening import CLIP_ENDINGS, Opened, open_recipe
 from app.pictures import FORMATS, MAX_PIXELS
-from app.progress import GRACE, INTERRUPTED, Progress, never
+from app.progress import GRACE, INTERRUPTED, Progress, interruptible, never
 from app.project import picture_names
 from app.recipe import Recipe
 from solver.context import Device
@@ -280,16 +275,56 @@ def _opened(name: str, max_pixels: int) -> Opened:
 
 # Processes ----------------------------------------------------------------------------------------------------------
 
-_wish = threading.Event()
+SERVING = "from app.batch import serve; serve()"
 
 
-def _begin(life: Connection) -> None:
-    """In a new worker; `life` has something to read, or its end, when it is to stop, or when nobody is left to tell it.
+class _Child:
+    """A process that does one task after the other, and ends as soon as nobody is left who could give it one.
 
-    No `Event` of multiprocessing: setting one waits for all that wait for it, also for a worker that was killed.
+    A forked process would share this one's GL, which no driver survives. A pool of the standard library's is lost with
+    any of its processes, and can hang where one is killed while another is started; here each stands for itself.
     """
-    signal.signal(signal.SIGTERM, lambda *_: _end_now())
-    threading.Thread(target=_end_with, args=(life,), daemon=True).start()
+
+    def __init__(self) -> None:
+        with _deaf_children():
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", SERVING],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._tasks = self._process.stdin
+        self._outcomes = self._process.stdout
+
+    def fileno(self) -> int:
+        """What can be read from when it has done its task, or died."""
+        return self._outcomes.fileno()
+
+    def begin(self, task: Task) -> None:
+        """Give it a task; it has none."""
+        with suppress(BrokenPipeError):  # it has died, as `outcome` will find
+            self._tasks.write(pickle.dumps(task))
+            self._tasks.flush()
+
+    def outcome(self) -> Outcome:
+        """What became of the task, once there is something to read. Raises `EOFError` if the process died of it."""
+        try:
+            return pickle.load(self._outcomes)
+        except pickle.UnpicklingError:
+            raise EOFError from None
+
+    def end(self) -> None:
+        """End it in the middle of whatever it does, with nothing half-written left."""
+        with suppress(BrokenPipeError):
+            self._tasks.close()
+        try:
+            self._process.wait(10 * GRACE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._outcomes.close()
 
 
 @contextmanager
@@ -306,12 +341,26 @@ def _deaf_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _end_with(life: Connection) -> None:
-    """End this worker in the middle of its work, if it is to stop and does not soon do so."""
-    life.poll(None)
-    _wish.set()
-    time.sleep(GRACE)
+def serve() -> None:
+    """Do the tasks that come by standard input, until its end or SIGTERM comes, in the middle of one if need be."""
+    outcomes = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # nothing else may get among the outcomes
+    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
+    with interruptible(_end_now) as cancel, suppress(Cancelled, KeyboardInterrupt, BrokenPipeError):
+        threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
+        while True:
+            outcome = perform(tasks.get(), cancel)
+            outcomes.write(pickle.dumps(outcome))
+            outcomes.flush()
     _end_now()
+
+
+def _listen(tasks: queue.SimpleQueue[Task]) -> None:
+    while True:
+        try:
+            tasks.put(pickle.load(sys.stdin.buffer))
+        except (EOFError, pickle.UnpicklingError):
+            _end_now()
 
 
 def _end_now() -> None:
@@ -319,117 +368,50 @@ def _end_now() -> None:
     os._exit(INTERRUPTED)
 
 
-def _perform_here(task: Task) -> Outcome:
-    return perform(task, _wish.is_set)
-
-
 def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress: Progress) -> None:
-    # A forked process would share this one's GL, which no driver survives.
-    context = multiprocessing.get_context("spawn")
-    theirs, ours = context.Pipe(duplex=False)
     waiting = deque((task, 1) for task in tasks)
-    while waiting:
-        with _deaf_children():  # the pool starts a process of its own, which keeps its books
-            pool = ProcessPoolExecutor(jobs, context, _begin, (theirs,))
-        running: dict[Future[Outcome], tuple[Task, int]] = {}
-        try:
-            while waiting or running:
-                # No more than are at work, so that few are suspected when a worker dies; a suspect is tried alone, so
-                # that what stood beside the culprit is not blamed for it again.
-                while waiting and len(running) < (jobs if waiting[0][1] == 1 else 1):
-                    if any(attempt > 1 for _, attempt in running.values()):
-                        break
-                    task, attempt = waiting.popleft()
-                    with _deaf_children():
-                        running[pool.submit(_perform_here, task)] = task, attempt
-                done, _ = wait(running, LOOK, FIRST_COMPLETED)
-                progress.check()
-                for future in done:
-                    outcome = future.result()
-                    del running[future]
+    busy: dict[_Child, tuple[Task, int]] = {}
+    idle: list[_Child] = []
+    try:
+        while waiting or busy:
+            # One that has died is tried again when all others are done, alone, with all the memory there is.
+            while waiting and len(busy) < (jobs if waiting[0][1] == 1 else 1):
+                if waiting[0][1] > 1:
+                    while idle:
+                        idle.pop().end()
+                child = idle.pop() if idle else _Child()
+                busy[child] = task, _ = waiting.popleft()
+                child.begin(task)
+            done, _, _ = select.select([*busy], [], [], LOOK)
+            progress.check()
+            for child in done:
+                task, attempt = busy[child]
+                try:
+                    outcome = child.outcome()
+                    idle.append(child)
+                except EOFError:
+                    child.end()
+                    outcome = Outcome(task.label, DIED)
+                    if attempt < ATTEMPTS:
+                        waiting.append((task, attempt + 1))
+                        outcome = None
+                del busy[child]
+                if outcome is not None:
                     report(outcome)
-        except BrokenProcessPool:
-            for task, attempt in running.values():
-                if attempt < ATTEMPTS:
-                    waiting.append((task, attempt + 1))
-                else:
-                    report(Outcome(task.label, DIED))
-        except BaseException:
-            ours.close()
-            for child in multiprocessing.active_children():  # one that is still being started does not listen yet
-                child.terminate()
-            raise
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+    finally:
+        for child in (*busy, *idle):
+            child.end()
 
 
 # A cluster ----------------------------------------------------------------------------------------------------------
 
 
-class _Child:
-    """A process that does one task after the other, for a thread of a Dask worker.
+def _perform_on_worker(task: Task) -> Outcome:
+    """In a thread of a Dask worker, which forgets a task that its client has cancelled.
 
     A GL context wants a process whose other threads leave its objects alone; Dask's collect garbage at any time. And a
     driver that crashes does not take the worker with it.
     """
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", "from app.batch import serve; serve()"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        )
-
-    def perform(self, task: Task, cancel: Callable[[], bool]) -> Outcome:
-        """Have a task done. Raises `Cancelled`, or `EOFError` if the process dies."""
-        stdin, stdout = self._process.stdin, self._process.stdout
-        assert stdin is not None
-        assert stdout is not None
-        try:
-            stdin.write(pickle.dumps(task))
-            stdin.flush()
-            while not select.select([stdout], [], [], LOOK)[0]:
-                if cancel():
-                    raise Cancelled
-            return pickle.load(stdout)
-        except BrokenPipeError:
-            raise EOFError from None
-
-    def end(self) -> None:
-        """End it in the middle of whatever it does, with nothing half-written left."""
-        self._process.terminate()
-        try:
-            self._process.wait(10 * GRACE)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-
-
-def _end_after(parent: int) -> None:
-    """End this process when that one has ended."""
-    while os.getppid() == parent:
-        time.sleep(LOOK)
-    _end_now()
-
-
-def serve() -> None:
-    """Do the tasks that come by standard input, until there are no more or nobody is left to hear of them."""
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # nothing else may get among the answers
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: _end_now())
-    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
-    while True:
-        try:
-            task = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        pickle.dump(perform(task), answers)
-        answers.flush()
-
-
-def _perform_on_worker(task: Task) -> Outcome:
-    """In a thread of a Dask worker, which forgets a task that its client has cancelled."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -442,14 +424,18 @@ def _perform_on_worker(task: Task) -> Outcome:
     for _ in range(ATTEMPTS):
         if not hasattr(_here, "child"):
             _here.child = _Child()
+        child: _Child = _here.child
         try:
-            return _here.child.perform(task, forgotten)
-        except EOFError:
+            child.begin(task)
+            while not select.select([child], [], [], LOOK)[0]:
+                if forgotten():
+                    raise Cancelled
+            return child.outcome()
+        except (EOFError, Cancelled) as error:
             del _here.child
-        except Cancelled:
-            _here.child.end()
-            del _here.child
-            raise
+            child.end()
+            if isinstance(error, Cancelled):
+                raise
     return Outcome(task.label, DIED)
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +140,8 @@ def test_one_that_fails_does_not_stop_the_others(folder: Path, jobs: int):
 
 def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Killed as for want of memory: whatever it had is done by another; what kills each of them is told."""
-    monkeypatch.setattr(batch, "_perform_here", _dying)
+    serving = "import app.batch, test_batch; app.batch.perform = test_batch.dying; app.batch.serve()"
+    monkeypatch.setattr(batch, "SERVING", serving)
     pictures = [folder / f"p{number}.png" for number in range(4)]
     heard: list[Outcome] = []
     assert run_batch(tasks(folder, pictures), heard.append, Progress(), 2) == 1
@@ -149,7 +151,7 @@ def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.Monke
     assert told["p3.png"] == batch.DIED
 
 
-def _dying(task: Task) -> Outcome:
+def dying(task: Task, cancel: Callable[[], bool]) -> Outcome:
     """A worker's work that kills it: for p0 the first time, for p3 each time."""
     assert task.picture is not None
     mark = task.picture.with_suffix(".tried")
@@ -203,8 +205,12 @@ def at_work(folder: Path) -> subprocess.Popen[str]:
 
 def workers(of: subprocess.Popen[str]) -> list[int]:
     """The processes that it has started to work in."""
-    children = Path(f"/proc/{of.pid}/task/{of.pid}/children").read_text().split()
-    return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    found = []
+    for pid in Path(f"/proc/{of.pid}/task/{of.pid}/children").read_text().split():
+        with suppress(FileNotFoundError):  # it has ended since
+            if b"serve()" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                found.append(int(pid))
+    return found
 
 
 def wait_until(true: Callable[[], object]) -> None:
@@ -224,13 +230,13 @@ def test_stopping_all_processes_at_once(folder: Path, number: signal.Signals, mo
     if moment != "starting":
         wait_until(lambda: len({*contents(folder)} - before) == 2)
     if moment == "a worker was killed":
-        killed = workers(job)
-        os.kill(killed[0], signal.SIGKILL)
-        wait_until(lambda: workers(job) and not {*workers(job)} & {*killed})  # their pictures are begun anew
+        killed = workers(job)[0]
+        os.kill(killed, signal.SIGKILL)
+        wait_until(lambda: len(workers(job)) == 2 and killed not in workers(job))  # another has begun the next picture
     os.killpg(job.pid, number)
     _, told = job.communicate(timeout=30)
-    assert job.returncode == INTERRUPTED
-    assert told == "fluidwarp: cancelled; 0 of 4 pictures are written, nothing is half-written\n"
+    line = "fluidwarp: cancelled; 0 of 4 pictures are written, nothing is half-written\n"
+    assert (job.returncode, told) == (INTERRUPTED, line)
     left = {*contents(folder)} - before
     assert all(name.startswith(".") for name in left)
     assert len(left) <= (moment == "a worker was killed")  # what is killed outright cannot clean up after itself
