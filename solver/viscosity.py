@@ -35,6 +35,7 @@ class Plan:
     Attributes:
         grids: coarser grids that are visited, at most; without any, and so without all that follows, v* is smoothed.
         nested: of these, the finest so many get a multigrid cycle while one correction is carried up through them.
+        brief: such a cycle goes one grid down only, for so many sweeps; with 0 it goes down to the coarsest.
         steps: conjugate gradient steps after the first, at most, each with one multigrid cycle; with 0 there are no
             conjugate gradients: v* is corrected once and then smoothed.
         tolerance: steps end after one that has brought less than this part of the energy norm.
@@ -44,6 +45,7 @@ class Plan:
 
     grids: int = 99
     nested: int = 99
+    brief: int = 0
     steps: int = 5
     tolerance: float = 0.0
     sweeps: tuple[int, int] = (2, 2)
@@ -64,9 +66,9 @@ def plan_for(least: float, largest: float) -> Plan:
         sweeps = 2 if largest <= 3.0 else 1
         if largest <= 5.0:
             return Plan(grids=grids, nested=0, steps=0, sweeps=(sweeps, 4))
-        if largest <= 50.0:
-            return Plan(grids=grids, nested=1, steps=0, sweeps=(sweeps, 2))
-        return Plan(grids=grids, nested=2, steps=0, sweeps=(1, 2))
+        # What such a cycle meets is smooth only where the viscosity reaches far.
+        brief = 4 if largest <= 15.0 else 5 if largest <= 150.0 else 0
+        return Plan(grids=grids, nested=1 if largest <= 50.0 else 2, brief=brief, steps=0, sweeps=(sweeps, 2))
     if largest <= 300.0 * least:
         return Plan(tolerance=0.03)
     # Rigid pieces pay only where they are far stiffer than what is around them.
@@ -477,7 +479,7 @@ class Viscosity:
         levels = self.levels[1 : last.depth + 1]
         rights = [level.right for level in levels]
         for fine, coarser in zip(rights, levels[1:], strict=False):
-            self._restrict(fine, coarser, coarser.right, begin=coarser is last)
+            self._restrict(fine, coarser, coarser.right, self._first_weight(coarser) if coarser is last else 0.0)
         if len(levels) == 1 and last is not self._exact_level:
             self._start(last, rights[-1], last.faces.write, self._weights(last)[0])
             last.faces.swap()
@@ -496,10 +498,13 @@ class Viscosity:
             self._smooth(finer, right, self._weights(finer)[::-1])
             # A cycle overwrites the right-hand sides of coarser grids only, and those are used up by now.
             if 0 < finer.depth <= self.plan.nested:
-                self._cycle(finer, right)
+                self._cycle(finer, right, brief=self.plan.brief)
 
-    def _cycle(self, level: Level, right: Pair, begun: bool = False) -> None:
-        """One multigrid cycle for A faces = right, from the level's iterate, or, `begun`, on from its first sweep."""
+    def _cycle(self, level: Level, right: Pair, begun: bool = False, brief: int = 0) -> None:
+        """One multigrid cycle for A faces = right, from the level's iterate, or, `begun`, on from its first sweep.
+
+        brief: see `Plan`.
+        """
         if level is self._exact_level:
             self._solve_exactly(right)
             return
@@ -507,27 +512,36 @@ class Viscosity:
         self._smooth(level, right, weights[1:] if begun else weights)
         if level is self._last:
             return
-        self._correct(level, right)
+        self._correct(level, right, brief)
         self._smooth(level, right, weights[::-1])
 
-    def _correct(self, level: Level, right: Pair) -> None:
-        """Add what a cycle on the coarser grids makes of the residual."""
+    def _correct(self, level: Level, right: Pair, brief: int = 0) -> None:
+        """Add what a cycle on the coarser grids makes of the residual, or so many sweeps on the next one."""
         # The write side is free until the correction is added.
         self._residual_of(level, level.faces.read, right, level.faces.write)
         coarser = self.levels[level.depth + 1]
-        self._restrict(level.faces.write, coarser, coarser.right, begin=True)
-        self._cycle(coarser, coarser.right, begun=True)
+        if brief:
+            first, *others = self._weights(coarser, brief, is_last=True)
+            self._restrict(level.faces.write, coarser, coarser.right, first)
+            self._smooth(coarser, coarser.right, others)
+        else:
+            self._restrict(level.faces.write, coarser, coarser.right, self._first_weight(coarser))
+            self._cycle(coarser, coarser.right, begun=True)
         self._prolong(coarser, level)
 
-    def _weights(self, level: Level, count: int = 0) -> list[float]:
-        """Chebyshev weights of the smoothing sweeps."""
+    def _first_weight(self, level: Level) -> float:
+        """Of the sweep that a cycle begins with, from rest; 0 where the level is solved exactly instead."""
+        return 0.0 if level is self._exact_level else self._weights(level)[0]
+
+    def _weights(self, level: Level, count: int = 0, is_last: bool = False) -> list[float]:
+        """Chebyshev weights of the smoothing sweeps; `is_last`: no coarser grid follows."""
         count = count or self.plan.sweeps[0 if level.depth == 0 else 1]
         least, largest = SMOOTHED
         if not self.plan.steps:
             # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient, D is
             # 1 + 6 k, and the coarser grid takes over about where |q|^2 is 1.
             k = self._largest / 4.0**level.depth
-            taken_over = 0.0 if level is self._last else 1.0
+            taken_over = 0.0 if is_last or level is self._last else 1.0
             least, largest = (1.0 + taken_over * k) / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k)
         middle, half = 0.5 * (largest + least), 0.5 * (largest - least)
         return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
@@ -565,9 +579,9 @@ class Viscosity:
         self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0], region)
         return self._residuals[0].fields
 
-    def _restrict(self, residual: Pair, coarser: Level, target: Pair, begin: bool = False) -> None:
-        """The residual on the coarser grid; with `begin`, where that is not solved exactly, the first sweep too."""
-        if not begin or coarser is self._exact_level:
+    def _restrict(self, residual: Pair, coarser: Level, target: Pair, weight: float = 0.0) -> None:
+        """The residual on the coarser grid; with a `weight` the first sweep on it too, from rest."""
+        if not weight:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
             restrict(target.fields, region=coarser.region, **residual.inputs(), **coarser.open)
             return
@@ -575,7 +589,7 @@ class Viscosity:
         restrict(
             target.fields + coarser.faces.write.fields,
             region=coarser.region,
-            weight=self._weights(coarser)[0],
+            weight=weight,
             **residual.inputs(),
             **coarser.matrix,
         )
