@@ -231,11 +231,10 @@ class Pressure:
             cycles = self._cycle_in_the_open(start, cycles, before=int(is_warm))
         if cycles + is_warm < 2:
             self._change.read.clear()
+        targets = self._across, self._down, self._last.write, self._base.write
+        parts: dict[str, Any] = {"base": self._base.read, "change": self._change.read, "before": self._last.read}
+        self._draw("gradient", targets, finest, trend=float(is_warm), **parts)
         pass_ = self.device.pass_
-        pass_("pressure/gradient.frag")(
-            (self._across, self._down, self._last.write, self._base.write),
-            base=self._base.read, change=self._change.read, before=self._last.read, trend=float(is_warm),
-        )  # fmt: skip
         inputs: dict[str, Any] = {**given, "across": self._across, "down": self._down}
         variant = {**self._variant, **_packing(given)}
         if self._has_solids:
