@@ -35,7 +35,8 @@ class Plan:
     Attributes:
         grids: coarser grids that are visited, at most; without any, and so without all that follows, v* is smoothed.
         nested: of these, the finest so many get a multigrid cycle while one correction is carried up through them.
-        brief: such a cycle goes one grid down only, for so many sweeps; with 0 it goes down to the coarsest.
+        brief: such a cycle goes one grid down only.
+        last: smoothing sweeps on the last of these grids, where it is not solved exactly; with 0 as on the others.
         steps: conjugate gradient steps after the first, at most, each with one multigrid cycle; with 0 there are no
             conjugate gradients: v* is corrected once and then smoothed.
         tolerance: steps end after one that has brought less than this part of the energy norm.
@@ -45,7 +46,8 @@ class Plan:
 
     grids: int = 99
     nested: int = 99
-    brief: int = 0
+    brief: bool = False
+    last: int = 0
     steps: int = 5
     tolerance: float = 0.0
     sweeps: tuple[int, int] = (2, 2)
@@ -64,11 +66,9 @@ def plan_for(least: float, largest: float) -> Plan:
         grids = max(1, math.ceil(math.log(largest / LEAST_VISITED, 4.0)))
         # A second sweep halves the error of the change where that is small; from 3 on it hardly tells.
         sweeps = 2 if largest <= 3.0 else 1
-        if largest <= 5.0:
-            return Plan(grids=grids, nested=0, steps=0, sweeps=(sweeps, 4))
-        # What such a cycle meets is smooth only where the viscosity reaches far.
-        brief = 4 if largest <= 15.0 else 5 if largest <= 150.0 else 0
-        return Plan(grids=grids, nested=1 if largest <= 50.0 else 2, brief=brief, steps=0, sweeps=(sweeps, 2))
+        nested = 0 if largest <= 5.0 else 1 if largest <= 50.0 else 2
+        # What a nested cycle meets is smooth only where the viscosity reaches far. Sweeps cost least on the last grid.
+        return Plan(grids, nested, largest <= 150.0, 4 if grids == 1 else 5, steps=0, sweeps=(sweeps, 2))
     if largest <= 300.0 * least:
         return Plan(tolerance=0.03)
     # Rigid pieces pay only where they are far stiffer than what is around them.
@@ -498,12 +498,12 @@ class Viscosity:
             self._smooth(finer, right, self._weights(finer)[::-1])
             # A cycle overwrites the right-hand sides of coarser grids only, and those are used up by now.
             if 0 < finer.depth <= self.plan.nested:
-                self._cycle(finer, right, brief=self.plan.brief)
+                self._cycle(finer, right, is_brief=self.plan.brief)
 
-    def _cycle(self, level: Level, right: Pair, begun: bool = False, brief: int = 0) -> None:
+    def _cycle(self, level: Level, right: Pair, begun: bool = False, is_brief: bool = False) -> None:
         """One multigrid cycle for A faces = right, from the level's iterate, or, `begun`, on from its first sweep.
 
-        brief: see `Plan`.
+        A brief one goes one grid down only.
         """
         if level is self._exact_level:
             self._solve_exactly(right)
@@ -512,16 +512,16 @@ class Viscosity:
         self._smooth(level, right, weights[1:] if begun else weights)
         if level is self._last:
             return
-        self._correct(level, right, brief)
+        self._correct(level, right, is_brief)
         self._smooth(level, right, weights[::-1])
 
-    def _correct(self, level: Level, right: Pair, brief: int = 0) -> None:
-        """Add what a cycle on the coarser grids makes of the residual, or so many sweeps on the next one."""
+    def _correct(self, level: Level, right: Pair, is_brief: bool = False) -> None:
+        """Add what a cycle on the coarser grids makes of the residual, or a brief one's sweeps on the next of them."""
         # The write side is free until the correction is added.
         self._residual_of(level, level.faces.read, right, level.faces.write)
         coarser = self.levels[level.depth + 1]
-        if brief:
-            first, *others = self._weights(coarser, brief, is_last=True)
+        if is_brief:
+            first, *others = self._weights(coarser, is_last=True)
             self._restrict(level.faces.write, coarser, coarser.right, first)
             self._smooth(coarser, coarser.right, others)
         else:
@@ -535,13 +535,14 @@ class Viscosity:
 
     def _weights(self, level: Level, count: int = 0, is_last: bool = False) -> list[float]:
         """Chebyshev weights of the smoothing sweeps; `is_last`: no coarser grid follows."""
-        count = count or self.plan.sweeps[0 if level.depth == 0 else 1]
+        is_last = is_last or level is self._last
+        count = count or (is_last and self.plan.last) or self.plan.sweeps[0 if level.depth == 0 else 1]
         least, largest = SMOOTHED
         if not self.plan.steps:
             # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient, D is
             # 1 + 6 k, and the coarser grid takes over about where |q|^2 is 1.
             k = self._largest / 4.0**level.depth
-            taken_over = 0.0 if is_last or level is self._last else 1.0
+            taken_over = 0.0 if is_last else 1.0
             least, largest = (1.0 + taken_over * k) / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k)
         middle, half = 0.5 * (largest + least), 0.5 * (largest - least)
         return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
