@@ -64,6 +64,19 @@ def test_push_carries_the_picture_along(robot: Robot) -> None:
     assert np.abs(robot.canvas().astype(int) - before).mean() > 1
 
 
+def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
+    """A row of the present entry's ground; also after steps back and forth."""
+    ground = np.array([67, 55, 37])
+    for number in range(12):
+        robot.drag((0.3 + 0.03 * number, 0.4), (0.35 + 0.03 * number, 0.45))
+    for chords in ((), ("ctrl+z",) * 10, ("ctrl+shift+z",) * 10):
+        for chord in chords:
+            robot.key(chord)
+        robot.rest()
+        shown = robot.pixels()[560:740, 1010:1270, :3].astype(int)
+        assert (np.abs(shown - ground).max(axis=-1) <= 8).sum() > 200 * 20
+
+
 def test_alt_pushes_against_the_drag(robot: Robot) -> None:
     robot.mods = Mods(alt=True)
     robot.drag((0.4, 0.5), (0.55, 0.5))

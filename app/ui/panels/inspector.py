@@ -131,7 +131,10 @@ def _masks(ui: Ui, editor: Editor) -> None:
 def _history(ui: Ui, editor: Editor) -> None:
     history, palette = editor.session.document.history, ui.palette
     entries, present = history.entries, history.index
-    height = min(len(entries), 8) * ui.px(26) + ui.px(4)
+    # As much as is in sight without scrolling the inspector, the header of the section below included.
+    room = imgui.get_content_region_avail().y - ui.px(60)
+    most = max(4, min(8, int(room / ui.px(26))))
+    height = min(len(entries), most) * ui.px(26) + ui.px(4)
     imgui.begin_child("entries", ImVec2(0, height))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
     clipper = imgui.ListClipper()
