@@ -282,7 +282,7 @@ class _Child:
     """A process that does one task after the other, and ends as soon as nobody is left who could give it one.
 
     A forked process would share this one's GL, which no driver survives. A pool of the standard library's is lost with
-    any of its processes, and can hang where one is killed while another is started; here each stands for itself.
+    any of its processes; here each stands for itself.
     """
 
     def __init__(self) -> None:
@@ -385,19 +385,17 @@ def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress
             done, _, _ = select.select([*busy], [], [], LOOK)
             progress.check()
             for child in done:
-                task, attempt = busy[child]
+                task, attempt = busy.pop(child)
                 try:
                     outcome = child.outcome()
                     idle.append(child)
                 except EOFError:
                     child.end()
-                    outcome = Outcome(task.label, DIED)
                     if attempt < ATTEMPTS:
                         waiting.append((task, attempt + 1))
-                        outcome = None
-                del busy[child]
-                if outcome is not None:
-                    report(outcome)
+                        continue
+                    outcome = Outcome(task.label, DIED)
+                report(outcome)
     finally:
         for child in (*busy, *idle):
             child.end()

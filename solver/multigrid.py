@@ -260,7 +260,10 @@ class Pressure:
 
     @property
     def pressure(self) -> np.ndarray:
-        """The last pressure, (ny, nx) float32, lengths^2 / s: it includes the time step."""
+        """The last pressure, (ny, nx) float32, lengths^2 / s: it includes the time step.
+
+        After a warm start what that step changed is a little smoother than what was subtracted; see `gradient.frag`.
+        """
         return _cells(self._last.read.get(), self.size) * np.float32(self.h)
 
     def divergence_norm(self, velocity: Field) -> float:
