@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from solver.context import Device
-from solver.field import Field
+from solver.field import DoubleField, Field
 from solver.grid import Grid
 from solver.multigrid import Pressure
 from solver.params import FluidParams
@@ -78,7 +78,7 @@ class Fluid:
         self.impulse = device.field(grid.size, 2, "impulse")
         self._trace = device.field(grid.size, 2, "trace")
         # Two cells more on every side, for what walls make of the velocity there.
-        self._departing = device.field((grid.nx + 4, grid.ny + 4), 4, "departing velocity")
+        self._departing = device.field((grid.nx + 4, grid.ny + 4), 2, "departing velocity")
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         self.measuring = False
         self.residuals = Residuals()
@@ -181,6 +181,21 @@ class Fluid:
                 trace(self._trace, velocity=self.faces(), dt_over_h=dt / self.grid.h, **self._wall_inputs())
             self._traced_dt = dt
         return self._trace
+
+    def carry(self, displacement: DoubleField, dt: float) -> None:
+        """Carry a displacement at the cells' centres, longer sides, along `dt` seconds of the velocity.
+
+        What is carried first after a step is drawn together with the trace, which the next step takes over.
+        """
+        inputs: dict[str, Any] = {"displacement": displacement.read, "h": self.grid.h}
+        if dt == self._traced_dt:
+            self.device.pass_("warp/advance.frag")(displacement.write, trace=self._trace, **inputs)
+        else:
+            advance = self.device.pass_("warp/advance.frag", TRACE=1, **self._wall_defines())
+            inputs |= {"velocity": self.faces(), "dt_over_h": dt / self.grid.h, **self._wall_inputs()}
+            advance((displacement.write, self._trace), **inputs)
+            self._traced_dt = dt
+        displacement.swap()
 
     def diffuse(self, dt: float, unpack: bool = True) -> None:
         """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled.

@@ -65,12 +65,14 @@ class Cycle:
         return max(first, self.each * whole if is_warm else 0.0) * self.each ** (cycles - 1)
 
 
-_LIGHT = chebyshev_weights(2, 0.6), chebyshev_weights(3, 0.35), chebyshev_weights(4, 0.25)
+_FAINT = chebyshev_weights(1, 0.4), chebyshev_weights(3, 0.35), chebyshev_weights(4, 0.25)
+_LIGHT = chebyshev_weights(2, 0.6), *_FAINT[1:]
 _COARSER = chebyshev_weights(4, 0.35), chebyshev_weights(5, 0.25)
 _QUICK = chebyshev_weights(3, 0.7), *_COARSER
 _THOROUGH = chebyshev_weights(4, 0.5), *_COARSER
 # From the cheapest on.
 OPEN = (
+    Cycle(_FAINT, rough=0.6, smooth=0.02, each=0.4),
     Cycle(_LIGHT, rough=0.35, smooth=0.003, each=0.2),
     Cycle(_QUICK, rough=0.25, smooth=0.0025, each=0.1),
     Cycle(_THOROUGH, rough=0.17, smooth=0.002, each=0.05),

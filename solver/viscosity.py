@@ -435,11 +435,9 @@ class Viscosity:
         residual, weights = self._residuals[0], self._weights(finest, 1 + self.plan.sweeps[0])
         self._residual_of(finest, v_star, right, residual)
         part = self._part_of(right, residual)
-        self._nested_grids()
         # The part of it that the coarser grid does carry is not to be added face by face once more.
         k = self._largest
-        carried = weights[0] * (1.0 + 1.5 * k) / (1.0 + 6.0 * k)
-        self._start(coarser, coarser.right, coarser.faces.read, -carried, add=True)
+        self._nested_grids(taken=weights[0] * (1.0 + 1.5 * k) / (1.0 + 6.0 * k))
         dragged: dict[str, Any] = {} if right is v_star else {"DRAGGED": 1}
         finish = self.device.pass_("viscosity/prolong.frag", CORRECT=1, **dragged, **finest.defines)
         finish(
@@ -473,8 +471,11 @@ class Viscosity:
         coarser.right, coarser.faces.read = damped, left
         return self._factors.read
 
-    def _nested_grids(self) -> None:
-        """A correction on the coarser grids: solved on the coarsest, then carried up and improved grid by grid."""
+    def _nested_grids(self, taken: float) -> None:
+        """A correction on the coarser grids: solved on the coarsest, then carried up and improved grid by grid.
+
+        From the finest of them so much of D^-1 times its right-hand side is taken away.
+        """
         last = self._last
         levels = self.levels[1 : last.depth + 1]
         rights = [level.right for level in levels]
@@ -483,7 +484,7 @@ class Viscosity:
         if len(levels) == 1 and last is not self._exact_level:
             self._start(last, rights[-1], last.faces.write, self._weights(last)[0])
             last.faces.swap()
-        self._cycle(last, rights[-1], begun=True)
+        self._cycle(last, rights[-1], begun=True, taken=taken if len(levels) == 1 else 0.0)
         for finer, coarser, right in reversed(list(zip(levels, levels[1:], rights, strict=False))):
             prolong = self.device.pass_("viscosity/prolong.frag", START=1, **finer.defines)
             prolong(
@@ -495,25 +496,31 @@ class Viscosity:
                 **finer.matrix,
             )
             finer.faces.swap()
-            self._smooth(finer, right, self._weights(finer)[::-1])
             # A cycle overwrites the right-hand sides of coarser grids only, and those are used up by now.
-            if 0 < finer.depth <= self.plan.nested:
-                self._cycle(finer, right, is_brief=self.plan.brief)
+            is_nested, left = finer.depth <= self.plan.nested, taken if finer is levels[0] else 0.0
+            self._smooth(finer, right, self._weights(finer)[::-1], taken=0.0 if is_nested else left)
+            if is_nested:
+                self._cycle(finer, right, is_brief=self.plan.brief, taken=left)
 
-    def _cycle(self, level: Level, right: Pair, begun: bool = False, is_brief: bool = False) -> None:
+    def _cycle(
+        self, level: Level, right: Pair, begun: bool = False, is_brief: bool = False, taken: float = 0.0
+    ) -> None:
         """One multigrid cycle for A faces = right, from the level's iterate, or, `begun`, on from its first sweep.
 
-        A brief one goes one grid down only.
+        A brief one goes one grid down only. Of D^-1 times `right` so much is `taken` away at the end.
         """
         if level is self._exact_level:
             self._solve_exactly(right)
+            if taken:
+                self._start(level, right, level.faces.read, -taken, add=True)
             return
         weights = self._weights(level)
-        self._smooth(level, right, weights[1:] if begun else weights)
         if level is self._last:
+            self._smooth(level, right, weights[1:] if begun else weights, taken=taken)
             return
+        self._smooth(level, right, weights[1:] if begun else weights)
         self._correct(level, right, is_brief)
-        self._smooth(level, right, weights[::-1])
+        self._smooth(level, right, weights[::-1], taken=taken)
 
     def _correct(self, level: Level, right: Pair, is_brief: bool = False) -> None:
         """Add what a cycle on the coarser grids makes of the residual, or a brief one's sweeps on the next of them."""
@@ -551,15 +558,18 @@ class Viscosity:
         start = self.device.pass_("viscosity/start.frag", **level.defines)
         start(target.fields, add=add, region=level.region, weight=weight, **right.inputs("right_"), **level.matrix)
 
-    def _smooth(self, level: Level, right: Pair, weights: list[float], start: Pair | None = None) -> None:
-        """One sweep for each weight, on from the level's iterate or from `start`."""
+    def _smooth(
+        self, level: Level, right: Pair, weights: list[float], start: Pair | None = None, taken: float = 0.0
+    ) -> None:
+        """One sweep for each weight, on from the level's iterate or from `start`; see `_cycle` for `taken`."""
         sweep = self.device.pass_("viscosity/sweep.frag", **level.defines)
-        for weight in weights:
+        for number, weight in enumerate(weights, 1):
             iterate = start or level.faces.read
             sweep(
                 level.faces.write.fields,
                 region=level.region,
                 weight=weight,
+                taken=taken if number == len(weights) else 0.0,
                 **iterate.inputs(),
                 **right.inputs("right_"),
                 **level.matrix,

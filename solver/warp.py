@@ -106,7 +106,8 @@ class WarpMap:
 
     def follow(self, fluid: Fluid, dt: float) -> None:
         """Carry the map one step by a fluid, which traces its own next step the same way: second-order backtrace."""
-        self.advance_traced(fluid.trace(dt))
+        fluid.carry(self._near, dt)
+        self._advanced()
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
@@ -118,6 +119,10 @@ class WarpMap:
         advance = self.device.pass_("warp/advance.frag")
         advance(self._near.write, displacement=self._near.read, trace=trace, h=self.grid.h)
         self._near.swap()
+        self._advanced()
+
+    def _advanced(self) -> None:
+        """Count a step, and fold if it is time to."""
         self._steps += 1
         self._changed()
         # The look waits for the GPU, so not at every step; at fixed steps, so that a replay folds at the same ones.

@@ -39,24 +39,24 @@ def padded_faces(
 def interpolate(
     values: np.ndarray, x: np.ndarray, y: np.ndarray, order: str, corner: tuple[np.ndarray, ...] | None = None
 ) -> np.ndarray:
-    """Values at fractional indices (x, y) of an array padded by PAD, linear or four-point Lagrange in each direction.
+    """Values at fractional indices (x, y) of an array padded by PAD, linear or by the cubic of `cubic_displacement`.
 
-    The four points lie around `corner`, by default the whole part of (x, y)."""
+    The points lie around `corner`, by default the whole part of (x, y)."""
     i, j = (np.floor(a).astype(int) for a in corner or (x, y))
     fx, fy = x - i, y - j
-    if order == "linear":
-        offsets, wx, wy = (0, 1), (1 - fx, fx), (1 - fy, fy)
-    else:
-        offsets = (-1, 0, 1, 2)
-        wx, wy = ([_lagrange(offsets, k, f) for k in offsets] for f in (fx, fy))
     rows, columns = values.shape
-    total = np.zeros_like(x, np.float64)
-    for dy, b in zip(offsets, wy, strict=True):
-        for dx, a in zip(offsets, wx, strict=True):
-            row = np.clip(j + dy + PAD, 0, rows - 1)
-            column = np.clip(i + dx + PAD, 0, columns - 1)
-            total += a * b * values[row, column]
-    return total
+
+    def product(across: tuple[int, ...], down: tuple[int, ...]) -> np.ndarray:
+        total = np.zeros_like(x, np.float64)
+        for dy in down:
+            for dx in across:
+                row = np.clip(j + dy + PAD, 0, rows - 1)
+                column = np.clip(i + dx + PAD, 0, columns - 1)
+                total += _lagrange(across, dx, fx) * _lagrange(down, dy, fy) * values[row, column]
+        return total
+
+    two, four = (0, 1), (-1, 0, 1, 2)
+    return product(two, two) if order == "linear" else product(four, two) + product(two, four) - product(two, two)
 
 
 def _lagrange(nodes: tuple[int, ...], k: int, f: np.ndarray) -> np.ndarray:

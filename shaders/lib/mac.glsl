@@ -37,3 +37,8 @@ vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, float dt_over_h) {
     vec2 middle = clamp(p - 0.5 * dt_over_h * here, vec2(0.0), edge);
     return clamp(p - dt_over_h * mac_velocity(velocity, middle), vec2(0.0), edge);
 }
+
+// The same for the centre of the cell at p, as a displacement, cells.
+vec2 mac_trace(sampler2D velocity, vec2 p, float dt_over_h) {
+    return mac_backtrace(velocity, p, mac_centre(velocity, p), dt_over_h) - p;
+}

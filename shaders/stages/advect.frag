@@ -1,11 +1,11 @@
-// Advect: w2(x) = decay * w1(x_d), what departs carried along the trace, each component at its own faces, interpolated by a
-// four-point cubic in both directions; packed 2 x 2 cells a texel as viscosity/block.glsl has it, 0 on pinned faces.
+// Advect: w2(x) = decay * w1(x_d), what departs carried along the trace, each component at its own faces, interpolated by
+// the cubic of lib/displacement.glsl; packed 2 x 2 cells a texel as viscosity/block.glsl has it, 0 on pinned faces.
 // u_departing: see depart.frag; u_trace: backtrace of the cell centres, cells; u_decay: exp(-drag dt).
-// reads: 41
+// reads: 57
 //
-// A face's departure is the mean of those of the two cells it parts. The 4 x 4 faces around the departure of u and of v
-// are nearly always the same texels, so both are read at once, around the mean departure, and each weighs them for its
-// own place; the cubic holds as long as that lies among the four, that is for a strain of up to two cells a step.
+// A face's departure is the mean of those of the two cells it parts. The faces around the departure of u and of v are
+// nearly always the same texels, so both are read at once, around the mean departure, and each weighs them for its own
+// place; the cubic holds as long as that lies among the four, that is for a strain of up to two cells a step.
 #include "lib/cubic.glsl"
 #ifdef UNIFORM
 #include "viscosity/box.glsl"
@@ -21,17 +21,23 @@ layout(location = 1) out vec4 out_v;
 vec2 arriving(vec2 cell, vec2 to_u, vec2 to_v, vec2 texel) {
     vec2 corner = floor(cell + 0.5 * (to_u + to_v));
     vec2 fu = clamp(cell + to_u - corner, -1.0, 2.0), fv = clamp(cell + to_v - corner, -1.0, 2.0);
+    // In R what u weighs, in G what v does: by the cubic along x and y, and by the linear along x and y.
     vec4 ux = cubic_lagrange(fu.x), uy = cubic_lagrange(fu.y), vx = cubic_lagrange(fv.x), vy = cubic_lagrange(fv.y);
+    vec2 lx = vec2(fu.x, fv.x), ly = vec2(fu.y, fv.y), kx = 1.0 - lx, ky = 1.0 - ly;
     // The departing begin two cells before the grid.
     vec2 first = (corner + 1.5) * texel;
-    float after = first.x + 2.0 * texel.x;
-    vec2 sum = vec2(0.0);
-    for (int j = 0; j < 4; ++j) {
-        float y = first.y + float(j) * texel.y;
-        vec4 a = texture(u_departing, vec2(first.x, y)), b = texture(u_departing, vec2(after, y));
-        sum += vec2(uy[j] * (dot(ux.xy, a.xz) + dot(ux.zw, b.xz)), vy[j] * (dot(vx.xy, a.yw) + dot(vx.zw, b.yw)));
-    }
-    return sum;
+    vec4 x = first.x + vec4(0.0, 1.0, 2.0, 3.0) * texel.x, y = first.y + vec4(0.0, 1.0, 2.0, 3.0) * texel.y;
+#define AT(i, j) texture(u_departing, vec2(x[i], y[j])).rg
+#define CX(i) vec2(ux[i], vx[i])
+#define CY(j) vec2(uy[j], vy[j])
+    vec2 bend = CX(1) - kx, bent = CX(2) - lx;
+    return (CY(1) * kx + ky * bend) * AT(1, 1) + (CY(1) * lx + ky * bent) * AT(2, 1)
+         + (CY(2) * kx + ly * bend) * AT(1, 2) + (CY(2) * lx + ly * bent) * AT(2, 2)
+         + ky * (CX(0) * AT(0, 1) + CX(3) * AT(3, 1)) + ly * (CX(0) * AT(0, 2) + CX(3) * AT(3, 2))
+         + CY(0) * (kx * AT(1, 0) + lx * AT(2, 0)) + CY(3) * (kx * AT(1, 3) + lx * AT(2, 3));
+#undef AT
+#undef CX
+#undef CY
 }
 
 void main() {

@@ -1,9 +1,8 @@
-// Depart: what is to be advected, w1 = w0 + dt f less what is carried with it, laid out to be read four by four: in RG
-// that at a cell's left and upper face, in BA that at those of the cell to the right, from two cells before the grid to
-// two behind it.
+// Depart: what is to be advected, w1 = w0 + dt f less what is carried with it, from two cells before the grid to two
+// behind it, so that it can be read four by four.
 // u_velocity (w0), u_carried: MAC faces, lengths / s. With FORCE: u_force, MAC faces, u_impulse times which is dt f.
-// Only far enough from the edges that neither cell is beyond one or on it; with EDGES anywhere.
-// reads: 6, and 12 with EDGES
+// Only far enough from the edges that the cell is not beyond one or on it; with EDGES anywhere.
+// reads: 3, and 6 with EDGES
 #ifdef EDGES
 #include "lib/walls.glsl"
 #endif
@@ -13,7 +12,7 @@ uniform sampler2D u_carried;
 uniform sampler2D u_force;
 uniform float u_impulse;
 #endif
-layout(location = 0) out vec4 out_departing;
+layout(location = 0) out vec2 out_departing;
 
 vec2 departing(vec2 cell, vec2 texel) {
     vec2 place = (cell + 0.5) * texel, sum = texture(u_velocity, place).rg - texture(u_carried, place).rg;
@@ -40,5 +39,5 @@ vec2 at(vec2 cell, vec2 size) { return departing(cell, 1.0 / size); }
 
 void main() {
     vec2 cell = floor(gl_FragCoord.xy) - 2.0, size = vec2(textureSize(u_velocity, 0));
-    out_departing = vec4(at(cell, size), at(cell + vec2(1.0, 0.0), size));
+    out_departing = at(cell, size);
 }

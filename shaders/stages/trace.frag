@@ -7,6 +7,5 @@ uniform float u_dt_over_h;
 layout(location = 0) out vec2 out_displacement;
 
 void main() {
-    vec2 p = gl_FragCoord.xy;
-    out_displacement = mac_backtrace(u_velocity, p, mac_centre(u_velocity, p), u_dt_over_h) - p;
+    out_displacement = mac_trace(u_velocity, gl_FragCoord.xy, u_dt_over_h);
 }
