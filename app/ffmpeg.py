@@ -1,4 +1,4 @@
-"""Running the ffmpeg that imageio-ffmpeg brings along: fed or read without blocking, stopped at will."""
+"""Running the ffmpeg that imageio-ffmpeg brings along: fed and read, stopped at will."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import select
 import signal
 import subprocess
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 
@@ -52,7 +53,7 @@ class Ffmpeg:
 
     arguments: what follows `ffmpeg -y`.
     label: the file a failure is told about, with `doing` ("write", "read") as the verb.
-    cancel: asked about ten times a second while ffmpeg keeps us waiting; when true, `Cancelled` is raised.
+    cancel: asked about ten times a second while ffmpeg keeps us waiting, in any thread; when true, `Cancelled` comes.
     """
 
     def __init__(
@@ -74,13 +75,15 @@ class Ffmpeg:
         self._stdin, self._stdout = self._process.stdin, self._process.stdout
         self._ending = ExitStack()
         self._ending.enter_context(if_abandoned(self._process.kill))
-        os.set_blocking(self._stdin.fileno(), False)
         os.set_blocking(self._stdout.fileno(), False)
+        self._watcher: threading.Thread | None = None
+        self._ended = threading.Event()
 
     def __enter__(self) -> Ffmpeg:
         return self
 
     def __exit__(self, *exception: object) -> None:
+        self._ended.set()
         self._ending.close()
         self._process.kill()
         self._process.wait()
@@ -90,17 +93,26 @@ class Ffmpeg:
 
     def feed(self, data: memoryview) -> None:
         """Write all of `data`, bytes, to its standard input."""
-        pipe = self._stdin.fileno()
-        while data:
+        self._check()
+        if self._watcher is None:
+            self._watcher = threading.Thread(target=self._watch, name="ffmpeg watcher", daemon=True)
+            self._watcher.start()
+        try:
+            # In one call, that waits without the interpreter's lock: a thread that renders keeps it long, and would
+            # let each part of a frame wait for it anew.
+            while data:
+                data = data[os.write(self._stdin.fileno(), data) :]
+        except BrokenPipeError:
             self._check()
-            if select.select([], [pipe], [], PATIENCE)[1]:
-                try:
-                    data = data[os.write(pipe, data) :]
-                except BlockingIOError:
-                    continue
-                except BrokenPipeError:
-                    self._process.wait()
-                    raise self.failure() from None
+            self._process.wait()
+            raise self.failure() from None
+
+    def _watch(self) -> None:
+        """End the process, and so a write that waits for it, when it is to be stopped."""
+        while not self._ended.wait(PATIENCE):
+            if self._cancel():
+                self._process.kill()
+                return
 
     def blocks(self, size: int) -> Iterator[bytearray]:
         """Its standard output in blocks of `size` bytes; raises `UserError` when it fails."""

@@ -61,7 +61,7 @@ class Device:
             max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
         )
         self.timings = Timings(ctx)
-        self._passes: dict[tuple[str, tuple[tuple[str, object], ...]], Pass] = {}
+        self._passes: dict[tuple[str, frozenset[tuple[str, object]]], Pass] = {}
         self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
         self._rest = ctx.simple_framebuffer((1, 1))
         # Reads a field between its texels, where a look is enough.
@@ -114,7 +114,7 @@ class Device:
         """The pass of fragment shader `shader` (a path below `shaders/`), compiled once for each set of defines."""
         from solver.passes import Pass
 
-        key = (shader, tuple(sorted(defines.items())))
+        key = shader, frozenset(defines.items())
         if key not in self._passes:
             self._passes[key] = Pass(self, shader, defines)
         return self._passes[key]

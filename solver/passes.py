@@ -37,15 +37,18 @@ class Pass:
         self.program = compile_program(device.ctx, shader, defines)
         self.program.label = shader
         self._vertices = device.ctx.vertex_array(self.program, [])
-        self._uniforms: dict[str, moderngl.Uniform] = {}
+        # By the names of the inputs, without their `u_`.
         self._units: dict[str, int] = {}
-        self._numbers: dict[str, object] = {}  # what the uniforms that are no textures hold
+        self._uniforms: dict[str, moderngl.Uniform] = {}  # that are no textures
+        self._numbers: dict[str, object] = {}  # what these hold
+        self._dropped: set[str] = set()  # inputs that the compiler has no use for
         for name in self.program:
             member = self.program[name]
             if isinstance(member, moderngl.Uniform):
-                self._uniforms[name] = member
                 if member.gl_type in GL_SAMPLERS:  # pyright: ignore[reportAttributeAccessIssue]
-                    self._units[name] = member.value = len(self._units)
+                    self._units[name.removeprefix("u_")] = member.value = len(self._units)
+                else:
+                    self._uniforms[name.removeprefix("u_")] = member
 
     def __call__(
         self,
@@ -66,8 +69,7 @@ class Pass:
             inputs: the shader's uniforms without their `u_`.
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
-        for name, value in inputs.items():
-            self._bind(f"u_{name}", value)
+        self._bind(inputs)
         framebuffer = self.device.framebuffer(*fields)
         regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
         if not regions:
@@ -95,9 +97,8 @@ class Pass:
             smooth: names of inputs that are read with linear filtering, whatever their textures say.
             inputs: the shader's uniforms without their `u_`.
         """
-        for name, value in inputs.items():
-            self._bind(f"u_{name}", value)
-        units = [self._units[f"u_{name}"] for name in smooth if f"u_{name}" in self._units]
+        self._bind(inputs)
+        units = [self._units[name] for name in smooth if name in self._units]
         for unit in units:
             self.device.linear.use(unit)
         framebuffer.use()
@@ -105,20 +106,25 @@ class Pass:
         for unit in units:
             self.device.linear.clear(unit)
 
-    def _bind(self, name: str, value: object) -> None:
+    def _bind(self, inputs: dict[str, object]) -> None:
+        units, numbers = self._units, self._numbers
+        for name, value in inputs.items():
+            if name in units:
+                texture = value.texture if isinstance(value, Field) else value
+                texture.use(units[name])  # pyright: ignore[reportAttributeAccessIssue]
+            elif name not in self._dropped and numbers.get(name) != value:
+                self._set(name, value)
+
+    def _set(self, name: str, value: object) -> None:
         uniform = self._uniforms.get(name)
-        if uniform is None:
-            # The compiler drops uniforms it has no use for; only a name the source does not know is a mistake.
-            if name not in self._source:
-                raise ShaderError(f"shaders/{self.shader} has no uniform {name}")
-            return
-        if isinstance(value, Field):
-            value.texture.use(self._units[name])
-        elif isinstance(value, moderngl.Texture):
-            value.use(self._units[name])
-        elif self._numbers.get(name) != value:
+        if uniform is not None:
             uniform.value = value  # pyright: ignore[reportAttributeAccessIssue]
             self._numbers[name] = value
+        elif f"u_{name}" in self._source:
+            # The compiler drops uniforms it has no use for; only a name the source does not know is a mistake.
+            self._dropped.add(name)
+        else:
+            raise ShaderError(f"shaders/{self.shader} has no uniform u_{name}")
 
 
 def _clipped(region: Region | list[Region], size: tuple[int, int]) -> list[Region]:

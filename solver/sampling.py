@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from math import ceil, prod, sqrt
+from math import ceil, floor, prod, sqrt
 from typing import Any, Literal
 
 import moderngl
@@ -179,7 +179,6 @@ class _Job:
             "WHOLE": whole,
             "ZOOMED": self.zoom != (1.0, 1.0),
             "BOUNDED": self.is_bounded and not inside,
-            "SINGLE": self.is_single,
             "ONE": places == 0,
             "PREPARED": self.is_prepared,
             "PACKED": self.is_packed,
@@ -213,7 +212,7 @@ class Sampler:
         self.tile = tile
         self._fields: dict[str, Field] = {}
         self._textures: dict[str, tuple[moderngl.Texture, tuple[object, ...]]] = {}
-        self._spread_for: tuple[object, ...] = ()
+        self._spread_for: dict[str, tuple[object, ...]] = {}  # what was spread last, by the field it is in
         self._classes_for: tuple[object, ...] = ()
         self._classes = np.empty((0, 0), np.uint8)
         self._held: tuple[np.ndarray, bool, bool] | None = None
@@ -322,28 +321,27 @@ class Sampler:
     def _draw(self, job: _Job, tile: tuple[int, int, int, int], room: tuple[int, int] | None) -> None:
         """Draw one tile of the result into the field "result", from the whole picture or by pieces that fit `room`."""
         left, top, right, bottom = tile
-        lattice = self._spread(job, tile)
         if job.is_paired:
             self._field("result", ((right - left + 1) // 2, bottom - top), 2, "u4")
         else:
             kind, _ = _KINDS[job.picture.dtype]
             self._field("result", (right - left, bottom - top), _TARGET_COMPONENTS[job.channels], kind)
         if room is None:
-            self._look_up(job, lattice, (left, top), (0, 0, right - left, bottom - top), None)
+            self._look_up(job, tile, (0, 0, right - left, bottom - top), None)
         else:
             more = 0 if job.is_single else 1
+            lattice = self._spread(job, tile, at_centres=job.is_single)
             places = lattice.get().reshape(lattice.height, -1, 2)[:, : right - left + more]
             places *= np.array(job.longer, np.float32)
             places[..., 0] += (np.arange(left, right + more) * job.zoom[0])[None, :]
             places[..., 1] += (np.arange(top, bottom + more) * job.zoom[1])[:, None]
-            self._draw_pieces(job, lattice, places, (left, top), (0, 0, right - left, bottom - top), room)
+            self._draw_pieces(job, tile, places, (0, 0, right - left, bottom - top), room)
 
     def _draw_pieces(
         self,
         job: _Job,
-        lattice: Field,
+        tile: tuple[int, int, int, int],
         places: np.ndarray,
-        origin: tuple[int, int],
         region: tuple[int, int, int, int],
         room: tuple[int, int],
     ) -> None:
@@ -367,44 +365,66 @@ class Sampler:
             # Where the map is torn, both halves may need what the whole does.
             if not fits or sum(prod(_size(_piece(job, places, half))) for half in halves) < 1.5 * prod(size):
                 for half in halves:
-                    self._draw_pieces(job, lattice, places, origin, half, room)
+                    self._draw_pieces(job, tile, places, half, room)
                 return
         self._load(job, piece, room)
-        self._look_up(job, lattice, origin, region, piece)
+        self._look_up(job, tile, region, piece)
 
-    def _spread(self, job: _Job, tile: tuple[int, int, int, int]) -> Field:
-        """The displacement at the corners of a tile's pixels, or at their centres if one place is enough."""
-        left, top, right, bottom = tile
-        more, shift = (0, 0.5) if job.is_single else (1, 0.0)
-        width, height = right - left + more, bottom - top + more
-        source, components, defines = job.displacement, 2, {}
-        if job.is_paired:
-            width, components, defines = (right - left + 1) // 2 + more, 4, {"PAIRED": 1}
-        key = (*job.key, job.size, job.is_single, job.is_paired, tile)
-        if key == self._spread_for:  # the same map over a film or a batch of pictures
-            return self._fields["lattice"]
-        self._spread_for = key
-        rows = self._field("along x", (width, source.height), components, "f4")
-        lattice = self._field("lattice", (width, height), components, "f4")
-        scale_x, scale_y = source.width / job.size[0], source.height / job.size[1]
-        self.device.pass_("sampling/spread.frag", ALONG_X=1, **defines)(
-            rows, displacement=source, first=left + shift, scale=scale_x
-        )
-        along_y = self.device.pass_("sampling/spread.frag", **defines)
-        along_y(lattice, displacement=rows, first=top + shift, scale=scale_y)
+    def _spread(
+        self, job: _Job, tile: tuple[int, int, int, int], at_centres: bool, region: list[Region] | None = None
+    ) -> Field:
+        """The displacement at the corners of a tile's pixels, or at their centres; only in a `region`, if given."""
+        _, top, _, bottom = tile
+        more, shift = (0, 0.5) if at_centres else (1, 0.0)
+        scale = job.displacement.height / job.size[1]
+        columns = None
+        if region:
+            # Of the rows, all that the region is interpolated from.
+            low, high = min(y for _, y, _, _ in region), max(y + height for _, y, _, height in region)
+            left, right = min(x for x, _, _, _ in region), max(x + width for x, _, width, _ in region)
+            first = min(floor((top + low) * scale) - _REACH, job.displacement.height - 4)
+            columns = [(left, first, right - left, ceil((top + high) * scale) + 2 * _REACH - first)]
+        rows = self._spread_along_x(job, tile, at_centres, columns)
+        lattice = self._field("lattice", (rows.width, bottom - top + more), rows.components, "f4")
+        if self._is_new("lattice", (*job.key, job.size, job.is_paired, at_centres, tile, region and tuple(region))):
+            along_y = self.device.pass_("sampling/spread.frag", **({"PAIRED": 1} if job.is_paired else {}))
+            along_y(lattice, region=region, displacement=rows, first=top + shift, scale=scale)
         return lattice
+
+    def _spread_along_x(
+        self, job: _Job, tile: tuple[int, int, int, int], at_centres: bool, region: list[Region] | None = None
+    ) -> Field:
+        """The same between the map's texels along x only, on all of its rows."""
+        left, _, right, _ = tile
+        more, shift = (0, 0.5) if at_centres else (1, 0.0)
+        role = "centres along x" if at_centres else "corners along x"
+        width, components, scale = right - left + more, 2, job.displacement.width / job.size[0]
+        defines: dict[str, object] = {"ALONG_X": 1}
+        if job.is_paired:
+            width, components = (right - left + 1) // 2 + more, 4
+            defines |= {"PAIRED": 1, "NEAR": 1} if scale <= 1.0 else {"PAIRED": 1}
+        rows = self._field(role, (width, job.displacement.height), components, "f4")
+        if self._is_new(role, (*job.key, job.size, job.is_paired, left, right, region and tuple(region))):
+            along_x = self.device.pass_("sampling/spread.frag", **defines)
+            along_x(rows, region=region, displacement=job.displacement, first=left + shift, scale=scale)
+        return rows
+
+    def _is_new(self, role: str, key: tuple[object, ...]) -> bool:
+        """Whether a field is to hold another thing than before: over a batch of pictures the map is the same."""
+        is_new = self._spread_for.get(role) != key
+        self._spread_for[role] = key
+        return is_new
 
     def _look_up(
         self,
         job: _Job,
-        lattice: Field,
-        origin: tuple[int, int],
+        tile: tuple[int, int, int, int],
         region: tuple[int, int, int, int],
         piece: tuple[int, int, int, int] | None,
     ) -> None:
         """Draw a region of a tile from a piece of the picture, or from all of it."""
         raw, _ = self._textures["raw"]
-        target, classes = self._fields["result"], self._classify(job)
+        target, classes, origin = self._fields["result"], self._classify(job), tile[:2]
         source = self._fields["prepared"].texture if job.is_prepared else raw
         extent = piece or (0, 0, *job.source_size)
         opaque = job.how.edges == "black" or not job.has_alpha
@@ -412,22 +432,33 @@ class Sampler:
         shown = classes[
             top // _BLOCK : -(-(top + region[3]) // _BLOCK), left // _BLOCK : -(-(left + region[2]) // _BLOCK)
         ]
+
+        def regions(wanted: np.ndarray, more: int = 0) -> list[Region]:
+            """Where the blocks are in the tile, with `more` of the lattice to the right and below."""
+            blocks = _rectangles(wanted) * _BLOCK
+            blocks[:, :2] += np.array((left // _BLOCK, top // _BLOCK)) * _BLOCK - origin
+            found = [_overlap(block, region) for block in blocks.tolist()]
+            if job.is_paired:
+                found = [(x // 2, y, (width + 1) // 2, height) for x, y, width, height in found]
+            return [(x, y, width + more, height + more) for x, y, width, height in found]
+
         for kind in np.unique(shown).tolist():
             defines = job.defines(whole=piece is None, places=kind // 2, inside=kind % 2 == 1)
-            blocks = _rectangles(shown == kind) * _BLOCK
-            blocks[:, :2] += np.array((left // _BLOCK, top // _BLOCK)) * _BLOCK - origin
-            regions = [_overlap(block, region) for block in blocks.tolist()]
-            if job.is_paired:
-                regions = [(x // 2, y, (width + 1) // 2, height) for x, y, width, height in regions]
+            if kind < 2:
+                displacement = self._spread_along_x(job, tile, at_centres=True)
+            else:
+                several = None if piece else regions(shown >= 2, more=1)
+                displacement = self._spread(job, tile, at_centres=False, region=several)
             self.device.pass_("sampling/look_up.frag", **defines)(
                 target,
-                region=regions,
+                region=regions(shown == kind),
                 source=source,
                 raw=raw,
-                displacement=lattice,
+                displacement=displacement,
                 texel=(1 / source.width, 1 / source.height),
                 raw_texel=(1 / raw.width, 1 / raw.height),
-                next=lattice.texel,
+                next=displacement.texel,
+                scale=job.displacement.height / job.size[1],
                 corner=extent[:2],
                 extent=(extent[2] - extent[0], extent[3] - extent[1]),
                 pixel=origin,
@@ -591,15 +622,17 @@ def _narrow(wide: np.ndarray, pixels: np.ndarray) -> None:
 
 def _rectangles(mask: np.ndarray) -> np.ndarray:
     """What is true in a mask as rectangles, (n, 4) of x, y, width and height: runs in its rows, joined downwards."""
+    padded = np.pad(mask, ((0, 0), (1, 1)))
+    rows, edges = np.nonzero(padded[:, 1:] != padded[:, :-1])
     found: list[list[int]] = []
     above: dict[tuple[int, int], list[int]] = {}
-    for y, row in enumerate(mask):
-        edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2).tolist()
-        above = {(x, end): above.get((x, end)) or [x, y, end - x, 0] for x, end in edges}
-        for rectangle in above.values():
+    for y, x, end in zip(rows[::2].tolist(), edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        rectangle = above.get((x, end))
+        if rectangle and rectangle[1] + rectangle[3] == y:
             rectangle[3] += 1
-            if rectangle[3] == 1:
-                found.append(rectangle)
+        else:
+            above[x, end] = rectangle = [x, y, end - x, 1]
+            found.append(rectangle)
     return np.array(found, int).reshape(-1, 4)
 
 

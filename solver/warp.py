@@ -253,7 +253,10 @@ class WarpMap:
     # -- reading it -------------------------------------------------------------------------------------------------
 
     def composed(self, scale: int | None = None) -> Field:
-        """The whole map's displacement on `scale` texels a cell, by default the base map's; valid until it changes."""
+        """The whole map's displacement on `scale` texels a cell, by default the base map's; valid until it changes.
+
+        To be looked up between its texels by the cubic, which is what the base is looked up by here, unlike in `read`.
+        """
         scale = scale or self.base_scale
         if scale == self.base_scale and self._steps == 0:
             return self._base.read
@@ -261,7 +264,7 @@ class WarpMap:
             size = self.grid.nx * scale, self.grid.ny * scale
             self._composed[scale] = self.device.field(size, 2, f"warp map at {scale}")
         if scale not in self._fresh:
-            self._compose(self._composed[scale])
+            self._compose(self._composed[scale], CUBIC=1)
             self._fresh.add(scale)
         return self._composed[scale]
 
@@ -311,8 +314,8 @@ class WarpMap:
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
-    def _compose(self, target: Field) -> None:
-        compose = self.device.pass_("warp/compose.frag", **self._held_defines())
+    def _compose(self, target: Field, **defines: object) -> None:
+        compose = self.device.pass_("warp/compose.frag", **self._held_defines(), **defines)
         compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
 
     def _parts(self) -> dict[str, Any]:

@@ -7,13 +7,13 @@
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels;
 // premultiplied where PREPARED is defined, two neighbours in a texel where PACKED is (prepare.frag), else as it is;
 // u_raw: with PREPARED, the picture as it is;
-// u_displacement: longer sides, at the corners of the result's pixels, or at their centres with SINGLE defined;
+// u_displacement: longer sides, at the corners of the result's pixels; with ONE defined at their centres along x, as
+// spread.frag draws it, and along y still at the map's texels, u_scale to a pixel;
 // u_texel, u_raw_texel, u_next: size of a texel of both and of the displacement, 0-1;
 // u_pixel: the result's pixel of the first fragment, or the first of its two; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
-// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places; ONE place,
-// and SINGLE where there is one everywhere; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
+// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places, or ONE; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
 // OPAQUE if there is no alpha; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
 // GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
 // they have in common is done once, and a software rasteriser waits for the pixels of both at the same time.
@@ -203,8 +203,8 @@ COLOR one_place(vec2 whole, vec2 place) {
 float even_noise(vec2 pixel) { return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715)))); }
 
 // The displacement at the corners of a pixel of the result: upper left and right, lower left and right; at its centre
-// where there is one place everywhere. In the picture's pixels.
-#ifdef SINGLE
+// where there is one place. In the picture's pixels.
+#ifdef ONE
 #define CORNERS vec2
 #else
 #define CORNERS mat4x2
@@ -218,16 +218,13 @@ vec4 look_up(vec2 pixel, CORNERS at) {
     const vec2 zoom = vec2(1.0), rest = vec2(0.0);
     vec2 whole = pixel;
 #endif
-#ifdef SINGLE
+#ifdef ONE
+    const bool shifted = true;
     vec2 centre = rest + 0.5 * zoom + at;
+    COLOR color = one_place(whole, centre);
 #else
     vec2 a = at[0], b = at[1], c = at[2], d = at[3];
     vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d);
-#endif
-#ifdef ONE
-    const bool shifted = true;
-    COLOR color = one_place(whole, centre);
-#else
     vec2 along_x = 0.5 * (b - a + d - c) + vec2(zoom.x, 0.0), along_y = 0.5 * (c - a + d - b) + vec2(0.0, zoom.y);
     float away_from_one = apart(along_x, along_y);
     bool shifted = away_from_one < 1e-3;
@@ -292,6 +289,33 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #endif
 }
 
+// Displacements: of two neighbours in a texel, or of one.
+#undef PARTS
+#ifdef PAIRED
+#define TEXELS vec4
+#define PARTS rgba
+#define LONGER u_longer.xyxy
+#else
+#define TEXELS vec2
+#define PARTS rg
+#define LONGER u_longer
+#endif
+
+#ifdef ONE
+#include "lib/along.glsl"
+uniform float u_scale;
+
+TEXELS at_centre(float pixel) {
+    float place = (pixel + 0.5) * u_scale - 0.5;
+    vec2 first = vec2(gl_FragCoord.x * u_next.x, 0.0);
+    return along(u_displacement, place, float(textureSize(u_displacement, 0).y), first, vec2(0.0, u_next.y)) * LONGER;
+}
+#else
+TEXELS displacement(float i, float j) {
+    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) * u_next).PARTS * LONGER;
+}
+#endif
+
 #ifdef PAIRED
 // Four values of 0-1 as bytes.
 uint in_a_word(vec4 color) {
@@ -299,32 +323,24 @@ uint in_a_word(vec4 color) {
     return uint(codes.r | codes.g << 8 | codes.b << 16 | codes.a << 24);
 }
 
-vec4 displacements(float i, float j) {
-    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) * u_next) * u_longer.xyxy;
-}
-
 void main() {
     vec2 left = floor(gl_FragCoord.xy) * vec2(2.0, 1.0) + u_pixel, right = left + vec2(1.0, 0.0);
-#ifdef SINGLE
-    vec4 at = displacements(0.0, 0.0);
+#ifdef ONE
+    vec4 at = at_centre(left.y);
     vec4 first = look_up(left, at.xy), second = look_up(right, at.zw);
 #else
-    vec4 upper = displacements(0.0, 0.0), lower = displacements(0.0, 1.0);
-    vec2 upper_right = displacements(1.0, 0.0).xy, lower_right = displacements(1.0, 1.0).xy;
+    vec4 upper = displacement(0.0, 0.0), lower = displacement(0.0, 1.0);
+    vec2 upper_right = displacement(1.0, 0.0).xy, lower_right = displacement(1.0, 1.0).xy;
     vec4 first = look_up(left, CORNERS(upper, lower));
     vec4 second = look_up(right, CORNERS(upper.zw, upper_right, lower.zw, lower_right));
 #endif
     out_colors = uvec2(in_a_word(first), in_a_word(second));
 }
 #else
-vec2 displacement(float i, float j) {
-    return texture(u_displacement, (gl_FragCoord.xy + vec2(i, j)) * u_next).rg * u_longer;
-}
-
 void main() {
     vec2 pixel = floor(gl_FragCoord.xy) + u_pixel;
-#ifdef SINGLE
-    out_color = look_up(pixel, displacement(0.0, 0.0));
+#ifdef ONE
+    out_color = look_up(pixel, at_centre(pixel.y));
 #else
     out_color = look_up(pixel, CORNERS(displacement(0.0, 0.0), displacement(1.0, 0.0),
                                        displacement(0.0, 1.0), displacement(1.0, 1.0)));

@@ -2,8 +2,9 @@
 // base.
 // u_near (D), u_base (B): displacements, longer sides, over the same domain, each of any number of texels;
 // u_extent: width and height of the domain, longer sides; x: see lib/place.glsl.
+// Define CUBIC to look into the base by the cubic, as whoever looks between the texels of the result will again.
 // Define HELD if there are cells, of u_held 1, in which the map does not change: nothing is added to the base there.
-// reads: 48
+// reads: 48, and 24 with CUBIC
 #include "lib/displacement.glsl"
 #include "lib/place.glsl"
 uniform sampler2D u_near;
@@ -29,5 +30,10 @@ void main() {
 #endif
     vec2 near = cubic_displacement(u_near, place * vec2(textureSize(u_near, 0)));
     place = clamp(place + near / u_extent, 0.0, 1.0);
-    out_displacement = near + quintic_displacement(u_base, place * vec2(textureSize(u_base, 0)));
+    vec2 p = place * vec2(textureSize(u_base, 0));
+#ifdef CUBIC
+    out_displacement = near + cubic_displacement(u_base, p);
+#else
+    out_displacement = near + quintic_displacement(u_base, p);
+#endif
 }
