@@ -97,8 +97,8 @@ class WarpMap:
         self._reductions = self._find_steepest, self._find_largest, self._find_total
         self._held: Field | None = None
         self._held_cells: np.ndarray | None = None  # what it holds; None if no cell
-        self._composed: dict[int, Field] = {}
-        self._fresh: set[int] = set()  # the scales at which `_composed` holds the present map
+        self._composed: dict[tuple[int, bool], Field] = {}
+        self._fresh: set[tuple[int, bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last fold
         self.version = 0  # counts the changes, for those who keep what they made of the map
 
@@ -252,21 +252,22 @@ class WarpMap:
 
     # -- reading it -------------------------------------------------------------------------------------------------
 
-    def composed(self, scale: int | None = None) -> Field:
+    def composed(self, scale: int | None = None, exact: bool = False) -> Field:
         """The whole map's displacement on `scale` texels a cell, by default the base map's; valid until it changes.
 
-        To be looked up between its texels by the cubic, which is what the base is looked up by here, unlike in `read`.
+        To be looked up between its texels by the cubic; unless `exact`, the base is looked up by the cubic for it too.
         """
         scale = scale or self.base_scale
         if scale == self.base_scale and self._steps == 0:
             return self._base.read
-        if scale not in self._composed:
+        key = scale, exact
+        if key not in self._composed:
             size = self.grid.nx * scale, self.grid.ny * scale
-            self._composed[scale] = self.device.field(size, 2, f"warp map at {scale}")
-        if scale not in self._fresh:
-            self._compose(self._composed[scale], CUBIC=1)
-            self._fresh.add(scale)
-        return self._composed[scale]
+            self._composed[key] = self.device.field(size, 2, f"warp map at {scale}")
+        if key not in self._fresh:
+            self._compose(self._composed[key], **({} if exact else {"CUBIC": 1}))
+            self._fresh.add(key)
+        return self._composed[key]
 
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
         """The displacement at the pixel centres of a picture of `size` (width, height), by default the grid's.

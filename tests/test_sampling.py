@@ -91,6 +91,16 @@ def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
             np.testing.assert_array_equal(np.concatenate(list(tiled.bands(warp, picture, size, how))), wanted)
 
 
+def test_tiles_are_the_same_to_the_bit_where_only_a_corner_is_distorted(device: Device) -> None:
+    """Untiled, the corners of the pixels are spread there only; in tiles, everywhere."""
+    displacement = waves((120, 104), 0.2)
+    displacement[:60] = displacement[:, :70] = 0.0
+    warp, picture = GivenMap(device, displacement), noise((260, 300, 3), "8")
+    for size in (None, (601, 523)):
+        wanted = Sampler(device).apply(warp, picture, size)
+        np.testing.assert_array_equal(Sampler(device, whole=30_000, tile=(96, 70)).apply(warp, picture, size), wanted)
+
+
 @pytest.mark.parametrize("edges", ["transparent", "mirror"])
 def test_a_film_in_tiles_makes_no_texture_anew(device: Device, edges: str) -> None:
     """Textures as large as each piece would be of another size at every frame, and memory fall to bits."""

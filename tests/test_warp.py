@@ -13,6 +13,7 @@ from solver.field import FieldError
 from solver.fluid import Fluid
 from solver.grid import Grid
 from solver.masks import Masks
+from solver.params import FluidParams, Walls
 from solver.sampling import Sampler
 from solver.warp import WarpMap
 
@@ -253,6 +254,23 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
                     np.testing.assert_array_equal(now[kept], then[kept])
         assert np.abs(after[0] - before[0]).max() > 1e-3
     assert np.abs(before[0])[frozen[row, column]].max() > 1e-3, "what had moved before it was frozen"
+
+
+@pytest.mark.parametrize("walls", [Walls(), Walls("none", (0.3, -0.2, 1.0, 0.5))], ids=["free-slip", "moving no-slip"])
+def test_a_map_is_carried_alike_whether_the_trace_is_there_or_is_drawn_with_it(device: Device, walls: Walls) -> None:
+    grid, near = Grid(37, 23), smooth(np.random.default_rng(5), (37, 23), 0.1)
+    found = []
+    for traced in (True, False):
+        fluid, warp = Fluid(device, grid, FluidParams(walls=walls)), WarpMap(device, grid)
+        fluid.set_velocity(reference.smooth_velocity(37, 23, seed=1))
+        warp._near.read.set(near)
+        if traced:
+            fluid.trace(0.05)
+        warp.follow(fluid, 0.05)
+        found.append((fluid.trace(0.05).get(), warp._near.read.get()))
+    assert difference(found[1][0], found[0][0]) < 1e-6
+    assert difference(found[1][1], found[0][1]) < 1e-6
+    assert difference(found[0][1], near) > 1e-2
 
 
 def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> None:
