@@ -65,8 +65,8 @@ class Cycle:
         return max(first, self.each * whole if is_warm else 0.0) * self.each ** (cycles - 1)
 
 
-_FAINT = chebyshev_weights(1, 0.4), chebyshev_weights(3, 0.35), chebyshev_weights(4, 0.25)
-_LIGHT = chebyshev_weights(2, 0.6), *_FAINT[1:]
+_FAINT = chebyshev_weights(1, 0.4), chebyshev_weights(3, 0.35)
+_LIGHT = chebyshev_weights(2, 0.6), chebyshev_weights(3, 0.35), chebyshev_weights(4, 0.25)
 _COARSER = chebyshev_weights(4, 0.35), chebyshev_weights(5, 0.25)
 _QUICK = chebyshev_weights(3, 0.7), *_COARSER
 _THOROUGH = chebyshev_weights(4, 0.5), *_COARSER
