@@ -171,7 +171,7 @@ class _Job:
         samples = self.how.samples
         return (1, MOST_SAMPLES // 2) if samples == "auto" else (samples // 2, samples // 2)
 
-    def defines(self, whole: bool, places: int, inside: bool) -> dict[str, object]:
+    def defines(self, whole: bool, places: int, inside: bool, spread: bool) -> dict[str, object]:
         """Of `look_up.frag`, for blocks that want one place a pixel (0), four (1) or more (2) and lie inside or not."""
         kind, levels = _KINDS[self.picture.dtype]
         dither = self.is_curved if self.how.dither is None else self.how.dither
@@ -180,6 +180,7 @@ class _Job:
             "ZOOMED": self.zoom != (1.0, 1.0),
             "BOUNDED": self.is_bounded and not inside,
             "ONE": places == 0,
+            "SPREAD": places == 0 and spread,
             "PREPARED": self.is_prepared,
             "PACKED": self.is_packed,
             "LINEAR_LIGHT": self.is_curved and self.is_prepared,
@@ -404,10 +405,16 @@ class Sampler:
             width, components = (right - left + 1) // 2 + more, 4
             defines |= {"PAIRED": 1, "NEAR": 1} if scale <= 1.0 else {"PAIRED": 1}
         rows = self._field(role, (width, job.displacement.height), components, "f4")
-        if self._is_new(role, (*job.key, job.size, job.is_paired, left, right, region and tuple(region))):
+        if self._is_new(role, self._key(job, tile, region)):
             along_x = self.device.pass_("sampling/spread.frag", **defines)
             along_x(rows, region=region, displacement=job.displacement, first=left + shift, scale=scale)
         return rows
+
+    def _key(
+        self, job: _Job, tile: tuple[int, int, int, int], region: list[Region] | None = None
+    ) -> tuple[object, ...]:
+        """What tells apart what is spread along x."""
+        return *job.key, job.size, job.is_paired, tile[0], tile[2], region and tuple(region)
 
     def _is_new(self, role: str, key: tuple[object, ...]) -> bool:
         """Whether a field is to hold another thing than before: over a batch of pictures the map is the same."""
@@ -442,9 +449,13 @@ class Sampler:
                 found = [(x // 2, y, (width + 1) // 2, height) for x, y, width, height in found]
             return [(x, y, width + more, height + more) for x, y, width, height in found]
 
+        # A map that is looked through again, as in a batch, is worth being spread once and for all.
+        is_known = job.is_single and self._spread_for.get("centres along x") == self._key(job, tile)
         for kind in np.unique(shown).tolist():
-            defines = job.defines(whole=piece is None, places=kind // 2, inside=kind % 2 == 1)
-            if kind < 2:
+            defines = job.defines(whole=piece is None, places=kind // 2, inside=kind % 2 == 1, spread=is_known)
+            if is_known:
+                displacement = self._spread(job, tile, at_centres=True)
+            elif kind < 2:
                 displacement = self._spread_along_x(job, tile, at_centres=True)
             else:
                 several = None if piece else regions(shown >= 2, more=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import cv2
 import numpy as np
 import pytest
@@ -83,12 +85,12 @@ def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
     warp = GivenMap(device, waves((230, 150), 0.2))
     whole, tiled = Sampler(device), Sampler(device, whole=12_000, tile=(64, 50))
     kinds = noise((150, 230, 3), "8"), noise((150, 231, 4), "8"), noise((150, 230, 2), "16"), noise((150, 230), "float")
-    for picture in kinds:
-        for size in (None, (301, 190)):
-            how = Sampling(edges=edges)  # type: ignore[arg-type]
-            wanted = whole.apply(warp, picture, size, how)
-            np.testing.assert_array_equal(tiled.apply(warp, picture, size, how), wanted)
-            np.testing.assert_array_equal(np.concatenate(list(tiled.bands(warp, picture, size, how))), wanted)
+    for picture, size, samples in itertools.product(kinds, (None, (301, 190)), ("auto", 1)):
+        how = Sampling(edges=edges, samples=samples)  # type: ignore[arg-type]
+        wanted = whole.apply(warp, picture, size, how)
+        np.testing.assert_array_equal(whole.apply(warp, picture, size, how), wanted)
+        np.testing.assert_array_equal(tiled.apply(warp, picture, size, how), wanted)
+        np.testing.assert_array_equal(np.concatenate(list(tiled.bands(warp, picture, size, how))), wanted)
 
 
 def test_tiles_are_the_same_to_the_bit_where_only_a_corner_is_distorted(device: Device) -> None:

@@ -8,7 +8,7 @@
 // premultiplied where PREPARED is defined, two neighbours in a texel where PACKED is (prepare.frag), else as it is;
 // u_raw: with PREPARED, the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels; with ONE defined at their centres along x, as
-// spread.frag draws it, and along y still at the map's texels, u_scale to a pixel;
+// spread.frag draws it, and along y still at the map's texels, u_scale to a pixel, or with SPREAD at the centres too;
 // u_texel, u_raw_texel, u_next: size of a texel of both and of the displacement, 0-1;
 // u_pixel: the result's pixel of the first fragment, or the first of its two; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
@@ -301,7 +301,9 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #define LONGER u_longer
 #endif
 
-#ifdef ONE
+#ifdef SPREAD
+TEXELS at_centre(float pixel) { return texture(u_displacement, gl_FragCoord.xy * u_next).PARTS * LONGER; }
+#elif defined(ONE)
 #include "lib/along.glsl"
 uniform float u_scale;
 
