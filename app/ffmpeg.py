@@ -143,6 +143,7 @@ class Ffmpeg:
             except subprocess.TimeoutExpired:
                 continue
             if status:
+                self._check()  # the watcher may have ended it
                 raise self.failure()
             return
 

@@ -378,6 +378,30 @@ def test_a_slow_encoder_is_stopped_within_half_a_second(tmp_path: Path, monkeypa
     assert contents(tmp_path) == ["sleeper"]
 
 
+def test_an_encoder_stopped_while_it_finishes_is_not_told_as_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The wish is heard by the watcher first, which ends the process while we wait for its end."""
+    sleeper = tmp_path / "sleeper"
+    sleeper.write_text("#!/bin/sh\ncat > /dev/null\nexec sleep 60\n")
+    sleeper.chmod(0o755)
+    monkeypatch.setattr(ffmpeg, "executable", lambda: str(sleeper))
+    given, asked = threading.Event(), threading.Event()
+
+    def cancel() -> bool:
+        if given.is_set() and threading.current_thread().name == "ffmpeg watcher":
+            asked.set()
+        return asked.is_set()
+
+    def work() -> None:
+        with animation_writer(tmp_path / "a.mp4", cancel=cancel) as write:
+            for frame in frames(3):
+                write(frame)
+            given.set()
+
+    with pytest.raises(Cancelled):
+        work()
+    assert contents(tmp_path) == ["sleeper"]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_an_error_between_frames_leaves_nothing(tmp_path: Path, name: str):
     def work() -> None:
