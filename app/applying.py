@@ -22,11 +22,11 @@ from app.pictures import MAX_PIXELS, picture_format, write_picture
 from app.progress import Progress
 from app.threads import ahead, behind
 from app.timeline import frame_rate
-from solver.context import Device
-from solver.field import FieldError
+from solver.gl.device import Device
+from solver.gl.field import FieldError
 from solver.grid import Grid
-from solver.sampling import Edges, GivenMap, Sampler, Sampling, SamplingError
-from solver.warp import WarpMap
+from solver.resample.sampler import Edges, GivenMap, Sampler, Sampling, SamplingError
+from solver.warp.map import WarpMap
 
 MOST_CELLS = 1024  # along the longer side, for turning a map round
 

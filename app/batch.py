@@ -27,7 +27,7 @@ from app.pictures import FORMATS, MAX_PIXELS
 from app.progress import GRACE, INTERRUPTED, Progress, interruptible, never
 from app.project import picture_names
 from app.recipe import Recipe
-from solver.context import Device
+from solver.gl.device import Device
 
 NAME = "{name}"
 """What stands for the name of each picture in the name of an output."""

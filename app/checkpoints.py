@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from app.recipe import Recipe
-from solver.context import Device
-from solver.field import Field
-from solver.warp import MapState
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.warp.map import MapState
 
 DEFAULT_BUDGET = 512 * 2**20
 

@@ -231,7 +231,7 @@ def _part(frames: str | None) -> tuple[int, int | None]:
 def _render_one(task: Task, opened: Opened) -> None:
     from app.export import run
     from app.progress import on_terminal
-    from solver.context import Device
+    from solver.gl.device import Device
 
     with on_terminal(task.written[0].name, None) as progress:
         progress.enter("reading")  # a large picture takes its time too
@@ -303,7 +303,7 @@ def apply(
     from app.batch import Edits
     from app.progress import on_terminal
     from app.recipe import Recipe
-    from solver.context import Device
+    from solver.gl.device import Device
 
     asked = Edits.of({"output": {"size": size, "fps": fps, "quality": quality}}, {"edges": edges}).applied(Recipe())
     job = Application(
@@ -369,7 +369,7 @@ def gallery(
     """Make the paper's figures again: results, animations and contact sheets."""
     from app.gallery import make
     from app.progress import on_terminal
-    from solver.context import Device
+    from solver.gl.device import Device
 
     with on_terminal("gallery", None) as progress, Device.headless() as device:
         measured = make(device, output, progress)

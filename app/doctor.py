@@ -125,7 +125,7 @@ def _ask(module: str) -> dict:
 def _probe_headless() -> dict:
     from dataclasses import asdict
 
-    from solver.context import ContextError, Device
+    from solver.gl.device import ContextError, Device
 
     try:
         with Device.headless() as device:

@@ -39,9 +39,9 @@ from app.states import StoredStates
 from app.threads import ahead, behind
 from app.timeline import Sentinel, Timeline, frame_positions, frame_rate
 from app.video import Clip
-from solver.context import Device
-from solver.sampling import GivenMap, Sampler, Sampling, SamplingError
-from solver.warp import WarpMap
+from solver.gl.device import Device
+from solver.resample.sampler import GivenMap, Sampler, Sampling, SamplingError
+from solver.warp.map import WarpMap
 
 POINTS_AT_ONCE = 1_000_000  # of a map
 PIXELS_A_STEP = 100_000  # whose look-up, or writing as PNG, takes about as long on a CPU as a step on 256 cells

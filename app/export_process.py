@@ -70,7 +70,7 @@ def _work(job: Job, pipe: Connection, wish: Any) -> None:
     from app.errors import Cancelled, UserError
     from app.export import run
     from app.progress import Progress
-    from solver.context import Device
+    from solver.gl.device import Device
 
     def report(done: int, total: int | None) -> None:
         pipe.send(("part", done / total if total else 0.0))

@@ -21,10 +21,10 @@ from app.progress import Progress
 from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
-from solver.context import Device
+from solver.gl.device import Device
 from solver.grid import Grid
-from solver.sampling import GivenMap, Sampler, Sampling
-from solver.warp import MapStatistics
+from solver.resample.sampler import GivenMap, Sampler, Sampling
+from solver.warp.map import MapStatistics
 
 FPS = 30
 LINGER = 24  # frames that the last one stands still

@@ -18,16 +18,16 @@ from app.sampling import Pictures, channels
 from app.strokes import Change, Dab, Stroke
 from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
-from solver.brush import Brush, Push, Tip, Twirl
-from solver.context import Device
-from solver.density import Density
-from solver.field import Field, FieldError
+from solver.brush.brush import Brush, Push, Tip, Twirl
+from solver.brush.masks import Masks
 from solver.fluid import Fluid
+from solver.gl.device import Device
+from solver.gl.field import Field, FieldError
 from solver.grid import Grid
-from solver.masks import Masks
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
-from solver.warp import MapState, WarpMap
+from solver.warp.density import Density
+from solver.warp.map import MapState, WarpMap
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought

@@ -19,7 +19,7 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.strokes import Change, Stroke
 from app.tools import Gesture, Press, Tool, Touch
-from solver.context import Device
+from solver.gl.device import Device
 
 REST = 0.004  # longer sides a second: a pixel of a screen in four frames
 LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each waits for the GPU

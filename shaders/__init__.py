@@ -1,1 +1,1 @@
-"""The GLSL sources, read as package data by `solver.program`."""
+"""The GLSL sources, read as package data by `solver.gl.program`."""

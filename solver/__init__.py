@@ -11,15 +11,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from solver.brush import Brush, Tip
-    from solver.context import ContextError, Device
-    from solver.density import Density
+    from solver.brush.brush import Brush, Tip
+    from solver.brush.masks import Masks
     from solver.fluid import Fluid
+    from solver.gl.device import ContextError, Device
     from solver.grid import Grid
-    from solver.masks import Masks
     from solver.paper import PaperFluid, PaperWarpMap
     from solver.params import FluidParams, Walls
-    from solver.warp import WarpMap
+    from solver.warp.density import Density
+    from solver.warp.map import WarpMap
 
 __all__ = [
     "Brush",
@@ -39,15 +39,15 @@ __all__ = [
 
 # Loaded when first asked for: a recipe needs `solver.grid` and must not bring all of GL along.
 _MODULES = {
-    "brush": ("Brush", "Tip"),
-    "context": ("ContextError", "Device"),
-    "density": ("Density",),
+    "brush.brush": ("Brush", "Tip"),
+    "brush.masks": ("Masks",),
     "fluid": ("Fluid",),
+    "gl.device": ("ContextError", "Device"),
     "grid": ("Grid",),
-    "masks": ("Masks",),
     "paper": ("PaperFluid", "PaperWarpMap"),
     "params": ("FluidParams", "Walls"),
-    "warp": ("WarpMap",),
+    "warp.density": ("Density",),
+    "warp.map": ("WarpMap",),
 }
 
 

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from solver.context import Device
-from solver.field import DoubleField, Field
+from solver.gl.device import Device
+from solver.gl.field import DoubleField, Field
 from solver.grid import Grid
-from solver.multigrid import Pressure
+from solver.packing import PackedFaces
 from solver.params import FluidParams
-from solver.viscosity import Pair, Viscosity
+from solver.pressure.projection import Pressure
+from solver.viscosity.solve import Viscosity
 
 # Cells along the edges of what departs that depend on the walls.
 RIM = 3
@@ -89,7 +90,7 @@ class Fluid:
         self._solids_changed = True
         self._solids_of: np.ndarray | None = None
         self._coefficients_of: object = None
-        self._packed: Pair | None = None  # w2, then w3, between the stages of a step
+        self._packed: PackedFaces | None = None  # w2, then w3, between the stages of a step
         self._viscosity_solver = Viscosity(device, grid.size)
         self._pressure_solver = Pressure(device, grid.size)
 
@@ -124,7 +125,7 @@ class Fluid:
         with self.device.stage("add force"):
             acting = [(force, impulse) for force, impulse in forces if impulse != 0.0]
             if self._has_impulse or len(acting) > 1:
-                add = self.device.pass_("stages/add_force.frag")
+                add = self.device.pass_("step/add_force.frag")
                 for force, impulse in acting:
                     add(self.impulse, add=True, force=force, impulse=impulse)
                 acting, self._has_impulse = [(self.impulse, 1.0)], True
@@ -137,8 +138,8 @@ class Fluid:
             inside = (RIM, RIM, width - 2 * RIM, height - 2 * RIM)
             around = [(0, 0, width, RIM), (0, height - RIM, width, RIM)]
             around += [(x, RIM, RIM, height - 2 * RIM) for x in (0, width - RIM)]
-            self.device.pass_("stages/depart.frag", **defines)(self._departing, region=inside, **inputs)
-            edges = self.device.pass_("stages/depart.frag", EDGES=1, **defines, **self._wall_defines())
+            self.device.pass_("step/depart.frag", **defines)(self._departing, region=inside, **inputs)
+            edges = self.device.pass_("step/depart.frag", EDGES=1, **defines, **self._wall_defines())
             edges(self._departing, region=around, **inputs, **self._wall_inputs())
             self._forget_impulse()
 
@@ -165,7 +166,7 @@ class Fluid:
         with self.device.stage("advect"):
             self._packed = self._viscosity_solver.given
             packing = self._viscosity_solver.packing
-            advect = self.device.pass_("stages/advect.frag", **packing.defines)
+            advect = self.device.pass_("step/advect.frag", **packing.defines)
             decay = math.exp(-self.params.drag * dt)
             advect(self._packed.fields, region=packing.region, departing=self._departing, trace=trace, decay=decay,
                    **packing.open)  # fmt: skip
@@ -177,7 +178,7 @@ class Fluid:
         """
         if dt != self._traced_dt:
             with self.device.stage("trace"):
-                trace = self.device.pass_("stages/trace.frag", **self._wall_defines())
+                trace = self.device.pass_("step/trace.frag", **self._wall_defines())
                 trace(self._trace, velocity=self.faces(), dt_over_h=dt / self.grid.h, **self._wall_inputs())
             self._traced_dt = dt
         return self._trace
@@ -256,7 +257,7 @@ class Fluid:
 
     def add_source(self, source: Field, amount: float = 1.0) -> None:
         """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
-        self.device.pass_("stages/add_source.frag")(self.source, add=True, source=source, amount=amount)
+        self.device.pass_("step/add_source.frag")(self.source, add=True, source=source, amount=amount)
         self.source_drawn()
 
     def source_drawn(self) -> None:

@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from solver.context import Device
-from solver.field import Field
 from solver.fluid import Fluid, Force
+from solver.gl.device import Device
+from solver.gl.field import Field
 from solver.grid import Grid
 from solver.params import FluidParams
-from solver.warp import Velocity, WarpMap
+from solver.warp.map import Velocity, WarpMap
 
 
 class PaperFluid(Fluid):

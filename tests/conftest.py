@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from solver.context import Device
+from solver.gl.device import Device
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
 from app.ui.files import fresh_recipe
 from app.ui.preferences import Preferences
-from solver.context import Device
+from solver.gl.device import Device
 
 SIZE = (1280, 800)
 TICK = 1 / 30

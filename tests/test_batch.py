@@ -21,7 +21,7 @@ from app.errors import Cancelled, UserError
 from app.pictures import Picture, read_picture, write_picture
 from app.progress import INTERRUPTED, Progress
 from app.replay import Replay
-from solver.context import Device
+from solver.gl.device import Device
 
 ROOT = Path(__file__).parent.parent
 RECIPE = """

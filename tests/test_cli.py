@@ -18,7 +18,7 @@ from app.pictures import Picture, read_picture, write_picture
 from app.progress import Progress
 from app.project import from_recipe, save
 from app.recipe import Recipe
-from solver.context import Device
+from solver.gl.device import Device
 
 ROOT = Path(__file__).parent.parent
 RECIPE = """

@@ -13,8 +13,8 @@ from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
 from app.schema import frozen
-from solver.context import Device
-from solver.warp import MapStatistics
+from solver.gl.device import Device
+from solver.warp.map import MapStatistics
 
 BLACK = np.zeros((200, 300, 3), np.uint8)
 

@@ -15,7 +15,7 @@ from app.animation import animation_writer
 from app.maps import Displacement, write_map
 from app.pictures import Picture, write_picture
 from app.project import from_recipe, save
-from solver.context import Device
+from solver.gl.device import Device
 
 RECIPE = """
 version = 1

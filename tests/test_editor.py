@@ -30,7 +30,7 @@ from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS
 from app.ui.saving import SaveDialog
 from editing import Robot, command_line, pattern, small_project, write_foreign_map
-from solver.context import Device
+from solver.gl.device import Device
 
 
 @pytest.fixture

@@ -30,8 +30,8 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.threads import ahead, behind
 from app.video import read_clip
-from solver.context import Device
-from solver.sampling import Sampler
+from solver.gl.device import Device
+from solver.resample.sampler import Sampler
 
 WIDTH, HEIGHT = 96, 64
 WHIRL = """

@@ -14,7 +14,7 @@ from app.gallery import Studio, arrows, contact_sheet, load, shades, sharpness, 
 from app.pictures import read_picture
 from app.progress import Progress
 from app.sampling import Pictures
-from solver.context import Device
+from solver.gl.device import Device
 from solver.grid import Grid
 
 

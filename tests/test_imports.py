@@ -79,7 +79,7 @@ from app.pictures import Picture
 from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
-from solver.context import Device
+from solver.gl.device import Device
 with Device.headless() as device:
     replay = Replay(device, Recipe.parse("[fluid]\\ngrid = 16"), Pictures(Picture(np.zeros((8, 8, 3), np.uint8))))
     replay.seek(2)

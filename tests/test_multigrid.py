@@ -9,10 +9,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 from solver import Fluid
-from solver.context import Device
+from solver.gl.device import Device
+from solver.gl.separable import Separable
 from solver.grid import Grid
-from solver.multigrid import Level, Pressure
-from solver.separable import Separable
+from solver.pressure.projection import Level, Pressure
 
 SIZES = [(8, 8), (9, 13), (64, 64), (61, 40), (100, 23)]
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import reference
-from solver.brush import Brush, Tip
-from solver.context import Device
+from solver.brush.brush import Brush, Tip
 from solver.fluid import Fluid
+from solver.gl.device import Device
 from solver.grid import Grid
 from solver.paper import PaperFluid
 from solver.params import FluidParams, Walls

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.context import Device
-from solver.reduce import Reduction
+from solver.gl.device import Device
+from solver.gl.reduction import Reduction
 
 
 @pytest.mark.parametrize("size", [(1, 1), (16, 16), (17, 5), (64, 64), (333, 217), (5, 700)])

@@ -14,8 +14,8 @@ from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
 from app.strokes import Stroke
-from solver.context import Device
-from solver.sampling import Sampler
+from solver.gl.device import Device
+from solver.resample.sampler import Sampler
 
 RECIPE = Recipe.parse("""
 duration = 1.0

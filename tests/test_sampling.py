@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 from scipy import ndimage
 
-from solver.context import Device
+from solver.gl.device import Device
 from solver.grid import Grid
-from solver.sampling import GivenMap, Sampler, Sampling, SamplingError
-from solver.warp import WarpMap
+from solver.resample.sampler import GivenMap, Sampler, Sampling, SamplingError
+from solver.warp.map import WarpMap
 
 KINDS = {"8": (np.uint8, 255), "16": (np.uint16, 65535), "float": (np.float32, 1)}
 

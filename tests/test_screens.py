@@ -14,7 +14,7 @@ import pytest
 
 from app.pictures import Picture, read_picture, write_picture
 from editing import Robot, small_project
-from solver.context import Device
+from solver.gl.device import Device
 
 GOLDEN = Path(__file__).parent / "golden"
 SIZE = (960, 600)

@@ -18,8 +18,8 @@ from app.progress import Progress
 from app.session import REST, Session
 from app.tools import TOOL, TOOLS, BrushSettings, Press
 from editing import small_project
-from solver.context import Device
-from solver.warp import MapStatistics
+from solver.gl.device import Device
+from solver.warp.map import MapStatistics
 
 PAINTING = [tool for tool in TOOLS if tool.gesture is not None]
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import shaders
-from solver.context import Device
-from solver.program import ShaderError, assemble, compile_program, read_shader
+from solver.gl.device import Device
+from solver.gl.program import ShaderError, assemble, compile_program, read_shader
 
 ROOT = Path(shaders.__file__).parent
 STAGES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.frag"))
@@ -31,7 +31,7 @@ def test_stage_states_its_texel_reads(stage: str) -> None:
 def test_error_names_file_and_line(device: Device, monkeypatch: pytest.MonkeyPatch, line: str) -> None:
     source = f'#include "lib/cubic.glsl"\n{line}out vec4 c;\nvoid main() {{\n    c = nonsense;\n}}\n'
     real = read_shader
-    monkeypatch.setattr("solver.program.read_shader", lambda path: source if path == "broken.frag" else real(path))
+    monkeypatch.setattr("solver.gl.program.read_shader", lambda path: source if path == "broken.frag" else real(path))
     with pytest.raises(ShaderError, match=rf"shaders/broken\.frag:{5 if line else 4}"):
         compile_program(device.ctx, "broken.frag", {})
 
@@ -51,7 +51,7 @@ layout(location = 2) out vec4 out_c;
 void main() { out_a = vec4(u_a, u_b); out_b = vec4(u_c, u_e, u_f); out_c = u_d; }
 """
     real = read_shader
-    monkeypatch.setattr("solver.program.read_shader", lambda path: source if path == "whole.frag" else real(path))
+    monkeypatch.setattr("solver.gl.program.read_shader", lambda path: source if path == "whole.frag" else real(path))
     targets = [device.field((5, 3), 4) for _ in range(3)]
     numbers = np.random.default_rng(0).standard_normal(11).astype(np.float32)
     a, b, c, d, e = np.split(numbers, [1, 4, 6, 10])
@@ -69,13 +69,13 @@ def test_missing_include_is_named() -> None:
 def test_unknown_uniform_is_a_mistake(device: Device) -> None:
     field = device.field((4, 4), 1)
     with pytest.raises(ShaderError, match="no uniform u_sauce"):
-        device.pass_("stages/add_source.frag")(field, sauce=field, amount=1.0)
+        device.pass_("step/add_source.frag")(field, sauce=field, amount=1.0)
 
 
 def test_pass_adds_within_its_region(device: Device) -> None:
     target, source = device.field((6, 5), 1), device.upload(np.ones((5, 6), np.float32))
     target.clear(1.0)
-    device.pass_("stages/add_source.frag")(target, add=True, region=(-2, 1, 4, 99), source=source, amount=2.0)
+    device.pass_("step/add_source.frag")(target, add=True, region=(-2, 1, 4, 99), source=source, amount=2.0)
     expected = np.ones((5, 6), np.float32)
     expected[1:, :2] = 3.0
     np.testing.assert_array_equal(target.get(), expected)

@@ -11,8 +11,8 @@ import pytest
 from scipy import ndimage
 
 import reference
-from solver.context import Device
 from solver.fluid import Fluid
+from solver.gl.device import Device
 from solver.grid import Grid
 from solver.params import FluidParams, Walls
 
@@ -39,7 +39,7 @@ def test_trace_and_advect(
     force = reference.smooth_velocity(nx, ny, seed=nx + 2)
     velocity, back = device.upload(faces), device.field((nx, ny), 2)
     defines, inputs = wall_inputs(no_slip, speed)
-    device.pass_("stages/trace.frag", **defines)(back, velocity=velocity, dt_over_h=courant, **inputs)
+    device.pass_("step/trace.frag", **defines)(back, velocity=velocity, dt_over_h=courant, **inputs)
     traced = reference.trace(faces, courant, no_slip=no_slip, speed=speed)
     assert relative(back.get(), traced) < 1e-4
     fluid = Fluid(device, Grid(nx, ny), FluidParams(walls=Walls("none" if no_slip else "free", speed), drag=0.5))
@@ -61,12 +61,12 @@ def test_trace_and_advect(
 def test_add_force_and_source(device: Device) -> None:
     faces = reference.smooth_velocity(20, 14, seed=3).astype(np.float32)
     velocity, force = device.upload(faces), device.upload(faces[::-1].copy())
-    device.pass_("stages/add_force.frag")(velocity, add=True, force=force, impulse=0.25)
+    device.pass_("step/add_force.frag")(velocity, add=True, force=force, impulse=0.25)
     np.testing.assert_allclose(velocity.get(), faces + np.float32(0.25) * faces[::-1], rtol=1e-6)
 
 
 def test_masks_compose(device: Device) -> None:
-    from solver.masks import LEAST_VISCOSITY, Masks
+    from solver.brush.masks import LEAST_VISCOSITY, Masks
 
     grid = Grid(12, 9)
     rng = np.random.default_rng(5)

@@ -12,10 +12,10 @@ from scipy import ndimage
 
 import reference
 from solver import Fluid, Grid, WarpMap
-from solver.context import Device
+from solver.gl.device import Device
 from solver.params import Walls
-from solver.stiff_parts import MOST_PARTS, SMALLEST_PART, connected_parts, some_bend
-from solver.viscosity import Viscosity
+from solver.viscosity.deflation import MOST_PARTS, SMALLEST_PART, connected_parts, some_bend
+from solver.viscosity.solve import Viscosity
 
 
 class Step:

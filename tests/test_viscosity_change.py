@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import reference
-from solver.context import Device
+from solver.gl.device import Device
 from solver.params import Walls
-from solver.viscosity import Viscosity
+from solver.viscosity.solve import Viscosity
 
 
 def test_error_is_a_fraction_of_the_change(device: Device) -> None:

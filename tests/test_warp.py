@@ -8,14 +8,14 @@ from scipy import ndimage
 
 import reference
 from flows import VORTEX_TIME, vortex, vortex_faces
-from solver.context import Device
-from solver.field import FieldError
+from solver.brush.masks import Masks
 from solver.fluid import Fluid
+from solver.gl.device import Device
+from solver.gl.field import FieldError
 from solver.grid import Grid
-from solver.masks import Masks
 from solver.params import FluidParams, Walls
-from solver.sampling import Sampler
-from solver.warp import WarpMap
+from solver.resample.sampler import Sampler
+from solver.warp.map import WarpMap
 
 
 def smooth(rng: np.random.Generator, size: tuple[int, int], amplitude: float) -> np.ndarray:

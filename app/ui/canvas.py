@@ -11,8 +11,8 @@ from app.session import Session
 from app.ui.state import State
 from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport
-from solver.context import Device
-from solver.field import Field
+from solver.gl.device import Device
+from solver.gl.field import Field
 
 LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
@@ -136,10 +136,10 @@ class Canvas:
         for force, acts in zip(replay.forces, acting, strict=True):
             share = 1.0 if acts else RESTING
             if force.faces is not None and force.strongest:
-                add = self.device.pass_("stages/add_force.frag")
+                add = self.device.pass_("step/add_force.frag")
                 add(fields[0], add=True, force=force.faces, impulse=share / force.strongest)
             if force.divergence is not None and force.widest:
-                add = self.device.pass_("stages/add_source.frag")
+                add = self.device.pass_("step/add_source.frag")
                 add(fields[1], add=True, source=force.divergence, amount=share / force.widest)
         self._force_fields, self._forces_of = fields, key
         return fields

@@ -34,7 +34,7 @@ from app.ui.quality import Quality
 from app.ui.state import LARGEST, SMALLEST, State
 from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
-from solver.context import Device
+from solver.gl.device import Device
 
 # Bytes of pixels of the pictures that were open before, to which Undo comes back.
 OPENED_BUDGET = 2**30

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from app.ui import theme
 from app.ui.events import Button, Event, Focus, Key, Mods, Move, Text, Wheel
-from solver.context import Device
+from solver.gl.device import Device
 
 _NAMED = {
     "left": imgui.Key.left_arrow, "right": imgui.Key.right_arrow, "up": imgui.Key.up_arrow,

@@ -16,7 +16,7 @@ from app.ui.events import LEFT, Button, Event, Key, Mods, Move
 from app.ui.files import load_any
 from app.ui.preferences import Preferences
 from app.ui.window import sample
-from solver.context import Device
+from solver.gl.device import Device
 
 SIZE = (1280, 800)
 TICK = 1 / 30

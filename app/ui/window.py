@@ -15,7 +15,7 @@ from app.ui.editor import Editor
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
 from app.ui.files import load_any
 from app.ui.preferences import Preferences
-from solver.context import Device
+from solver.gl.device import Device
 
 TITLE = "fluidwarp"
 SIZE = (1280, 800)

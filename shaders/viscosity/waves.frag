@@ -1,5 +1,5 @@
 // Waves: matrices times the rows of the faces of a grid, or with DOWN their columns; one direction of ViscousWaves in
-// solver/separable.py. With SOLVE the viscous step is made on the waves that come out, (1 + k A) w = b, where for the
+// solver/gl/separable.py. With SOLVE the viscous step is made on the waves that come out, (1 + k A) w = b, where for the
 // wave numbers p, q in a box of n x m cells, a = 2 sin(pi p / 2 n), b = 2 sin(pi q / 2 m):
 //   A = (2 a^2 + b^2   a b        )
 //       (a b           2 b^2 + a^2)

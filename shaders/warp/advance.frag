@@ -1,7 +1,7 @@
 // Advance: D'(x) = (x_d - x) + D(x_d), the map's displacement carried one step by the fluid (numerics: characteristic
 // mapping method; paper section 4.1, eq. (5) without diffusion).
 // u_displacement: cell centres, longer sides; u_h: side of a cell, longer sides; u_trace: x_d - x, cells.
-// With TRACE it is drawn too, as a second output, as stages/trace.frag does: u_velocity, u_dt_over_h.
+// With TRACE it is drawn too, as a second output, as step/trace.frag does: u_velocity, u_dt_over_h.
 // reads: 13, and 23 with TRACE
 #include "lib/displacement.glsl"
 #ifdef TRACE

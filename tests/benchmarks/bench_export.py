@@ -32,7 +32,7 @@ from app.opening import open_recipe
 from app.pictures import Picture, read_picture
 from app.progress import Progress
 from app.recipe import Output, Recipe
-from solver.context import Device
+from solver.gl.device import Device
 
 ROUNDS = 3
 RATE = 30

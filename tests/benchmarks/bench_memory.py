@@ -21,7 +21,7 @@ from app.export import Job, run
 from app.pictures import Picture
 from app.progress import Progress
 from app.recipe import FluidSettings, Output, Recipe
-from solver.context import Device
+from solver.gl.device import Device
 
 MIB = 2**20
 VORTEX = {"kind": "vortex", "point": (0.5, 0.5), "radius": 0.3, "strength": 3.0}

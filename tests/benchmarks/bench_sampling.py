@@ -16,10 +16,10 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from solver.context import Device
+from solver.gl.device import Device
 from solver.grid import Grid
-from solver.sampling import Sampler, Sampling
-from solver.warp import WarpMap
+from solver.resample.sampler import Sampler, Sampling
+from solver.warp.map import WarpMap
 
 WIDTH, HEIGHT = 3840, 2160
 ROUNDS = 5

@@ -21,7 +21,7 @@ from rich.table import Table
 from scipy import ndimage
 
 from solver import Device, Fluid, Grid, PaperFluid, WarpMap
-from solver.program import FULL_SCREEN_VERTEX, assemble
+from solver.gl.program import FULL_SCREEN_VERTEX, assemble
 
 JACOBI = """#version 330 core
 uniform sampler2D u_p; uniform vec2 u_texel; in vec2 v_uv; out float out_p;

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.context import Device
+from solver.gl.device import Device
 
 _ROW = 256  # points in a row of the texture that lists them
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solver.context import Device
-from solver.field import Field
+from solver.gl.device import Device
+from solver.gl.field import Field
 from solver.grid import Grid
 
 DIFFUSION_SWEEPS = 20
@@ -37,13 +37,15 @@ class Density:
     def advance(self, faces: Field, grid: Grid, dt: float) -> None:
         """Move by the velocity on `faces` of the fluid's `grid` for `dt` seconds, diffuse, and add the source."""
         with self.device.stage("density"):
-            advect = self.device.pass_("density/advect.frag")
+            advect = self.device.pass_("warp/density/advect.frag")
             advect(self._values.write, density=self._values.read, velocity=faces, dt_over_h=dt / grid.h)
             self._values.swap()
             if self.kappa > 0:
                 self._diffuse(dt)
             if self._source is not None:
-                self.device.pass_("density/add_source.frag")(self._values.read, add=True, source=self._source, dt=dt)
+                self.device.pass_("warp/density/add_source.frag")(
+                    self._values.read, add=True, source=self._source, dt=dt
+                )
 
     def set(self, values: np.ndarray) -> None:
         """Start again from (h, w) or (h, w, c)."""
@@ -70,7 +72,7 @@ class Density:
     def _diffuse(self, dt: float) -> None:
         self._before.copy_from(self._values.read)
         k = dt * self.kappa * max(self._before.size) ** 2
-        sweep = self.device.pass_("density/diffuse.frag")
+        sweep = self.device.pass_("warp/density/diffuse.frag")
         for _ in range(DIFFUSION_SWEEPS):
             sweep(self._values.write, density=self._values.read, before=self._before, k=k)
             self._values.swap()

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver.context import Device
-from solver.field import Field
-from solver.passes import Region
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Region
 
 MOST_PARTS = 63
 SMALLEST_PART = 12  # cells

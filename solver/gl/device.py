@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
-from solver.field import DoubleField, Field
-from solver.timing import Timings
+from solver.gl.field import DoubleField, Field
+from solver.gl.timing import Timings
 
 if TYPE_CHECKING:
-    from solver.passes import Pass
+    from solver.gl.passes import Pass
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
 
@@ -94,11 +94,11 @@ class Device:
     # -- what is made in it -----------------------------------------------------------------------------------------
 
     def field(self, size: tuple[int, int], components: int = 1, label: str = "field", dtype: str = "f4") -> Field:
-        """A zeroed texture that can be drawn into; see `solver.field.Field`."""
+        """A zeroed texture that can be drawn into; see `solver.gl.field.Field`."""
         return Field(self, size, components, label, dtype)
 
     def double_field(self, size: tuple[int, int], components: int = 1, label: str = "field") -> DoubleField:
-        """A ping-pong pair of fields; see `solver.field.DoubleField`."""
+        """A ping-pong pair of fields; see `solver.gl.field.DoubleField`."""
         return DoubleField(self, size, components, label)
 
     def upload(self, array: np.ndarray, label: str = "upload", dtype: str | None = None) -> Field:
@@ -112,7 +112,7 @@ class Device:
 
     def pass_(self, shader: str, **defines: object) -> Pass:
         """The pass of fragment shader `shader` (a path below `shaders/`), compiled once for each set of defines."""
-        from solver.passes import Pass
+        from solver.gl.passes import Pass
 
         key = shader, frozenset(defines.items())
         if key not in self._passes:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.brush import Tip
-from solver.context import Device
-from solver.field import DoubleField, Field
+from solver.brush.brush import Tip
 from solver.fluid import Fluid
+from solver.gl.device import Device
+from solver.gl.field import DoubleField, Field
 from solver.grid import Grid
 
 # Decades that painting may thin or thicken the fluid by, and the viscosity it starts from where there is none.
@@ -66,7 +66,7 @@ class Masks:
         Solid are the frozen cells and those within two of them, so that with `WarpMap.hold` no bit of a picture changes
         in a frozen cell.
         """
-        self.device.pass_("stages/compose_masks.frag")(
+        self.device.pass_("step/compose_masks.frag")(
             (fluid.viscosity, fluid.solid),
             base_viscosity=self.base_viscosity,
             base_frozen=self.base_frozen,

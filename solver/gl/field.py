@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 if TYPE_CHECKING:
-    from solver.context import Device
+    from solver.gl.device import Device
 
 _NUMPY = {"f1": np.uint8, "nu2": np.uint16, "u4": np.uint32, "f2": np.float16, "f4": np.float32}
 

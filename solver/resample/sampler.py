@@ -11,10 +11,10 @@ from typing import Any, Literal
 import moderngl
 import numpy as np
 
-from solver.context import Device
-from solver.field import Field
-from solver.passes import Region
-from solver.warp import WarpMap
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Region
+from solver.warp.map import WarpMap
 
 Quality = Literal["catmull-rom", "bilinear", "nearest"]
 Edges = Literal["transparent", "black", "clamp", "mirror", "wrap"]
@@ -388,7 +388,7 @@ class Sampler:
         rows = self._spread_along_x(job, tile, at_centres, columns)
         lattice = self._field("lattice", (rows.width, bottom - top + more), rows.components, "f4")
         if self._is_new("lattice", (*job.key, job.size, job.is_paired, at_centres, tile, region and tuple(region))):
-            along_y = self.device.pass_("sampling/spread.frag", **({"PAIRED": 1} if job.is_paired else {}))
+            along_y = self.device.pass_("resample/spread.frag", **({"PAIRED": 1} if job.is_paired else {}))
             along_y(lattice, region=region, displacement=rows, first=top + shift, scale=scale)
         return lattice
 
@@ -406,7 +406,7 @@ class Sampler:
             defines |= {"PAIRED": 1, "NEAR": 1} if scale <= 1.0 else {"PAIRED": 1}
         rows = self._field(role, (width, job.displacement.height), components, "f4")
         if self._is_new(role, self._key(job, tile, region)):
-            along_x = self.device.pass_("sampling/spread.frag", **defines)
+            along_x = self.device.pass_("resample/spread.frag", **defines)
             along_x(rows, region=region, displacement=job.displacement, first=left + shift, scale=scale)
         return rows
 
@@ -460,7 +460,7 @@ class Sampler:
             else:
                 several = None if piece else regions(shown >= 2, more=1)
                 displacement = self._spread(job, tile, at_centres=False, region=several)
-            self.device.pass_("sampling/look_up.frag", **defines)(
+            self.device.pass_("resample/look_up.frag", **defines)(
                 target,
                 region=regions(shown == kind),
                 source=source,
@@ -494,7 +494,7 @@ class Sampler:
             defines: dict[str, object] = {"SINGLE": 1} if job.is_single else {}
             if job.how.samples != "auto":
                 defines["EVERYWHERE"] = min(job.pairs[0], 2)
-            self.device.pass_("sampling/classify.frag", **defines)(
+            self.device.pass_("resample/classify.frag", **defines)(
                 classes,
                 displacement=source,
                 texel=source.texel,
@@ -537,7 +537,7 @@ class Sampler:
             if job.is_packed:
                 defines["PACKED"], more = 1, 1
             prepared = self._field("prepared", (raw.width + more, raw.height), 4, "u4" if job.is_packed else "f4")
-            prepare = self.device.pass_("sampling/prepare.frag", **defines)
+            prepare = self.device.pass_("resample/prepare.frag", **defines)
             prepare(prepared, region=(0, 0, width + more, height), picture=raw, count=(width, height))
 
     def _take(self, job: _Job, target: np.ndarray) -> None:

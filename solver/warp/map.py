@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.context import Device
-from solver.field import Field, FieldError
-from solver.forward import ForwardMap
+from solver.gl.device import Device
+from solver.gl.field import Field, FieldError
+from solver.gl.points import draw_at
+from solver.gl.reduction import Reduction
 from solver.grid import Grid
-from solver.points import draw_at
-from solver.reduce import Reduction
+from solver.warp.inverse import ForwardMap
 
 if TYPE_CHECKING:
     from solver.fluid import Fluid
@@ -111,7 +111,7 @@ class WarpMap:
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
-        self.device.pass_("stages/trace.frag")(self._trace, velocity=velocity, dt_over_h=dt / self.grid.h)
+        self.device.pass_("step/trace.frag")(self._trace, velocity=velocity, dt_over_h=dt / self.grid.h)
         self.advance_traced(self._trace)
 
     def advance_traced(self, trace: Field) -> None:

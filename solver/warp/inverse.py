@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.points import draw_at
+from solver.gl.points import draw_at
 
 if TYPE_CHECKING:
-    from solver.warp import WarpMap
+    from solver.warp.map import WarpMap
 
 
 class ForwardMap:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import moderngl
 
-from solver.field import Field
-from solver.program import ShaderError, assemble, compile_program, declared_reads
+from solver.gl.field import Field
+from solver.gl.program import ShaderError, assemble, compile_program, declared_reads
 
 if TYPE_CHECKING:
-    from solver.context import Device
+    from solver.gl.device import Device
 
 GL_SAMPLERS = 0x8B5E, 0x8DD2  # sampler2D, usampler2D
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from solver.context import Device
-    from solver.field import Field
-    from solver.passes import Pass
+    from solver.gl.device import Device
+    from solver.gl.field import Field
+    from solver.gl.passes import Pass
 
     Faces = tuple[Field, Field]  # of u and of v
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.field import DoubleField, Field
-from solver.passes import Target
-from solver.reduce import Reduction
-from solver.separable import Separable
+from solver.gl.field import DoubleField, Field
+from solver.gl.passes import Target
+from solver.gl.reduction import Reduction
+from solver.gl.separable import Separable
 
 if TYPE_CHECKING:
-    from solver.context import Device
-    from solver.viscosity import Pair
+    from solver.gl.device import Device
+    from solver.packing import PackedFaces
 
 # A level of no more blocks of 2 x 2 cells than this is solved directly, by a dense matrix.
 DIRECT_BLOCKS = 64
@@ -204,7 +204,7 @@ class Pressure:
         source: Field | None = None,
         warm: bool = False,
         carried: DoubleField | None = None,
-        packed: Pair | None = None,
+        packed: PackedFaces | None = None,
     ) -> int:
         """Make `velocity` free of divergence, or its divergence equal to the source's; writes and swaps.
 

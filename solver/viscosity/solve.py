@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from solver.context import Device
-from solver.field import DoubleField, Field
+from solver.gl.device import Device
+from solver.gl.field import DoubleField, Field
+from solver.gl.passes import Region
+from solver.gl.reduction import Reduction
+from solver.gl.separable import ViscousWaves
+from solver.packing import DoublePackedFaces, PackedFaces, Packing, unpacked
 from solver.params import Walls
-from solver.passes import Region
-from solver.reduce import Reduction
-from solver.separable import ViscousWaves
-from solver.stiff_parts import StiffParts
+from solver.viscosity.deflation import StiffParts
 
 # Texels (of 2 x 2 cells) of the coarsest grid, on which the inverse matrix is at hand.
 COARSEST = 64
@@ -75,50 +76,6 @@ def plan_for(least: float, largest: float) -> Plan:
     return Plan(tolerance=0.08, sweeps=(1, 1), stiff=max(100.0, math.sqrt(least * largest)))
 
 
-class Pair:
-    """Packed faces: u and v, 2 x 2 a texel, inside a ring of zeros (see shaders/viscosity/block.glsl)."""
-
-    def __init__(self, device: Device, size: tuple[int, int], label: str) -> None:
-        self.u = device.field(size, 4, f"{label} u")
-        self.v = device.field(size, 4, f"{label} v")
-
-    @property
-    def fields(self) -> tuple[Field, Field]:
-        return self.u, self.v
-
-    def inputs(self, name: str = "") -> dict[str, Any]:
-        """The pair as a pass's inputs `<name>u` and `<name>v`."""
-        return {f"{name}u": self.u, f"{name}v": self.v}
-
-    def release(self) -> None:
-        self.u.release()
-        self.v.release()
-
-
-@dataclass(frozen=True)
-class Packing:
-    """What a pass needs to draw packed faces: where, its defines, and the inputs that tell the open ones."""
-
-    region: Region
-    defines: dict[str, Any]
-    open: dict[str, Any]
-
-
-class DoublePair:
-    """A ping-pong of pairs: `read`, `write` and `swap()`."""
-
-    def __init__(self, device: Device, size: tuple[int, int], label: str) -> None:
-        self.read = Pair(device, size, f"{label} a")
-        self.write = Pair(device, size, f"{label} b")
-
-    def swap(self) -> None:
-        self.read, self.write = self.write, self.read
-
-    def release(self) -> None:
-        self.read.release()
-        self.write.release()
-
-
 class Level:
     """One grid of the hierarchy: its matrix, its right-hand side and its iterate."""
 
@@ -136,8 +93,8 @@ class Level:
             for name in ("cells_x", "cells_y", "nodes", "inverse_u", "inverse_v")
         }
         self.packed["open"] = device.field(ringed, 4, f"{label} open", "f1")
-        self.right = Pair(device, ringed, f"{label} right-hand side")
-        self.faces = DoublePair(device, ringed, f"{label} faces")
+        self.right = PackedFaces(device, ringed, f"{label} right-hand side")
+        self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
         # Without solids, what walls leave of a grid whose last column or row is only half in it.
         self.box = finest[0] >> depth, finest[1] >> depth
         self.use(None, {})
@@ -193,15 +150,15 @@ class Viscosity:
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
         finest = self.levels[0]
         ringed = finest.right.u.size
-        self._ways = [Pair(device, ringed, f"viscous way {step}") for step in range(1, MOST_STEPS + 1)]
-        self._solution = Pair(device, ringed, "viscous solution")
+        self._ways = [PackedFaces(device, ringed, f"viscous way {step}") for step in range(1, MOST_STEPS + 1)]
+        self._solution = PackedFaces(device, ringed, "viscous solution")
         # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
-        self._change = DoublePair(device, ringed, "viscous change")
+        self._change = DoublePackedFaces(device, ringed, "viscous change")
         # Three follow one another; the last holds the right-hand side that moving walls make.
-        self._residuals = [Pair(device, ringed, f"viscous residual {step}") for step in range(4)]
+        self._residuals = [PackedFaces(device, ringed, f"viscous residual {step}") for step in range(4)]
         self._stiff_parts = StiffParts(device, finest.texels)
-        self._az = Pair(device, ringed, "viscous stress of z")
-        self._a_change = Pair(device, ringed, "viscous stress of the change")
+        self._az = PackedFaces(device, ringed, "viscous stress of z")
+        self._a_change = PackedFaces(device, ringed, "viscous stress of the change")
         self._factors = device.double_field((MOST_STEPS + 1, 1), 4, "viscous steps")
         self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
@@ -262,7 +219,7 @@ class Viscosity:
         return self.levels[min(self.plan.grids, self._exact_level.depth)]
 
     @property
-    def given(self) -> Pair:
+    def given(self) -> PackedFaces:
         """v*, packed, which is to be drawn here before `solve`: see `packing`."""
         return self.levels[0].right
 
@@ -277,7 +234,7 @@ class Viscosity:
         self._pack(velocity.read, self.given)
         self.unpack(self.solve(), velocity.read)
 
-    def solve(self) -> Pair:
+    def solve(self) -> PackedFaces:
         """The solution for what is `given`, packed, in lengths / s; valid until the next solve.
 
         By conjugate gradients from rest, first along v* and what the last step made of its v*, or by one correction to
@@ -293,16 +250,16 @@ class Viscosity:
         self._smooth(finest, right, self._weights(finest), start=self.given)
         return finest.faces.read
 
-    def unpack(self, faces: Pair, velocity: Field) -> None:
+    def unpack(self, faces: PackedFaces, velocity: Field) -> None:
         """Packed faces as a velocity on MAC faces."""
         self.device.pass_("viscosity/unpack.frag")(velocity, **faces.inputs())
 
-    def _pack(self, velocity: Field, target: Pair) -> None:
+    def _pack(self, velocity: Field, target: PackedFaces) -> None:
         packing = self.packing
         pack = self.device.pass_("viscosity/pack.frag", **packing.defines)
         pack(target.fields, region=packing.region, velocity=velocity, **packing.open)
 
-    def _right_hand_side(self) -> Pair:
+    def _right_hand_side(self) -> PackedFaces:
         """v*, and what walls that move drag along."""
         if not any(self._wall_speed):
             return self.given
@@ -314,7 +271,7 @@ class Viscosity:
 
     # -- conjugate gradients ----------------------------------------------------------------------------------------
 
-    def _conjugate_gradients(self, v_star: Pair, right: Pair) -> Pair:
+    def _conjugate_gradients(self, v_star: PackedFaces, right: PackedFaces) -> PackedFaces:
         """Solve A x = right along v*, then along multigrid cycles of what is left, until a cycle brings little more."""
         solution = v_star
         for done in range(0, self.plan.steps, MOST_STEPS):
@@ -324,7 +281,7 @@ class Viscosity:
                 break
         return solution
 
-    def _round(self, first: Pair, right: Pair, count: int) -> bool:
+    def _round(self, first: PackedFaces, right: PackedFaces, count: int) -> bool:
         """Leave in `_solution` the best of the plane of `first` and the last change, and then of so many more ways.
 
         The ways z are kept as they are, and only their factors are made conjugate; they are added up once, at the end.
@@ -332,7 +289,7 @@ class Viscosity:
         Returns:
             Whether still more would do little.
         """
-        finest, ways, before = self.levels[0], list[Pair](), right
+        finest, ways, before = self.levels[0], list[PackedFaces](), right
         self._measure_first(first, right)
         for step in range(count):
             left = self._residuals[step % 3]
@@ -357,7 +314,7 @@ class Viscosity:
         self._change.swap()
         return is_enough
 
-    def _measure_first(self, first: Pair, right: Pair) -> None:
+    def _measure_first(self, first: PackedFaces, right: PackedFaces) -> None:
         """A times `first` and the last change, and how much of both has the least energy."""
         finest = self.levels[0]
         self.device.pass_("viscosity/measure_first.frag", **finest.defines)(
@@ -375,7 +332,7 @@ class Viscosity:
         )
         self._factors.swap()
 
-    def _measure(self, z: Pair, right: Pair, before: Pair, step: int) -> None:
+    def _measure(self, z: PackedFaces, right: PackedFaces, before: PackedFaces, step: int) -> None:
         """A z, and from the residuals now and before how far to go along z once it is conjugate to the last way."""
         finest = self.levels[0]
         self.device.pass_("viscosity/measure.frag", **finest.defines)(
@@ -397,7 +354,7 @@ class Viscosity:
         gains = alpha**2 * curvature
         return bool(gains[step] <= self.plan.tolerance**2 * gains.sum())
 
-    def _advance(self, right: Pair, before: Pair, left: Pair, step: int) -> None:
+    def _advance(self, right: PackedFaces, before: PackedFaces, left: PackedFaces, step: int) -> None:
         """What the step leaves of the residual, and on it the first sweep of a cycle from rest."""
         finest = self.levels[0]
         defines: dict[str, Any] = {} if step else {"FIRST": 1}
@@ -414,7 +371,7 @@ class Viscosity:
         )
         finest.faces.swap()
 
-    def _finest_cycle(self, right: Pair) -> None:
+    def _finest_cycle(self, right: PackedFaces) -> None:
         """The rest of a multigrid cycle on the finest grid, from the first sweep on; stiff parts move as pieces."""
         finest = self.levels[0]
         if len(self.levels) == 1:
@@ -429,7 +386,7 @@ class Viscosity:
 
     # -- multigrid --------------------------------------------------------------------------------------------------
 
-    def _corrected(self, v_star: Pair, right: Pair) -> Pair:
+    def _corrected(self, v_star: PackedFaces, right: PackedFaces) -> PackedFaces:
         """A part of v*, corrected once: on the coarser grids, and face by face for what these do not carry."""
         finest, coarser = self.levels[:2]
         residual, weights = self._residuals[0], self._weights(finest, 1 + self.plan.sweeps[0])
@@ -455,7 +412,7 @@ class Viscosity:
         self._smooth(finest, right, weights[1:])
         return finest.faces.read
 
-    def _part_of(self, right: Pair, residual: Pair) -> Field:
+    def _part_of(self, right: PackedFaces, residual: PackedFaces) -> Field:
         """The part of v* that has least energy on the next coarser grid, one texel; what it leaves is `right` there."""
         coarser = self.levels[1]
         wanted, left, damped = coarser.faces.write, coarser.right, coarser.faces.read
@@ -503,7 +460,7 @@ class Viscosity:
                 self._cycle(finer, right, is_brief=self.plan.brief, taken=left)
 
     def _cycle(
-        self, level: Level, right: Pair, begun: bool = False, is_brief: bool = False, taken: float = 0.0
+        self, level: Level, right: PackedFaces, begun: bool = False, is_brief: bool = False, taken: float = 0.0
     ) -> None:
         """One multigrid cycle for A faces = right, from the level's iterate, or, `begun`, on from its first sweep.
 
@@ -522,7 +479,7 @@ class Viscosity:
         self._correct(level, right, is_brief)
         self._smooth(level, right, weights[::-1], taken=taken)
 
-    def _correct(self, level: Level, right: Pair, is_brief: bool = False) -> None:
+    def _correct(self, level: Level, right: PackedFaces, is_brief: bool = False) -> None:
         """Add what a cycle on the coarser grids makes of the residual, or a brief one's sweeps on the next of them."""
         # The write side is free until the correction is added.
         self._residual_of(level, level.faces.read, right, level.faces.write)
@@ -554,12 +511,17 @@ class Viscosity:
         middle, half = 0.5 * (largest + least), 0.5 * (largest - least)
         return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
 
-    def _start(self, level: Level, right: Pair, target: Pair, weight: float, add: bool = False) -> None:
+    def _start(self, level: Level, right: PackedFaces, target: PackedFaces, weight: float, add: bool = False) -> None:
         start = self.device.pass_("viscosity/start.frag", **level.defines)
         start(target.fields, add=add, region=level.region, weight=weight, **right.inputs("right_"), **level.matrix)
 
     def _smooth(
-        self, level: Level, right: Pair, weights: list[float], start: Pair | None = None, taken: float = 0.0
+        self,
+        level: Level,
+        right: PackedFaces,
+        weights: list[float],
+        start: PackedFaces | None = None,
+        taken: float = 0.0,
     ) -> None:
         """One sweep for each weight, on from the level's iterate or from `start`; see `_cycle` for `taken`."""
         sweep = self.device.pass_("viscosity/sweep.frag", **level.defines)
@@ -577,7 +539,9 @@ class Viscosity:
             level.faces.swap()
             start = None
 
-    def _residual_of(self, level: Level, faces: Pair, right: Pair, target: Pair, region: Region | None = None) -> None:
+    def _residual_of(
+        self, level: Level, faces: PackedFaces, right: PackedFaces, target: PackedFaces, region: Region | None = None
+    ) -> None:
         residual = self.device.pass_("viscosity/residual.frag", **level.defines)
         residual(
             target.fields, region=region or level.region, **faces.inputs(), **right.inputs("right_"), **level.matrix
@@ -590,7 +554,7 @@ class Viscosity:
         self._residual_of(finest, finest.faces.read, finest.right, self._residuals[0], region)
         return self._residuals[0].fields
 
-    def _restrict(self, residual: Pair, coarser: Level, target: Pair, weight: float = 0.0) -> None:
+    def _restrict(self, residual: PackedFaces, coarser: Level, target: PackedFaces, weight: float = 0.0) -> None:
         """The residual on the coarser grid; with a `weight` the first sweep on it too, from rest."""
         if not weight:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
@@ -617,7 +581,7 @@ class Viscosity:
         )
         finer.faces.swap()
 
-    def _solve_exactly(self, right: Pair) -> None:
+    def _solve_exactly(self, right: PackedFaces) -> None:
         level = self._exact_level
         if self._has_waves:
             self._waves.solve(right.fields, level.faces.write.fields, level.matrix["stiffness"])
@@ -714,12 +678,6 @@ def box_entries(level: Level) -> Entries:
     inside = (x < across) & (y < down)
     open_u, open_v = (inside & (x > 0))[:-1, :-1], (inside & (y > 0))[:-1, :-1]
     return cells, cells, level.matrix["stiffness"] * at_walls, open_u, open_v
-
-
-def unpacked(texels: np.ndarray) -> np.ndarray:
-    """Cells in their places, from the texels of 2 x 2 of them."""
-    height, width = texels.shape[:2]
-    return texels.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)
 
 
 def inverse_matrix(

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from solver.context import Device
-from solver.field import Field
+from solver.gl.device import Device
+from solver.gl.field import Field
 
 _SIDE = 8  # texels along the blocks that become one
 _SMALL = 20  # so many texels across are cheaper for one fragment to go through than to shrink again
@@ -26,7 +26,7 @@ class Reduction:
 
     def __init__(self, device: Device, size: tuple[int, int], components: int, kind: Literal["max", "sum"]) -> None:
         self._kind = kind
-        self._shrink = device.pass_("reduce/shrink.frag", **({"SUM": 1} if kind == "sum" else {}))
+        self._shrink = device.pass_("gl/shrink.frag", **({"SUM": 1} if kind == "sum" else {}))
         self._levels: list[Field] = []
         while max(size) > _SMALL:
             size = -(-size[0] // _SIDE), -(-size[1] // _SIDE)

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from solver.context import Device
-from solver.field import Field
 from solver.fluid import Fluid
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Region
 from solver.grid import Grid
-from solver.passes import Region
-from solver.warp import WarpMap
+from solver.warp.map import WarpMap
 
 Point = tuple[float, float]
 

@@ -1,0 +1,1 @@
+"""OpenGL and nothing of physics: the device, float textures, full-screen passes, sums over a texture."""

@@ -1,0 +1,62 @@
+"""Packed faces: u and v of the MAC grid, 2 x 2 of them a texel, inside a ring of zeros."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Region
+
+
+class PackedFaces:
+    """Packed faces: u and v, 2 x 2 a texel, inside a ring of zeros (see shaders/viscosity/block.glsl)."""
+
+    def __init__(self, device: Device, size: tuple[int, int], label: str) -> None:
+        self.u = device.field(size, 4, f"{label} u")
+        self.v = device.field(size, 4, f"{label} v")
+
+    @property
+    def fields(self) -> tuple[Field, Field]:
+        return self.u, self.v
+
+    def inputs(self, name: str = "") -> dict[str, Any]:
+        """The pair as a pass's inputs `<name>u` and `<name>v`."""
+        return {f"{name}u": self.u, f"{name}v": self.v}
+
+    def release(self) -> None:
+        self.u.release()
+        self.v.release()
+
+
+@dataclass(frozen=True)
+class Packing:
+    """What a pass needs to draw packed faces: where, its defines, and the inputs that tell the open ones."""
+
+    region: Region
+    defines: dict[str, Any]
+    open: dict[str, Any]
+
+
+class DoublePackedFaces:
+    """A ping-pong of pairs: `read`, `write` and `swap()`."""
+
+    def __init__(self, device: Device, size: tuple[int, int], label: str) -> None:
+        self.read = PackedFaces(device, size, f"{label} a")
+        self.write = PackedFaces(device, size, f"{label} b")
+
+    def swap(self) -> None:
+        self.read, self.write = self.write, self.read
+
+    def release(self) -> None:
+        self.read.release()
+        self.write.release()
+
+
+def unpacked(texels: np.ndarray) -> np.ndarray:
+    """Cells in their places, from the texels of 2 x 2 of them."""
+    height, width = texels.shape[:2]
+    return texels.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)

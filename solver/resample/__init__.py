@@ -1,0 +1,1 @@
+"""Looking a picture up through a map."""

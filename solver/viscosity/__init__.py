@@ -1,0 +1,1 @@
+"""The implicit viscous step with a viscosity that varies from cell to cell."""

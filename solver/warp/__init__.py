@@ -1,0 +1,1 @@
+"""What the velocity carries: the map of the picture, its inverse, and densities."""
