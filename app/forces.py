@@ -213,17 +213,19 @@ class GradientForce(_Force):
             return None
         faces = np.pad(self._faces(grid, pictures).astype(np.float64), ((0, 1), (0, 1), (0, 0)))
         u, v = faces[..., 0], faces[..., 1]
-        return ((u[:-1, 1:] - u[:-1, :-1] + v[1:, :-1] - v[:-1, :-1]) / grid.h).astype(np.float32)
+        across, down = np.diff(u[:-1], axis=1), np.diff(v[:, :-1], axis=0)
+        return (across / grid.spacing[0] + down / grid.spacing[1]).astype(np.float32)
 
     def _faces(self, grid: Grid, pictures: Pictures) -> np.ndarray:
         height = self.potential(grid, pictures)
         if np.ptp(height) < 1e-6:
             raise ValueError(f"{self.picture} is the same everywhere, so that it has no gradient")
         # The steepest place of a blurred edge of height 1 then has gradient 1, whatever the blur.
-        scale = self.strength * self.blur / 2 * math.sqrt(2 * math.pi) / grid.h
+        scale = self.strength * self.blur / 2 * math.sqrt(2 * math.pi)
         scale *= -1.0 if self.direction == "outward" else 1.0
         u, v = np.zeros_like(height), np.zeros_like(height)
-        u[:, 1:], v[1:] = scale * np.diff(height, axis=1), scale * np.diff(height, axis=0)
+        u[:, 1:] = scale * np.diff(height, axis=1) / grid.spacing[0]
+        v[1:] = scale * np.diff(height, axis=0) / grid.spacing[1]
         if self.within:
             weight_u, weight_v = _to_faces(*(self.within.weight(grid),) * 2)
             u, v = u * weight_u, v * weight_v
@@ -370,8 +372,8 @@ def _slope(r: np.ndarray, radius: float, falloff: Falloff) -> np.ndarray:
 def _neighbourhood(grid: Grid, place: np.ndarray, radius: float, falloff: Falloff) -> tuple[slice, slice]:
     """The cells that a profile at `place` reaches, as rows and columns."""
     reach = radius * (3.5 if falloff == "gaussian" else 1.0)
-    low = np.maximum(np.floor((place - reach) / grid.h).astype(int), 0)
-    high = np.maximum(np.ceil((place + reach) / grid.h).astype(int) + 1, 0)
+    low = np.maximum(np.floor((place - reach) / grid.spacing).astype(int), 0)
+    high = np.maximum(np.ceil((place + reach) / grid.spacing).astype(int) + 1, 0)
     return slice(low[1], high[1]), slice(low[0], high[0])
 
 
@@ -380,9 +382,10 @@ def _curl(grid: Grid, centre: np.ndarray, stream: Callable[[np.ndarray, np.ndarr
 
     `stream(x, y)` takes places relative to `centre`. A brush that reaches over the edge is cut off there.
     """
-    x, y = np.meshgrid(np.arange(grid.nx + 1) * grid.h - centre[0], np.arange(grid.ny + 1) * grid.h - centre[1])
+    hx, hy = grid.spacing
+    x, y = np.meshgrid(np.arange(grid.nx + 1) * hx - centre[0], np.arange(grid.ny + 1) * hy - centre[1])
     nodes = stream(x, y)
-    return _on_faces(np.diff(nodes, axis=0)[:, :-1] / grid.h, -np.diff(nodes, axis=1)[:-1] / grid.h)
+    return _on_faces(np.diff(nodes, axis=0)[:, :-1] / hy, -np.diff(nodes, axis=1)[:-1] / hx)
 
 
 def _to_faces(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The simulation's grid: square cells over a picture whose longer side is 1."""
+"""The simulation's grid: cells over a picture whose longer side is 1."""
 
 from __future__ import annotations
 
@@ -11,14 +11,26 @@ SMALLEST_GRID = 8
 
 @dataclass(frozen=True)
 class Grid:
-    """`nx x ny` square cells of side `h = 1 / max(nx, ny)`; x to the right, y down, row 0 on top."""
+    """`nx x ny` cells over a picture whose longer side is 1; x to the right, y down, row 0 on top.
+
+    Attributes:
+        nx, ny: whole cells along the width and the height, each from 8.
+        extent: (width, height) of the picture, the longer of them 1; by default that of square cells. The cells divide
+            it evenly, so that they are a little wider or narrower than high where it is no whole number of squares.
+    """
 
     nx: int
     ny: int
+    extent: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         if min(self.nx, self.ny) < SMALLEST_GRID:
             raise ValueError(f"a grid of {self.nx} x {self.ny} is below {SMALLEST_GRID} x {SMALLEST_GRID}")
+        if self.extent == (0.0, 0.0):
+            longer = max(self.nx, self.ny)
+            object.__setattr__(self, "extent", (self.nx / longer, self.ny / longer))
+        if not (max(self.extent) == 1.0 and min(self.extent) > 0.0):
+            raise ValueError(f"a picture of {self.extent} longer sides: the longer must be 1, the other above 0")
 
     @classmethod
     def for_picture(cls, width: int, height: int, cells: int) -> Grid:
@@ -39,14 +51,14 @@ class Grid:
         return self.nx, self.ny
 
     @property
-    def h(self) -> float:
-        """Side of a cell, in longer sides of the picture."""
-        return 1.0 / max(self.nx, self.ny)
+    def spacing(self) -> tuple[float, float]:
+        """(width, height) of a cell, in longer sides of the picture."""
+        return self.extent[0] / self.nx, self.extent[1] / self.ny
 
     @property
-    def extent(self) -> tuple[float, float]:
-        """(width, height) of the domain, the longer of them 1."""
-        return self.nx * self.h, self.ny * self.h
+    def h(self) -> float:
+        """The longer side of a cell, for what needs no more than its scale."""
+        return max(self.spacing)
 
     def centres(self) -> tuple[np.ndarray, np.ndarray]:
         """x and y of the cell centres, float64, each (ny, nx)."""
@@ -65,5 +77,6 @@ class Grid:
         return self._points(0.0, 0.0)
 
     def _points(self, dx: float, dy: float) -> tuple[np.ndarray, np.ndarray]:
-        x, y = np.meshgrid((np.arange(self.nx) + dx) * self.h, (np.arange(self.ny) + dy) * self.h)
+        (width, height), (nx, ny) = self.extent, self.size
+        x, y = np.meshgrid((np.arange(nx) + dx) / nx * width, (np.arange(ny) + dy) / ny * height)
         return x, y
