@@ -4,9 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import moderngl
 import pytest
 
+import solver.gl.passes
+from khronos import Programs
 from solver.gl.device import Device
+
+
+@pytest.fixture(scope="session", autouse=True)
+def khronos_accepts_every_program() -> Iterator[None]:
+    """Every program that the tests of this process compile passes the Khronos reference compiler too."""
+    compile_program, programs = solver.gl.passes.compile_program, Programs()
+
+    def noting(ctx: moderngl.Context, fragment: str, defines: dict[str, object]) -> moderngl.Program:
+        program = compile_program(ctx, fragment, defines)
+        programs.add(fragment, defines)
+        return program
+
+    solver.gl.passes.compile_program = noting
+    yield
+    solver.gl.passes.compile_program = compile_program
+    assert not programs.complaints()
 
 
 @pytest.fixture(scope="session")

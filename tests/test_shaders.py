@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import shaders
+from khronos import Programs
 from solver.gl.device import Device
 from solver.gl.program import ShaderError, assemble, compile_program, read_shader
 
@@ -59,6 +60,19 @@ void main() { out_a = vec4(u_a, u_b); out_b = vec4(u_c, u_e, u_f); out_c = u_d; 
     found = np.concatenate([target.get() for target in targets], axis=-1)
     wanted = np.concatenate([a, b, c, e, np.array([-7], np.float32), d])
     np.testing.assert_array_equal(found, np.broadcast_to(wanted, found.shape))
+
+
+def test_the_reference_compiler_finds_what_drivers_overlook(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = read_shader
+    source = "out vec4 c;\nvoid main() { int i = 0; c = vec4(i) * texture(u_nowhere, vec2(0.5)); }\n"
+    monkeypatch.setattr("solver.gl.program.read_shader", lambda path: source if path == "wrong.frag" else real(path))
+    programs = Programs()
+    programs.add("step/add_force.frag", {})
+    assert not programs.complaints()
+    programs.add("wrong.frag", {})
+    complaint, *_ = programs.complaints()
+    assert complaint.startswith("wrong.frag")
+    assert "u_nowhere" in complaint
 
 
 def test_missing_include_is_named() -> None:

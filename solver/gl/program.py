@@ -93,18 +93,24 @@ def _carried(vertex: str, fragment: str) -> tuple[str, str]:
     )
 
 
-def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, object]) -> moderngl.Program:
-    """The program of a fragment shader: over the whole screen, or with the vertex shader of the same name beside it.
-
-    Raises:
-        ShaderError: if it does not compile; names the file and the line, includes resolved.
-    """
+def program_sources(fragment: str, defines: dict[str, object]) -> tuple[str, str, list[tuple[str, int]]]:
+    """The GLSL of the vertex and of the fragment shader of a program, and where each line of the latter comes from."""
     own = fragment.replace(".frag", ".vert")
     vertex_source, _ = assemble(own if shader_exists(own) else FULL_SCREEN_VERTEX, {})
     source, table = assemble(fragment, defines)
     if not shader_exists(own):
         vertex_source, source = _carried(vertex_source, source)
         table = table[: source.count("\n") - len(table)] + table
+    return vertex_source, source, table
+
+
+def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, object]) -> moderngl.Program:
+    """The program of a fragment shader: over the whole screen, or with the vertex shader of the same name beside it.
+
+    Raises:
+        ShaderError: if it does not compile; names the file and the line, includes resolved.
+    """
+    vertex_source, source, table = program_sources(fragment, defines)
 
     def place(match: re.Match[str]) -> str:
         line = int(match.group(1) or match.group(2))
