@@ -23,6 +23,8 @@ class Programs:
     def complaints(self) -> list[str]:
         """What glslangValidator finds wrong with them, each beginning with the shader and its defines."""
         found: list[str] = []
+        if not self._sources:
+            return found
         with tempfile.TemporaryDirectory() as folder:
             names: dict[str, str] = {}
             for number, (name, sources) in enumerate(self._sources.items()):
