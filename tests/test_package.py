@@ -51,7 +51,8 @@ def test_the_wheel_holds_the_program_and_no_tests(built: Path):
 
 def test_the_source_distribution_is_built_from_itself(built: Path):
     (source,) = built.glob("*.tar.gz")
-    names = {name.split("/", 1)[-1] for name in tarfile.open(source).getnames()}
+    with tarfile.open(source) as archive:
+        names = {name.split("/", 1)[-1] for name in archive.getnames()}
     assert {"pyproject.toml", "README.md", "LICENSE", "shaders/lib/full_screen.vert", "app/cli.py"} <= names
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes.util
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -41,6 +43,19 @@ class Limits:
         return any(name in self.renderer.lower() for name in ("llvmpipe", "softpipe", "swiftshader"))
 
 
+def _standalone_contexts() -> Iterator[dict[str, Any]]:
+    """How a context without a window can be asked for on this system, the best first."""
+    if not sys.platform.startswith("linux"):
+        yield {}  # WGL on Windows, CGL on macOS
+        return
+    yield {"backend": "egl"}
+    if ctypes.util.find_library("EGL"):
+        # Without the -dev packages only the versioned names exist.
+        yield {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1"}
+    if os.environ.get("DISPLAY"):
+        yield {"libgl": "libGL.so.1", "libx11": "libX11.so.6"}  # GLX
+
+
 class Device:
     """One GL context and everything made in it.
 
@@ -72,24 +87,21 @@ class Device:
 
     @classmethod
     def headless(cls) -> Device:
-        """A device of its own through EGL, with no window.
+        """A device of its own, with no window: through EGL on Linux, through the system's own way elsewhere.
 
         Raises:
-            ContextError: if EGL or an OpenGL 3.3 driver is missing; the message says what to install.
+            ContextError: if there is no OpenGL 3.3 driver; the message says what was tried and what to install.
         """
-        attempts: list[dict[str, Any]] = [{}]
-        if ctypes.util.find_library("EGL"):
-            # Without the -dev packages only the versioned names exist.
-            attempts.append({"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
-        reason = ""
-        for libraries in attempts:
+        reasons: list[str] = []
+        for settings in _standalone_contexts():
             try:
-                ctx = moderngl.create_context(require=330, standalone=True, **{"backend": "egl", **libraries})
+                ctx = moderngl.create_context(require=330, standalone=True, **settings)
             except Exception as error:  # glcontext raises plain Exception
-                reason = str(error)
+                reasons.append(str(error))
             else:
                 return cls(ctx, owns_context=True)
-        raise ContextError(f"no OpenGL 3.3 without a window ({reason}); {INSTALL_HINT}")
+        hint = f"; {INSTALL_HINT}" if sys.platform.startswith("linux") else ""
+        raise ContextError(f"no OpenGL 3.3 without a window ({', '.join(dict.fromkeys(reasons))}){hint}")
 
     # -- what is made in it -----------------------------------------------------------------------------------------
 
