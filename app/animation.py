@@ -219,7 +219,8 @@ def animation_writer(
     loops: GIF, APNG, WebP; 0 is for ever.
     quality, bits: of a sequence's pictures; see `write_picture`.
     sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
-    like: the picture whose profile and metadata the pictures of a sequence get.
+    like: the picture whose profile and metadata the pictures of a sequence get; whether its alpha is premultiplied, so
+        that of the frames is.
     cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
     passed: hears of frames that a later pass has gone through, after all were given, in formats that have `passes`.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
@@ -234,18 +235,22 @@ def animation_writer(
         with sequence_writer(path, write_one, first, cancel) as write:
             yield write
         return
+
+    def straight(frame: np.ndarray) -> np.ndarray:
+        return like.with_pixels(frame).straight().pixels if like else frame
+
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
     with replacing(path) as temporary:
         if container.name == "GIF":
             with _gif_writer(temporary, str(path), rate, loops, cancel, passed) as write:
-                yield write
+                yield lambda frame: write(straight(frame))
             return
         sound_in, sound_out = _sound(container, sound, rate, frames, sound_from)
         encoding = container.encoding(codec)
         even = container.even
         with _Video(temporary, str(path), encoding, rate, even, crf, loops, sound_in, sound_out, cancel) as video:
-            yield video.write
+            yield lambda frame: video.write(straight(frame))
             video.finish()
 
 

@@ -114,7 +114,7 @@ class Application:
             mend = "write f.%04d.png or .mp4" if not animated else "write a picture, such as out.png"
             given = "several maps or a clip" if not animated else "one map and one picture"
             raise UserError(f"Cannot write {self.output}: {given} do not make {what}; {mend}.")
-        with Applier(device, self.edges) as applier:
+        with Applier(device, self.edges, source.picture.premultiplied) as applier:
             if animated:
                 self._write_frames(applier, source, progress)
             else:
@@ -173,9 +173,9 @@ class Application:
 class Applier:
     """Looks pictures up through given maps; keeps the last map on the GPU, as most stay for many frames."""
 
-    def __init__(self, device: Device, edges: Edges) -> None:
+    def __init__(self, device: Device, edges: Edges, premultiplied: bool = False) -> None:
         self._device = device
-        self._edges: Edges = edges
+        self._how = Sampling(edges=edges, premultiplied=premultiplied)
         self._sampler = Sampler(device)
         self._given: Displacement | None = None
         self._map: GivenMap | None = None
@@ -199,8 +199,7 @@ class Applier:
                 inverse = inverted(self._device, given) if given.forward else given
                 values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
                 self._map, self._given = GivenMap(self._device, values), given
-            how = Sampling(edges=self._edges)
-            return looked_up(self._sampler, self._map, pixels, size, how, alpha, heard)
+            return looked_up(self._sampler, self._map, pixels, size, self._how, alpha, heard)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
 

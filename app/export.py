@@ -7,7 +7,7 @@ import gc
 import json
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import chain, count, groupby, islice, pairwise, repeat
 from math import ceil
@@ -214,6 +214,8 @@ class _Export:
         self.states = StoredStates(job.states, self.replay, self.pictures.notice) if job.states else None
         self.sampler = Sampler(device)
         self.size = result_size(job.recipe, job.picture)
+        # What the results belong to; densities are straight, whatever the picture is.
+        self.like = replace(job.picture, premultiplied=False) if job.recipe.mode == "density" else job.picture
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.numbers: list[dict[str, Any]] = []
         self._position: Fraction | None = None
@@ -239,7 +241,7 @@ class _Export:
             if job.output is not None:
                 steps = steps_for(self.size)
                 frame = self._frame(job.picture.pixels, self.progress.parts(steps, self.size[1]))
-                picture = job.picture.with_pixels(frame)
+                picture = self.like.with_pixels(frame)
                 self.progress.enter("writing")
                 write_picture(job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip)
                 self.progress.count(steps)
@@ -344,7 +346,7 @@ class _Export:
             sound_from=float(first / job.rate) + (job.clip.late if job.clip else 0),
             frames=None if last is None else last + 1 - first,
             first=first,
-            like=job.picture.stripped() if job.strip else job.picture,
+            like=self.like.stripped() if job.strip else self.like,
             cancel=self.progress.cancel,
             passed=self.progress.advance,
         )
@@ -392,7 +394,8 @@ class _Export:
         # The frames of an animation are all of one kind, and most of its formats have no alpha.
         alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
         with self.device.stage("sample picture"):
-            how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
+            premultiplied = self.job.picture.premultiplied
+            how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples, premultiplied=premultiplied)
             try:
                 return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, heard)
             except SamplingError as error:

@@ -175,7 +175,7 @@ class FieldForce(_Force):
         picture = pictures.load(self.picture)
         if picture.pixels.shape[2] < 3:
             raise ValueError(f"{self.picture} is grey; a field needs red (x) and green (y)")
-        x, y = (to_grid(component, grid) for component in _decoded(picture.pixels))
+        x, y = (to_grid(component, grid) for component in _decoded(picture.straight().pixels))
         return _on_faces(*_to_faces(self.strength * x, self.strength * (y if self.green == "down" else -y)))
 
 

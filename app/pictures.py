@@ -20,6 +20,8 @@ import numpy as np
 from app.errors import UserError
 from app.files import replacing
 
+EXR_LAYOUT = frozenset({"version", "chunkCount", "maxSamplesPerPixel", "dwaCompressionLevel"})
+
 MAX_PIXELS = 400_000_000
 MOST_TEXT = 64 * 2**20  # bytes of a profile or text in a PNG, unpacked
 PNG_LEVEL = 4  # on photographs as small as zlib's 6 within 1 %, in half the time
@@ -35,8 +37,12 @@ LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
 class Picture:
     """Pixels, top row first, with what belongs to them.
 
-    `pixels` is (h, w, c), c = 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA, alpha straight; uint8 and uint16 hold the whole
-    range in the transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
+    `pixels` is (h, w, c), c = 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; uint8 and uint16 hold the whole range in the
+    transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
+    premultiplied: where there is alpha, the colours are multiplied by it, as the file has them. They stay so, since
+    dividing rounds, and since the colour where alpha is 0 (a flame, a glow) would be lost.
+    attributes: numbers of an EXR's header by name, such as pixelAspectRatio. chunks: a PNG's, that say what its colours
+    mean. notes: what of the file is not in here, a sentence each.
     """
 
     pixels: np.ndarray
@@ -46,6 +52,10 @@ class Picture:
     dpi: tuple[float, float] | None = None
     chromaticities: tuple[float, ...] | None = None
     texts: Mapping[str, str] = field(default_factory=dict)
+    premultiplied: bool = False
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    chunks: Mapping[bytes, bytes] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
@@ -75,7 +85,15 @@ class Picture:
 
     def stripped(self) -> Picture:
         """The same pixels without the metadata; what the colours mean is kept."""
-        return Picture(self.pixels, icc=self.icc, chromaticities=self.chromaticities)
+        kept = {key: value for key, value in self.attributes.items() if key == "pixelAspectRatio"}
+        return replace(self, exif=None, xmp=None, dpi=None, texts={}, attributes=kept)
+
+    def straight(self) -> Picture:
+        """The same picture, its colours not multiplied by alpha."""
+        if not self.premultiplied:
+            return self
+        pixels = unpremultiplied(self.pixels) if self.has_alpha else self.pixels
+        return replace(self, pixels=pixels, premultiplied=False)
 
 
 @dataclass(frozen=True)
@@ -180,8 +198,9 @@ def unpremultiplied(pixels: np.ndarray) -> np.ndarray:
     """Straight alpha from premultiplied; colour without alpha is left as it is."""
     alpha = pixels[..., -1:].astype(np.float32)
     whole = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
-    scale = np.divide(whole, alpha, out=np.ones_like(alpha), where=alpha > 0)
-    colours = pixels[..., :-1] * scale
+    with np.errstate(all="ignore"):  # what is infinite or NaN stays so
+        scale = np.divide(whole, alpha, out=np.ones_like(alpha), where=alpha > 0)
+        colours = pixels[..., :-1] * scale
     if pixels.dtype != np.float32:
         colours = np.clip(colours + 0.5, 0, whole)
     return np.concatenate([colours.astype(pixels.dtype), pixels[..., -1:]], axis=2)
@@ -423,8 +442,8 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
     if pixels.shape[2] > 4:  # further samples are masks and spot colours
         pixels = pixels[..., : 4 if page.extrasamples else 3]
-    if page.extrasamples and page.extrasamples[0] == tifffile.EXTRASAMPLE.ASSOCALPHA and pixels.shape[2] in (2, 4):
-        pixels = unpremultiplied(pixels)
+
+    premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
 
     exif = Image.Exif()
     with file.open("rb") as stream:
@@ -445,6 +464,7 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
         exif=encoded,
         xmp=_upright_xmp(bytes(tags[700])) if 700 in tags else None,
         dpi=_positive([value * unit for value in resolution]) if unit and len(resolution) == 2 else None,
+        premultiplied=premultiplied,
     )
 
 
@@ -522,10 +542,18 @@ def _read_exr(file: Path, name: str, max_pixels: int) -> Picture:
     place_window(data, (left - first_x, top - first_y), pixels)
     chromaticities = header.get("chromaticities")
     return Picture(
-        unpremultiplied(pixels) if wanted[-1] == "A" else pixels,
+        pixels,
         chromaticities=tuple(float(value) for value in chromaticities) if chromaticities is not None else None,
         texts={key: value for key, value in header.items() if isinstance(value, str) and key not in ("name", "view")},
+        premultiplied=True,
+        attributes={key: value for key, value in header.items() if _is_kept(key, value)},
     )
+
+
+def _is_kept(key: str, value: Any) -> bool:
+    """Whether an attribute of an EXR is a number or a few, and says nothing about how the file is laid out."""
+    numbers = isinstance(value, int | float) or (isinstance(value, np.ndarray) and value.dtype.kind == "f")
+    return numbers and key not in EXR_LAYOUT
 
 
 def place_window(data: np.ndarray, at: tuple[int, int], into: np.ndarray) -> None:
@@ -566,6 +594,8 @@ def write_picture(
     if strip:
         picture = picture.stripped()
     depth = bits or max((held for held in chosen.bits if held <= picture.bits), default=chosen.bits[0])
+    if depth != picture.bits or chosen not in (TIFF, EXR):
+        picture = picture.straight()
     picture = picture.with_pixels(to_bits(picture.pixels, depth))
     if picture.has_alpha and not chosen.alpha:
         picture = picture.with_pixels(over(picture.pixels, background))
@@ -669,7 +699,7 @@ def _write_tiff(temporary: Path, picture: Picture) -> None:
         picture.pixels if channels > 1 else picture.pixels[..., 0],
         photometric="rgb" if channels >= 3 else "minisblack",
         planarconfig="contig" if channels > 1 else None,
-        extrasamples=["unassalpha"] if picture.has_alpha else None,
+        extrasamples=["assocalpha" if picture.premultiplied else "unassalpha"] if picture.has_alpha else None,
         compression="zlib",
         compressionargs={"level": PNG_LEVEL},
         predictor=True,
@@ -718,9 +748,10 @@ def _write_exr(temporary: Path, picture: Picture) -> None:
     if pixels.shape[2] == 2:  # luminance with alpha is allowed, and misread by ffmpeg
         pixels = pixels[..., [0, 0, 0, 1]]
     names = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
-    if picture.has_alpha:  # OpenEXR's convention is premultiplied
-        pixels = np.concatenate([pixels[..., :-1] * pixels[..., -1:], pixels[..., -1:]], axis=2)
-    attributes: dict[str, Any] = dict(picture.texts)
+    if picture.has_alpha and not picture.premultiplied:  # OpenEXR's convention
+        with np.errstate(all="ignore"):
+            pixels = np.concatenate([pixels[..., :-1] * pixels[..., -1:], pixels[..., -1:]], axis=2)
+    attributes: dict[str, Any] = {**picture.texts, **picture.attributes}
     if picture.chromaticities:
         attributes["chromaticities"] = picture.chromaticities
     write_exr(temporary, {name: pixels[..., index] for index, name in enumerate(names)}, attributes)

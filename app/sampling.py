@@ -94,7 +94,7 @@ class Pictures:
 
 def channels(picture: Picture) -> tuple[np.ndarray, np.ndarray]:
     """Red, green and blue (h, w, 3) as the eye sees them (sRGB curve), and alpha (h, w), float32 in [0, 1]."""
-    pixels = picture.pixels
+    pixels = picture.straight().pixels
     if picture.linear:
         colours = linear_to_srgb(np.clip(np.nan_to_num(pixels), 0, 1)).astype(np.float32)
     else:

@@ -200,7 +200,7 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
         else:
             blocks = pixels.reshape(height // step, step, width // step, step, -1)
             pixels = blocks.mean(axis=(1, 3), dtype=np.float32).astype(picture.pixels.dtype)
-    pixels = to_bits(pixels, 8, dither=False)
+    pixels = to_bits(picture.with_pixels(pixels).straight().pixels, 8, dither=False)
     if pixels.shape[2] <= 2:
         pixels = np.concatenate([pixels[..., :1].repeat(3, axis=2), pixels[..., 1:]], axis=2)
     if pixels.shape[2] == 3:

@@ -6,7 +6,7 @@
 //
 // u_source: the picture, or a piece of it, whose first pixel is u_corner and whose size u_extent, in pixels;
 // premultiplied where PREPARED is defined, two neighbours in a texel where PACKED is (prepare.frag), else as it is;
-// u_raw: with PREPARED, the picture as it is;
+// u_raw: the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels; with ONE defined at their centres along x, as
 // spread.frag draws it, and along y still at the map's texels, u_scale to a pixel, or with SPREAD at the centres too;
 // u_texel, u_raw_texel, u_next: size of a texel of both and of the displacement, 0-1;
@@ -14,7 +14,7 @@
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
 // Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places, or ONE; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
-// OPAQUE if there is no alpha; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
+// OPAQUE if there is no alpha; PREMULTIPLIED if u_raw is, and the result; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
 // GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
 // they have in common is done once, and a software rasteriser waits for the pixels of both at the same time.
 // reads: 30
@@ -256,11 +256,18 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #endif
 #endif
 
-#if defined(PREPARED) && !defined(OPAQUE)
+#if TAPS > 1 && !defined(OPAQUE)
     // The weights add up to 1 but for their rounding, less than a millionth: what is opaque stays so, in the very colours
     // that it has without an alpha channel.
     color.a = color.a > 1.0 - 1e-5 ? 1.0 : max(color.a, 0.0);
-    color.rgb = color.a > 0.0 ? color.rgb / color.a : vec3(0.0);
+#ifdef PREPARED
+    float weight = color.a > 0.0 ? color.a : 1.0;
+#ifdef PREMULTIPLIED
+    color.rgb /= weight;
+#else
+    color.rgb = color.a > 0.0 ? color.rgb / weight : vec3(0.0);
+#endif
+#endif
 #endif
 #ifdef CLAMPED
     color = clamp(color, 0.0, 1.0);
@@ -268,11 +275,14 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #ifdef LINEAR_LIGHT
     color.rgb = linear_to_srgb(color.rgb);
 #endif
+#if defined(PREPARED) && defined(PREMULTIPLIED)
+    color.rgb *= weight;
+#endif
 #ifdef DITHER
     color.rgb = min(floor(color.rgb * 255.0 + even_noise(pixel)), 255.0) / 255.0;
 #endif
-#if defined(PREPARED) && !defined(ZOOMED)
-    // Moved by whole pixels, and above all not at all: the very values of the picture.
+#if TAPS > 1 && !defined(ZOOMED) && (defined(PREPARED) || !defined(CODES))
+    // Moved by whole pixels, and above all not at all: the very values of the picture, infinite ones and NaN too.
     vec2 nearest = floor(centre), same = whole - CORNER + nearest + 0.5;
     bool copied = shifted && all(lessThan(abs(centre - nearest - 0.5), vec2(1.0 / 1024.0)))
                && all(greaterThan(same, vec2(0.0))) && all(lessThan(same, u_extent));

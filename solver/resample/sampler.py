@@ -46,6 +46,7 @@ class Sampling:
             stretch s of the map in that direction there: 2 clamp(ceil(0.75 s), 1, 4), 1 where it shifts or enlarges.
         linear_light: mix in linear light; uint8 and uint16 are taken as sRGB, float32 as linear already.
         dither: spread the rounding to 8 bits by a fixed pattern; by default where light is mixed.
+        premultiplied: the colours are multiplied by alpha already, and stay so.
     """
 
     quality: Quality = "catmull-rom"
@@ -53,6 +54,7 @@ class Sampling:
     samples: int | Literal["auto"] = "auto"
     linear_light: bool = True
     dither: bool | None = None
+    premultiplied: bool = False
 
 
 class GivenMap:
@@ -110,13 +112,22 @@ class _Job:
         return self.channels in (2, 4)
 
     @property
+    def is_premultiplied(self) -> bool:
+        return self.has_alpha and self.how.premultiplied
+
+    @property
     def is_curved(self) -> bool:
         """True if the values are sRGB and are to be mixed in linear light."""
         return self.how.linear_light and self.picture.dtype != np.float32
 
     @property
     def is_prepared(self) -> bool:
-        return self.how.quality != "nearest" and (self.is_curved or self.has_alpha)
+        return self.how.quality != "nearest" and (self.is_curved or self.has_alpha != self.is_premultiplied)
+
+    @property
+    def preparation(self) -> tuple[bool, bool, bool]:
+        """What the picture on the GPU depends on."""
+        return self.is_prepared, self.is_curved, self.is_premultiplied
 
     @cached_property
     def is_packed(self) -> bool:
@@ -188,6 +199,7 @@ class _Job:
             "CLAMPED": levels > 0 and self.how.quality == "catmull-rom",  # the only one that overshoots
             "DITHER": dither and kind == "f1" and self.how.quality != "nearest",
             "OPAQUE": not self.has_alpha,
+            "PREMULTIPLIED": self.is_premultiplied,
             "GREY_ALPHA": self.channels == 2,
             "PAIRED": self.is_paired,
         }
@@ -216,7 +228,7 @@ class Sampler:
         self._spread_for: dict[str, tuple[object, ...]] = {}  # what was spread last, by the field it is in
         self._classes_for: tuple[object, ...] = ()
         self._classes = np.empty((0, 0), np.uint8)
-        self._held: tuple[np.ndarray, bool, bool] | None = None
+        self._held: tuple[np.ndarray, bool, bool, bool] | None = None
 
     def apply(
         self,
@@ -229,7 +241,7 @@ class Sampler:
 
         Args:
             warp: the map, laid over the whole of the picture.
-            picture: (h, w) or (h, w, 1-4), uint8, uint16 or float32, straight alpha last. A read-only array that is
+            picture: (h, w) or (h, w, 1-4), uint8, uint16 or float32, alpha last. A read-only array that is
                 given again is still there and is not uploaded again.
             size: (width, height) of the result, by default the picture's.
             how: see `Sampling`.
@@ -266,7 +278,7 @@ class Sampler:
         if whole and not self._holds(picture, job):
             self._load(job, (0, 0, *job.source_size))
             # The array itself and not its id: no other can take its place in memory as long as it is held.
-            self._held = None if picture.flags.writeable else (picture, job.is_prepared, job.is_curved)
+            self._held = None if picture.flags.writeable else (picture, *job.preparation)
         for top in range(0, height, rows):
             bottom = min(top + rows, height)
             shape = bottom - top, width, job.channels
@@ -514,7 +526,7 @@ class Sampler:
         """Whether all of the picture is on the GPU as the job needs it."""
         if self._held is None or self._held[0] is not picture:
             return False
-        return self._held[1:] == (job.is_prepared, job.is_curved)
+        return self._held[1:] == job.preparation
 
     def _load(self, job: _Job, piece: tuple[int, int, int, int], room: tuple[int, int] | None = None) -> None:
         """Upload a piece of the picture (left, top, right, bottom) and prepare it; without `room` it is all of it."""
@@ -532,7 +544,8 @@ class Sampler:
         raw = self._texture("raw", least, job.channels, kind, exact=room is None)
         _write(raw, np.ascontiguousarray(pixels))
         if job.is_prepared:
-            defines: dict[str, object] = {"LINEAR_LIGHT": 1} if job.is_curved else {}
+            flags = {"LINEAR_LIGHT": job.is_curved, "PREMULTIPLIED": job.is_premultiplied}
+            defines: dict[str, object] = {name: 1 for name, wanted in flags.items() if wanted}
             more = 0
             if job.is_packed:
                 defines["PACKED"], more = 1, 1
