@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
 
 import typer
 
-from app.errors import Cancelled, UserError
+from app.errors import Cancelled, UserError, shown
 from app.progress import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -56,8 +56,12 @@ def main() -> None:
 
 
 def _fail(message: str, status: int) -> NoReturn:
-    print(f"fluidwarp: {message}", file=sys.stderr)
+    _say(message)
     sys.exit(status)
+
+
+def _say(message: str) -> None:
+    print(f"fluidwarp: {shown(message)}", file=sys.stderr)
 
 
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="What to write; its ending says how.")]
@@ -241,7 +245,7 @@ def _render_one(task: Task, opened: Opened) -> None:
         with Device.headless() as device:
             report = run(device, job, progress)
     for notice in (*report.notices, *([report.verdict] if report.verdict else [])):
-        print(f"fluidwarp: {notice}", file=sys.stderr)
+        _say(notice)
 
 
 def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
@@ -250,11 +254,11 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     from app.progress import leave, on_terminal
 
     def tell(outcome: Outcome) -> None:
-        named = outcome.error.startswith(f"Cannot read {outcome.label}") or not outcome.error
+        named = outcome.error.startswith(f"Cannot read {shown(outcome.label)}") or not outcome.error
         line = outcome.error if named else f"{outcome.label}: {outcome.error}"
         for text in (line, *(f"{outcome.label}: {notice}" for notice in outcome.notices)):
             if text:
-                print(f"fluidwarp: {' '.join(text.split())}", file=sys.stderr)
+                _say(" ".join(text.split()))
 
     written = 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -15,6 +16,7 @@ import numpy as np
 from app.animation import sequence_writer
 from app.errors import UserError
 from app.files import replacing
+from app.inputs import open_input
 from app.pictures import MAX_PIXELS, check_size, exr_channels, read_exr, read_picture, write_exr
 from app.progress import never
 
@@ -101,7 +103,7 @@ def holds(path: str | os.PathLike[str]) -> Holds:
     if suffix not in (".exr", ".tif", ".tiff"):
         return "map" if suffix in MAP_ENDINGS else "picture"
     try:
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             head = stream.read(HEAD)
         if any(convention.encode() in head for convention in CONVENTIONS.values()):
             return "map"
@@ -274,8 +276,7 @@ def read_map(
     check_map(path)
     suffix = Path(path).suffix.lower()
     if suffix in (".flo", ".npy"):
-        offsets = _read_flo(Path(path)) if suffix == ".flo" else _read_npy(Path(path))
-        check_size(Path(path), offsets.shape[1], offsets.shape[0], max_pixels)
+        offsets = _read_flo(Path(path), max_pixels) if suffix == ".flo" else _read_npy(Path(path), max_pixels)
         _check_finite(path, offsets)
         if suffix == ".npy":
             return Displacement(offsets)
@@ -303,43 +304,48 @@ def _check_finite(path: str | os.PathLike[str], values: np.ndarray) -> None:
         )
 
 
-def _read_flo(file: Path) -> np.ndarray:
-    data = _bytes(file)
-    size = np.frombuffer(data[4:12], "<i4") if len(data) >= 12 else np.zeros(2, np.int32)
-    if len(data) < 12 or np.frombuffer(data[:4], "<f4")[0] != FLO_MAGIC or size.min() < 1:
-        raise UserError(f"Cannot read {file}: it is no Middlebury .flo file.")
-    width, height = int(size[0]), int(size[1])
-    if len(data) != 12 + width * height * 8:
-        raise UserError(f"Cannot read {file}: {width} x {height} offsets need another length of file; get it again.")
-    return np.frombuffer(data, "<f4", offset=12).reshape(height, width, 2)
+def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
+    with open_input(file, "map") as stream:
+        head = stream.read(12)
+        width, height = (int(side) for side in np.frombuffer(head[4:12].ljust(8, b"\0"), "<i4"))
+        if len(head) < 12 or np.frombuffer(head[:4], "<f4")[0] != FLO_MAGIC or min(width, height) < 1:
+            raise UserError(f"Cannot read {file}: it is no Middlebury .flo file.")
+        check_size(file, width, height, max_pixels)
+        if os.fstat(stream.fileno()).st_size != 12 + width * height * 8:
+            raise UserError(
+                f"Cannot read {file}: {width} x {height} offsets need another length of file; get it again."
+            )
+        return _in_memory(file, lambda: np.fromfile(stream, "<f4", 2 * width * height)).reshape(height, width, 2)
 
 
-def _read_npy(file: Path) -> np.ndarray:
-    import io
+def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
+    with open_input(file, "map") as stream:
+        try:
+            headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+            shape, _, kind = headers[np.lib.format.read_magic(stream)](stream)
+        except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+            raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error
+        if len(shape) != 3 or shape[2] != 2 or kind.kind != "f":
+            raise UserError(
+                f"Cannot read {file}: a map is a float array (height, width, 2), this one is {kind} {shape}."
+            )
+        if min(shape) < 1:
+            raise UserError(f"Cannot read {file}: the array {shape} is empty.")
+        check_size(file, shape[1], shape[0], max_pixels)
+        if os.fstat(stream.fileno()).st_size < stream.tell() + math.prod(shape) * kind.itemsize:
+            raise UserError(f"Cannot read {file}: it is truncated; get it again.")
+        stream.seek(0)
+        return _in_memory(file, lambda: np.load(stream, allow_pickle=False))
 
-    data = io.BytesIO(_bytes(file))
+
+def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:
     try:
-        values = np.load(data, allow_pickle=False)
+        return read()
     except MemoryError:
         raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
-    except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error
-    if not isinstance(values, np.ndarray) or values.ndim != 3 or values.shape[2] != 2 or values.dtype.kind != "f":
-        kind = f"{getattr(values, 'dtype', 'of several')} {getattr(values, 'shape', 'arrays')}"
-        raise UserError(f"Cannot read {file}: a map is a float array (height, width, 2), this one is {kind}.")
-    if 0 in values.shape:
-        raise UserError(f"Cannot read {file}: the array {values.shape} is empty.")
-    return values
-
-
-def _bytes(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except FileNotFoundError:
-        raise UserError(f"Cannot read {file}: there is no such file; check the name.") from None
     except OSError as error:
-        raise UserError(f"Cannot read {file}: {error.strerror}.") from error
+        raise UserError(f"Cannot read {file}: {error.strerror or error}.") from None
 
 
 def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
@@ -375,6 +381,6 @@ def _read_tiff(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str],
         try:
             told = json.loads(tiff.pages.first.description)["fluidwarp"]
             edge = int(told["overscan"])
-        except (ValueError, TypeError, KeyError):  # made elsewhere
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):  # made elsewhere
             edge = 0
     return values, told, edge

@@ -19,6 +19,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.files import replacing
+from app.inputs import open_input
 
 EXR_LAYOUT = frozenset({"version", "chunkCount", "maxSamplesPerPixel", "dwaCompressionLevel"})
 
@@ -235,17 +236,11 @@ def read_picture(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> 
 
 def _head(file: Path) -> bytes:
     """The first bytes of a file that is there and not empty."""
-    try:
-        if file.is_dir():
-            raise UserError(f"Cannot read {file}: it is a folder; give the name of a picture.")
-        if file.stat().st_size == 0:
-            raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
-        with file.open("rb") as stream:
-            return stream.read(16)
-    except FileNotFoundError:
-        raise UserError(f"Cannot read {file}: there is no such file; check the name.") from None
-    except OSError as error:
-        raise UserError(f"Cannot read {file}: {error.strerror}.") from error
+    with open_input(file, "picture") as stream:
+        head = stream.read(16)
+    if not head:
+        raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
+    return head
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import Any
 
 from app.errors import UserError
 from app.files import replacing
+from app.inputs import MOST_TEXT, Archive, open_input, read_input
 from app.pictures import MAX_PIXELS, Picture, read_picture
 from app.recipe import Recipe
 from app.schema import plain
@@ -20,7 +21,6 @@ RECIPE = "recipe.toml"
 FORMAT = "format.txt"
 VERSION = 1
 MOST_BYTES = 4 * 2**30
-MOST_TEXT = 128 * 2**20  # bytes of a recipe: strokes of a day
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ def is_project(path: str | os.PathLike[str]) -> bool:
     if Path(path).suffix.lower() == SUFFIX:
         return True
     try:
-        with open(path, "rb") as stream:
+        with open_input(path) as stream:
             return stream.read(4) == b"PK\3\4"
-    except OSError:
+    except (OSError, UserError):
         return False
 
 
@@ -70,7 +70,7 @@ def from_picture(path: str | os.PathLike[str], recipe: Recipe | None = None) -> 
     """
     path = Path(path)
     picture = read_picture(path)
-    return Project((recipe or Recipe()).edited(picture=path.name), picture, path.read_bytes(), path.parent)
+    return Project((recipe or Recipe()).edited(picture=path.name), picture, _picture_bytes(path), path.parent)
 
 
 def from_recipe(path: str | os.PathLike[str]) -> Project:
@@ -84,7 +84,7 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
     if recipe.picture is None:
         raise UserError(f"{path} names no picture; open a picture first, then apply the recipe to it")
     source = path.parent / recipe.picture
-    return Project(recipe, read_picture(source), source.read_bytes(), path.parent)
+    return Project(recipe, read_picture(source), _picture_bytes(source), path.parent)
 
 
 def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
@@ -95,14 +95,12 @@ def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
     """
     path = Path(path)
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_input(path, "project") as stream, Archive(stream) as archive:
             return _read(path, archive, max_pixels)
-    except FileNotFoundError:
-        raise UserError(f"{path} does not exist") from None
-    except UserError:
+    except (UserError, MemoryError):
         raise
     except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror or error}") from None
+        raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
     except Exception:  # of a damaged archive: BadZipFile, zlib.error, NotImplementedError, RuntimeError, IndexError ...
         raise UserError(f"{path} is no fluidwarp project, or is cut short or damaged; get it again") from None
 
@@ -123,11 +121,15 @@ def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) 
     return replace(project, path=path, embedded=embedded)
 
 
-def _read(path: Path, archive: zipfile.ZipFile, max_pixels: int) -> Project:
+def _picture_bytes(file: Path) -> bytes:
+    return read_input(file, "picture", MOST_BYTES)
+
+
+def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     names = set(archive.namelist())
     if max(archive.getinfo(name).file_size for name in (FORMAT, RECIPE)) > MOST_TEXT:
         raise UserError(f"{path} holds a recipe of more than {MOST_TEXT >> 20} MB; get it again")
-    words = archive.read(FORMAT).decode().split()
+    words = archive.member(FORMAT).decode().split()
     if words[:2] != ["fluidwarp", "project"]:
         raise ValueError
     if int(words[2]) > VERSION:
@@ -135,7 +137,7 @@ def _read(path: Path, archive: zipfile.ZipFile, max_pixels: int) -> Project:
             f"{path} was written by a newer fluidwarp (project format {words[2]}, this one reads up to {VERSION}); "
             "install a newer fluidwarp"
         )
-    recipe = Recipe.parse(archive.read(RECIPE).decode(), f"the recipe in {path}")
+    recipe = Recipe.decode(archive.member(RECIPE), f"the recipe in {path}")
     if recipe.picture is None:
         raise ValueError
     held = [name for name in picture_names(recipe) if name in names]
@@ -143,14 +145,14 @@ def _read(path: Path, archive: zipfile.ZipFile, max_pixels: int) -> Project:
     if not embedded:
         source = path.parent / recipe.picture
         picture = read_picture(source, max_pixels)
-        return Project(recipe, picture, source.read_bytes(), path.parent, path, embedded=False)
+        return Project(recipe, picture, _picture_bytes(source), path.parent, path, embedded=False)
     if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
         raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")
     keeper = tempfile.TemporaryDirectory(prefix="fluidwarp-", ignore_cleanup_errors=True)
     folder = Path(keeper.name)
     for name in held:
-        archive.extract(name, folder)  # which lets nothing out of the folder
-    data = archive.read(recipe.picture)
+        archive.unpack(name, folder)
+    data = archive.member(recipe.picture)
     source = folder / recipe.picture
     try:
         picture = read_picture(source, max_pixels)
@@ -171,9 +173,9 @@ def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
             files[inside] = project.data
         else:
             try:
-                files[inside] = (project.folder / name).read_bytes()
-            except OSError as error:
-                raise UserError(f"Cannot save: {project.folder / name} cannot be read ({error.strerror})") from None
+                files[inside] = _picture_bytes(project.folder / name)
+            except UserError as error:
+                raise UserError(f"Cannot save the project. {error}") from None
         new_names[name] = inside
     if all(old == new for old, new in new_names.items()):
         return project.recipe, files

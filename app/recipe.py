@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from itertools import pairwise, zip_longest
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from app import toml
 from app.errors import UserError
 from app.files import replacing
 from app.forces import Force
+from app.inputs import MOST_TEXT, read_input
 from app.masks import FreezeLayer, ViscosityLayer
-from app.schema import Model, Place, Radius, complaint, frozen, plain
+from app.schema import FileName, Model, Place, Radius, complaint, frozen, plain
 from app.strokes import Change, Stroke
 
 VERSION = 1
@@ -164,8 +164,8 @@ class Recipe(Model):
 
     version: Literal[1] = VERSION
     name: str = ""
-    picture: Annotated[str, Field(min_length=1)] | None = None
-    map: Annotated[str, Field(min_length=1)] | None = None
+    picture: FileName | None = None
+    map: FileName | None = None
     duration: Annotated[float, Field(gt=0, le=1_000_000)] = 1.0
     edges: Literal["transparent", "black", "clamp", "mirror", "wrap"] = "transparent"
     mode: Literal["coordinates", "density"] = "coordinates"
@@ -200,12 +200,7 @@ class Recipe(Model):
         Raises:
             UserError: naming `source`, the line, the key, and what was expected.
         """
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            # tomllib's own words for a key that is written a second time.
-            said = str(error).replace("Cannot overwrite a value", "the same key is given twice")
-            raise UserError(f"{source} is not valid TOML: {said}") from None
+        data = toml.parsed(text, source)
         version = data.get("version", VERSION)
         if isinstance(version, int) and version > VERSION:
             raise UserError(
@@ -224,18 +219,16 @@ class Recipe(Model):
         Raises:
             UserError: if it cannot be read, or as `parse`.
         """
-        path = Path(path)
+        return cls.decode(read_input(path, "recipe", MOST_TEXT), str(path))
+
+    @classmethod
+    def decode(cls, data: bytes, source: str) -> Self:
+        """The recipe in the bytes of a file. Raises `UserError` as `parse`."""
         try:
-            text = path.read_text("utf-8-sig")  # some editors put a mark before the text
-        except FileNotFoundError:
-            raise UserError(f"{path} does not exist") from None
-        except IsADirectoryError:
-            raise UserError(f"{path} is a folder, not a recipe") from None
+            text = data.decode("utf-8-sig")  # some editors put a mark before the text
         except UnicodeDecodeError:
-            raise UserError(f"{path} is not a recipe: it is not text, or not saved as UTF-8") from None
-        except OSError as error:
-            raise UserError(f"{path} cannot be read: {error.strerror}") from None
-        return cls.parse(text, str(path))
+            raise UserError(f"{source} is not a recipe: it is not text, or not saved as UTF-8") from None
+        return cls.parse(text, source)
 
     def text(self) -> str:
         """The recipe as TOML, without what is as by default; `parse` gives the same recipe back, bit for bit."""

@@ -16,13 +16,13 @@ from pydantic import Field, model_validator
 from app.errors import UserError
 from app.maps import cropped, read_map
 from app.pictures import Picture, linear_to_srgb, read_picture
-from app.schema import Fraction01, Model, Place, Radius
+from app.schema import FileName, Fraction01, Model, Place, Radius
 from solver.grid import Grid
 
 SOURCE = "source"
 """The name by which a recipe calls the picture that is warped, where it could name an auxiliary one."""
 
-PictureName = Annotated[str, Field(min_length=1)]
+PictureName = FileName
 Point = tuple[Place, Place]
 """x and y as fractions of the picture's width and height, from its top left corner."""
 Box = tuple[Place, Place, Place, Place]

@@ -7,7 +7,7 @@ import re
 from datetime import date, time
 from typing import Annotated, Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from app.errors import UserError
@@ -24,6 +24,16 @@ Fraction01 = Annotated[float, Field(ge=0, le=1)]
 
 Place = Annotated[float, Field(ge=-10, le=10)]
 """A fraction of the picture's width or height; a little outside is allowed, as a drag may leave the picture."""
+
+
+def _without_nul(name: str) -> str:
+    if "\0" in name:
+        raise ValueError("no file has a NUL in its name")
+    return name
+
+
+FileName = Annotated[str, Field(min_length=1), AfterValidator(_without_nul)]
+"""The name of a file, relative to the recipe's folder."""
 
 Radius = Annotated[float, Field(gt=0, le=10)]
 """A radius, in longer sides of the picture."""
@@ -230,7 +240,8 @@ def _choices(field: FieldInfo) -> tuple[Any, ...]:
 
 # -- where it stands in the file --------------------------------------------------------------------------------------
 
-_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]#]+?)\s*\]")
+# Each repetition ends where the next begins, or a line of many spaces would be tried again from each of them.
+_HEADER = re.compile(r"^\s*(\[\[?)([^\]#]+)\]")
 _KEY = re.compile(r"^\s*([A-Za-z0-9_\"'.-]+)\s*=")
 
 
@@ -242,7 +253,7 @@ def line_of(text: str, path: list[int | str]) -> int | None:
     for number, line in enumerate(text.splitlines(), 1):
         if header := _HEADER.match(line):
             brackets, name = header.groups()
-            here = _indexed([part.strip(" \"'") for part in name.split(".")], counts, brackets == "[[")
+            here = _indexed([part.strip(" \t\"'") for part in name.split(".")], counts, brackets == "[[")
             found = here
         elif key := _KEY.match(line):
             found = here + [part.strip(" \"'") for part in key.group(1).split(".")]

@@ -16,6 +16,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.files import cannot_write, replacing
+from app.inputs import Archive, open_input
 from app.recipe import Recipe
 from app.replay import Replay, Snapshot
 
@@ -81,8 +82,13 @@ class StoredStates:
 
     def _load(self, tick: int) -> bool:
         path = self._path(tick)
+        if not path.exists():  # another process has just tidied it up
+            return False
         try:
-            with np.load(path, allow_pickle=False) as stored:  # a zip file, whose checksums NumPy looks at
+            with open_input(path, "state", BUDGET) as stream, Archive(stream) as archive:
+                archive.check_stored()
+            # A zip file, whose checksums NumPy looks at.
+            with open_input(path) as stream, np.load(stream, allow_pickle=False) as stored:
                 if str(stored["about"]) != self._about(tick):
                     raise ValueError("it is of another simulation")
                 count = sum(name.startswith("field") for name in stored.files)
@@ -90,8 +96,6 @@ class StoredStates:
                 held = stored["held"] if "held" in stored.files else None
                 self._replay.resume(tick, Snapshot(fields, int(stored["steps"]), held))
             os.utime(path)
-        except FileNotFoundError:  # another process has just tidied it up
-            return False
         except Exception as error:  # of damaged files the readers raise anything
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             self._notice(f"{path} is damaged ({reason}) and is made anew")

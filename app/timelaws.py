@@ -352,6 +352,7 @@ def _compiled(text: str) -> Callable[[float], Any]:
                     raise refuse(f'gives "{name}" {len(node.args)} numbers; it takes {wanted or "two or more"}')
                 arguments = [sub(argument) for argument in node.args]
                 return lambda t: function(*(argument(t) for argument in arguments))
-        raise refuse(f'holds "{ast.unparse(node)}", which is not allowed in a formula')
+        part = ast.get_source_segment(text.strip(), node)
+        raise refuse(f'holds "{part}", which is not allowed in a formula')
 
     return build(tree.body)

@@ -14,6 +14,7 @@ import numpy as np
 
 from app import ffmpeg
 from app.errors import UserError
+from app.inputs import open_input
 from app.pictures import MAX_PIXELS, check_size
 from app.progress import never
 
@@ -122,16 +123,9 @@ def _late(told: str, video: str) -> float:
 
 def _banner(file: Path) -> str:
     """What ffmpeg says of a file it opens; imageio-ffmpeg brings no ffprobe."""
-    try:
-        if file.is_dir():
-            raise UserError(f"Cannot read {file}: it is a folder; give the name of a video.")
-        if file.stat().st_size == 0:
+    with open_input(file, "video") as stream:
+        if not stream.read(1):
             raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
-        file.open("rb").close()
-    except FileNotFoundError:
-        raise UserError(f"Cannot read {file}: there is no such file; check the name.") from None
-    except OSError as error:
-        raise UserError(f"Cannot read {file}: {error.strerror}.") from None
     command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}"]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     return done.stderr.decode("utf-8", "replace")

@@ -82,7 +82,7 @@ def test_both_modules_are_the_command(folder: Path, module: str):
     command = [sys.executable, "-m", module, "render", "none.toml"]
     ran = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     assert ran.returncode != 0
-    assert "none.toml does not exist" in ran.stderr
+    assert "Cannot read none.toml: there is no such file" in ran.stderr
 
 
 def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path):
@@ -173,7 +173,7 @@ def test_no_egl_is_told(folder: Path):
 
 
 BAD = {
-    "no such recipe": (["b.toml", "-o", "x.png"], "b.toml does not exist"),
+    "no such recipe": (["b.toml", "-o", "x.png"], "Cannot read b.toml: there is no such file"),
     "no such name": (["nonesuch", "-o", "x.png"], "nonesuch does not exist; recipes that come with fluidwarp"),
     "a picture as recipe": (["cat.png", "-o", "x.png"], "cat.png is a picture and not a recipe"),
     "a clip as recipe": (["a.mov", "-o", "x.mp4"], "a.mov is a clip and not a recipe"),

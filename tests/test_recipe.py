@@ -186,7 +186,7 @@ def test_the_guide_names_what_holds_where_a_key_is_left_out():
 
 def test_files_that_are_none(tmp_path: Path):
     (tmp_path / "noise.toml").write_bytes(bytes(range(256)))
-    for name, words in (("none.toml", "does not exist"), ("noise.toml", "not text"), ("", "is a folder")):
+    for name, words in (("none.toml", "there is no such file"), ("noise.toml", "not text"), ("", "is a folder")):
         with pytest.raises(UserError, match=words):
             Recipe.load(tmp_path / name)
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from app.errors import UserError
+from app.inputs import read_input
+
 MOST_RECENT = 10
+MOST_BYTES = 2**20  # of the file
 
 
 @dataclass
@@ -38,8 +43,8 @@ class Preferences:
 
         path = user_config_path("fluidwarp") / "preferences.json"
         try:
-            data: Any = json.loads(path.read_text("utf-8"))
-        except (OSError, ValueError):
+            data: Any = json.loads(read_input(path, "file of preferences", MOST_BYTES))
+        except (UserError, ValueError, RecursionError):
             data = {}
         kept = cls(path=path)
         if isinstance(data, dict):
@@ -48,7 +53,7 @@ class Preferences:
                 if part.name != "path" and isinstance(value, type(getattr(kept, part.name))):
                     setattr(kept, part.name, value)
         kept.theme = kept.theme if kept.theme in ("dark", "light") else "dark"
-        kept.scale = min(max(kept.scale, 0.75), 3.0)
+        kept.scale = min(max(kept.scale, 0.75), 3.0) if math.isfinite(kept.scale) else 1.0
         kept.recent = [str(name) for name in kept.recent][:MOST_RECENT]
         return kept
 

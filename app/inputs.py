@@ -1,0 +1,133 @@
+"""Opening what others made: ordinary files of a bounded size, and archives that unpack to no more than they may."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+import zipfile
+from pathlib import Path
+from typing import BinaryIO
+
+from app.errors import UserError
+
+MOST_TEXT = 128 * 2**20  # bytes of a recipe: strokes of a day
+SMALL = 2 * 2**20  # bytes that anything may unpack to
+MOST_UNPACKED = 20  # times its size that a larger member of an archive may unpack to; strokes come to 3
+MOST_INDEX = 16 * 2**20  # bytes of an archive's list of members
+
+
+def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | None = None) -> BinaryIO:
+    """Open an ordinary file of no more than `most` bytes for reading: never a pipe or a device, which might not end.
+
+    kind: what messages call it. Raises `UserError`.
+    """
+    try:
+        _check(path, os.stat(path), kind, most)
+        stream = open(path, "rb", opener=_without_waiting)  # noqa: SIM115 - whoever asked for it closes it
+        try:
+            _check(path, os.fstat(stream.fileno()), kind, most)
+        except UserError:
+            stream.close()
+            raise
+        return stream
+    except FileNotFoundError:
+        raise UserError(f"Cannot read {path}: there is no such file; check the name.") from None
+    except ValueError:
+        raise UserError(f"Cannot read {path}: no file has a NUL in its name; check the name.") from None
+    except OSError as error:
+        raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open what may have become a pipe since it was looked at."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def read_input(path: str | os.PathLike[str], kind: str, most: int) -> bytes:
+    """All of an ordinary file of no more than `most` bytes. Raises `UserError`."""
+    with open_input(path, kind, most) as stream:
+        try:
+            data = stream.read(most + 1)
+        except OSError as error:
+            raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
+    if len(data) > most:  # it grew, or is one of the system's files whose size is told as 0
+        raise _too_large(path, kind, most)
+    return data
+
+
+def _check(path: str | os.PathLike[str], status: os.stat_result, kind: str, most: int | None) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise UserError(f"Cannot read {path}: it is a folder; give the name of a {kind}.")
+    if not stat.S_ISREG(status.st_mode):
+        raise UserError(f"Cannot read {path}: it is a pipe or a device; save it as an ordinary file first.")
+    if most is not None and status.st_size > most:
+        raise _too_large(path, kind, most)
+
+
+def _too_large(path: str | os.PathLike[str], kind: str, most: int) -> UserError:
+    size = f"{most >> 20} MB" if most >= 2**20 else f"{most} bytes"
+    return UserError(f"Cannot read {path}: it has more than {size}, the most that a {kind} may have; get it again.")
+
+
+class Archive(zipfile.ZipFile):
+    """A zip file whose members are read without unpacking more than they may.
+
+    stream: from `open_input`. Raises whatever `zipfile` does where it is damaged.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        super().__init__(_Reader(stream))
+
+    def check(self, name: str) -> None:
+        """Raise `ValueError` if a member unpacks to more than it may, or in another way than that of projects."""
+        member = self.getinfo(name)
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{name} is compressed in an unknown way")  # in others, a step may unpack to any size
+        if member.file_size > max(SMALL, MOST_UNPACKED * member.compress_size):
+            raise ValueError(f"{name} unpacks to {member.file_size} bytes, far more than a file like it")
+
+    def check_stored(self) -> None:
+        """Raise `ValueError` if any member is compressed, so that all have no more bytes than the file."""
+        if any(member.compress_type != zipfile.ZIP_STORED for member in self.infolist()):
+            raise ValueError("it is compressed")
+
+    def member(self, name: str) -> bytes:
+        """All of a member. Raises `KeyError` if there is none, or as `check`."""
+        self.check(name)
+        with self.open(name) as stream:
+            unpacked = bytearray()
+            # In steps, since read() unpacks everything there is before it looks at what the index says.
+            while step := stream.read(2**20):
+                unpacked += step
+        return bytes(unpacked)
+
+    def unpack(self, name: str, folder: Path) -> None:
+        """Write a member to where `name` leads from `folder`. Raises as `check`."""
+        self.check(name)
+        self.extract(name, folder)  # in small steps, and it lets nothing out of the folder
+
+
+class _Reader(io.BufferedIOBase):
+    """A stream that gives no more at once than an archive's index may have: `ZipFile` reads that as a whole."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        data = self._stream.read(MOST_INDEX + 1 if size is None or size < 0 else min(size, MOST_INDEX + 1))
+        if len(data) > MOST_INDEX:
+            raise ValueError("its list of members is too long")
+        return data
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        return self._stream.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._stream.tell()
+
+    def seekable(self) -> bool:
+        return True
+
+    def readable(self) -> bool:
+        return True
