@@ -65,6 +65,10 @@ class Session:
         self.is_rebuilding = False
         self.last_place: tuple[float, float] | None = None
         self._gesture: Gesture | None = None
+        # The tick that the gesture is recorded at: ahead of the simulation while strokes before it are still waiting.
+        self._pen = 0
+        # The person has sent the playhead back, and what is done next takes the place of what comes after it.
+        self._went_back = False
         self._tool: Tool | None = None
         self._opposite = False
         self._touch: Touch | None = None
@@ -112,27 +116,33 @@ class Session:
 
     @property
     def is_behind(self) -> bool:
-        """True while the playhead is on its way to where it was sent."""
-        return self._target is not None and self._target != self.tick
+        """True while the playhead is on its way: to where it was sent, or through strokes that are still waiting."""
+        return self.target != self.tick
 
     @property
     def target(self) -> int:
         """Where the playhead is or is going."""
-        return self.tick if self._target is None else self._target
+        if self._target is not None:
+            return self._target
+        if self.is_painting:
+            return self._pen
+        return self.end if self.coasting else self.tick
 
     # -- painting ---------------------------------------------------------------------------------------------------
 
     def press(self, tool: Tool, press: Press, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
-        """The pointer went down at (x, y), fractions of the picture: a gesture begins, and time with it."""
+        """The pointer went down at (x, y), fractions of the picture: a gesture begins, and time with it.
+
+        Where strokes before it are not yet simulated to their ends, it is recorded behind them.
+        """
         if tool.gesture is None:
             return
         self.release()
-        self._arrive()
         self.playing = False
-        if self.tick < self.end:
-            self._cut()
+        self._pen = self._go_on()
+        self._target = None
         self._tool, self._opposite = tool, press.opposite
-        self._touch = Touch(self.tick, *self._inside(x, y), pressure, shift)
+        self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
         self.path = [self._touch[1:3]]
         self._gesture = tool.gesture(replace(press, last=self.last_place), self._touch)
         self.replay.checkpoint()
@@ -142,7 +152,7 @@ class Session:
         """The pointer moved; every sample counts."""
         if self._gesture is None:
             return
-        self._touch = Touch(self.tick, *self._inside(x, y), pressure, shift)
+        self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
         self.path.append(self._touch[1:3])
         self._hear(self._gesture.send(self._touch))
 
@@ -158,9 +168,11 @@ class Session:
             stroke = finished.value
         self.stroke, path, self.path = None, self.path, []
         if stroke is None:
+            if not self.coasting:
+                self._show(self.document.recipe)
             return
         self.last_place = path[-1]
-        ticks = max(self.tick, stroke.last_tick + 1)
+        ticks = max(self._pen, stroke.last_tick + 1)
         self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=ticks * self.dt)
         self.replay.use(self._live)
         self.commit(self._label(stroke))
@@ -172,14 +184,16 @@ class Session:
             return
         self._gesture.close()
         self._gesture = self.stroke = None
-        self.path = []
-        self._show(self.document.recipe, self.document.recipe.ticks if self.end else 0)
+        self.path, coasting = [], self.coasting
+        self._show(self.document.recipe)
+        if coasting:
+            self._coast()
 
     def _hear(self, stroke: Stroke | None) -> None:
         self.stroke = stroke
         if stroke is not None:
-            ticks = max(self.tick + 1, 1)
-            self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=ticks * self.dt)
+            duration = (self._pen + 1) * self.dt
+            self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=duration)
             self.replay.use(self._live)
         self.changes += 1
 
@@ -199,44 +213,56 @@ class Session:
     def advance(self, ticks: int) -> None:
         """Let time go on by up to `ticks`, but always by one; on the way to the playhead's target, by what it takes."""
         start = time.perf_counter()
-        if self.is_behind:
+        if self._target is not None:
             self._approach(start + PATIENCE)
             return
-        for _ in range(ticks):
-            if self.is_painting and (self.stroke is not None or self.coasting):
+        while ticks > 0 or self.is_behind:
+            if self.is_painting and ticks > 0 and (self.stroke is not None or self.coasting):
                 self._record()
+            elif self.is_behind:
+                self._step()
             elif self.coasting:
                 self._record()
                 self._look_for_rest()
-            elif self.playing:
-                if self.tick >= self.end:
-                    self.playing = False
-                    return
+            elif self.playing and self.tick < self.end:
                 self._step()
             else:
-                return
+                self.playing = False
+                break
+            ticks -= 1
             if time.perf_counter() - start > QUICK:
-                return
+                break
+        if not self.is_behind:
+            self.is_rebuilding = False
 
     def play(self) -> None:
         """Play the recording, from the start when it is at its end; while the fluid moves, pause."""
         self.release()
-        if self.coasting or self.playing:
+        if self.coasting or self.playing or (self._target is not None and not self._went_back):
             self.pause()
-            return
-        self._arrive()
-        if self.end and self.tick >= self.end:
-            if self._is_fast():
-                self._coast()
-                return
-            self.seek(0)
-            self._arrive()
-        self.playing = self.tick < self.end
+        elif not self._went_back and self.tick < self.end:
+            self._finish()
+        elif self.end and self.target >= self.end and self._is_fast():
+            self._coast()
+        elif self.end:
+            if self.target >= self.end:
+                self.seek(0)
+            self.playing = True
 
     def pause(self) -> None:
-        """Let time stand still."""
+        """Let time stand still, also while strokes are waiting; a playhead that was sent back still arrives."""
         self.release()
         self.playing = self.coasting = False
+        if not self._went_back and not self.is_rebuilding:
+            self._target = None
+        self.changes += 1
+
+    def stop_recording(self) -> None:
+        """Let time stand still at the end of all that has been done; what is still waiting is simulated."""
+        self.release()
+        self.playing = self.coasting = False
+        if not self._went_back:
+            self._send(self.end)
         self.changes += 1
 
     def step(self) -> None:
@@ -252,7 +278,9 @@ class Session:
         """Send the playhead to a tick of the recording; it arrives over the next frames."""
         self.release()
         self.playing = self.coasting = False
-        self._target = min(max(tick, 0), self.end)
+        tick = min(max(tick, 0), self.end)
+        self._went_back = tick < self.end
+        self._send(tick)
         self.changes += 1
 
     def settle(self, patience: float = 600.0) -> None:
@@ -266,13 +294,25 @@ class Session:
         self.coasting, self._coasted = True, 0
         self.changes += 1
 
+    def _finish(self) -> None:
+        """Go on through what is waiting; the fluid comes to rest by itself if it ends with a stroke."""
+        if any(stroke.last_tick + 1 >= self.end for stroke in self._live.stroke):
+            self._coast()
+        else:
+            self._send(self.end)
+
     def _record(self) -> None:
-        """One tick more than there has been; the open stroke stays where the pointer is."""
-        if self.stroke is not None and self._gesture is not None and self.stroke.last_tick < self.tick:
+        """One tick more than there has been, and a step; the open stroke stays where the pointer is.
+
+        While strokes are waiting, a gesture is recorded as it would be without them: a tick for every step.
+        """
+        if self._gesture is not None:
             assert self._touch is not None
-            self._touch = self._touch._replace(tick=self.tick)
-            self._hear(self._gesture.send(self._touch))
-        ticks = self.tick + 1
+            if self.stroke is None or self.stroke.last_tick < self._pen:
+                self._touch = self._touch._replace(tick=self._pen)
+                self._hear(self._gesture.send(self._touch))
+            self._pen += 1
+        ticks = self._pen if self.is_painting else self.tick + 1
         if self._live.ticks < ticks:
             self._live = self._live.edited(duration=ticks * self.dt)
             self.replay.use(self._live)
@@ -289,8 +329,7 @@ class Session:
 
     def _look_for_rest(self) -> None:
         self._coasted += 1
-        busy = any(stroke.last_tick >= self.tick for stroke in self._live.stroke)
-        if busy or self._coasted % LOOK_EVERY:
+        if self._coasted % LOOK_EVERY:
             return
         if not self._is_fast() or self._coasted * self.dt > MOST_COASTING:
             self.coasting = False
@@ -300,54 +339,62 @@ class Session:
     def _is_fast(self) -> bool:
         return self.replay.fluid.motion().largest_speed > REST
 
+    def _send(self, tick: int) -> None:
+        """Let the playhead go to a tick over the next frames."""
+        self._target = tick if tick != self.tick else None
+
+    def _head_for(self, tick: int) -> None:
+        """Go to the last moment up to a tick that is kept, unless this one is between them."""
+        near = self.replay.checkpoints.nearest(self._live, tick)
+        if tick < self.tick or (near is not None and near.tick > self.tick):
+            self.replay.seek(near.tick if near is not None else 0)
+
     def _approach(self, deadline: float) -> None:
         """Work towards the target until the deadline, by way of the nearest checkpoint."""
-        target, replay = self._target, self.replay
+        target = self._target
         if target is None:
             return
-        near = replay.checkpoints.nearest(self._live, target)
-        if target < replay.tick or (near is not None and near.tick > replay.tick):
-            replay.seek(near.tick if near is not None else 0)
-        while replay.tick < target:
+        self._head_for(target)
+        while self.tick < target:
             self._step()
             if time.perf_counter() > deadline:
                 break
         self.changes += 1
-        if replay.tick == target:
+        if self.tick == target:
             self._target, self.is_rebuilding = None, False
 
     def _arrive(self) -> None:
-        while self.is_behind:
+        while self._target is not None:
             self._approach(time.perf_counter() + 60)
-        self._target = None
 
     # -- edits ------------------------------------------------------------------------------------------------------
 
     def change(self, name: str, **settings: Any) -> None:
         """Set something from the playhead on: viscosity, drag, walls, clear_velocity, reset_warp, clear_masks."""
-        self._arrive()
         self.preview_change(**settings)
         self.commit(name)
-        if any(settings.get(key) for key in ("clear_velocity", "reset_warp", "clear_masks")):
-            self._record()
-        self._coast_if_moving()
+        if self.tick == self.end - 1:
+            self._arrive()
+        if self.end and (self.is_behind or self._is_fast()):
+            self._coast()
 
     def preview_change(self, **settings: Any) -> None:
         """As `change`, without an entry in the history yet: for a slider that is being dragged."""
         self.release()
-        self._arrive()
-        self.playing = self.coasting = False
-        base = self._base
-        if not base.stroke and not base.change and self.tick == 0 and settings.keys() <= {"viscosity", "drag", "walls"}:
+        base, lasts = self._base, settings.keys() <= {"viscosity", "drag", "walls"}
+        if not base.stroke and not base.change and self.target == 0 and lasts:
             self._use(base.edited(fluid=base.fluid.model_copy(update=settings)))
             return
-        if self.tick < self.end:
-            self._cut()
-            base = self._base
-        before = [change for change in base.change if change.tick != self.tick]
-        here = [change for change in base.change if change.tick == self.tick]
-        made = (here[-1] if here else Change(tick=self.tick)).model_copy(update=settings)
-        self._use(base.edited(change=(*before, made)))
+        tick = self._go_on()
+        self.playing = self.coasting = False
+        base = self._base
+        before = [change for change in base.change if change.tick != tick]
+        here = [change for change in base.change if change.tick == tick]
+        made = (here[-1] if here else Change(tick=tick)).model_copy(update=settings)
+        # What is done at once needs a tick to be done in.
+        duration = base.duration if lasts else (tick + 1) * self.dt
+        self._use(base.edited(change=(*before, made), duration=duration))
+        self._send(self.end)
 
     def preview(self, **parts: Any) -> None:
         """Replace parts of the recipe, without an entry in the history yet."""
@@ -422,17 +469,13 @@ class Session:
         self.release()
         self._show(self.document.history.go_to(index))
 
-    def _coast_if_moving(self) -> None:
-        if self.end and self.tick >= self.end and self._is_fast():
-            self._coast()
-
-    def _show(self, recipe: Recipe, tick: int | None = None) -> None:
+    def _show(self, recipe: Recipe) -> None:
         """Another state of the work, with the playhead at its end."""
-        self.playing = self.coasting = False
+        self.playing = self.coasting = self._went_back = False
         self.replay.checkpoint()
         self._base = recipe
         self._use(recipe)
-        self._target = self.end if tick is None else min(tick, self.end)
+        self._target = self.end
         self._approach(time.perf_counter() + 0.08)
 
     def _use(self, recipe: Recipe) -> None:
@@ -452,15 +495,23 @@ class Session:
                 replay.seek(near.tick if near is not None else 0)
         self._live = recipe
         replay.use(recipe)
-        self._target = min(tick, self.end)
-        if self._target == replay.tick:
-            self._target = None
+        self._send(min(tick, self.end))
         self.changes += 1
 
-    def _cut(self) -> None:
-        """Go on from the playhead: what was recorded after it is left to undo."""
-        base, tick = self._base, self.tick
-        strokes = []
+    def _go_on(self) -> int:
+        """The tick at which what is done next begins: behind all that is recorded, or where the playhead was sent back.
+
+        There, what was recorded after it is left to undo.
+        """
+        tick = self.target if self._went_back else self.end
+        self._head_for(tick)
+        if tick < self.end:
+            self._cut(tick)
+        self._went_back = False
+        return tick
+
+    def _cut(self, tick: int) -> None:
+        base, strokes = self._base, []
         for stroke in base.stroke:
             kept = tuple(sample for sample in stroke.samples if sample[0] < tick)
             if len(kept) == len(stroke.samples):

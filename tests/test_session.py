@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from app.pictures import read_picture
 from app.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.progress import Progress
 from app.session import REST, Session
+from app.strokes import Stroke
 from app.tools import TOOL, TOOLS, BrushSettings, Press
 from editing import small_project
 from solver.gl.device import Device
@@ -278,3 +280,141 @@ def test_a_long_push_smears_and_does_not_fold(session: Session, feel: Feel, ways
     assert statistics.folds == 0
     # It still takes what lay under it along for well over its own radius.
     assert statistics.displacement_max > 1.4 * press.brush.radius
+
+
+# Strokes that wait for the simulation --------------------------------------------------------------------------------
+
+
+def strike(session: Session, number: int, tool: str = "push") -> None:
+    """A quick stroke to the right on a machine that makes one tick in its time."""
+    press = Press(BrushSettings(0.12, 0.2), False, session.extent, session.dt)
+    session.press(TOOL[tool], press, 0.3, 0.2 + 0.2 * number)
+    session.move(0.5, 0.2 + 0.2 * number)
+    session.advance(1)
+    session.move(0.7, 0.2 + 0.2 * number)
+    session.release()
+
+
+def path_of(stroke: Stroke) -> list[tuple[int, float, float]]:
+    return [(tick - stroke.first_tick, x, round(y - stroke.samples[0][2], 5)) for tick, x, y, _ in stroke.samples]
+
+
+def test_quick_strokes_wait_for_one_another_and_all_act_in_full(
+    device: Device, session: Session, tmp_path: Path
+) -> None:
+    patient = Session(device, session.project)
+    for number in range(4):
+        strike(session, number)
+        assert session.is_behind
+        strike(patient, number)
+        while patient.is_behind:
+            patient.advance(0)
+    assert session.notice is None
+    strokes = session.recipe.stroke
+    assert strokes == patient.recipe.stroke
+    assert [path_of(stroke) for stroke in strokes] == [path_of(strokes[0])] * 4
+    assert all(later.first_tick > stroke.last_tick for stroke, later in pairwise(strokes))
+    session.settle()
+    assert session.recipe.stroke == strokes
+    patient.settle()
+    seen = session.replay.warp.read()
+    assert np.array_equal(seen, patient.replay.warp.read())
+    patient.release_gpu()
+    # What is saved is what was seen.
+    projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "w.fluidwarp")
+    again = Session(device, projects.load(tmp_path / "w.fluidwarp"))
+    again.settle()
+    assert np.array_equal(again.replay.warp.read(), seen)
+    again.release_gpu()
+
+
+def test_undo_takes_exactly_the_last_of_the_waiting_strokes(session: Session) -> None:
+    strike(session, 0)
+    strike(session, 1)
+    before = session.recipe
+    session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.5, 0.8)
+    session.release()
+    session.undo()
+    assert session.recipe == before
+    session.settle()
+    assert session.tick == session.end
+    seen = session.replay.warp.read()
+    session.redo()
+    assert len(session.recipe.stroke) == 3
+    session.undo()
+    session.settle()
+    assert np.array_equal(session.replay.warp.read(), seen)
+
+
+def test_only_sending_the_playhead_back_cuts_what_comes_after_it(session: Session) -> None:
+    strike(session, 0)
+    session.pause()
+    assert session.tick < session.end
+    # Time that stands still in the middle of a stroke is no wish to lose the rest of it.
+    strike(session, 1)
+    assert [stroke.samples[-1][1] for stroke in session.recipe.stroke] == [0.7, 0.7]
+    session.pause()
+    session.play()
+    session.settle()
+    assert session.tick == session.end
+    session.seek(2)
+    strike(session, 2)
+    first, second = session.recipe.stroke
+    assert first.last_tick == 1
+    assert second.first_tick == 2
+    assert session.notice is not None
+
+
+@pytest.mark.parametrize(
+    "settings", [{"viscosity": 0.3, "drag": 0.0}, {"clear_velocity": True}], ids=["another feel", "all motion stopped"]
+)
+def test_a_change_waits_behind_the_strokes_too(session: Session, settings: dict) -> None:
+    strike(session, 0)
+    strokes = session.recipe.stroke
+    session.change("Change", **settings)
+    strike(session, 1)
+    assert session.recipe.stroke[:1] == strokes
+    assert strokes[0].last_tick < session.recipe.change[0].tick <= session.recipe.stroke[1].first_tick
+    session.settle()
+    seen, tick = session.replay.warp.read(), session.tick
+    session.replay.checkpoints.clear()
+    session.replay.seek(0)
+    session.replay.seek(tick)
+    assert np.array_equal(session.replay.warp.read(), seen)
+
+
+def test_a_stroke_held_while_others_wait_lasts_as_long_as_it_was_held(session: Session) -> None:
+    for number in range(3):
+        strike(session, number)
+    waiting = session.end - session.tick
+    session.press(TOOL["twirl"], Press(BrushSettings(), False, session.extent, session.dt), 0.5, 0.5)
+    for _ in range(waiting + 10):
+        session.advance(1)
+    session.release()
+    twirl = session.recipe.stroke[-1]
+    assert waiting + 9 <= twirl.last_tick - twirl.first_tick <= waiting + 10
+    session.settle()
+    assert session.tick == session.end
+
+
+def test_what_is_given_up_leaves_the_waiting_strokes(session: Session) -> None:
+    strike(session, 0)
+    strike(session, 1)
+    strokes = session.recipe.stroke
+    session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.5, 0.8)
+    session.move(0.6, 0.8)
+    session.cancel()
+    session.settle()
+    assert session.recipe.stroke == strokes
+    assert session.tick == session.end == session.document.recipe.ticks
+
+
+def test_what_waits_is_finished_though_nothing_more_is_recorded(session: Session) -> None:
+    strike(session, 0)
+    strike(session, 1)
+    recipe = session.recipe
+    session.stop_recording()
+    assert session.target == session.end
+    session.settle()
+    assert session.tick == session.end
+    assert session.document.recipe == recipe

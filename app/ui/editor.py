@@ -156,7 +156,7 @@ class Editor:
 
     def _turn_to(self, index: int) -> None:
         if self._index >= 0:
-            self.session.pause()
+            self.session.stop_recording()
         self._index = index
         self.view = Viewport(self.layout.canvas, self.canvas.size, self.ui.density)
 

@@ -182,7 +182,7 @@ class Files:
         session.release()
         if session.coasting:
             session.settle(2.0)
-            session.pause()
+            session.stop_recording()
         project = replace(session.project, recipe=session.document.recipe)
         if embed is None:
             embed = project.embedded if project.path is not None else editor.preferences.embed

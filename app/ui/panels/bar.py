@@ -113,7 +113,7 @@ def _slider(ui: Ui, editor: Editor, setting: Setting, width: float) -> None:
 def feels(ui: Ui, editor: Editor, name: str, width: float = 0.0) -> None:
     """The choice between the feels."""
     session = editor.session
-    fluid = session.recipe.fluid_at(session.tick)
+    fluid = session.recipe.fluid_at(session.target)
     now = next((number for number, feel in enumerate(FEELS) if feel.fits(fluid)), -1)
     chosen = ui.segmented(name, [feel.name for feel in FEELS], now, width)
     if chosen != now:

@@ -47,7 +47,7 @@ def draw(ui: Ui, editor: Editor) -> None:
 
 def _fluid(ui: Ui, editor: Editor) -> None:
     session = editor.session
-    fluid = session.recipe.fluid_at(session.tick)
+    fluid = session.recipe.fluid_at(session.target)
     now = next((feel for feel in FEELS if feel.fits(fluid)), None)
     chosen = ui.segmented("feel", [feel.name for feel in FEELS], FEELS.index(now) if now else -1, -1)
     if chosen >= 0 and FEELS[chosen] is not now:
