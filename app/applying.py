@@ -25,7 +25,8 @@ from app.timeline import frame_rate
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
-from solver.resample.sampler import Edges, GivenMap, Sampler, Sampling, SamplingError
+from solver.resample.plan import Edges, GivenMap, Sampling, SamplingError
+from solver.resample.sampler import Sampler
 from solver.warp.map import WarpMap
 
 MOST_CELLS = 1024  # along the longer side, for turning a map round

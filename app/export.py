@@ -40,7 +40,8 @@ from app.threads import ahead, behind
 from app.timeline import Sentinel, Timeline, frame_positions, frame_rate
 from app.video import Clip
 from solver.gl.device import Device
-from solver.resample.sampler import GivenMap, Sampler, Sampling, SamplingError
+from solver.resample.plan import GivenMap, Sampling, SamplingError
+from solver.resample.sampler import Sampler
 from solver.warp.map import WarpMap
 
 POINTS_AT_ONCE = 1_000_000  # of a map

@@ -23,7 +23,8 @@ from app.replay import Replay
 from app.sampling import Pictures
 from solver.gl.device import Device
 from solver.grid import Grid
-from solver.resample.sampler import GivenMap, Sampler, Sampling
+from solver.resample.plan import GivenMap, Sampling
+from solver.resample.sampler import Sampler
 from solver.warp.map import MapStatistics
 
 FPS = 30

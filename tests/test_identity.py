@@ -21,7 +21,8 @@ from app.pictures import Picture, read_picture, write_picture
 from app.progress import Progress
 from app.recipe import FluidSettings, Output, Recipe
 from solver.gl.device import Device
-from solver.resample.sampler import GivenMap, Sampler, Sampling
+from solver.resample.plan import GivenMap, Sampling
+from solver.resample.sampler import Sampler
 
 SIZES = [(37, 23), (8, 131), (64, 9)]
 CHANNELS = {1: "grey", 2: "grey+alpha", 3: "RGB", 4: "RGBA"}

@@ -16,7 +16,8 @@ from app.opening import open_recipe
 from app.pictures import linear_to_srgb, read_exr, read_picture, srgb_to_linear
 from app.progress import Progress
 from solver.gl.device import Device
-from solver.resample.sampler import GivenMap, Sampler, Sampling
+from solver.resample.plan import GivenMap, Sampling
+from solver.resample.sampler import Sampler
 
 PHOTOGRAPHS = ["coffee", "cat", "rocket"]  # recipes of photographs of 600 x 400, 451 x 300 and 640 x 427 pixels
 FINER = 4

@@ -1,12 +1,12 @@
 // Classify: what the blocks of a result want when they are looked up, from the map's texels about each block: 2 kind +
-// inside, over 255. Kind 0: one place a pixel is enough; 1: four places are, as 0.75 of the stretch is at
-// most 1; 2: more are wanted. Inside: 1 where every place lies within the bounds of the picture.
+// inside, over 255. Kind 0: one sample a pixel is enough; 1: four samples are, as 0.75 of the stretch is at
+// most 1; 2: more are wanted. Inside: 1 where every sample lies within the bounds of the picture.
 // u_displacement: longer sides, of texels of u_texel, 0-1; u_side: pixels of the result along a block; u_scale: texels to a pixel of the result;
 // u_zoom: pixels of the picture to one of the result; u_longer: pixels of the picture to a longer side;
 // u_middle, u_half: middle and half sides, pixels, of the rectangle beyond which there is nothing.
-// Define SINGLE where one place is enough anyway, EVERYWHERE where four or more are wanted as soon as one is not enough.
+// Define SINGLE where one sample is enough anyway, EVERYWHERE where four or more are wanted as soon as one is not enough.
 // reads: 300
-#include "lib/apart.glsl"
+#include "lib/footprint.glsl"
 uniform sampler2D u_displacement;
 uniform vec2 u_texel;
 uniform float u_side;
@@ -17,8 +17,8 @@ uniform vec2 u_middle;
 uniform vec2 u_half;
 layout(location = 0) out float out_class;
 
-const float ONE_PLACE = 0.05;  // as near each other as that they make less than a quarter of a level of 255
-const float FOUR_PLACES = 1.33;
+const float ONE_SAMPLE = 0.05;  // as near each other as that they make less than a quarter of a level of 255
+const float FOUR_SAMPLES = 1.33;
 
 vec2 displacement(vec2 texel) { return texture(u_displacement, (texel + 0.5) * u_texel).rg * u_longer; }
 
@@ -39,16 +39,16 @@ void main() {
             most = max(most, max(abs(right - here), abs(below - here)));
 #ifndef SINGLE
             vec2 a = (right - here) * u_scale.x + step_x, b = (below - here) * u_scale.y + step_y;
-            farthest = max(farthest, apart(a, b));
+            farthest = max(farthest, footprint(a, b));
             longest = max(longest, max(length(a), length(b)));
 #endif
             here = right;
         }
     }
 #ifdef EVERYWHERE
-    float kind = farthest > ONE_PLACE ? float(EVERYWHERE) : 0.0;
+    float kind = farthest > ONE_SAMPLE ? float(EVERYWHERE) : 0.0;
 #else
-    float kind = farthest > ONE_PLACE ? (longest > FOUR_PLACES ? 2.0 : 1.0) : 0.0;
+    float kind = farthest > ONE_SAMPLE ? (longest > FOUR_SAMPLES ? 2.0 : 1.0) : 0.0;
 #endif
     // Between texels, and beyond the outermost ones, the map is never farther than that from those around.
     vec2 margin = 4.0 * most + 1.0;

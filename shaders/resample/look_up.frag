@@ -1,4 +1,4 @@
-// Look up: the picture at x + D(x), the mean of places spread evenly over each pixel of the result.
+// Look up: the picture at x + D(x), the mean of samples spread evenly over each pixel of the result.
 // Along x and along y there are 2 clamp(ceil(0.75 s), 1, 4) of them, s the stretch of the map in that direction over
 // the pixel; where the map shrinks and distorts nothing, there is one at the centre. Four neighbours lie within a pixel of the
 // picture: they are looked up at once, in the block of pixels that holds what they are made of.
@@ -8,12 +8,12 @@
 // premultiplied where PREPARED is defined, two neighbours in a texel where PACKED is (prepare.frag), else as it is;
 // u_raw: the picture as it is;
 // u_displacement: longer sides, at the corners of the result's pixels; with ONE defined at their centres along x, as
-// spread.frag draws it, and along y still at the map's texels, u_scale to a pixel, or with SPREAD at the centres too;
+// sample_points.frag draws it, and along y still at the map's texels, u_scale to a pixel, or with AT_CENTRES both ways;
 // u_texel, u_raw_texel, u_next: size of a texel of both and of the displacement, 0-1;
 // u_pixel: the result's pixel of the first fragment, or the first of its two; u_zoom: pixels of the picture to a pixel of the result;
 // u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
-// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of places, or ONE; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
+// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of samples, or ONE; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
 // OPAQUE if there is no alpha; PREMULTIPLIED if u_raw is, and the result; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
 // GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
 // they have in common is done once, and a software rasteriser waits for the pixels of both at the same time.
@@ -24,7 +24,7 @@
 #define MOST_PAIRS 4
 #endif
 #include "lib/srgb.glsl"
-#include "lib/apart.glsl"
+#include "lib/footprint.glsl"
 #ifdef PACKED
 uniform usampler2D u_source;
 #else
@@ -226,7 +226,7 @@ vec4 look_up(vec2 pixel, CORNERS at) {
     vec2 a = at[0], b = at[1], c = at[2], d = at[3];
     vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d);
     vec2 along_x = 0.5 * (b - a + d - c) + vec2(zoom.x, 0.0), along_y = 0.5 * (c - a + d - b) + vec2(0.0, zoom.y);
-    float away_from_one = apart(along_x, along_y);
+    float away_from_one = footprint(along_x, along_y);
     bool shifted = away_from_one < 1e-3;
 #if MOST_PAIRS > 1
     vec2 bend = a - b - c + d, stretch = vec2(length(along_x), length(along_y));
@@ -311,7 +311,7 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #define LONGER u_longer
 #endif
 
-#ifdef SPREAD
+#ifdef AT_CENTRES
 TEXELS at_centre(float pixel) { return texture(u_displacement, gl_FragCoord.xy * u_next).PARTS * LONGER; }
 #elif defined(ONE)
 #include "lib/along.glsl"

@@ -120,3 +120,40 @@ class DoubleField:
     def release(self) -> None:
         self.read.release()
         self.write.release()
+
+
+class FieldPool:
+    """Fields kept by what they are for, each made anew when it has to be another one.
+
+    Args:
+        device: where they live.
+        label: what their names begin with.
+    """
+
+    def __init__(self, device: Device, label: str) -> None:
+        self.device = device
+        self.label = label
+        self._fields: dict[str, Field] = {}
+
+    def __getitem__(self, role: str) -> Field:
+        return self._fields[role]
+
+    @property
+    def fields(self) -> list[Field]:
+        """All that are kept."""
+        return list(self._fields.values())
+
+    def get(self, role: str, size: tuple[int, int], components: int, dtype: str = "f4") -> Field:
+        """The field for `role`; what it holds is kept as long as it is asked for as the same."""
+        kept = self._fields.get(role)
+        if kept is None or (kept.size, kept.components, kept.dtype) != (size, components, dtype):
+            if kept is not None:
+                kept.release()
+            self._fields[role] = self.device.field(size, components, f"{self.label}, {role}", dtype)
+        return self._fields[role]
+
+    def release(self) -> None:
+        """Free them all."""
+        for field in self.fields:
+            field.release()
+        self._fields.clear()

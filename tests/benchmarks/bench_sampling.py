@@ -18,7 +18,8 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.grid import Grid
-from solver.resample.sampler import Sampler, Sampling
+from solver.resample.plan import Sampling
+from solver.resample.sampler import Sampler
 from solver.warp.map import WarpMap
 
 WIDTH, HEIGHT = 3840, 2160

@@ -1,4 +1,4 @@
-// Spread: a displacement taken at the lattice of a picture in one direction, by a four-point Lagrange cubic; drawn once
+// Sample points: a displacement interpolated at the lattice of a picture in one direction, by a four-point Lagrange cubic; drawn once
 // along x and then along y, which reads 8 texels where both at once would read 16.
 // u_displacement: longer sides; u_first: lattice point of the first fragment, in pixels of the picture;
 // u_scale: texels of the displacement to a pixel. Define ALONG_X for the first of the two, and PAIRED where a texel of
