@@ -49,7 +49,7 @@ LOOSEST = 0.3
 # making the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
 START = 0.68
 MORE = 6.0
-COASTING = 2.0
+COASTING = 3.0
 
 # What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
 FARTHEST = 2.0

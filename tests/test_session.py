@@ -205,6 +205,20 @@ def test_a_long_fast_push_of_water_does_not_fold(session: Session) -> None:
         session.undo()
 
 
+def test_water_swirls_on_by_itself(session: Session) -> None:
+    session.set_grid(128)
+    session.change(WATER.name, viscosity=WATER.viscosity, drag=WATER.drag)
+    session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.35, 0.5)
+    for k in range(1, 16):
+        session.move(0.35 + 0.02 * k, 0.5)
+        session.advance(1)
+    session.release()
+    tick, released = session.tick, session.replay.warp.read()
+    session.settle()
+    assert (session.tick - tick) * session.dt > 3
+    assert np.abs(session.replay.warp.read() - released).max() > 0.15
+
+
 def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Session) -> None:
     session.set_grid(128)
     session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
