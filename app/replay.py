@@ -160,6 +160,12 @@ class Replay:
             self._passing = self._state()
             self._step(part)
 
+    def head_for(self, tick: int) -> None:
+        """Go to the last moment up to a tick that is kept, unless this one lies between the two."""
+        nearest = self.checkpoints.nearest(self.recipe, tick)
+        if tick < self.tick or (nearest is not None and nearest.tick > self.tick):
+            self.seek(nearest.tick if nearest is not None else 0)
+
     def use(self, recipe: Recipe) -> None:
         """Go on with another recipe at the same tick, making again what differs in its past."""
         self._leave_passing()
