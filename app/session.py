@@ -131,6 +131,13 @@ class Session:
             return self._pen
         return self.end if self.coasting else self.tick
 
+    @property
+    def waiting(self) -> list[Stroke]:
+        """The strokes that are drawn already, and that the simulation has not come to the end of."""
+        if self._target is not None or not (self.is_painting or self.coasting):
+            return []
+        return [stroke for stroke in self._live.stroke if stroke.last_tick >= self.tick]
+
     # -- painting ---------------------------------------------------------------------------------------------------
 
     def press(self, tool: Tool, press: Press, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:

@@ -166,6 +166,7 @@ class Quality:
             self._watch(session)
         if not self.is_on:
             self._wanted = None
+            session.forget_grid()
         elif session.is_painting:
             self._judge(dt)
         if self.is_preparing:
