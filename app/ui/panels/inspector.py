@@ -97,7 +97,7 @@ def _quality(ui: Ui, editor: Editor) -> None:
     session = editor.session
     width, height = editor.canvas.size
     grid = session.recipe.fluid.grid
-    ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits; {grid} cells")
+    ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits; grid of {grid}")
     automatic = editor.quality.is_on
     index = 0 if automatic else 1 + GRIDS.index(grid) if grid in GRIDS else -1
     chosen = ui.segmented("grid", ["Auto", *(str(cells) for cells in GRIDS)], index, -1)
