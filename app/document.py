@@ -51,6 +51,11 @@ class Document:
         self.history = History(recipe, budget=self.history.budget)
         self._saved = recipe
 
+    def simulate_on(self, cells: int) -> None:
+        """Let all states of the work be simulated on another grid: no edit, nothing to undo and nothing to save."""
+        self.history.replace_all(lambda recipe: recipe.on_grid(cells))
+        self._saved = self._saved.on_grid(cells)
+
     def saved(self, path: Path) -> None:
         """Take note that the work, as it is now, has been written to `path`."""
         self.path = path

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 from app.recipe import Recipe
 
@@ -88,6 +89,10 @@ class History:
         del self._entries[self._index + 1 :]
         before = self._entries[self._index - 1].recipe if self._index else None
         self._entries[self._index] = Entry(self._entries[self._index].name, recipe, _own_bytes(recipe, before))
+
+    def replace_all(self, change: Callable[[Recipe], Recipe]) -> None:
+        """Let every state be another recipe, which is no edit: the list stays as it is, and so does the present."""
+        self._entries = [replace(entry, recipe=change(entry.recipe)) for entry in self._entries]
 
     def undo(self) -> Recipe:
         """The recipe one edit earlier; the present one where there is none."""

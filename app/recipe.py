@@ -280,6 +280,10 @@ class Recipe(Model):
         """The recipe with some of its parts replaced by parts that are valid in themselves; shares all the others."""
         return self.model_copy(update=parts)
 
+    def on_grid(self, cells: int) -> Self:
+        """The recipe, simulated on another grid."""
+        return self.edited(fluid=self.fluid.model_copy(update={"grid": cells}))
+
     def checked(self, source: str = "the recipe") -> Self:
         """The recipe, validated as a whole again: for parts that came from outside, that is from `source`.
 

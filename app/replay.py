@@ -49,7 +49,7 @@ LOOSEST = 0.3
 # making the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
 START = 0.68
 MORE = 6.0
-COASTING = 2.0
+COASTING = 3.0
 
 # What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
 FARTHEST = 2.0
@@ -159,6 +159,12 @@ class Replay:
         if part:
             self._passing = self._state()
             self._step(part)
+
+    def head_for(self, tick: int) -> None:
+        """Go to the last moment up to a tick that is kept, unless this one lies between the two."""
+        nearest = self.checkpoints.nearest(self.recipe, tick)
+        if tick < self.tick or (nearest is not None and nearest.tick > self.tick):
+            self.seek(nearest.tick if nearest is not None else 0)
 
     def use(self, recipe: Recipe) -> None:
         """Go on with another recipe at the same tick, making again what differs in its past."""

@@ -47,6 +47,7 @@ class Session:
         stroke: the stroke that is open.
         is_rebuilding: all is made again on another grid; what is seen in between is of no interest.
         notice: something the person should hear of, for the window to take.
+        is_grid_automatic: nobody has chosen the grid, and it may follow the machine.
         changes: grows with everything that changes what is seen.
     """
 
@@ -63,12 +64,14 @@ class Session:
         self.notice: str | None = None
         self.changes = 0
         self.is_rebuilding = False
+        self.is_grid_automatic = False
         self.last_place: tuple[float, float] | None = None
         self._gesture: Gesture | None = None
         # The tick that the gesture is recorded at: ahead of the simulation while strokes before it are still waiting.
         self._pen = 0
         # The person has sent the playhead back, and what is done next takes the place of what comes after it.
         self._went_back = False
+        self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
         self._tool: Tool | None = None
         self._opposite = False
         self._touch: Touch | None = None
@@ -127,6 +130,13 @@ class Session:
         if self.is_painting:
             return self._pen
         return self.end if self.coasting else self.tick
+
+    @property
+    def waiting(self) -> list[Stroke]:
+        """The strokes that are drawn already, and that the simulation has not come to the end of."""
+        if self._target is not None or not (self.is_painting or self.coasting):
+            return []
+        return [stroke for stroke in self._live.stroke if stroke.last_tick >= self.tick]
 
     # -- painting ---------------------------------------------------------------------------------------------------
 
@@ -343,18 +353,12 @@ class Session:
         """Let the playhead go to a tick over the next frames."""
         self._target = tick if tick != self.tick else None
 
-    def _head_for(self, tick: int) -> None:
-        """Go to the last moment up to a tick that is kept, unless this one is between them."""
-        near = self.replay.checkpoints.nearest(self._live, tick)
-        if tick < self.tick or (near is not None and near.tick > self.tick):
-            self.replay.seek(near.tick if near is not None else 0)
-
     def _approach(self, deadline: float) -> None:
         """Work towards the target until the deadline, by way of the nearest checkpoint."""
         target = self._target
         if target is None:
             return
-        self._head_for(target)
+        self.replay.head_for(target)
         while self.tick < target:
             self._step()
             if time.perf_counter() > deadline:
@@ -433,9 +437,46 @@ class Session:
         self.edit("Start from a map" if name else "Start from the picture", map=name)
 
     def set_grid(self, cells: int, name: str = "Quality") -> None:
-        """Simulate on another grid, by replaying all that has been done."""
+        """Simulate on another grid, by replaying all that has been done; from now on it is the person's choice."""
+        self.is_grid_automatic = False
+        self.forget_grid()
         if cells != self._live.fluid.grid:
             self.edit(name, fluid=self._live.fluid.model_copy(update={"grid": cells}))
+
+    def prepare_grid(self, cells: int, seconds: float) -> bool:
+        """Simulate all that has been done on another grid too, for a while; True once that has taken this one's place.
+
+        Until then everything stays as it is, and also then it is no edit.
+        """
+        recipe, start = self._live.on_grid(cells), time.perf_counter()
+        if self._prepared is not None and not recipe.is_set_up_as(self._prepared.recipe):
+            self.forget_grid()
+        if self._prepared is None:
+            self._prepared = Replay(self.device, recipe, self.pictures, self.replay.checkpoints.budget // 2)
+        prepared = self._prepared
+        if (common := recipe.agrees_until(prepared.recipe)) < prepared.tick:
+            prepared.head_for(int(common))
+        prepared.use(recipe)
+        prepared.head_for(self.tick)
+        while prepared.tick < self.tick:
+            prepared.advance()
+            if time.perf_counter() - start > seconds:
+                break
+        if prepared.tick < self.tick:
+            return False
+        prepared.checkpoints.budget = self.replay.checkpoints.budget
+        self.replay.release()
+        self.replay, self._prepared = prepared, None
+        self.document.simulate_on(cells)
+        self._base, self._live = self._base.on_grid(cells), recipe
+        self.changes += 1
+        return True
+
+    def forget_grid(self) -> None:
+        """Go on with this grid, whatever another one was prepared for."""
+        if self._prepared is not None:
+            self._prepared.release()
+            self._prepared = None
 
     def begin_with(self, **fluid: Any) -> None:
         """Other settings of the fluid for work that has not begun yet: no edit, and nothing to save."""
@@ -491,8 +532,7 @@ class Session:
         else:
             common = recipe.agrees_until(before)
             if common < replay.tick:
-                near = replay.checkpoints.nearest(recipe, int(min(common, replay.tick)))
-                replay.seek(near.tick if near is not None else 0)
+                replay.head_for(int(common))
         self._live = recipe
         replay.use(recipe)
         self._send(min(tick, self.end))
@@ -504,7 +544,7 @@ class Session:
         There, what was recorded after it is left to undo.
         """
         tick = self.target if self._went_back else self.end
-        self._head_for(tick)
+        self.replay.head_for(tick)
         if tick < self.end:
             self._cut(tick)
         self._went_back = False
@@ -542,4 +582,5 @@ class Session:
 
     def release_gpu(self) -> None:
         """Free the textures."""
+        self.forget_grid()
         self.replay.release()

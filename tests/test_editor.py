@@ -27,7 +27,7 @@ from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.preferences import Preferences
-from app.ui.quality import GRIDS
+from app.ui.quality import GRIDS, Speed
 from app.ui.saving import SaveDialog
 from editing import Robot, command_line, pattern, small_project, write_foreign_map
 from solver.gl.device import Device
@@ -1162,25 +1162,92 @@ def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> No
     assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
 
 
-def test_slow_painting_is_answered_by_a_coarser_grid_but_never_by_losing_redo(automatic: Robot) -> None:
+def paint_at(robot: Robot, dt: float, seconds: float = 2.5) -> None:
+    """A stroke on a machine that takes `dt` seconds for a frame."""
+    robot.move(*robot.at(0.4, 0.5))
+    robot.press()
+    count = round(seconds / dt)
+    for step in range(count):
+        robot.frame(Move(*robot.at(0.4 + 0.1 * step / count, 0.5)), dt=dt)
+    robot.release()
+    robot.editor.session.settle()
+
+
+def until_on(robot: Robot, grid: int) -> None:
+    """Draw frames until the grid is another one, in none of which the picture goes back."""
+    session = robot.editor.session
+    tick = session.tick
+    assert session.recipe.fluid.grid != grid
+    for _ in range(2000):
+        robot.frame(dt=0.02)
+        assert session.tick == tick
+        assert not session.is_rebuilding
+        if session.recipe.fluid.grid == grid:
+            break
+    assert session.replay.grid.nx == session.recipe.fluid.grid == grid
+    assert session.document.recipe == session.recipe
+
+
+def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(automatic: Robot) -> None:
     automatic.until(lambda: not automatic.editor.quality.is_measuring)
     session = automatic.editor.session
     session.begin_with(grid=128)
-
-    def paint_slowly() -> None:
-        automatic.move(*automatic.at(0.4, 0.5))
-        automatic.press()
-        automatic.frame(count=1, dt=0.1)
-        for step in range(20):
-            automatic.frame(Move(*automatic.at(0.4 + 0.005 * step, 0.5)), dt=0.1)
-        automatic.release()
-
-    paint_slowly()
+    automatic.drag((0.4, 0.3), (0.5, 0.3))
+    automatic.editor.session.settle()
+    seen = automatic.warp()
+    paint_at(automatic, 0.1)
     automatic.key("ctrl+z")
-    automatic.frame(count=5)
-    assert session.recipe.fluid.grid == 128
+    until_on(automatic, 96)
+    assert "below 30 frames a second" in automatic.editor.messages.shown[-1].text
+    assert names(automatic) == ["Open", "Push", "Push"]
+    # What is seen is the work on this grid, which is nearly what it was on the other; and it can still be redone.
+    warp = automatic.warp()
+    assert np.abs(warp).max() == pytest.approx(np.abs(seen).max(), rel=0.1)
+    session.replay.checkpoints.clear()
+    session.replay.seek(0)
+    session.replay.seek(session.end)
+    assert np.array_equal(automatic.warp(), warp)
     automatic.key("ctrl+y")
     automatic.rest()
-    assert names(automatic) == ["Open", "Push", "Grid of 96"]
+    assert len(session.recipe.stroke) == 2
+    for _ in range(2):
+        automatic.key("ctrl+z")
     assert session.recipe.fluid.grid == 96
-    assert "below 30 frames a second" in automatic.editor.messages.shown[-1].text
+    assert not automatic.editor.is_dirty
+
+
+def test_the_grid_is_finer_again_where_there_is_time(automatic: Robot) -> None:
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    quality, session = automatic.editor.quality, automatic.editor.session
+    quality._speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
+    session.begin_with(grid=128, dt=1 / 60)
+    paint_at(automatic, 0.1)
+    until_on(automatic, 96)
+    paint_at(automatic, 1 / 60)
+    until_on(automatic, 128)
+    assert names(automatic) == ["Open", "Push", "Push"]
+
+
+def test_a_grid_that_was_chosen_stays(automatic: Robot) -> None:
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    quality, session = automatic.editor.quality, automatic.editor.session
+    session.begin_with(grid=160)
+    session.set_grid(128, "Grid of 128")
+    paint_at(automatic, 0.1)
+    automatic.frame(count=20)
+    assert session.recipe.fluid.grid == 128
+    assert names(automatic)[-2:] == ["Grid of 128", "Push"]
+    assert not automatic.editor.wants_frame() or automatic.editor.clock.settling
+    # Until it is left to the machine again.
+    quality._grid = 96
+    quality.turn_on()
+    until_on(automatic, 96)
+
+
+def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
+    robot = Robot(device, small_project(tmp_path, 128), preferences=Preferences(auto_quality=True))
+    robot.until(lambda: not robot.editor.quality.is_measuring)
+    paint_at(robot, 0.1)
+    robot.frame(count=20)
+    assert robot.editor.session.recipe.fluid.grid == 128
+    robot.close()

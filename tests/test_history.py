@@ -46,6 +46,17 @@ def test_an_edit_of_nothing_is_none():
     assert not history.can_undo
 
 
+def test_all_states_replaced_are_no_edit():
+    history = History(Recipe())
+    for name in ("A", "B", "C"):
+        history.commit(name, history.recipe.edited(name=name))
+    history.undo()
+    history.replace_all(lambda recipe: recipe.on_grid(64))
+    assert [entry.name for entry in history.entries] == ["Open", "A", "B", "C"]
+    assert (history.recipe.name, history.redo_name) == ("B", "C")
+    assert {entry.recipe.fluid.grid for entry in history.entries} == {64}
+
+
 def test_recipes_share_what_did_not_change():
     long = Recipe(stroke=tuple(stroke(seed, 1000) for seed in range(50)))
     history = History(long)

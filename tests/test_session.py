@@ -205,6 +205,20 @@ def test_a_long_fast_push_of_water_does_not_fold(session: Session) -> None:
         session.undo()
 
 
+def test_water_swirls_on_by_itself(session: Session) -> None:
+    session.set_grid(128)
+    session.change(WATER.name, viscosity=WATER.viscosity, drag=WATER.drag)
+    session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.35, 0.5)
+    for k in range(1, 16):
+        session.move(0.35 + 0.02 * k, 0.5)
+        session.advance(1)
+    session.release()
+    tick, released = session.tick, session.replay.warp.read()
+    session.settle()
+    assert (session.tick - tick) * session.dt > 3
+    assert np.abs(session.replay.warp.read() - released).max() > 0.15
+
+
 def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Session) -> None:
     session.set_grid(128)
     session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
@@ -418,3 +432,48 @@ def test_what_waits_is_finished_though_nothing_more_is_recorded(session: Session
     session.settle()
     assert session.tick == session.end
     assert session.document.recipe == recipe
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
+    session: Session, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    monkeypatch.setattr("app.session.QUICK", 0.0)  # a machine on which every tick takes a frame
+    monkeypatch.setattr("app.session.PATIENCE", 0.0)
+    dice = random.Random(seed)
+
+    def gesture() -> None:
+        strokes, went_back = session.recipe.stroke, session._went_back
+        press = Press(BrushSettings(0.12, 0.2), dice.random() < 0.2, session.extent, session.dt)
+        session.press(TOOL[dice.choice(PAINTING).name], press, dice.random(), dice.random(), 1.0, dice.random() < 0.1)
+        for _ in range(dice.randrange(5)):
+            session.move(dice.random(), dice.random())
+            session.advance(dice.randrange(3))
+        if dice.random() < 0.2:
+            session.cancel()
+        else:
+            session.release()
+        if not went_back:
+            assert session.recipe.stroke[: len(strokes)] == strokes
+
+    doings = [
+        *[gesture] * 6, session.undo, session.redo, session.pause, session.play, session.step, session.cancel,
+        session.stop_recording, lambda: session.change("Putty", viscosity=dice.choice((0.3, 0.03))),
+        lambda: session.change("Stop all motion", clear_velocity=True), lambda: session.prepare_grid(24, 0.0),
+        lambda: session.go_to(dice.randrange(len(session.document.history.entries))),
+        lambda: session.seek(dice.randrange(session.end + 1)),
+    ]  # fmt: skip
+    for _ in range(40):
+        dice.choice(doings)()
+        for _ in range(dice.randrange(6)):
+            session.advance(dice.randrange(3))
+        assert session.document.recipe == session.recipe
+        assert 0 <= session.tick <= max(session.end, 1)
+    session.seek(session.end)
+    session.settle()
+    seen, tick = session.replay.warp.read(), session.tick
+    assert tick == session.end
+    session.replay.checkpoints.clear()
+    session.replay.seek(0)
+    session.replay.seek(tick)
+    assert np.array_equal(session.replay.warp.read(), seen)

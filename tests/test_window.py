@@ -18,7 +18,7 @@ from PIL import Image
 from app import project as projects
 from app.pictures import read_picture, write_picture
 from app.recipe import Recipe
-from editing import pattern, write_foreign_map
+from editing import pattern, small_project, write_foreign_map
 
 NEEDED = ("Xvfb", "xdotool")
 PATIENCE = 90.0
@@ -183,6 +183,35 @@ def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
     subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
     assert np.array_equal(read_picture(exported).pixels, read_picture(rendered).pixels)
     assert isinstance(saved.recipe, Recipe)
+
+
+def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path) -> None:
+    """Four of them are drawn while the first is simulated, and exported while the last ones still wait."""
+    work, exported, rendered = (tmp_path / name for name in ("work.fluidwarp", "work warped.png", "rendered.png"))
+    projects.save(small_project(tmp_path, grid=384), work)
+    desk.open(work)
+    words = ["mousemove", "300", "200", "sleep", "0.5"]
+    for y in (200, 300, 400, 500):
+        words += ["mousemove", "300", str(y), "mousedown", "1", "sleep", "0.05"]
+        words += ["mousemove", "500", str(y), "sleep", "0.05", "mousemove", "700", str(y), "mouseup", "1"]
+    desk.do(*words)
+    desk.until(lambda: desk.title() == "work * - fluidwarp", "the strokes to be recorded")
+    desk.insist(lambda: desk.key("ctrl+s"), lambda: desk.title() == "work - fluidwarp", "it to be saved")
+
+    def export() -> None:
+        desk.key("ctrl+e")
+        time.sleep(1.5)
+        desk.key("Return")
+
+    desk.insist(export, exported.exists, "the export")
+    strokes = projects.load(work).recipe.stroke
+    assert len(strokes) == 4
+    for stroke in strokes:
+        assert stroke.samples[-1][1] - stroke.samples[0][1] == pytest.approx(400 / 864, abs=0.01)
+    assert all(later.first_tick > stroke.last_tick for stroke, later in pairwise(strokes))
+    command = [sys.executable, "-m", "app", "render", str(work), "-o", str(rendered)]
+    subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
+    assert exported.read_bytes() == rendered.read_bytes()
 
 
 def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:

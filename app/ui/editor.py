@@ -157,6 +157,7 @@ class Editor:
     def _turn_to(self, index: int) -> None:
         if self._index >= 0:
             self.session.stop_recording()
+            self.session.forget_grid()
         self._index = index
         self.view = Viewport(self.layout.canvas, self.canvas.size, self.ui.density)
 
@@ -199,7 +200,8 @@ class Editor:
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
-        return self.quality.is_measuring or self.session.is_moving or self.clock.settling > 0
+        busy = self.quality.is_measuring or self.quality.is_preparing
+        return busy or self.session.is_moving or self.clock.settling > 0
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""

@@ -12,10 +12,14 @@ from app.strokes import Stroke
 from app.ui.files import fresh_recipe
 
 if TYPE_CHECKING:
+    from app.session import Session
     from app.ui.editor import Editor
 
 GRIDS = (96, 128, 160, 192, 256, 384)
-PATIENCE = 1.5  # seconds below the wanted rate before something is done about it
+PATIENCE = 1.5  # seconds below the wanted rate, or with time to spare, before something is done about it
+HICCUP = 0.25  # seconds of one frame that count
+AT_ONCE = 0.02  # seconds of a frame for preparing another grid
+LONGEST = 120.0  # seconds that preparing one may take: a machine at rest should rest
 WANTED = 30.0  # frames a second while painting
 # Of a frame: painting takes a tenth more than what is measured, by checkpoints, looks at the map and a longer recipe;
 # and other programs want their part.
@@ -57,30 +61,58 @@ class Speed:
 
 
 class Quality:
-    """Chooses the grid when something is opened, and a coarser one when painting is slow."""
+    """Chooses the grid when a picture is opened, and another one where painting is slow or has time to spare.
+
+    Only as long as the person has not chosen one; and what is seen and the history stay as they are: another grid is
+    prepared while nothing moves, and takes the place of this one when it is where this one is.
+    """
 
     def __init__(self, editor: Editor) -> None:
         self.editor = editor
-        self._slow_for = 0.0
-        self._pending = False
-        self._limit = GRIDS[-1]
+        self._session: Session | None = None  # that is watched
+        self._wanted: int | None = None
+        self._slow_for = self._spare_for = 0.0
+        self._steps, self._has_stepped = 0, False
+        self._grid: int | None = None  # that painting has been well on
         self._frames = 0
         self._speed: Speed | None = None
         self._trial: Replay | None = None
         self._spent: list[list[float]] = []  # milliseconds of the ticks on each grid of `TRIALS` so far
         self._drawing: list[float] = []
 
+    @property
+    def is_on(self) -> bool:
+        """The grid of what is open follows the machine."""
+        return self.editor.state.auto_quality and self.editor.session.is_grid_automatic
+
+    def turn_on(self) -> None:
+        """Let the grid of what is open follow the machine, whoever has chosen it."""
+        self.editor.state.auto_quality = self.editor.session.is_grid_automatic = True
+        self._begin()
+
     def opened(self) -> None:
-        """Something new is open; an untouched picture is given the grid that this machine does well on."""
-        self._slow_for, self._pending = 0.0, False
+        """Something new is open; of an untouched picture, nobody has chosen the grid."""
         session = self.editor.session
-        # Who has undone everything may want it back: what can be redone was made on the grid as it is.
-        history = session.document.history
-        fresh = len(history.entries) == 1 and history.recipe.edited(picture=None) == fresh_recipe()
-        if self._speed is None or not self.editor.state.auto_quality or not fresh:
+        session.is_grid_automatic = session.recipe.edited(picture=None) == fresh_recipe()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Take the grid that this machine does well on, as far as that is known."""
+        session = self.editor.session
+        self._watch(session)
+        if self._speed is None or self._grid is None or not self.is_on:
             return
-        grid = min(self._speed.best_grid, self._limit)
-        session.begin_with(grid=grid, dt=1 / 60 if self._speed.tick(grid) < FAST else 1 / 30)
+        # Who has undone everything may want it back: what can be redone was made with the ticks as they are.
+        if session.end == 0 and len(session.document.history.entries) == 1:
+            session.begin_with(grid=self._grid, dt=1 / 60 if self._speed.tick(self._grid) < FAST else 1 / 30)
+        elif session.recipe.fluid.grid != self._grid:
+            self._wanted = self._grid
+
+    def _watch(self, session: Session) -> None:
+        """Begin to watch the rate anew."""
+        self._session, self._wanted = session, None
+        self._steps, self._has_stepped = session.replay.steps, False
+        self._slow_for = self._spare_for = 0.0
 
     @property
     def is_measuring(self) -> bool:
@@ -113,7 +145,8 @@ class Quality:
             # The first ones compile.
             fine, coarse = (median_low(ticks[2:]) for ticks in self._spent)
             self._speed = Speed.of(fine, coarse, median_low(self._drawing[2:]))
-            self.opened()
+            self._grid = self._speed.best_grid
+            self._begin()
 
     def _new_trial(self, grid: int) -> Replay:
         """A push of which the picture on the canvas knows nothing."""
@@ -124,33 +157,61 @@ class Quality:
         return Replay(self.editor.device, recipe, session.pictures, budget=0)
 
     def look(self, dt: float) -> None:
-        """Watch the rate while the person paints; a coarser grid is taken when the stroke is finished.
+        """Watch the rate while the person paints; another grid is prepared when nothing moves.
 
         `dt`: seconds since the last frame.
         """
-        editor = self.editor
-        if not editor.state.auto_quality:
-            return
-        if editor.session.is_painting:
-            # A hiccup, such as a shader that is compiled, is no slow machine.
-            if dt < 0.25:
-                slow = dt > 1.1 / WANTED
-                self._slow_for = min(max(self._slow_for + (dt if slow else -dt), 0.0), 3.0)
-            self._pending = self._pending or self._slow_for > PATIENCE
-        elif self._pending and not editor.session.is_moving and not editor.session.document.history.can_redo:
-            # Another grid is an edit, after which there is nothing to redo; nobody has asked for it.
-            self._pending, self._slow_for = False, 0.0
-            self._coarsen()
+        editor, session = self.editor, self.editor.session
+        if session is not self._session:
+            self._watch(session)
+        if not self.is_on:
+            self._wanted = None
+            session.forget_grid()
+        elif session.is_painting:
+            self._judge(dt)
+        if self.is_preparing:
+            assert self._wanted is not None
+            before = session.recipe.fluid.grid
+            if session.prepare_grid(self._wanted, AT_ONCE):
+                self._grid = self._wanted
+                self._watch(session)
+                if self._grid < before:
+                    editor.messages.say(
+                        f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {self._grid} cells "
+                        f"instead of {before}. Quality in the inspector changes it."
+                    )
 
-    def _coarsen(self) -> None:
+    @property
+    def is_preparing(self) -> bool:
+        """Another grid is wanted, and there is time for it."""
         editor = self.editor
-        now = editor.session.recipe.fluid.grid
-        coarser = [grid for grid in GRIDS if grid < now]
-        if not coarser:
-            return
-        editor.session.set_grid(coarser[-1], f"Grid of {coarser[-1]}")
-        self._limit = coarser[-1]
-        editor.messages.say(
-            f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {coarser[-1]} cells instead "
-            f"of {now}. Quality in the inspector changes it."
-        )
+        busy = editor.session.is_moving or editor.files.is_loading or editor.exports.is_running
+        return self._wanted is not None and self.is_on and not busy
+
+    def _judge(self, dt: float) -> None:
+        """Learn from a frame while the person paints what grid would be better."""
+        session = self.editor.session
+        # A hiccup, such as a shader that is compiled, is no slow machine.
+        dt = min(dt, HICCUP)
+        # `dt` is what the frame before took, so what was done in that one counts.
+        has_stepped, self._has_stepped = self._has_stepped, session.replay.steps != self._steps
+        self._steps = session.replay.steps
+        now = session.recipe.fluid.grid
+        coarser = max((grid for grid in GRIDS if grid < now), default=None)
+        finer = min((grid for grid in GRIDS if grid > now), default=None)
+        slow = dt > 1.1 / WANTED
+        self._slow_for = min(max(self._slow_for + (dt if slow else -dt), 0.0), 2 * PATIENCE)
+        if has_stepped and finer is not None and self._speed is not None:
+            more = (self._speed.tick(finer) - self._speed.tick(now)) * 1e-3
+            spare = dt + more < (1 - SPARE) / WANTED
+            self._spare_for = min(max(self._spare_for + (dt if spare else -dt), 0.0), 2 * PATIENCE)
+        if self._slow_for > PATIENCE:
+            self._wanted = coarser
+        elif self._spare_for > PATIENCE:
+            self._wanted = finer
+        if self._wanted is not None and self._takes(self._wanted) > LONGEST:
+            self._wanted = None
+
+    def _takes(self, grid: int) -> float:
+        """Seconds to simulate all that has been done on a grid."""
+        return 0.0 if self._speed is None else self.editor.session.tick * self._speed.tick(grid) * 1e-3

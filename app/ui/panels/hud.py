@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from app.ui.editor import Editor
 
 _rects: list[Rect] = []
+BEHIND = 12  # ticks from which on it is told that the simulation is behind
+MOST_WAITING = 100  # strokes that are drawn
 WHITE, BLACK = rgb("ffffff"), rgb("000000")
 
 
@@ -35,6 +37,7 @@ def draw(ui: Ui, editor: Editor) -> None:
         _forces(ui, editor, lines)
     _split(ui, editor, lines)
     _path(ui, editor, lines)
+    _waiting(ui, editor, lines)
     if editor.shows_ring:
         _ring(ui, editor, lines)
     lines.pop_clip_rect()
@@ -79,6 +82,19 @@ def _path(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
     lines.add_polyline(points, packed(BLACK, 0.45), ui.px(5), 0)
     lines.add_polyline(points, packed(ui.palette.accent), ui.px(2.4), 0)
     _arrow_head(lines, points[max(len(points) - 6, 0)], points[-1], ui.px(10), ui.palette.accent)
+
+
+def _waiting(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
+    """Where strokes will act that are drawn already, while the simulation is clearly behind them."""
+    session = editor.session
+    if session.target - session.tick < BEHIND:
+        return
+    for stroke in session.waiting[:MOST_WAITING]:
+        step = max(len(stroke.samples) // 40, 1)
+        places = [*(sample[1:3] for sample in stroke.samples[::step]), stroke.samples[-1][1:3]]
+        points: list[Any] = [ImVec2(*editor.view.to_screen(*place)) for place in places]
+        lines.add_polyline(points, packed(BLACK, 0.3), ui.px(3.5), 0)
+        lines.add_polyline(points, packed(WHITE, 0.7), ui.px(1.5), 0)
 
 
 def _arrow_head(lines: imgui.ImDrawList, start: ImVec2, end: ImVec2, size: float, colour: Colour) -> None:
@@ -203,8 +219,7 @@ def _statistics(ui: Ui, editor: Editor) -> None:
 
 def _catching_up(ui: Ui, editor: Editor) -> None:
     session, canvas = editor.session, editor.layout.canvas
-    left = session.target - session.tick
-    if left < 12:
+    if session.target - session.tick < BEHIND:
         return
     with ui.floating("catching up", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9):
         imgui.dummy(ImVec2(0, 0))

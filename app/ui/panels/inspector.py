@@ -96,13 +96,17 @@ def _view(ui: Ui, editor: Editor) -> None:
 def _quality(ui: Ui, editor: Editor) -> None:
     session = editor.session
     width, height = editor.canvas.size
-    ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits")
     grid = session.recipe.fluid.grid
-    index = GRIDS.index(grid) if grid in GRIDS else -1
-    chosen = ui.segmented("grid", [str(cells) for cells in GRIDS], index, -1)
-    ui.tooltip("Cells along the longer side", more="More is finer and slower. What is seen is what is exported.")
-    if chosen != index and chosen >= 0:
-        session.set_grid(GRIDS[chosen], f"Grid of {GRIDS[chosen]}")
+    ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits; grid of {grid}")
+    automatic = editor.quality.is_on
+    index = 0 if automatic else 1 + GRIDS.index(grid) if grid in GRIDS else -1
+    chosen = ui.segmented("grid", ["Auto", *(str(cells) for cells in GRIDS)], index, -1)
+    more = "More is finer and slower. Auto is as many as this machine can paint on. What is seen is what is exported."
+    ui.tooltip("Cells along the longer side", more=more)
+    if chosen == 0 and not automatic:
+        editor.quality.turn_on()
+    elif chosen > 0 and chosen != index:
+        session.set_grid(GRIDS[chosen - 1], f"Grid of {GRIDS[chosen - 1]}")
     if session.recipe.map is not None:
         ui.dim(f"Starts from the map {PurePath(session.recipe.map).name}")
         if ui.button("Start from the picture", width=-1, height=30):

@@ -95,7 +95,7 @@ def _track(ui: Ui, editor: Editor, width: float) -> None:
     for stroke in session.recipe.stroke:
         a, b = across(stroke.first_tick), across(stroke.last_tick + 1)
         colour = KINDS.get(stroke.tool, MASKS)
-        faded = 1.0 if stroke.first_tick < session.target else 0.45
+        faded = 1.0 if stroke.first_tick < min(session.tick, session.target) else 0.45
         low, high = ImVec2(a, top + ui.px(3)), ImVec2(max(b - ui.px(1), a + ui.px(2)), bottom - ui.px(3))
         draw.add_rect_filled(low, high, packed(colour, faded), ui.px(2))
     for change in session.recipe.change:
