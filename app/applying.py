@@ -251,8 +251,8 @@ def _staying(given: Iterator[Displacement]) -> Iterator[Displacement]:
     yield from repeat(last)
 
 
-def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progress: Progress) -> None:
-    """Write a map, or a sequence of maps, in another format, whole or not at all.
+def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progress: Progress) -> tuple[str, ...]:
+    """Write a map, or a sequence of maps, in another format, whole or not at all. Says what the user should hear of.
 
     Raises:
         UserError: if one cannot be read or written.
@@ -272,6 +272,12 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
             write = stack.enter_context(writer)
         else:
             write = partial(maps.write_map, output, kind=kind)
-        for given in source.read():
+        notices = []
+        for file, given in zip(files.values(), source.read(), strict=True):
+            if device and (folded := folds(cropped(given).values)):
+                notices.append(
+                    f"{file.name} folds over itself in {folded} of its pixels, where no inverse can be right"
+                )
             write(inverted(device, given) if device else given)
             progress.advance()
+    return tuple(notices)

@@ -361,7 +361,8 @@ def convert(
 
     source = _map_source(map_, kind, grid, overscan, max_pixels)
     with on_terminal(output.name, None) as progress:
-        converted(source, output, "offsets" if offsets else "st", invert, progress)
+        notices = converted(source, output, "offsets" if offsets else "st", invert, progress)
+    _tell(*notices)
 
 
 @cli.command()

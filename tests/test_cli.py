@@ -418,6 +418,10 @@ def test_a_fold_is_told(folder: Path):
     first, second = ran.stderr.splitlines()
     assert first == "fluidwarp: m.npy folds over itself in 96 of its pixels"
     assert re.fullmatch(r"fluidwarp: the warp folds over itself in \d+ of 768 cells of the grid", second)
+    ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy")
+    assert ran.stderr == ""
+    ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy", "--invert")
+    assert ran.stderr == "fluidwarp: m.npy folds over itself in 96 of its pixels, where no inverse can be right\n"
     write_map(folder / "m.0007.npy", Displacement(values * 0))
     write_map(folder / "m.0008.npy", Displacement(values))
     ran = fluidwarp(folder, "apply", "m.%04d.npy", "cat.png", "-o", "z.%04d.png")
