@@ -356,7 +356,7 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
             icc=icc,
             exif=_upright_exif(exif),
             xmp=_upright_xmp(xmp.encode() if isinstance(xmp, str) else xmp),
-            dpi=_positive(image.info.get("dpi")),
+            dpi=_upright_dpi(image.info.get("dpi"), orientation),
             texts={key: text.replace("\0", "") for key, text in texts.items() if key},
             chunks=chunks,
             note=lost(file, losses),
@@ -444,8 +444,12 @@ def _plain_mode(image: Any) -> str:
     return ("L" if grey else "RGB") + ("A" if alpha else "")
 
 
-def _positive(dpi: Any) -> tuple[float, float] | None:
-    return (float(dpi[0]), float(dpi[1])) if dpi and float(dpi[0]) > 0 and float(dpi[1]) > 0 else None
+def _upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:
+    """Pixels an inch along x and y of the upright picture, if they are told at all."""
+    if not dpi or len(dpi) != 2 or float(dpi[0]) <= 0 or float(dpi[1]) <= 0:
+        return None
+    x, y = float(dpi[0]), float(dpi[1])
+    return (y, x) if orientation in (5, 6, 7, 8) else (x, y)
 
 
 def upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
@@ -544,14 +548,15 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
             encoded = _upright_exif(exif)
         except Exception:  # damaged metadata must not cost the picture
             encoded = None
+    orientation = int(tags.get(ORIENTATION, 1))
     unit = {2: 1.0, 3: 2.54}.get(int(tags.get(296, 2)))
     resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]
     return Picture(
-        upright(pixels, int(tags.get(ORIENTATION, 1))),
+        upright(pixels, orientation),
         icc=bytes(icc) if icc is not None else None,
         exif=encoded,
         xmp=_upright_xmp(bytes(tags[700])) if 700 in tags else None,
-        dpi=_positive([value * unit for value in resolution]) if unit and len(resolution) == 2 else None,
+        dpi=_upright_dpi([value * unit for value in resolution], orientation) if unit else None,
         premultiplied=premultiplied,
         note=lost(file, losses),
     )

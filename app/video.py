@@ -33,7 +33,7 @@ class Clip:
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
     rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
-    note: what of it is lost, in a sentence; "" if nothing. bytes, inode: of the file when it was looked into.
+    note: what of it is lost, in a sentence; "" if nothing. file_size, inode: of the file when it was looked into.
     sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
     as a rule after its sound; 0 where an older ffmpeg does not tell. bits: 8, or 16 for what has more than 8.
     """
@@ -51,7 +51,7 @@ class Clip:
     decoder: tuple[str, ...]
     filters: str
     note: str
-    bytes: int
+    file_size: int
     inode: tuple[int, int]
 
     def read_frames(
@@ -90,9 +90,9 @@ class Clip:
             now = self.path.stat()
         except OSError:
             return
-        if (now.st_dev, now.st_ino) == self.inode and now.st_size != self.bytes:
+        if (now.st_dev, now.st_ino) == self.inode and now.st_size != self.file_size:
             raise UserError(
-                f"Cannot read {self.path}: it changed while it was read, from {self.bytes} to {now.st_size} bytes; "
+                f"Cannot read {self.path}: it changed while it was read, from {self.file_size} to {now.st_size} bytes; "
                 "start again when it is written whole.",
                 CHANGED,
             )
@@ -101,7 +101,7 @@ class Clip:
 def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
     """Look into a video file; raises `UserError` when it is none."""
     file = Path(path)
-    told = _banner(file)
+    told, seen = _banner(file), file.stat()
     video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
     if video is None:
         raise UserError(f"Cannot read {path}: it is no video, or damaged; give the name of a video.")
@@ -120,7 +120,6 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
     check_size(file, width, height, max_pixels)
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
     seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
-    now = file.stat()
     rotation = re.search(r"rotation of (-?[\d.]+) degrees", told)
     return Clip(
         path=file,
@@ -136,8 +135,8 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
         note=lost(file, _losses(told, video)),
-        bytes=now.st_size,
-        inode=(now.st_dev, now.st_ino),
+        file_size=seen.st_size,
+        inode=(seen.st_dev, seen.st_ino),
     )
 
 

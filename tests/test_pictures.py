@@ -508,6 +508,16 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
     assert not stripped.texts
 
 
+@pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
+def test_narrow_pixels_of_a_turned_picture_are_turned_too(tmp_path: Path, ending: str):
+    path, image = tmp_path / f"a.{ending}", Image.fromarray(smooth(3))
+    tags = {"tiffinfo": {274: 6}} if ending == "tif" else {"exif": exif_bytes(6)}
+    image.save(path, dpi=(300, 150), **tags)
+    assert read_picture(path).dpi == pytest.approx((150, 300), abs=0.1)
+    image.save(path, dpi=(300, 150))
+    assert read_picture(path).dpi == pytest.approx((300, 150), abs=0.1)
+
+
 def test_16_bit_png_and_exr_keep_their_metadata(tmp_path: Path):
     given = Picture(noise(4, np.uint16), icc=SRGB, exif=exif_bytes(), xmp=XMP, texts={"Title": "Ö"})
     write_picture(tmp_path / "a.png", given)
