@@ -7,6 +7,7 @@ import struct
 import subprocess
 import zlib
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -398,8 +399,8 @@ def test_what_a_png_tells_of_its_colours_stays_and_is_told_where_it_matters(tmp_
 def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     import imagecodecs
 
-    options = {"level": 100, "primaries": 9, "transfer": 16, "matrix": 0}
-    (tmp_path / "a.avif").write_bytes(imagecodecs.avif_encode(smooth(3), **options))
+    encoded = imagecodecs.avif_encode(smooth(3), level=100, primaries=9, transfer=16, matrix=0)
+    (tmp_path / "a.avif").write_bytes(encoded)
     assert read_picture(tmp_path / "a.avif").note == (
         "a.avif: its colours are BT.2020 PQ (nclx) and are taken for sRGB"
     )
@@ -511,7 +512,7 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
 @pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
 def test_narrow_pixels_of_a_turned_picture_are_turned_too(tmp_path: Path, ending: str):
     path, image = tmp_path / f"a.{ending}", Image.fromarray(smooth(3))
-    tags = {"tiffinfo": {274: 6}} if ending == "tif" else {"exif": exif_bytes(6)}
+    tags: dict[str, Any] = {"tiffinfo": {274: 6}} if ending == "tif" else {"exif": exif_bytes(6)}
     image.save(path, dpi=(300, 150), **tags)
     assert read_picture(path).dpi == pytest.approx((150, 300), abs=0.1)
     image.save(path, dpi=(300, 150))
