@@ -59,7 +59,7 @@ class Clip:
     ) -> Generator[np.ndarray, None, None]:
         """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time.
 
-        notice: hears, at the end, what was damaged in a clip that could be read all the same.
+        notice: hears, at the end, what was damaged or missing in a clip that could be read all the same.
         Raises `UserError`, with a status of its own if the file was cut or written anew meanwhile.
         """
         channels = 4 if self.alpha else 3
@@ -71,15 +71,19 @@ class Clip:
         dtype = np.dtype(np.uint8 if self.bits == 8 else np.uint16)
         shape = self.height, self.width, channels
         with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel) as process:
+            count = 0
             try:
                 for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
                     yield np.frombuffer(block, dtype).reshape(shape)
+                    count += 1
             except UserError:
                 self._check_unchanged()
                 raise
             self._check_unchanged()
             if complaint := process.complaint():
                 notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
+            elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
+                notice(f"{self.path} has {count} frames, and by the length it tells about {self.frames}")
 
     def _check_unchanged(self) -> None:
         """Raise `UserError` if the file is not as it was: the frames would be fewer, or some of another clip.

@@ -655,6 +655,19 @@ def test_a_clip_that_is_cut_while_it_is_read_is_a_failure_of_its_own(tmp_path: P
     assert raised.value.status == 65
 
 
+def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
+    """By what ffmpeg complains of, or else by the length that the file tells."""
+    said: list[str] = []
+    path = generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=4", "-c:v", "mjpeg")
+    os.truncate(path, path.stat().st_size // 2)
+    assert 10 < len(list(read_clip(path).read_frames(notice=said.append))) < 30
+    path = generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=4", "-f", "lavfi", "-i", "sine=d=8", "-c:v", "mjpeg")
+    assert len(list(read_clip(path).read_frames(notice=said.append))) == 40
+    assert len(said) == 2
+    assert "a.mkv is damaged, and what could be read of it was used" in said[0]
+    assert said[1] == f"{path} has 40 frames, and by the length it tells about 80"
+
+
 def test_a_clip_that_is_replaced_or_deleted_while_it_is_read_is_read_to_its_end(tmp_path: Path):
     path = generate(tmp_path / "a.mkv", "testsrc=s=640x480:r=10:d=4", "-c:v", "ffv1")
     other = generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=1", "-c:v", "ffv1")
