@@ -300,7 +300,9 @@ def read_map(
     _check_finite(path, values)
     edge = edge if overscan is None else overscan
     if edge < 0 or 2 * edge >= min(values.shape[:2]):
-        raise UserError(f"Cannot read {path}: an overscan of {edge} leaves nothing of {values.shape[1::-1]} pixels.")
+        height, width = values.shape[:2]
+        named = f"an overscan of {edge}" if overscan is None else f"--overscan {edge}"
+        raise UserError(f"Cannot read {path}: {named} leaves nothing of its {width} x {height} pixels.")
     if (kind or told.get("map", "st")) == "offsets":
         read = from_offsets(values, up=True, overscan=edge)
     else:

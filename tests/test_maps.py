@@ -285,7 +285,7 @@ def test_what_is_no_map(tmp_path: Path):
     with pytest.raises(UserError, match=r"b\.npy: there is no such file; check the name\.$"):
         read_map(tmp_path / "b.npy")
     write_map(tmp_path / "b.tif", identity(8, 8))
-    with pytest.raises(UserError, match="an overscan of 4 leaves nothing"):
+    with pytest.raises(UserError, match="--overscan 4 leaves nothing of its"):
         read_map(tmp_path / "b.tif", overscan=4)
     for name in ("b.tif", "b.exr", "b.flo", "b.npy"):
         write_map(tmp_path / name, identity(8, 8))
