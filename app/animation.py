@@ -16,7 +16,7 @@ import numpy as np
 from app import ffmpeg
 from app.errors import Cancelled, UserError
 from app.files import NUMBER, cannot_write, is_sequence, replacing, replacing_many, temporary_beside, temporary_file
-from app.pictures import FORMATS, Picture, check_picture_output, picture_format, to_bits, write_picture
+from app.pictures import FORMATS, Picture, check_picture_output, to_bits, write_picture
 from app.progress import never
 from app.video import sound_codec
 
@@ -112,6 +112,12 @@ class Container:
         return self.codecs[codec or next(iter(self.codecs))]
 
 
+# The widest and highest picture that an encoder, or what holds it, takes.
+LARGEST = {
+    "h264": (16384, 16384), "vp9": (65536, 65536), "av1": (16384, 8704), "prores-4444": (65534, 65534),
+    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (16383, 16383),
+}  # fmt: skip
+
 ANIMATIONS = {
     ".mp4": Container("MP4", {"h264": _mp4}, even=True, sound=("aac", "mp3", "ac3"), encoder=("aac", "-b:a", "192k")),
     ".webm": Container(
@@ -148,8 +154,13 @@ def passes(path: str | os.PathLike[str]) -> int:
     return 1 if is_sequence(path) else ANIMATIONS[Path(path).suffix.lower()].passes
 
 
-def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1, codec: str | None = None) -> None:
-    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate or codec."""
+def check_animation(
+    path: str | os.PathLike[str],
+    fps: float | Fraction = 1,
+    codec: str | None = None,
+    size: tuple[int, int] | None = None,
+) -> None:
+    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate, codec or size."""
     if not 0 < fps <= 1000:
         raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
     if is_sequence(path):
@@ -159,7 +170,7 @@ def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1, cod
         if suffix in ANIMATIONS and suffix not in FORMATS:
             mend = f"end in one of {' '.join(FORMATS)}, or leave out the number for one {suffix}"
             raise UserError(f"Cannot write {path}: a sequence's files are pictures; {mend}.")
-        picture_format(path)
+        check_picture_output(path, size=size)
         if codec is not None:
             raise UserError(f"Cannot write {path}: a sequence of pictures has no codec; leave out --codec.")
         return
@@ -172,6 +183,13 @@ def check_animation(path: str | os.PathLike[str], fps: float | Fraction = 1, cod
         raise UserError(f"Cannot write {path}: {suffix} holds {' or '.join(known)}, not {codec}; change --codec.")
     if suffix == ".gif" and fps > 50:
         raise UserError(f"Cannot write {path}: GIF shows at most 50 frames a second; lower the rate or use .apng.")
+    used = codec or next(iter(known))
+    most = LARGEST.get(used)
+    if size is not None and most is not None and (size[0] > most[0] or size[1] > most[1]):
+        raise UserError(
+            f"Cannot write {path}: the result is {size[0]} x {size[1]} pixels, and {used} holds no more than "
+            f"{most[0]} x {most[1]}; make it smaller, or write name.%04d.png."
+        )
 
 
 def check_output(
@@ -181,15 +199,19 @@ def check_output(
     fps: float | Fraction = 1,
     codec: str | None = None,
     bits: int | None = None,
+    size: tuple[int, int] | None = None,
 ) -> None:
-    """Raise `UserError` if there is no format for `path`, as an animation if `animated` or so named, else a still."""
+    """Raise `UserError` if there is no format for `path`, as an animation if `animated` or so named, else a still.
+
+    The format must have the codec, the bits a channel and room for the size, (width, height) in pixels, that are given.
+    """
     if animated or is_animation(path):
-        check_animation(path, fps, codec)
+        check_animation(path, fps, codec, size)
         return
     if Path(path).suffix.lower() not in FORMATS:
         endings = f"a picture's name must end in one of {' '.join(FORMATS)}, an animation's in {' '.join(ANIMATIONS)}"
         raise UserError(f"Cannot write {path}: {endings}.")
-    check_picture_output(path, bits)
+    check_picture_output(path, bits, size)
     if codec is not None:
         raise UserError(f"Cannot write {path}: a picture has no codec; leave out --codec, or write a video.")
 

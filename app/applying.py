@@ -16,9 +16,9 @@ from app.animation import animation_writer, check_output, is_animation, passes
 from app.errors import UserError
 from app.export import longer_side, looked_up, steps_for
 from app.files import check_kept, is_sequence, number_in, writable
-from app.maps import Displacement, Kind, cropped, read_map
+from app.maps import Displacement, Kind, cropped, folds, read_map
 from app.opening import Source, open_source
-from app.pictures import MAX_PIXELS, picture_format, write_picture
+from app.pictures import MAX_PIXELS, picture_format, unheld, write_picture
 from app.progress import Progress
 from app.threads import ahead, behind
 from app.timeline import frame_rate
@@ -100,8 +100,8 @@ class Application:
         for source in (self.source, *self.maps.files().values()):
             check_kept(source, self.output)
 
-    def run(self, device: Device, progress: Progress) -> None:
-        """Do it; nothing is left behind if it is cancelled or fails.
+    def run(self, device: Device, progress: Progress) -> tuple[str, ...]:
+        """Do it; nothing is left behind if it is cancelled or fails. Says what the user should hear of.
 
         Raises:
             UserError: if a map has other proportions than the picture, or anything cannot be read or written.
@@ -110,6 +110,8 @@ class Application:
         progress.enter("reading")
         animated = is_animation(self.output)
         source = open_source(self.source, self.maps.max_pixels)
+        notices = [source.picture.note, unheld(self.output, source.picture)]
+        check_output(self.output, size=self._size(source))
         if animated != (self.maps.is_sequence or source.clip is not None):
             what = "a still" if not animated else "an animation"
             mend = "write f.%04d.png or .mp4" if not animated else "write a picture, such as out.png"
@@ -117,7 +119,7 @@ class Application:
             raise UserError(f"Cannot write {self.output}: {given} do not make {what}; {mend}.")
         with Applier(device, self.edges, source.picture.premultiplied) as applier:
             if animated:
-                self._write_frames(applier, source, progress)
+                self._write_frames(applier, source, progress, notices)
             else:
                 size = self._size(source)
                 steps = steps_for(size)
@@ -130,6 +132,8 @@ class Application:
                 progress.enter("writing")
                 write_picture(self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip)
                 progress.count(steps)
+            notices.extend(applier.notices(self.maps.path))
+        return tuple(filter(None, notices))
 
     @property
     def _alpha(self) -> bool:
@@ -139,7 +143,7 @@ class Application:
         own = source.picture.width, source.picture.height
         return own if self.size is None else longer_side(own, self.size)
 
-    def _write_frames(self, applier: Applier, source: Source, progress: Progress) -> None:
+    def _write_frames(self, applier: Applier, source: Source, progress: Progress, notices: list[str]) -> None:
         clip = source.clip
         frames = clip.frames if clip else len(self.maps.files())
         progress.total = frames and frames * passes(self.output)
@@ -163,7 +167,7 @@ class Application:
             given_maps = self.maps.read()
             frames = repeat(source.picture.pixels)
             if clip:
-                frames = stack.enter_context(ahead(clip.read_frames(progress.cancel)))
+                frames = stack.enter_context(ahead(clip.read_frames(progress.cancel, notices.append)))
                 given_maps = _staying(given_maps)
             for given, pixels in zip(given_maps, frames, strict=False):
                 write(applier.warped(given, pixels, size, self._alpha, lambda rows: progress.check()))
@@ -180,6 +184,7 @@ class Applier:
         self._sampler = Sampler(device)
         self._given: Displacement | None = None
         self._map: GivenMap | None = None
+        self._folds: list[int] = []  # of the maps that fold over themselves, in how many pixels each
 
     def __enter__(self) -> Applier:
         return self
@@ -199,10 +204,22 @@ class Applier:
                     self._map.release()
                 inverse = inverted(self._device, given) if given.forward else given
                 values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
+                if folded := folds(values):
+                    self._folds.append(folded)
                 self._map, self._given = GivenMap(self._device, values), given
             return looked_up(self._sampler, self._map, pixels, size, self._how, alpha, heard)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
+
+    def notices(self, path: Path) -> list[str]:
+        """What the user should hear of the maps of `path`."""
+        if not self._folds:
+            return []
+        if is_sequence(path):
+            return [
+                f"{len(self._folds)} of the maps {path.name} fold over themselves, in up to {max(self._folds)} pixels"
+            ]
+        return [f"{path.name} folds over itself in {self._folds[0]} of its pixels"]
 
 
 def inverted(device: Device, given: Displacement) -> Displacement:
@@ -235,8 +252,8 @@ def _staying(given: Iterator[Displacement]) -> Iterator[Displacement]:
     yield from repeat(last)
 
 
-def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progress: Progress) -> None:
-    """Write a map, or a sequence of maps, in another format, whole or not at all.
+def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progress: Progress) -> tuple[str, ...]:
+    """Write a map, or a sequence of maps, in another format, whole or not at all. Says what the user should hear of.
 
     Raises:
         UserError: if one cannot be read or written.
@@ -256,6 +273,12 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
             write = stack.enter_context(writer)
         else:
             write = partial(maps.write_map, output, kind=kind)
-        for given in source.read():
+        notices = []
+        for file, given in zip(files.values(), source.read(), strict=True):
+            if device and (folded := folds(cropped(given).values)):
+                notices.append(
+                    f"{file.name} folds over itself in {folded} of its pixels, where no inverse can be right"
+                )
             write(inverted(device, given) if device else given)
             progress.advance()
+    return tuple(notices)

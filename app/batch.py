@@ -32,6 +32,13 @@ from solver.gl.device import Device
 NAME = "{name}"
 """What stands for the name of each picture in the name of an output."""
 
+COMMAND_LINE = "the command line"
+FLAGS = {  # by which the command line sets a key of the recipe
+    "'fluid.grid'": "--grid", "'fluid.solver'": "--solver", "'output.size'": "--size", "'output.fps'": "--fps",
+    "'output.quality'": "--quality", "'time.start'": "--from", "'time.end'": "--to", "'duration'": "--duration",
+    "time: 'end'": "--to", "'start'": "--from", "'edges'": "--edges",
+}  # fmt: skip
+
 ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
 DIED = "its process died each time, perhaps for want of memory; use fewer --jobs or a smaller --size"
 CONNECTING = 10  # seconds that a scheduler has to answer
@@ -59,7 +66,13 @@ class Edits:
         parts = dict(self.keys)
         for name, table in self.tables:
             parts[name] = getattr(recipe, name).model_copy(update=dict(table))
-        return recipe.edited(**parts).checked("the command line") if parts else recipe
+        try:
+            return recipe.edited(**parts).checked(COMMAND_LINE) if parts else recipe
+        except UserError as error:
+            said = str(error).removeprefix(f"{COMMAND_LINE}: ")
+            for key, flag in FLAGS.items():
+                said = said.replace(key, flag)
+            raise UserError(said) from None
 
 
 @dataclass(frozen=True)

@@ -56,12 +56,14 @@ def main() -> None:
 
 
 def _fail(message: str, status: int) -> NoReturn:
-    _say(message)
+    _tell(message)
     sys.exit(status)
 
 
-def _say(message: str) -> None:
-    print(f"fluidwarp: {shown(message)}", file=sys.stderr)
+def _tell(*lines: str) -> None:
+    """Say what the user should hear of, a line each, on stderr."""
+    for line in filter(None, lines):
+        print(f"fluidwarp: {shown(' '.join(line.split()))}", file=sys.stderr)
 
 
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="What to write; its ending says how.")]
@@ -96,7 +98,7 @@ def edit(
 
 # Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
 
-MaxPixels = Annotated[int, typer.Option(help="Refuse larger pictures, clips and maps.")]
+MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse larger pictures, clips and maps.")]
 Bits = Annotated[Optional[int], typer.Option(help="8, 16 or 32 bits a channel, instead of the picture's own.")]  # noqa: UP045
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
 Codec = Annotated[
@@ -244,8 +246,7 @@ def _render_one(task: Task, opened: Opened) -> None:
         progress.enter("")
         with Device.headless() as device:
             report = run(device, job, progress)
-    for notice in (*report.notices, *([report.verdict] if report.verdict else [])):
-        _say(notice)
+    _tell(*report.notices, *([report.verdict] if report.verdict else []))
 
 
 def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
@@ -256,9 +257,7 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     def tell(outcome: Outcome) -> None:
         named = outcome.error.startswith(f"Cannot read {shown(outcome.label)}") or not outcome.error
         line = outcome.error if named else f"{outcome.label}: {outcome.error}"
-        for text in (line, *(f"{outcome.label}: {notice}" for notice in outcome.notices)):
-            if text:
-                _say(" ".join(text.split()))
+        _tell(line, *(f"{outcome.label}: {notice}" for notice in outcome.notices))
 
     written = 0
 
@@ -324,7 +323,8 @@ def apply(
     )
     job.check()
     with on_terminal(output.name, None) as progress, Device.headless() as device:
-        job.run(device, progress)
+        notices = job.run(device, progress)
+    _tell(*notices)
 
 
 def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:
@@ -361,7 +361,8 @@ def convert(
 
     source = _map_source(map_, kind, grid, overscan, max_pixels)
     with on_terminal(output.name, None) as progress:
-        converted(source, output, "offsets" if offsets else "st", invert, progress)
+        notices = converted(source, output, "offsets" if offsets else "st", invert, progress)
+    _tell(*notices)
 
 
 @cli.command()

@@ -30,7 +30,7 @@ from app.errors import UserError
 from app.files import cannot_write, is_sequence, replacing, writable
 from app.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.opening import check_picture
-from app.pictures import Picture, picture_format, write_picture
+from app.pictures import MAX_PIXELS, Picture, picture_format, unheld, write_picture
 from app.progress import Progress
 from app.recipe import Recipe
 from app.replay import Replay
@@ -134,9 +134,17 @@ class Job:
         """
         check_picture(self.picture, self.recipe.fluid.grid)
         if self.output is not None:
-            check_output(self.output, animated=self.animated, fps=self.rate, codec=self.codec, bits=self.bits)
+            check_output(
+                self.output,
+                animated=self.animated,
+                fps=self.rate,
+                codec=self.codec,
+                bits=self.bits,
+                size=result_size(self.recipe, self.picture),
+            )
         if self.maps is not None:
             check_map(self.maps.path)
+            self._check_map_size(self.maps)
             if self.maps.is_sequence and not self.has_frames:
                 raise UserError(
                     f"{self.maps.path} numbers the maps of an animation and {self.output} is a picture; "
@@ -151,6 +159,15 @@ class Job:
                 writable(path)
         if self.states is not None and self.states.exists() and not self.states.is_dir():
             raise cannot_write(self.states, FileExistsError(errno.EEXIST, "it is a file"))
+
+    def _check_map_size(self, maps: MapOutput) -> None:
+        size = result_size(self.recipe, self.picture)
+        width, height = size if maps.size is None else longer_side(size, maps.size)
+        if width * height > MAX_PIXELS:
+            raise UserError(f"--map-size {maps.size} makes a map of {width} x {height} pixels; ask for fewer")
+        width, height = width + 2 * maps.overscan, height + 2 * maps.overscan
+        if width * height > MAX_PIXELS:
+            raise UserError(f"--overscan {maps.overscan} makes a map of {width} x {height} pixels; ask for fewer")
 
 
 @dataclass(frozen=True)
@@ -250,7 +267,13 @@ class _Export:
             count = 1
         if job.maps is not None and not job.maps.is_sequence:
             self.progress.enter("making the map")
-            found = self._map(job.maps)
+            try:
+                found = self._map(job.maps)
+            except MemoryError:
+                width, height = (side + 2 * job.maps.overscan for side in self._map_size(job.maps))
+                raise UserError(
+                    f"there is not enough memory for a map of {width} x {height} pixels; lower --map-size or --overscan"
+                ) from None
             self.progress.advance(steps_for((found.width, found.height)))
             self.progress.enter("writing the map")
             write_map(job.maps.path, found, job.maps.kind)
@@ -260,7 +283,17 @@ class _Export:
                 temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
         if self.states is not None:
             self.states.keep(last=True)  # where the next part begins
+        self._note_losses()
         return Report(count, end, verdict, tuple(self.pictures.notices))
+
+    def _note_losses(self) -> None:
+        """What the user should know of the last warp, and of what the output cannot hold."""
+        folded = self.replay.warp.statistics().folds if self.recipe.mode == "coordinates" else 0
+        if folded:
+            cells = self.replay.grid.nx * self.replay.grid.ny
+            self.pictures.notice(f"the warp folds over itself in {folded} of {cells} cells of the grid")
+        if self.job.output is not None and (said := unheld(self.job.output, self.job.picture)):
+            self.pictures.notice(said)
 
     def _steps_for_stills(self) -> int:
         """What the last picture and the last map count as, looked up and written."""

@@ -20,6 +20,7 @@ class ExportProcess:
         state: what is being done beside the work itself, as "writing"; or "".
         is_done: it has ended, well or not.
         error: why it failed, as a sentence; "" if it did not.
+        notices: what the person should hear of it, once it has ended well.
         cancelled: it was stopped.
     """
 
@@ -29,6 +30,7 @@ class ExportProcess:
         self.state = ""
         self.is_done = False
         self.error = ""
+        self.notices: tuple[str, ...] = ()
         self.cancelled = False
         # A forked process would share this one's GL, which no driver survives.
         context = multiprocessing.get_context("spawn")
@@ -50,6 +52,7 @@ class ExportProcess:
                 else:
                     self.is_done = True
                     self.error = value if kind == "error" else ""
+                    self.notices = value if kind == "done" else ()
                     self.cancelled = kind == "cancelled"
         except (EOFError, OSError):
             if not self.is_done:
@@ -77,8 +80,8 @@ def _work(job: Job, pipe: Connection, wish: Any) -> None:
 
     try:
         with Device.headless() as device:
-            run(device, job, Progress(None, report, wish.is_set, lambda state: pipe.send(("state", state))))
-        pipe.send(("done", ""))
+            told = run(device, job, Progress(None, report, wish.is_set, lambda state: pipe.send(("state", state))))
+        pipe.send(("done", told.notices))
     except Cancelled:
         pipe.send(("cancelled", ""))
     except UserError as error:

@@ -178,6 +178,22 @@ def from_offsets(offsets: np.ndarray, *, up: bool, overscan: int = 0) -> Displac
     return Displacement(offsets / np.array([longest, -longest if up else longest], np.float64), overscan)
 
 
+def folds(values: np.ndarray) -> int:
+    """In how many pixels a map, its values (h, w, 2) in longer sides, turns the picture over: det J <= 0."""
+    height, width = values.shape[:2]
+    longest, count = max(width, height), 0
+    if min(width, height) < 2:
+        return 0
+    for rows in _strips(values):
+        # central differences, which want a row more on each side
+        low, high = max(0, rows.start - 1), min(height, rows.stop + 1)
+        down, along = np.gradient(values[low:high] * longest, axis=(0, 1))
+        inner = slice(rows.start - low, min(height, rows.stop) - low)
+        down, along = down[inner], along[inner]
+        count += int(((1 + along[..., 0]) * (1 + down[..., 1]) <= along[..., 1] * down[..., 0]).sum())
+    return count
+
+
 def _strips(array: np.ndarray) -> Iterator[slice]:
     rows = max(1, 500_000 // max(1, array[0].size))
     for top in range(0, len(array), rows):
@@ -285,7 +301,9 @@ def read_map(
     _check_finite(path, values)
     edge = edge if overscan is None else overscan
     if edge < 0 or 2 * edge >= min(values.shape[:2]):
-        raise UserError(f"Cannot read {path}: an overscan of {edge} leaves nothing of {values.shape[1::-1]} pixels.")
+        height, width = values.shape[:2]
+        named = f"an overscan of {edge}" if overscan is None else f"--overscan {edge}"
+        raise UserError(f"Cannot read {path}: {named} leaves nothing of its {width} x {height} pixels.")
     if (kind or told.get("map", "st")) == "offsets":
         read = from_offsets(values, up=True, overscan=edge)
     else:

@@ -42,7 +42,7 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
         first = next(frames, None)
     if first is None:
         raise UserError(f"Cannot read {path}: it has no frame that can be decoded; get it again.")
-    return Source(Picture(first), clip)
+    return Source(Picture(first, note=clip.note), clip)
 
 
 def check_picture(picture: Picture, cells: int) -> None:

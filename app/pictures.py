@@ -9,8 +9,8 @@ import re
 import struct
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ class Picture:
     premultiplied: where there is alpha, the colours are multiplied by it, as the file has them. They stay so, since
     dividing rounds, and since the colour where alpha is 0 (a flame, a glow) would be lost.
     attributes: numbers of an EXR's header by name, such as pixelAspectRatio. chunks: a PNG's, that say what its colours
-    mean. notes: what of the file is not in here, a sentence each.
+    mean. note: what of the file is lost, in a sentence that names it; "" if nothing.
     """
 
     pixels: np.ndarray
@@ -56,7 +56,7 @@ class Picture:
     premultiplied: bool = False
     attributes: Mapping[str, Any] = field(default_factory=dict)
     chunks: Mapping[bytes, bytes] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    note: str = ""
 
     @property
     def width(self) -> int:
@@ -108,10 +108,10 @@ class Format:
     longest: int = 2**31 - 1
 
 
-PNG = Format("PNG", (8, 16))
+PNG = Format("PNG", (8, 16), longest=1_000_000)
 JPEG = Format("JPEG", (8,), alpha=False, longest=65500)
 WEBP = Format("WebP", (8,), grey=False, longest=16383)
-AVIF = Format("AVIF", (8,), grey=False, longest=65536)
+AVIF = Format("AVIF", (8,), grey=False, longest=32768)  # what decoders take
 TIFF = Format("TIFF", (8, 16, 32))
 EXR = Format("OpenEXR", (32,))
 
@@ -122,6 +122,15 @@ SIGNATURES = {
     "PNG": rb"\x89PNG\r\n\x1a\n", "JPEG": rb"\xff\xd8\xff", "WebP": rb"RIFF....WEBP", "AVIF": rb"....ftypavi[fs]",
     "TIFF": rb"II[*+]\0|MM\0[*+]", "OpenEXR": rb"v/1\x01", "GIF": rb"GIF8[79]a", "BMP": rb"BM",
 }  # fmt: skip
+# What the codes of H.273 mean, where it is not what sRGB and BT.709 have; other codes are told as numbers.
+PRIMARIES = {5: "BT.601", 6: "BT.601", 9: "BT.2020", 10: "XYZ", 11: "DCI-P3", 12: "Display P3"}
+TRANSFERS = {4: "gamma 2.2", 5: "gamma 2.8", 8: "linear", 16: "PQ", 18: "HLG"}
+USUAL_PRIMARIES, USUAL_TRANSFERS = (1, 2), (1, 2, 6, 13, 14, 15)
+INK = "its inks (CMYK) become RGB"
+COLOUR_CHUNKS = {b"cICP": 4, b"gAMA": 4, b"cHRM": 32, b"sRGB": 1, b"mDCV": 24, b"cLLI": 8}  # and their lengths
+USUAL_GAMMA = range(45000, 46000)  # 1 / 2.2, as sRGB has it on the whole
+REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
+
 # What imageio reads for us, by the ending: some of these, as TGA, have no signature.
 OTHERS = {
     ".dds": "DDS", ".ico": "ICO", ".j2k": "JPEG 2000", ".jp2": "JPEG 2000", ".pbm": "PBM", ".pcx": "PCX", ".pgm": "PGM",
@@ -137,12 +146,19 @@ def picture_format(path: str | os.PathLike[str]) -> Format:
     return known
 
 
-def check_picture_output(path: str | os.PathLike[str], bits: int | None = None) -> None:
-    """Raise `UserError` if `path` has no ending of a picture we write, or its format not these bits a channel."""
+def check_picture_output(
+    path: str | os.PathLike[str], bits: int | None = None, size: tuple[int, int] | None = None
+) -> None:
+    """Raise `UserError` if `path` has no ending of a picture we write, or its format not these bits or this size."""
     chosen = picture_format(path)
     if bits is not None and bits not in chosen.bits:
         raise UserError(
             f"Cannot write {path}: {chosen.name} holds {' or '.join(map(str, chosen.bits))} bits a channel, not {bits}."
+        )
+    if size is not None and max(size) > chosen.longest:
+        raise UserError(
+            f"Cannot write {path}: the result is {size[0]} x {size[1]} pixels, and {chosen.name} holds no side longer "
+            f"than {chosen.longest}; make it smaller, or write a TIFF."
         )
 
 
@@ -261,6 +277,32 @@ def _decoding(file: Path, name: str) -> Iterator[None]:
         raise UserError(message) from error
 
 
+def lost(file: Path, losses: Sequence[str]) -> str:
+    """What of a file is lost, in one sentence that names it; "" if nothing."""
+    return f"{file.name}: {'; '.join(losses)}" if losses else ""
+
+
+def _few(names: Sequence[str]) -> str:
+    """Some of the names that a file gives to its parts, for a message: no control characters, not too many or long."""
+    shown = ["".join(letter if letter.isprintable() else "?" for letter in name[:40]) for name in names[:4]]
+    return ", ".join(shown) + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
+
+
+def _unusual_colours(primaries: int, transfer: int) -> str:
+    """What colours are, by the codes of H.273, if they are neither sRGB's nor BT.709's; else ""."""
+    named = [PRIMARIES.get(primaries, f"primaries {primaries}")] if primaries not in USUAL_PRIMARIES else []
+    named += [TRANSFERS.get(transfer, f"transfer {transfer}")] if transfer not in USUAL_TRANSFERS else []
+    return " ".join(named)
+
+
+def unheld(path: str | os.PathLike[str], picture: Picture) -> str:
+    """What a picture's colours mean and the format of `path` cannot tell, in a sentence; "" if nothing."""
+    own = picture.chromaticities
+    if own is None or np.allclose(own, REC709, atol=1e-3) or Path(path).suffix.lower() == ".exr":
+        return ""
+    return f"{Path(path).name} cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709"
+
+
 def check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
     """Raise `UserError` for more than `max_pixels`, telling how to raise the limit."""
     if width * height > max_pixels:
@@ -278,6 +320,8 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
     with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
         check_size(file, *image.size, max_pixels)
         icc = image.info.get("icc_profile")
+        chunks = _png_colours(file) if name == "PNG" else {}
+        losses = _colours_lost(file, name, chunks, icc is not None)
         if name == "PNG" and _png_bits(file) == 16:
             import imagecodecs
 
@@ -289,6 +333,7 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
             with _quiet():  # Pillow gives 8 bits of these too
                 pixels = _spread_to_16(imagecodecs.avif_decode(file.read_bytes()), deep)
         elif image.mode == "CMYK":
+            losses.append(INK)
             pixels, icc = cmyk_to_rgb(np.asarray(image), icc)
         else:
             pixels = np.asarray(image if image.mode == (mode := _plain_mode(image)) else image.convert(mode))
@@ -298,13 +343,18 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
         if isinstance(comment := image.info.get("comment"), bytes):
             texts["Comment"] = comment.decode("utf-8", "replace")
         xmp = image.info.get("xmp")
+        with suppress(Exception):  # those after the first may be damaged
+            if (count := getattr(image, "n_frames", 1)) > 1:
+                losses.append(f"of its {count} {'pictures' if name == 'JPEG' else 'frames'} the first is taken")
         return Picture(
             upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
             icc=icc,
             exif=_upright_exif(exif),
             xmp=_upright_xmp(xmp.encode() if isinstance(xmp, str) else xmp),
-            dpi=_positive(image.info.get("dpi")),
+            dpi=_upright_dpi(image.info.get("dpi"), orientation),
             texts={key: text.replace("\0", "") for key, text in texts.items() if key},
+            chunks=chunks,
+            note=lost(file, losses),
         )
 
 
@@ -334,6 +384,41 @@ def _png_bits(file: Path) -> int:
         return stream.read(25)[24]
 
 
+def _png_colours(file: Path) -> dict[bytes, bytes]:
+    """The chunks of a PNG that say what its colours mean; all of them stand before the pixels."""
+    found: dict[bytes, bytes] = {}
+    with file.open("rb") as stream:
+        stream.seek(8)
+        while len(head := stream.read(8)) == 8 and head[4:] != b"IDAT":
+            length = int.from_bytes(head[:4], "big")
+            end = stream.tell() + length + 4
+            if COLOUR_CHUNKS.get(head[4:]) == length:
+                found[head[4:]] = stream.read(length)
+            stream.seek(end)
+    return found
+
+
+def _colours_lost(file: Path, name: str, chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:
+    """What a PNG or an AVIF tells of its colours, and we do not understand."""
+    if name == "AVIF":
+        codes = re.search(rb"colrnclx(....)", _start(file), re.DOTALL)
+        colours = _unusual_colours(*struct.unpack(">HH", codes[1])) if codes else ""
+        return [f"its colours are {colours} (nclx) and are taken for sRGB"] if colours else []
+    if codes := chunks.get(b"cICP"):
+        colours = _unusual_colours(codes[0], codes[1])
+        return [f"its colours are {colours} (cICP), which a PNG keeps, and are mixed as if sRGB"] if colours else []
+    if has_profile or b"sRGB" in chunks:
+        return []
+    told = []
+    if b"gAMA" in chunks and (value := int.from_bytes(chunks[b"gAMA"], "big")) not in USUAL_GAMMA:
+        told.append(f"gamma of {value / 100000:g} (gAMA)")
+    if b"cHRM" in chunks:
+        x_y = np.frombuffer(chunks[b"cHRM"], ">u4") / 100000
+        if not np.allclose(np.roll(x_y, -2), REC709, atol=2e-3):
+            told.append("primaries (cHRM)")
+    return [f"its {' and '.join(told)} are kept in a PNG alone, and its colours mixed as if sRGB"] if told else []
+
+
 def _avif_bits(file: Path) -> int:
     """Bits a channel, from the flags of the first AV1 configuration (AV1 in ISOBMFF, 2.3.3)."""
     start = _start(file)
@@ -354,8 +439,12 @@ def _plain_mode(image: Any) -> str:
     return ("L" if grey else "RGB") + ("A" if alpha else "")
 
 
-def _positive(dpi: Any) -> tuple[float, float] | None:
-    return (float(dpi[0]), float(dpi[1])) if dpi and float(dpi[0]) > 0 and float(dpi[1]) > 0 else None
+def _upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:
+    """Pixels an inch along x and y of the upright picture, if they are told at all."""
+    if not dpi or len(dpi) != 2 or float(dpi[0]) <= 0 or float(dpi[1]) <= 0:
+        return None
+    x, y = float(dpi[0]), float(dpi[1])
+    return (y, x) if orientation in (5, 6, 7, 8) else (x, y)
 
 
 def upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
@@ -422,6 +511,7 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
         samples = [axis for axis in page.axes if axis in "YXS"]
         if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
             raise UserError(f"Cannot read {file}: a TIFF with the axes {page.axes} is no picture; save one page of it.")
+        losses = _tiff_losses(tiff)
         pixels = page.asarray()
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
     pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
@@ -430,12 +520,14 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
     if photometric == "PALETTE":
         pixels = np.moveaxis(np.asarray(tags[320], np.uint16), 0, -1)[pixels[..., 0]]
     elif photometric == "SEPARATED":
+        losses.append(INK)
         pixels, icc = cmyk_to_rgb(pixels[..., :4], icc)
     elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
         pixels = np.iinfo(pixels.dtype).max - pixels
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
     if pixels.shape[2] > 4:  # further samples are masks and spot colours
+        losses.append(f"of its {pixels.shape[2]} samples a pixel the first are taken")
         pixels = pixels[..., : 4 if page.extrasamples else 3]
 
     premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
@@ -451,16 +543,30 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
             encoded = _upright_exif(exif)
         except Exception:  # damaged metadata must not cost the picture
             encoded = None
+    orientation = int(tags.get(ORIENTATION, 1))
     unit = {2: 1.0, 3: 2.54}.get(int(tags.get(296, 2)))
     resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]
     return Picture(
-        upright(pixels, int(tags.get(ORIENTATION, 1))),
+        upright(pixels, orientation),
         icc=bytes(icc) if icc is not None else None,
         exif=encoded,
         xmp=_upright_xmp(bytes(tags[700])) if 700 in tags else None,
-        dpi=_positive([value * unit for value in resolution]) if unit and len(resolution) == 2 else None,
+        dpi=_upright_dpi([value * unit for value in resolution], orientation) if unit else None,
         premultiplied=premultiplied,
+        note=lost(file, losses),
     )
+
+
+def _tiff_losses(tiff: Any) -> list[str]:
+    """What of a TIFF is not in its first page, and what is cut of its samples."""
+    losses = []
+    with suppress(Exception):  # pages after the first may be damaged
+        pages = sum(not page.subfiletype & 5 for page in tiff.pages)  # neither smaller versions nor masks
+        if pages > 1:
+            losses.append(f"of its {pages} pages the first is taken")
+    if (kind := tiff.pages.first.dtype) is not None and kind.itemsize > (2 if kind.kind == "u" else 4):
+        losses.append(f"its {8 * kind.itemsize} bits become {16 if kind.kind == 'u' else 32}")
+    return losses
 
 
 def _plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
@@ -536,13 +642,34 @@ def _read_exr(file: Path, name: str, max_pixels: int) -> Picture:
     pixels = np.zeros((last_y - first_y + 1, last_x - first_x + 1, len(wanted)), np.float32)
     place_window(data, (left - first_x, top - first_y), pixels)
     chromaticities = header.get("chromaticities")
+    others = [key for key in channels if key not in wanted]
+    losses = [f"its channels {_few(others)} are not kept"] if others else []
+    losses += _exr_losses(file, header)
     return Picture(
         pixels,
         chromaticities=tuple(float(value) for value in chromaticities) if chromaticities is not None else None,
         texts={key: value for key, value in header.items() if isinstance(value, str) and key not in ("name", "view")},
         premultiplied=True,
         attributes={key: value for key, value in header.items() if _is_kept(key, value)},
+        note=lost(file, losses),
     )
+
+
+def _exr_losses(file: Path, header: Mapping[str, Any]) -> list[str]:
+    """What of an EXR lies beside its first part, or beyond its display window."""
+    import OpenEXR
+
+    with _quiet():
+        parts = [part.header.get("name", "") for part in OpenEXR.File(str(file), header_only=True).parts[1:]]
+    losses = [f"its further parts {_few(parts)} are not kept"] if parts else []
+    (left, top), (right, bottom) = header["dataWindow"]
+    (first_x, first_y), (last_x, last_y) = header["displayWindow"]
+    beyond = max(first_x - left, first_y - top, right - last_x, bottom - last_y)
+    if beyond > 0:
+        losses.append(f"its {int(beyond)} pixels of overscan, beyond the display window, are not kept")
+    if first_x or first_y:
+        losses.append(f"its display window begins at {int(first_x)}, {int(first_y)} and is moved to 0, 0")
+    return losses
 
 
 def _is_kept(key: str, value: Any) -> bool:
@@ -580,12 +707,8 @@ def write_picture(
     background: what shows through where the format has no alpha.
     Raises `UserError`.
     """
-    check_picture_output(path, bits)
+    check_picture_output(path, bits, (picture.width, picture.height))
     chosen = picture_format(path)
-    if max(picture.width, picture.height) > chosen.longest:
-        raise UserError(
-            f"Cannot write {path}: {chosen.name} holds no side longer than {chosen.longest} pixels; use PNG or TIFF."
-        )
     if strip:
         picture = picture.stripped()
     depth = bits or max((held for held in chosen.bits if held <= picture.bits), default=chosen.bits[0])
@@ -617,6 +740,8 @@ def _encode_png(picture: Picture) -> bytes:
     # a view, so that its parts are no copies: of a large picture each would take a hundred megabytes
     encoded = memoryview(imagecodecs.png_encode(pixels if pixels.shape[2] > 1 else pixels[..., 0], level=PNG_LEVEL))
     extra = PngInfo()
+    for kind, data in picture.chunks.items():
+        extra.add(kind, data)
     if picture.icc:
         extra.add(b"iCCP", b"ICC Profile\0\0" + zlib.compress(picture.icc))
     if picture.dpi:

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from app.errors import UserError
-from app.maps import cropped, read_map
+from app.maps import cropped, folds, read_map
 from app.pictures import Picture, linear_to_srgb, read_picture
 from app.schema import FileName, Fraction01, Model, Place, Radius
 from solver.grid import Grid
@@ -40,7 +40,7 @@ class Pictures:
     def __init__(self, source: Picture, folder: str | Path = ".") -> None:
         self.source = source
         self.folder = Path(folder)
-        self.notices: list[str] = []
+        self.notices: list[str] = [source.note] if source.note else []
         self._read: dict[str, Picture] = {}
         self._maps: dict[str, np.ndarray] = {}
 
@@ -53,6 +53,8 @@ class Pictures:
             return self.source
         if name not in self._read:
             picture = self._read[name] = read_picture(self.folder / name)
+            if picture.note:
+                self.notice(picture.note)
             mine, wanted = (picture.width, picture.height), (self.source.width, self.source.height)
             if mine != wanted:
                 same = abs(mine[0] * wanted[1] - mine[1] * wanted[0]) <= max(mine + wanted)
@@ -72,6 +74,8 @@ class Pictures:
             if given.forward:
                 raise UserError(f"{name} tells where each point goes; turn it round with: fluidwarp convert --invert")
             self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
+            if folded := folds(self._maps[name]):
+                self.notice(f"{name} folds over itself in {folded} of its pixels")
         return self._maps[name]
 
     def forget_map(self, name: str) -> None:

@@ -15,8 +15,18 @@ import numpy as np
 from app import ffmpeg
 from app.errors import UserError
 from app.inputs import open_input
-from app.pictures import MAX_PIXELS, check_size
+from app.pictures import MAX_PIXELS, check_size, lost
 from app.progress import never
+
+CHANGED = 65  # exit status when a clip changes under the job
+
+# What ffmpeg calls colours that are BT.709 or sRGB, or nearly; and the others' usual names.
+USUAL_PRIMARIES = {"unknown", "reserved", "bt709", "gbr"}
+USUAL_TRANSFERS = {*USUAL_PRIMARIES, "iec61966-2-1", "smpte170m", "bt2020-10", "bt2020-12"}
+NAMES = {
+    "bt2020": "BT.2020", "smpte2084": "PQ", "arib-std-b67": "HLG", "smpte432": "Display P3", "smpte431": "DCI-P3",
+    "smpte170m": "BT.601", "bt470bg": "BT.601",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -24,6 +34,7 @@ class Clip:
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
     rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
+    note: what of it is lost, in a sentence; "" if nothing. file_size, inode: of the file when it was looked into.
     sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
     as a rule after its sound; 0 where an older ffmpeg does not tell. bits: 8, or 16 for what has more than 8.
     """
@@ -40,13 +51,17 @@ class Clip:
     alpha: bool
     decoder: tuple[str, ...]
     filters: str
+    note: str
+    file_size: int
+    inode: tuple[int, int]
 
     def read_frames(
         self, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
     ) -> Generator[np.ndarray, None, None]:
         """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time.
 
-        notice: hears, at the end, what was damaged in a clip that could be read all the same.
+        notice: hears, at the end, what was damaged or missing in a clip that could be read all the same.
+        Raises `UserError`, with a status of its own if the file was cut or written anew meanwhile.
         """
         channels = 4 if self.alpha else 3
         kind = {(False, 8): "rgb24", (True, 8): "rgba", (False, 16): "rgb48le", (True, 16): "rgba64le"}
@@ -57,16 +72,41 @@ class Clip:
         dtype = np.dtype(np.uint8 if self.bits == 8 else np.uint16)
         shape = self.height, self.width, channels
         with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel) as process:
-            for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
-                yield np.frombuffer(block, dtype).reshape(shape)
+            count = 0
+            try:
+                for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
+                    yield np.frombuffer(block, dtype).reshape(shape)
+                    count += 1
+            except UserError:
+                self._check_unchanged()
+                raise
+            self._check_unchanged()
             if complaint := process.complaint():
                 notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
+            elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
+                notice(f"{self.path} has {count} frames, and by the length it tells about {self.frames}")
+
+    def _check_unchanged(self) -> None:
+        """Raise `UserError` if the file is not as it was: the frames would be fewer, or some of another clip.
+
+        One that was deleted or replaced by another is still read to its end, as it was opened before.
+        """
+        try:
+            now = self.path.stat()
+        except OSError:
+            return
+        if (now.st_dev, now.st_ino) == self.inode and now.st_size != self.file_size:
+            raise UserError(
+                f"Cannot read {self.path}: it changed while it was read, from {self.file_size} to {now.st_size} bytes; "
+                "start again when it is written whole.",
+                CHANGED,
+            )
 
 
 def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
     """Look into a video file; raises `UserError` when it is none."""
     file = Path(path)
-    told = _banner(file)
+    told, seen = _banner(file), file.stat()
     video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
     if video is None:
         raise UserError(f"Cannot read {path}: it is no video, or damaged; give the name of a video.")
@@ -99,7 +139,33 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
         alpha=alpha,
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
+        note=lost(file, _losses(told, video)),
+        file_size=seen.st_size,
+        inode=(seen.st_dev, seen.st_ino),
     )
+
+
+def _losses(told: str, video: str) -> list[str]:
+    """What of a clip is not understood, or not carried over, by ffmpeg's words about its first video stream."""
+    found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
+    words = [word.strip() for word in found[1].split(",")] if found else []
+    losses = []
+    if named := next((word for word in words if re.search(r"/|bt|smpte|arib|film|iec", word)), ""):
+        parts = named.split("/")
+        _, primaries, transfer = parts if len(parts) == 3 else [named] * 3
+        odd = [primaries] if primaries not in USUAL_PRIMARIES else []
+        odd += [transfer] if transfer not in USUAL_TRANSFERS and transfer not in odd else []
+        if odd:
+            losses.append(f"its colours are {' '.join(NAMES.get(name, name) for name in odd)} and are taken for BT.709")
+    if any(word.startswith(("top", "bottom")) for word in words):
+        losses.append("it is interlaced, and its fields are taken for whole frames")
+    for kind, kept in (("Video", "picture tracks"), ("Audio", "sound tracks")):
+        count = sum("attached pic" not in line for line in re.findall(rf"Stream #0.*: {kind}: .*", told))
+        if count > 1:
+            losses.append(f"of its {count} {kept} the first is taken")
+    if re.search(r"Stream #0.*: Subtitle: ", told):
+        losses.append("its subtitles are not kept")
+    return losses
 
 
 def sound_codec(path: str | os.PathLike[str]) -> str | None:

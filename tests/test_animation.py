@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -604,3 +605,77 @@ def test_what_is_no_clip(tmp_path: Path):
         read_clip(tmp_path / "whole.mp4", max_pixels=100)
     with pytest.raises(Cancelled):
         next(read_clip(tmp_path / "whole.mp4").read_frames(lambda: True))
+
+
+def tagged(path: Path, setting: str, *options: str) -> str:
+    """The note about a clip whose frames are tagged so."""
+    return read_clip(generate(path, "testsrc=s=64x48:r=10:d=0.4", "-vf", setting, *options)).note
+
+
+def test_what_of_a_clip_is_not_understood_is_told(tmp_path: Path):
+    ten, hdr = "format=yuv420p10le", "setparams=colorspace=bt2020nc:color_primaries=bt2020:color_trc="
+    assert tagged(tmp_path / "a.mp4", "format=yuv420p") == ""
+    assert tagged(tmp_path / "a.mp4", f"format=yuv420p,{animation.BT709}") == ""
+    assert tagged(tmp_path / "a.mkv", f"format=gbrp,{animation.SRGB}", "-c:v", "ffv1") == ""
+    said = tagged(tmp_path / "pq.mp4", f"{ten},{hdr}smpte2084")
+    assert said == "pq.mp4: its colours are BT.2020 PQ and are taken for BT.709"
+    assert "BT.2020 HLG" in tagged(tmp_path / "hlg.mkv", f"{ten},{hdr}arib-std-b67")
+    assert "BT.2020 and" in tagged(tmp_path / "sdr.mp4", f"{ten},{hdr}bt709")
+    assert "BT.601 and" in tagged(
+        tmp_path / "sd.mp4", "setparams=colorspace=smpte170m:color_primaries=smpte170m:color_trc=smpte170m"
+    )
+    assert "linear and" in tagged(tmp_path / "a.mkv", "format=gbrp,setparams=color_trc=linear", "-c:v", "ffv1")
+    said = tagged(tmp_path / "a.mp4", "format=yuv420p,tinterlace=interleave_top", "-flags", "+ildct+ilme")
+    assert said == "a.mp4: it is interlaced, and its fields are taken for whole frames"
+    said = tagged(tmp_path / "a.mov", "format=yuv422p10,setfield=bff", "-flags", "+ildct+ilme", "-c:v", "prores_ks")
+    assert "interlaced" in said
+
+
+def test_further_tracks_of_a_clip_are_told(tmp_path: Path):
+    (tmp_path / "words.srt").write_text("1\n00:00:00,000 --> 00:00:01,000\nhello\n")
+    inputs = ["-f", "lavfi", "-i", "sine=d=1", "-i", str(tmp_path / "words.srt")]
+    tracks = ["-map", "0:v", "-map", "1:a", "-map", "1:a", "-map", "2:s", "-c:v", "ffv1"]
+    clip = read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", *inputs, *tracks))
+    assert clip.note == "a.mkv: of its 2 sound tracks the first is taken; its subtitles are not kept"
+
+
+NOISE = "nullsrc=s=640x480:r=10:d=4,geq=random(1)*255"
+
+
+@pytest.mark.parametrize("ending", [".mkv", ".mp4", ".avi"])
+def test_a_clip_that_is_cut_while_it_is_read_is_a_failure_of_its_own(tmp_path: Path, ending: str):
+    path = generate(tmp_path / f"a{ending}", NOISE, "-c:v", "mjpeg", "-q:v", "2")
+    size, clip = path.stat().st_size, read_clip(path)
+    assert size > 4_000_000  # more than lies in the pipes
+    reading = clip.read_frames()
+    next(reading)
+    os.truncate(path, size // 2)
+    with pytest.raises(UserError, match=f"a{ending}: it changed while it was read, from {size} to") as raised:
+        list(reading)
+    assert raised.value.status == 65
+
+
+def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
+    """By what ffmpeg complains of, or else by the length that the file tells."""
+    said: list[str] = []
+    path = generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=4", "-c:v", "mjpeg")
+    os.truncate(path, path.stat().st_size // 2)
+    assert 10 < len(list(read_clip(path).read_frames(notice=said.append))) < 30
+    path = generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=4", "-f", "lavfi", "-i", "sine=d=8", "-c:v", "mjpeg")
+    assert len(list(read_clip(path).read_frames(notice=said.append))) == 40
+    assert len(said) == 2
+    assert "a.mkv is damaged, and what could be read of it was used" in said[0]
+    assert said[1] == f"{path} has 40 frames, and by the length it tells about 80"
+
+
+def test_a_clip_that_is_replaced_or_deleted_while_it_is_read_is_read_to_its_end(tmp_path: Path):
+    path = generate(tmp_path / "a.mkv", "testsrc=s=640x480:r=10:d=4", "-c:v", "ffv1")
+    other = generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=1", "-c:v", "ffv1")
+    reading = read_clip(path).read_frames()
+    next(reading)
+    os.replace(other, path)
+    assert len(list(reading)) == 39
+    reading = read_clip(path).read_frames()
+    next(reading)
+    path.unlink()
+    assert len(list(reading)) == 9

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -11,9 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from app import cli, doctor
 from app.export import Job, run
+from app.maps import Displacement, write_map
 from app.pictures import Picture, read_picture, write_picture
 from app.progress import Progress
 from app.project import from_recipe, save
@@ -211,9 +214,26 @@ BAD = {
     "two of one name": (["a.toml", "cat.png", "cat.png", "-o", "new"], "would both become"),
     "no address": (["a.toml", "cat.png", "-o", "sub.png", "--cluster", "here"], "give for example tcp://host:8786"),
     "several into one": (["a.toml", "cat.png", "cat.png", "-o", "x.png"], "{name}"),
-    "grid 0": (["a.toml", "-o", "x.png", "--grid", "0"], "'fluid.grid' must be at least 8, not 0"),
-    "fps nan": (["a.toml", "-o", "x.gif", "--fps", "nan"], "'output.fps' must be a finite number"),
-    "solver": (["a.toml", "-o", "x.png", "--solver", "best"], "'fluid.solver' must be one of 'mac' or 'paper'"),
+    "grid 0": (["a.toml", "-o", "x.png", "--grid", "0"], "--grid must be at least 8, not 0"),
+    "fps nan": (["a.toml", "-o", "x.gif", "--fps", "nan"], "--fps must be a finite number"),
+    "size": (["a.toml", "-o", "x.png", "--size", "99999"], "--size must be at most 32768, not 99999"),
+    "quality": (["a.toml", "-o", "x.jpg", "--quality", "0"], "--quality must be at least 1, not 0"),
+    "from nan": (["a.toml", "-o", "x.gif", "--from", "nan"], "--from must be a finite number"),
+    "back in time": (["a.toml", "-o", "x.gif", "--from", "2", "--to", "1"], "--to (1) is before --from (2)"),
+    "duration": (["a.toml", "-o", "x.gif", "--duration", "1e7"], "--duration must be at most 1e+06"),
+    "overscan": (["a.toml", "--map", "m.exr", "--overscan", "1000000"], "--overscan 1000000 makes a map of 2000064 x"),
+    "overscan beyond all": (["a.toml", "--map", "m.exr", "--overscan", "9" * 30], f"--overscan {'9' * 30} makes"),
+    "map size": (["a.toml", "--map", "m.exr", "--map-size", "1000000"], "--map-size 1000000 makes a map of 1000000 x"),
+    "too wide for WebP": (["a.toml", "-o", "x.webp", "--size", "20000"], "WebP holds no side longer than 16383"),
+    "a sequence of WebP": (["a.toml", "-o", "x.%d.webp", "--size", "20000"], "WebP holds no side longer than 16383"),
+    "too wide for an animated WebP": (
+        ["a.toml", "-o", "x.webp", "--animated", "--size", "20000"], "webp holds no more than 16383 x 16383"
+    ),
+    "too wide for H.264": (["a.toml", "-o", "x.mp4", "--size", "20000"], "h264 holds no more than 16384 x 16384"),
+    "too high for AV1": (
+        ["a.toml", "-o", "x.webm", "--codec", "av1", "--size", "12000"], "av1 holds no more than 16384 x 8704"
+    ),
+    "solver": (["a.toml", "-o", "x.png", "--solver", "best"], "--solver must be one of 'mac' or 'paper'"),
     "T = 0": (["T0.toml", "-o", "x.png"], "T0.toml, line 1: 'duration' must be greater than 0"),
     "unknown key": (["key.toml", "-o", "x.png"], "key.toml, line 6: force[1] \"x\": unknown key 'radios'"),
     "wrong type": (["type.toml", "-o", "x.png"], "type.toml, line 2: 'fluid.grid' must be a whole number, not \"64\""),
@@ -366,3 +386,88 @@ def test_memory_does_not_grow_with_the_frames(device: Device, tmp_path: Path):
     report = run(device, Job(recipe, picture, tmp_path, tmp_path / "x.%03d.jpg"), Progress(report=look))
     assert report.frames == 41
     assert resident[39] < resident[9] + 10
+
+
+def test_what_is_lost_is_told_in_a_line(folder: Path):
+    """By every command that reads pictures, of the picture itself and of those that the recipe names."""
+    wild = Image.open(folder / "cat.png")
+    wild.save(folder / "pages.tif", save_all=True, append_images=[wild, wild])
+    (folder / "b.toml").write_text(RECIPE.replace("cat.png", "pages.tif"))
+    line = "fluidwarp: pages.tif: of its 3 pages the first is taken\n"
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "x.png")
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", line)
+    ran = fluidwarp(folder, "render", "a.toml", "pages.tif", "cat.png", "-o", "several")
+    assert ran.returncode == 0
+    assert [text.rpartition("/")[2] for text in ran.stderr.splitlines()] == [f"pages.tif: {line[11:-1]}"]
+    mask = '[[viscosity]]\nkind = "picture"\npicture = "pages.tif"\nscale = 0.1\n'
+    (folder / "c.toml").write_text(RECIPE + mask)
+    assert fluidwarp(folder, "render", "c.toml", "-o", "y.png").stderr == line
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    ran = fluidwarp(folder, "apply", "m.npy", "pages.tif", "-o", "z.png")
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", line)
+
+
+def test_a_fold_is_told(folder: Path):
+    values = np.zeros((48, 64, 2), np.float32)
+    values[:, 32:, 0] = -0.1
+    write_map(folder / "m.npy", Displacement(values))
+    ran = fluidwarp(folder, "apply", "m.npy", "cat.png", "-o", "z.png")
+    assert (ran.returncode, ran.stderr) == (0, "fluidwarp: m.npy folds over itself in 96 of its pixels\n")
+    (folder / "b.toml").write_text('map = "m.npy"\n' + RECIPE)
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "z.png")
+    first, second = ran.stderr.splitlines()
+    assert first == "fluidwarp: m.npy folds over itself in 96 of its pixels"
+    assert re.fullmatch(r"fluidwarp: the warp folds over itself in \d+ of 768 cells of the grid", second)
+    ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy")
+    assert ran.stderr == ""
+    ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy", "--invert")
+    assert ran.stderr == "fluidwarp: m.npy folds over itself in 96 of its pixels, where no inverse can be right\n"
+    write_map(folder / "m.0007.npy", Displacement(values * 0))
+    write_map(folder / "m.0008.npy", Displacement(values))
+    ran = fluidwarp(folder, "apply", "m.%04d.npy", "cat.png", "-o", "z.%04d.png")
+    assert ran.stderr == "fluidwarp: 1 of the maps m.%04d.npy fold over themselves, in up to 96 pixels\n"
+
+
+def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(folder: Path):
+    from app.ffmpeg import executable
+
+    noise = ["-f", "lavfi", "-i", "nullsrc=s=640x480:r=10:d=6,geq=random(1)*255", "-c:v", "mjpeg", "-q:v", "2"]
+    subprocess.run([executable(), "-v", "error", *noise, str(folder / "in.mkv")], check=True)
+    words = ["render", "a.toml", "in.mkv", "-o", "out.mkv", "--grid", "32"]
+    command = [sys.executable, "-m", "app", *words]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True) as running:
+        while running.poll() is None and not any(name.startswith(".out") for name in here(folder)):
+            time.sleep(0.01)
+        os.truncate(folder / "in.mkv", (folder / "in.mkv").stat().st_size // 2)
+        said = running.communicate(timeout=60)[1]
+    assert running.returncode == 65
+    assert "in.mkv: it changed while it was read" in said
+    assert len(said.splitlines()) == 1
+    assert here(folder) == {"a.toml", "cat.png", "in.mkv"}
+
+
+@pytest.mark.parametrize("words", [["render", "a.toml", "-o", "x.png"], ["apply", "m.npy", "cat.png", "-o", "x.png"]])
+def test_a_limit_below_one_pixel_is_refused(folder: Path, words: list[str]):
+    for limit in ("-1", "0"):
+        ran = fluidwarp(folder, *words, "--max-pixels", limit)
+        assert ran.returncode == 2
+        assert "--max-pixels" in ran.stderr
+
+
+def test_a_picture_too_wide_is_refused_before_it_is_warped(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    write_picture(folder / "wide.png", Picture(np.zeros((8, 16384, 3), np.uint8)))
+    write_map(folder / "m.npy", Displacement(np.zeros((8, 16384, 2), np.float32)))
+    ran = fluidwarp(folder, "apply", "m.npy", "wide.png", "-o", "x.webp")
+    assert (ran.returncode, len(ran.stderr.splitlines())) == (1, 1)
+    assert "the result is 16384 x 8 pixels, and WebP holds no side longer than 16383" in ran.stderr
+
+
+def test_primaries_that_a_format_cannot_tell_are_told(folder: Path):
+    primaries = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+    write_picture(folder / "aces.exr", Picture(np.ones((48, 64, 3), np.float32), chromaticities=primaries))
+    ran = fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.tif")
+    assert ran.stderr == (
+        "fluidwarp: x.tif cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709\n"
+    )
+    assert fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.exr").stderr == ""

@@ -14,14 +14,15 @@ import pytest
 
 from app import project as projects
 from app.export import Job, MapOutput, run
-from app.maps import read_map
-from app.pictures import read_picture, write_picture
+from app.maps import Displacement, read_map, write_map
+from app.pictures import Picture, read_picture, write_picture
 from app.progress import Progress
 from app.project import Project
 from app.recipe import Recipe
 from app.tools import TOOLS
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
+from app.ui.canvas import shown_pixels
 from app.ui.dialogs import PictureOrMap, Preferring, Shortcuts, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
@@ -1251,3 +1252,44 @@ def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
     robot.frame(count=20)
     assert robot.editor.session.recipe.fluid.grid == 128
     robot.close()
+
+
+# What is lost -------------------------------------------------------------------------------------------------------
+
+
+def test_what_of_a_file_is_lost_is_told_when_it_is_opened_and_not_again(robot: Robot, tmp_path: Path) -> None:
+    from PIL import Image
+
+    page = Image.fromarray(pattern().pixels)
+    page.save(tmp_path / "pages.tif", save_all=True, append_images=[page])
+    robot.editor.files.open(tmp_path / "pages.tif")
+    robot.until(lambda: not robot.editor.files.is_loading)
+    line = "pages.tif: of its 2 pages the first is taken"
+    assert [message.text for message in robot.editor.messages.shown] == [line]
+    robot.editor.messages.shown.clear()
+    robot.editor.exports.start(ExportDialog(robot.editor.session, str(tmp_path)).job())
+    robot.until(lambda: not robot.editor.exports.is_running)
+    assert [message.text for message in robot.editor.messages.shown] == [f"Exported pages warped.png to {tmp_path}"]
+
+
+def test_what_an_export_tells_is_shown(robot: Robot, tmp_path: Path) -> None:
+    values = np.zeros((180, 240, 2), np.float32)
+    values[:, 120:, 0] = -0.1
+    write_map(tmp_path / "m.npy", Displacement(values))
+    robot.editor.files.start_from_map(tmp_path / "m.npy")
+    robot.editor.messages.shown.clear()
+    robot.editor.exports.start(ExportDialog(robot.editor.session, str(tmp_path)).job())
+    robot.until(lambda: not robot.editor.exports.is_running)
+    said = [message.text for message in robot.editor.messages.shown]
+    assert any("the warp folds over itself" in text for text in said), said
+
+
+def test_light_without_alpha_is_seen() -> None:
+    """A flame of an EXR, soft edges and what shines through beside it."""
+    flame = np.zeros((1, 4, 4), np.float32)
+    flame[0, 0] = 0.5, 0.25, 0, 0
+    flame[0, 1] = 0.0005, 0.0005, 0.0005, 0.001  # the outermost of a soft edge
+    flame[0, 2] = 0.25, 0, 0, 0.5
+    flame[0, 3] = 4, 0.5, 0, 1
+    seen = shown_pixels(Picture(flame, premultiplied=True), 64)[0].tolist()
+    assert seen == [[188, 137, 0, 0], [0, 0, 0, 0], [94, 0, 0, 128], [255, 188, 0, 255]]

@@ -17,9 +17,10 @@ from app.export import Job, run
 from app.ffmpeg import executable
 from app.maps import Displacement, write_map
 from app.opening import open_source
-from app.pictures import Picture, read_picture, write_picture
+from app.pictures import Picture, read_picture, to_bits, write_picture
 from app.progress import Progress
 from app.recipe import FluidSettings, Output, Recipe
+from app.video import read_clip
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
@@ -250,3 +251,30 @@ def test_the_shape_of_pixels_and_other_numbers_of_an_exr_stay(device: Device, tm
     assert header["pixelAspectRatio"] == 2.0
     assert "owner" not in header
     assert "isoSpeed" not in header
+
+
+def test_what_holds_no_premultiplied_colours_gets_straight_ones(device: Device, tmp_path: Path):
+    half = np.zeros((24, 36, 4), np.float32)
+    half[:] = 0.25, 0.125, 0.0, 0.5
+    source = written(tmp_path / "in.exr", half)
+    wanted = to_bits(np.array([[[0.5, 0.25, 0.0, 0.5]]], np.float32), 16)[0, 0]
+    rendered(device, source, tmp_path / "out.png")
+    assert (in_png(tmp_path / "out.png") == wanted).all()
+    rendered(device, source, tmp_path / "f.%d.png")
+    assert (in_png(tmp_path / "f.0.png") == wanted).all()
+    rendered(device, source, tmp_path / "out.mkv")
+    frame = next(read_clip(tmp_path / "out.mkv").read_frames())
+    assert (frame == wanted).all()
+    recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), mode="density")
+    run(device, Job(recipe, read_picture(source), tmp_path, tmp_path / "density.png"), Progress())
+    np.testing.assert_allclose(in_png(tmp_path / "density.png")[12, 18], wanted // 257, atol=1)
+
+
+def test_tiles_of_premultiplied_colours_are_the_same_to_the_bit(device: Device):
+    y, x = np.mgrid[0:150, 0:230].astype(np.float32)
+    warp = GivenMap(device, np.stack([0.1 * np.sin(y / 21), 0.1 * np.cos(x / 33)], axis=-1).astype(np.float32))
+    whole, tiled = Sampler(device), Sampler(device, whole=12_000, tile=(64, 50))
+    how = Sampling(premultiplied=True)
+    for top, dtype in ((255, np.uint8), (65535, np.uint16), (1, np.float32)):
+        pixels = (np.random.default_rng(0).random((150, 230, 4), np.float32) * top).astype(dtype)
+        np.testing.assert_array_equal(tiled.apply(warp, pixels, how=how), whole.apply(warp, pixels, how=how))

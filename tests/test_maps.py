@@ -19,6 +19,7 @@ from app.maps import (
     Displacement,
     Grid,
     Kind,
+    folds,
     from_offsets,
     from_st,
     holds,
@@ -284,7 +285,7 @@ def test_what_is_no_map(tmp_path: Path):
     with pytest.raises(UserError, match=r"b\.npy: there is no such file; check the name\.$"):
         read_map(tmp_path / "b.npy")
     write_map(tmp_path / "b.tif", identity(8, 8))
-    with pytest.raises(UserError, match="an overscan of 4 leaves nothing"):
+    with pytest.raises(UserError, match="--overscan 4 leaves nothing of its"):
         read_map(tmp_path / "b.tif", overscan=4)
     for name in ("b.tif", "b.exr", "b.flo", "b.npy"):
         write_map(tmp_path / name, identity(8, 8))
@@ -322,6 +323,20 @@ def test_a_disk_that_fills_up_in_the_middle(tmp_path: Path, ending: str):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(tmp_path.iterdir())
+
+
+def test_folds_are_counted():
+    y, x = np.mgrid[0:90, 0:600] / 600
+    values = np.zeros((90, 600, 2))
+    assert folds(values) == 0
+    values[..., 0] = -1.5 * np.clip(x - 0.5, 0, 0.1)  # beyond the middle the picture is turned over, a tenth wide
+    assert abs(folds(values) - 60 * 90) <= 2 * 90
+    values[..., 0] = -0.5 * x
+    values[..., 1] = -2 * y
+    assert folds(values) == values[..., 0].size
+    turned = np.stack([-x - y, x - y], axis=-1)  # by a quarter, which folds nothing
+    assert folds(turned) == 0
+    assert folds(np.zeros((1, 9, 2))) == 0
 
 
 def test_offsets_there_and_back():

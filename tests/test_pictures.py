@@ -7,6 +7,7 @@ import struct
 import subprocess
 import zlib
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -326,6 +327,122 @@ def test_exr_with_other_windows_and_channels(tmp_path: Path):
         read_picture(save({"depth": plane}))
 
 
+# What is lost -------------------------------------------------------------------------------------------------------
+
+
+def test_what_of_an_exr_is_lost_is_told(tmp_path: Path):
+    import OpenEXR
+
+    plane = noise(1, np.float32, (5, 4))[..., 0]
+    rgb = dict.fromkeys("RGB", plane)
+    path = tmp_path / "shot.exr"
+
+    def note(*parts: OpenEXR.Part) -> str:
+        OpenEXR.File(list(parts)).write(str(path))
+        return read_picture(path).note
+
+    def window(*corners: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
+
+    assert note(OpenEXR.Part({}, rgb)) == ""
+    layers = {f"layer{number}.R": plane for number in range(9)}
+    said = note(OpenEXR.Part({}, {**rgb, "Z": plane}))
+    assert said == "shot.exr: its channels Z are not kept"
+    said = note(OpenEXR.Part({}, {**rgb, **layers}))
+    assert said == "shot.exr: its channels layer0.R, layer1.R, layer2.R, layer3.R and 5 more are not kept"
+    said = note(OpenEXR.Part({"name": "left"}, rgb), OpenEXR.Part({"name": "right\x1b[31m"}, {"Z": plane}))
+    assert said == "shot.exr: its further parts right?[31m are not kept"
+    said = note(OpenEXR.Part({"dataWindow": window(-1, 0, 2, 4), "displayWindow": window(0, 0, 2, 4)}, rgb))
+    assert said == "shot.exr: its 1 pixels of overscan, beyond the display window, are not kept"
+    said = note(OpenEXR.Part({"dataWindow": window(7, 9, 10, 13), "displayWindow": window(7, 9, 10, 13)}, rgb))
+    assert said == "shot.exr: its display window begins at 7, 9 and is moved to 0, 0"
+
+
+def with_chunks(path: Path, **chunks: bytes) -> str:
+    """The note about a PNG that has these chunks."""
+    Image.fromarray(smooth(3)).save(path)
+    plain = path.read_bytes()
+    added = b"".join(
+        struct.pack(">I", len(data)) + name.encode() + data + struct.pack(">I", zlib.crc32(name.encode() + data))
+        for name, data in chunks.items()
+    )
+    path.write_bytes(plain[:33] + added + plain[33:])
+    return read_picture(path).note
+
+
+def test_what_a_png_tells_of_its_colours_stays_and_is_told_where_it_matters(tmp_path: Path):
+    path = tmp_path / "a.png"
+    usual = struct.pack(">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)
+    wide = struct.pack(">8I", 31270, 32900, 68000, 32000, 26500, 69000, 15000, 6000)
+    light = struct.pack(">I", 100000)
+    assert with_chunks(path) == ""
+    assert with_chunks(path, gAMA=struct.pack(">I", 45455), cHRM=usual) == ""
+    assert with_chunks(path, gAMA=light, sRGB=b"\0") == ""
+    assert with_chunks(path, cICP=bytes([1, 13, 0, 1])) == ""
+    said = with_chunks(path, gAMA=light, cHRM=wide)
+    assert said == (
+        "a.png: its gamma of 1 (gAMA) and primaries (cHRM) are kept in a PNG alone, and its colours mixed as if sRGB"
+    )
+    said = with_chunks(path, cICP=bytes([9, 16, 0, 1]), gAMA=light, cLLI=bytes(8))
+    assert said == "a.png: its colours are BT.2020 PQ (cICP), which a PNG keeps, and are mixed as if sRGB"
+    picture = read_picture(path)
+    for given in (picture, picture.with_pixels(to_bits(picture.pixels, 16))):
+        write_picture(tmp_path / "b.png", given, strip=True)
+        kept = (tmp_path / "b.png").read_bytes()
+        for name, data in {b"cICP": bytes([9, 16, 0, 1]), b"gAMA": light, b"cLLI": bytes(8)}.items():
+            chunk = struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+            assert kept.count(chunk) == 1
+            assert kept.index(chunk) < kept.index(b"IDAT")
+        np.testing.assert_array_equal(with_opencv(tmp_path / "b.png"), given.pixels)
+
+
+def test_the_colours_of_an_avif_are_told(tmp_path: Path):
+    import imagecodecs
+
+    encoded = imagecodecs.avif_encode(smooth(3), level=100, primaries=9, transfer=16, matrix=0)
+    (tmp_path / "a.avif").write_bytes(encoded)
+    assert read_picture(tmp_path / "a.avif").note == (
+        "a.avif: its colours are BT.2020 PQ (nclx) and are taken for sRGB"
+    )
+    write_picture(tmp_path / "a.avif", Picture(smooth(3)))
+    assert read_picture(tmp_path / "a.avif").note == ""
+
+
+@pytest.mark.parametrize("ending", [".gif", ".png", ".webp", ".tif", ".jpg", ".avif"])
+def test_further_frames_and_pages_are_told(tmp_path: Path, ending: str):
+    path = tmp_path / f"a{ending}"
+    pictures = [Image.fromarray(np.roll(smooth(3), number, axis=1)) for number in range(3)]
+    kind = {".jpg": "MPO"}.get(ending)
+    pictures[0].save(path, kind, save_all=True, append_images=pictures[1:])
+    what = {".tif": "pages", ".jpg": "pictures"}.get(ending, "frames")
+    read = read_picture(path)
+    assert read.note == f"a{ending}: of its 3 {what} the first is taken"
+    assert np.abs(read.pixels.astype(int) - np.asarray(Image.open(path).convert("RGB"))).mean() < 1
+    pictures[0].save(path)
+    assert read_picture(path).note == ""
+
+
+def test_what_of_a_tiff_is_lost_is_told(tmp_path: Path):
+    path = tmp_path / "a.tif"
+    for pixels, said in {
+        "uint32": (noise(1, np.uint16)[..., 0].astype(np.uint32), "its 32 bits become 16"),
+        "float64": (noise(1, np.float32)[..., 0].astype(np.float64), "its 64 bits become 32"),
+        "float16": (noise(1, np.float32)[..., 0].astype(np.float16), ""),
+    }.values():
+        tifffile.imwrite(path, pixels)
+        assert read_picture(path).note == (said and f"a.tif: {said}")
+    tifffile.imwrite(
+        path, np.dstack([noise(4, np.uint8), noise(2, np.uint8)]), photometric="rgb", planarconfig="contig"
+    )
+    assert read_picture(path).note == "a.tif: of its 6 samples a pixel the first are taken"
+    Image.frombytes("CMYK", (32, 32), bytes(32 * 32 * 4)).save(path)
+    assert read_picture(path).note == "a.tif: its inks (CMYK) become RGB"
+    with tifffile.TiffWriter(path) as writer:  # a smaller version of the same picture is no page of its own
+        writer.write(smooth(3), photometric="rgb")
+        writer.write(smooth(3)[::2, ::2], photometric="rgb", subfiletype=1)
+    assert read_picture(path).note == ""
+
+
 # What belongs to a picture ------------------------------------------------------------------------------------------
 
 
@@ -390,6 +507,16 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
     assert not stripped.exif
     assert not stripped.xmp
     assert not stripped.texts
+
+
+@pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
+def test_narrow_pixels_of_a_turned_picture_are_turned_too(tmp_path: Path, ending: str):
+    path, image = tmp_path / f"a.{ending}", Image.fromarray(smooth(3))
+    tags: dict[str, Any] = {"tiffinfo": {274: 6}} if ending == "tif" else {"exif": exif_bytes(6)}
+    image.save(path, dpi=(300, 150), **tags)
+    assert read_picture(path).dpi == pytest.approx((150, 300), abs=0.1)
+    image.save(path, dpi=(300, 150))
+    assert read_picture(path).dpi == pytest.approx((300, 150), abs=0.1)
 
 
 def test_16_bit_png_and_exr_keep_their_metadata(tmp_path: Path):
@@ -495,7 +622,7 @@ def test_names_that_cannot_be_written(tmp_path: Path):
     }.items():
         with pytest.raises(UserError, match=message):
             write_picture(tmp_path / name, picture)
-    with pytest.raises(UserError, match="WebP holds no side longer than 16383 pixels"):
+    with pytest.raises(UserError, match="WebP holds no side longer than 16383; make it smaller"):
         write_picture(tmp_path / "a.webp", Picture(np.zeros((1, 17000, 3), np.uint8)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "folder.png"]
 

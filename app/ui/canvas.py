@@ -200,7 +200,9 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
         else:
             blocks = pixels.reshape(height // step, step, width // step, step, -1)
             pixels = blocks.mean(axis=(1, 3), dtype=np.float32).astype(picture.pixels.dtype)
-    pixels = to_bits(picture.with_pixels(pixels).straight().pixels, 8, dither=False)
+    shown = picture.with_pixels(pixels)
+    straight = shown.straight().pixels
+    pixels = to_bits(straight, 8, dither=False)
     if pixels.shape[2] <= 2:
         pixels = np.concatenate([pixels[..., :1].repeat(3, axis=2), pixels[..., 1:]], axis=2)
     if pixels.shape[2] == 3:
@@ -208,6 +210,10 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
         return np.ascontiguousarray(np.concatenate([pixels, opaque], axis=2))
     alpha = pixels[..., 3:].astype(np.uint16)
     colours = ((pixels[..., :3] * alpha + 127) // 255).astype(np.uint8)
+    if shown.premultiplied and shown.linear:
+        # A flame is light that covers nothing: what is brighter than white would be at this alpha is added.
+        light = shown.pixels[..., :-1] - np.clip(straight[..., :-1], 0, 1) * straight[..., -1:]
+        colours = np.minimum(colours.astype(np.uint16) + to_bits(light, 8, dither=False), 255).astype(np.uint8)
     return np.ascontiguousarray(np.concatenate([colours, pixels[..., 3:]], axis=2))
 
 

@@ -54,7 +54,7 @@ class ExportDialog(Dialog):
         self.kind = PICTURE
         self.format = [0 for _ in KINDS]
         self.forward = self.offsets = False
-        self.picture = session.project.picture
+        self.picture = replace(session.project.picture, note="")  # it was told when the picture was opened
         self.size = max(self.picture.width, self.picture.height)
         self.quality = session.recipe.output.quality
         self.fps = session.recipe.output.fps
@@ -306,6 +306,8 @@ class Exports:
             if process.error:
                 self.messages.warn(process.error)
             elif not process.cancelled:
+                for notice in process.notices:
+                    self.messages.say(notice)
                 self.messages.done(f"Exported {process.job.target.name} to {process.job.target.parent}")
             return
         with ui.floating("exporting", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
