@@ -258,7 +258,7 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
         line = outcome.error if named else f"{outcome.label}: {outcome.error}"
         for text in (line, *(f"{outcome.label}: {notice}" for notice in outcome.notices)):
             if text:
-                _say(" ".join(text.split()))
+                _say(text)
 
     written = 0
 
