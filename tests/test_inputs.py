@@ -94,8 +94,12 @@ def key(dice: random.Random, most: int) -> str:
 
 
 def value(dice: random.Random, most: int) -> str:
-    number = dice.choice(["0", "-1", "1.5", "1e999", "nan", "-inf", "9" * 5000, "0x" + "f" * 5000, "1_0", "1e" + "9" * 99])
-    escape = dice.choice(["\\u0000", "\\u001b[31m", "\\u202e", "\\n", "\\\\", '\\"', "\\U0010ffff", "\\ud800", "x", "\u0007"])
+    number = dice.choice(
+        ["0", "-1", "1.5", "1e999", "nan", "-inf", "9" * 5000, "0x" + "f" * 5000, "1_0", "1e" + "9" * 99]
+    )
+    escape = dice.choice(
+        ["\\u0000", "\\u001b[31m", "\\u202e", "\\n", "\\\\", '\\"', "\\U0010ffff", "\\ud800", "x", "\u0007"]
+    )
     return dice.choice(
         [
             number,
@@ -119,7 +123,9 @@ def table(dice: random.Random, most: int) -> str:
 def known(dice: random.Random, most: int) -> str:
     """Something that a recipe does hold, its values wrong, or far too much of it."""
     name = dice.choice(["picture", "map", "name", "duration", "version", "edges", "mode", "stroke", "force", "fluid"])
-    formula = many(dice.choice(["~", "-", "(", "not ", "1+", "sin(", "[", "1 is 1 or ", "'", "t**", "9**", "0_"]), 499, dice)
+    formula = many(
+        dice.choice(["~", "-", "(", "not ", "1+", "sin(", "[", "1 is 1 or ", "'", "t**", "9**", "0_"]), 499, dice
+    )
     inner = f'kind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\nformula = "{formula}1"'
     return dice.choice(
         [
@@ -238,13 +244,17 @@ def hostile_project(dice: random.Random, picture: bytes) -> bytes:
         case 1:
             members["recipe.toml"] = hostile_text(dice).encode("utf-8", "surrogatepass")
         case 2:
-            inside = dice.choice(["b\\u0000", "../a.png", "a/../../b.png", "/etc/passwd", "x" * 5000, "recipe.toml", "a\\u001b.png"])
+            inside = dice.choice(
+                ["b\\u0000", "../a.png", "a/../../b.png", "/etc/passwd", "x" * 5000, "recipe.toml", "a\\u001b.png"]
+            )
             members["recipe.toml"] = f'picture = "{inside}"'.encode()
             members[inside.replace("\\u0000", "\0").replace("\\u001b", "\x1b")] = picture
         case 3:
             members |= {f"{number}": b"" for number in range(dice.randrange(10_000))}
         case 4:
-            members["format.txt"] = dice.choice([b"", b"fluidwarp project", b"fluidwarp project " + b"9" * 5000, b"\xff"])
+            members["format.txt"] = dice.choice(
+                [b"", b"fluidwarp project", b"fluidwarp project " + b"9" * 5000, b"\xff"]
+            )
         case _:
             pass
     data = packed(members, dice.choice([zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA]))
@@ -407,9 +417,7 @@ def test_preferences_that_are_hostile_are_as_by_default(tmp_path: Path, text: st
 
 def test_what_is_shown_is_one_line_that_no_terminal_obeys():
     assert shown("Grüße, 你好 👩‍🚀: \\") == "Grüße, 你好 👩‍🚀: \\"  # as it is
-    assert shown("a\x1b[31m\n\t\r\0\x7f\x9b\u202e\u2028\udcff") == (
-        r"a\x1b[31m\n\t\r\x00\x7f\x9b\u202e\u2028\udcff"
-    )
+    assert shown("a\x1b[31m\n\t\r\0\x7f\x9b\u202e\u2028\udcff") == (r"a\x1b[31m\n\t\r\x00\x7f\x9b\u202e\u2028\udcff")
     assert str(UserError("\x1b]0;title\x07")) == r"\x1b]0;title\x07"
     long = str(UserError(f"Cannot read {'x' * 100_000}: there is no such file; check the name."))
     assert len(long) < MOST_SHOWN + 10
