@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import pickle
@@ -549,18 +550,28 @@ def _client(address: str) -> Iterator[Any]:
     try:
         from distributed import Client
         from distributed.comm.addressing import parse_address, parse_host_port
+        from distributed.comm.core import connect
+        from distributed.security import Security
     except ImportError:
         raise UserError("a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'", 2) from None
+
+    async def look(security: Security) -> None:
+        # Its own limit is for the connection alone, and not for the first words.
+        arguments = security.get_connection_args("client")
+        comm = await asyncio.wait_for(connect(address, timeout=CONNECTING, **arguments), CONNECTING + 1)
+        comm.abort()
+
+    # The client finds out too, but goes on for half a minute and ends in a traceback.
     try:
-        # The client finds out too, but goes on for half a minute and ends in a traceback.
         scheme, place = parse_address(address)
         if scheme not in SCHEMES:
             raise ValueError(f"an address begins with {' or '.join(f'{known}://' for known in SCHEMES)}")
         if not 0 < parse_host_port(place)[1] < 65536:
             raise ValueError("there is no such port")
+        asyncio.run(look(Security()))
         client = Client(address, timeout=CONNECTING, set_as_default=False)
     except Exception as error:  # of what answers there, but is no scheduler, Dask raises anything
-        said = str(error).strip().splitlines() or [type(error).__name__]
+        said = str(error).strip().splitlines() or ["what is there says nothing"]
         raise UserError(
             f"no Dask scheduler answers at {address} ({said[0]}); give for example tcp://host:8786"
         ) from None

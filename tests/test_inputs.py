@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import inputs, states, toml
+from app import inputs, toml
 from app.errors import MOST_SHOWN, UserError, shown
 from app.inputs import open_input, read_input
 from app.maps import holds, read_map

@@ -155,7 +155,7 @@ def test_what_is_from_before_this_host_was_started_is_swept(tmp_path: Path):
         path.touch()
         os.utime(path, (changed, changed))
     sweep(tmp_path)
-    assert [path for path in tmp_path.iterdir()] == [new]
+    assert list(tmp_path.iterdir()) == [new]
 
 
 def test_without_a_list_of_processes_nothing_is_swept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
