@@ -457,7 +457,7 @@ def _run_on_cluster(
     before = {task: _stamps(task) for task in tasks}
     heard: set[Task] = set()
     watched, idle = time.monotonic(), False
-    with _silent_logging(), _client(address) as client:
+    with _client(address) as client:
         # Dask gives the tasks of a worker that dies to the others, as often as its allowed-failures says.
         futures = {client.submit(_perform_on_worker, task, pure=False): task for task in tasks}
         for future in futures:
@@ -535,17 +535,6 @@ def _are_new(now: Stamps, before: Stamps) -> bool:
 
 
 @contextmanager
-def _silent_logging() -> Iterator[None]:
-    """Keep Dask from telling by itself, at length, what is told in a sentence."""
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logging.disable(before)
-
-
-@contextmanager
 def _client(address: str) -> Iterator[Any]:
     try:
         from distributed import Client
@@ -554,6 +543,9 @@ def _client(address: str) -> Iterator[Any]:
         from distributed.security import Security
     except ImportError:
         raise UserError("a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'", 2) from None
+
+    # Dask tells by itself, at length and also afterwards, what is told here in a sentence; nothing else here logs.
+    logging.disable(logging.CRITICAL)
 
     async def look(security: Security) -> None:
         # Its own limit is for the connection alone, and not for the first words.
