@@ -500,12 +500,10 @@ class _Gone(Exception):
 
 
 def _outcome(future: Any, task: Task) -> Outcome:
-    from distributed.comm import CommClosedError
-
     if future.status == "finished":
         try:
             return future.result(CONNECTING)
-        except (CancelledError, CommClosedError, OSError, TimeoutError):
+        except (CancelledError, OSError, TimeoutError):
             raise _Gone from None
     if future.status != "error":  # nobody but the client cancels, when it loses the scheduler
         raise _Gone

@@ -89,7 +89,8 @@ def test_a_folder_is_swept_once_in_a_process(tmp_path: Path, write: Callable[[],
     for number in range(2):
         (tmp_path / name).touch()
         with write() as temporary:
-            temporary.is_dir() or temporary.touch()
+            if not temporary.is_dir():
+                temporary.touch()
             assert (tmp_path / name).exists() == bool(number)
 
 
