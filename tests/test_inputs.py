@@ -250,7 +250,7 @@ def hostile_project(dice: random.Random, picture: bytes) -> bytes:
             members["recipe.toml"] = f'picture = "{inside}"'.encode()
             members[inside.replace("\\u0000", "\0").replace("\\u001b", "\x1b")] = picture
         case 3:
-            members |= {f"{number}": b"" for number in range(dice.randrange(10_000))}
+            members |= {f"{number}": b"" for number in range(dice.randrange(1000))}
         case 4:
             members["format.txt"] = dice.choice(
                 [b"", b"fluidwarp project", b"fluidwarp project " + b"9" * 5000, b"\xff"]
