@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import os
 import pickle
 import queue
@@ -10,8 +12,10 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -42,6 +46,8 @@ FLAGS = {  # by which the command line sets a key of the recipe
 ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
 DIED = "its process died each time, perhaps for want of memory; use fewer --jobs or a smaller --size"
 CONNECTING = 10  # seconds that a scheduler has to answer
+WATCHING = 5  # seconds between two looks at whether a scheduler has any worker
+SCHEMES = ("tcp", "tls", "ws", "wss", "ucx")  # what a scheduler's address may begin with
 LOOK = 0.1  # seconds between two looks at the wish to stop
 
 
@@ -231,13 +237,20 @@ Report = Callable[[Outcome], None]
 
 
 def run_batch(
-    tasks: Sequence[Task], report: Report, progress: Progress, jobs: int = 1, cluster: str | None = None
+    tasks: Sequence[Task],
+    report: Report,
+    progress: Progress,
+    jobs: int = 1,
+    cluster: str | None = None,
+    notice: Callable[[str], None] = lambda said: None,
 ) -> int:
     """Do all tasks, whatever becomes of any; `report` hears of each as it ends. Says how many failed.
 
-    jobs: processes on this machine. cluster: the address of a Dask scheduler, which decides instead.
+    jobs: processes on this machine. cluster: the address of a Dask scheduler, which decides instead. notice: hears what
+    is waited for.
 
     Raises:
+        UserError: if there is no such scheduler, or it goes; how many are written is said.
         Cancelled: if `progress` says so; what is finished stays, nothing is half-written.
     """
     failures = 0
@@ -250,7 +263,7 @@ def run_batch(
         progress.advance()
 
     if cluster is not None:
-        _run_on_cluster(tasks, cluster, heard, progress)
+        _run_on_cluster(tasks, cluster, heard, progress, notice)
     elif min(jobs, len(tasks)) > 1:
         _run_in_processes(tasks, min(jobs, len(tasks)), heard, progress)
     else:
@@ -450,44 +463,120 @@ def _perform_on_worker(task: Task) -> Outcome:
     return Outcome(task.label, DIED)
 
 
-def _run_on_cluster(tasks: Sequence[Task], address: str, report: Report, progress: Progress) -> None:
-    try:
-        from distributed import Client
-        from distributed.comm.addressing import parse_address, parse_host_port
-    except ImportError:
-        raise UserError("a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'", 2) from None
-    try:
-        scheme, place = parse_address(address)
-        if scheme in ("tcp", "tls"):
-            parse_host_port(place)  # the client finds out too, but goes on for half a minute and ends in a traceback
-        client = Client(address, timeout=CONNECTING, set_as_default=False)
-    except (OSError, TimeoutError, ValueError, TypeError) as error:
-        raise UserError(f"no Dask scheduler answers at {address} ({error}); give for example tcp://host:8786") from None
+def _run_on_cluster(
+    tasks: Sequence[Task], address: str, report: Report, progress: Progress, notice: Callable[[str], None]
+) -> None:
     ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    with client:
+    before = {task: _stamps(task) for task in tasks}
+    heard: set[Task] = set()
+    watched, idle = time.monotonic(), False
+    with _client(address) as client:
         # Dask gives the tasks of a worker that dies to the others, as often as its allowed-failures says.
         futures = {client.submit(_perform_on_worker, task, pure=False): task for task in tasks}
         for future in futures:
             future.add_done_callback(ended.put)
         try:
-            left = len(futures)
-            while left:
+            while len(heard) < len(tasks):
                 progress.check()
                 try:
                     future = ended.get(timeout=LOOK)
                 except queue.Empty:
+                    if time.monotonic() > watched + WATCHING:
+                        watched, was_idle, idle = time.monotonic(), idle, not _has_workers(client)
+                        if idle and not was_idle:
+                            mend = f"start one with: dask worker {address}"
+                            notice(f"the Dask scheduler at {address} has no worker, and is waited for; {mend}")
                     continue
-                left -= 1
                 report(_outcome(future, futures[future]))
+                heard.add(futures[future])
+        except _Gone:
+            # What is written appears whole, so that it can be told by its files alone.
+            written = sum(_are_new(_stamps(task), before[task]) for task in tasks)
+            raise UserError(
+                f"the Dask scheduler at {address} is gone; {written} of {len(tasks)} pictures are written, and its "
+                "workers may still finish what they have in hand; start it again, and then this for the others"
+            ) from None
         except BaseException:
             client.cancel(list(futures), force=True)
             raise
 
 
+def _has_workers(client: Any) -> bool:
+    try:
+        return bool(client.nthreads())
+    except OSError:  # it is gone, as the futures will tell
+        return True
+
+
+class _Gone(Exception):
+    """The scheduler does not know of our tasks any more."""
+
+
 def _outcome(future: Any, task: Task) -> Outcome:
     if future.status == "finished":
-        return future.result()
-    error = future.exception() if future.status == "error" else None
+        try:
+            return future.result(CONNECTING)
+        except (CancelledError, OSError, TimeoutError):
+            raise _Gone from None
+    if future.status != "error":  # nobody but the client cancels, when it loses the scheduler
+        raise _Gone
+    error = future.exception()
     if type(error).__name__ == "KilledWorker":
         return Outcome(task.label, "every worker that tried it died, perhaps for want of memory")
-    return Outcome(task.label, f"it failed on the cluster ({error or future.status})")
+    return Outcome(task.label, f"it failed on the cluster ({error})")
+
+
+Stamps = tuple[tuple[int, int] | None, ...]
+
+
+def _stamps(task: Task) -> Stamps:
+    """What changes when the files of a task are replaced; None for one that is not there."""
+    found = []
+    for path in task.written:
+        try:
+            status = path.stat()
+            found.append((status.st_ino, status.st_mtime_ns))
+        except OSError:
+            found.append(None)
+    return tuple(found)
+
+
+def _are_new(now: Stamps, before: Stamps) -> bool:
+    return all(mine is not None and mine != other for mine, other in zip(now, before, strict=True))
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    try:
+        from distributed import Client
+        from distributed.comm.addressing import parse_address, parse_host_port
+        from distributed.comm.core import connect
+        from distributed.security import Security
+    except ImportError:
+        raise UserError("a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'", 2) from None
+
+    # Dask tells by itself, at length and also afterwards, what is told here in a sentence; nothing else here logs.
+    logging.disable(logging.CRITICAL)
+
+    async def look(security: Security) -> None:
+        # Its own limit is for the connection alone, and not for the first words.
+        arguments = security.get_connection_args("client")
+        comm = await asyncio.wait_for(connect(address, timeout=CONNECTING, **arguments), CONNECTING + 1)
+        comm.abort()
+
+    # The client finds out too, but goes on for half a minute and ends in a traceback.
+    try:
+        scheme, place = parse_address(address)
+        if scheme not in SCHEMES:
+            raise ValueError(f"an address begins with {' or '.join(f'{known}://' for known in SCHEMES)}")
+        if not 0 < parse_host_port(place)[1] < 65536:
+            raise ValueError("there is no such port")
+        asyncio.run(look(Security()))
+        client = Client(address, timeout=CONNECTING, set_as_default=False)
+    except Exception as error:  # of what answers there, but is no scheduler, Dask raises anything
+        said = str(error).strip().splitlines() or ["what is there says nothing"]
+        raise UserError(
+            f"no Dask scheduler answers at {address} ({said[0]}); give for example tcp://host:8786"
+        ) from None
+    with client:
+        yield client

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import re
-import secrets
 import shutil
 import threading
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from app.errors import UserError
+from app.leftovers import sweep, temporary_name
 
 MENDS = {
     errno.ENOSPC: "the disk is full; free some space or choose another folder",
@@ -65,7 +65,7 @@ def temporary_file(path: Path) -> Iterator[Path]:
 
 def temporary_beside(path: Path) -> Path:
     """A hidden name nobody uses in the folder of `path`, with the same ending."""
-    return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(4)}{path.suffix}")
+    return path.with_name(temporary_name(path.stem, path.suffix))
 
 
 def writable(path: str | os.PathLike[str]) -> Path:
@@ -132,6 +132,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     When the block raises, the temporary file goes and `path` is as it was. `OSError` becomes `UserError`.
     """
     target = writable(path)
+    sweep(target.parent)
     try:
         with temporary_file(temporary_beside(target)) as temporary:
             yield temporary
@@ -147,6 +148,7 @@ def replacing_many(folder: str | os.PathLike[str], label: str) -> Iterator[Path]
     When the block raises, they all go and `folder` is as it was. `label` names the output in errors.
     """
     target = writable(Path(folder) / label).parent
+    sweep(target)
     temporary = temporary_beside(target / "sequence")
     remove = partial(shutil.rmtree, temporary, ignore_errors=True)
     with if_abandoned(remove):

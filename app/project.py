@@ -12,6 +12,7 @@ from typing import Any
 from app.errors import UserError
 from app.files import replacing
 from app.inputs import MOST_TEXT, Archive, open_input, read_input
+from app.leftovers import temporary_folder
 from app.pictures import MAX_PIXELS, Picture, read_picture
 from app.recipe import Recipe
 from app.schema import plain
@@ -148,7 +149,7 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
         return Project(recipe, picture, _picture_bytes(source), path.parent, path, embedded=False)
     if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
         raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")
-    keeper = tempfile.TemporaryDirectory(prefix="fluidwarp-", ignore_cleanup_errors=True)
+    keeper = temporary_folder()
     folder = Path(keeper.name)
     for name in held:
         archive.unpack(name, folder)

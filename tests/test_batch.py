@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import gc
+import json
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -277,6 +282,101 @@ def test_no_cluster_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(batch, "CONNECTING", 1)
     with pytest.raises(UserError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         run_batch(tasks(folder, [folder / "p0.png"]), lambda outcome: None, Progress(), cluster="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("http://127.0.0.1:9", "an address begins with tcp://"),
+        ("inproc://x", "an address begins with tcp://"),
+        ("127.0.0.1", "missing port number"),
+        ("tcp://127.0.0.1:99999", "there is no such port"),
+        ("tls://127.0.0.1:9", "no Dask scheduler answers"),
+        ("", "no Dask scheduler answers"),
+    ],
+)
+def test_a_wrong_address_is_told(folder: Path, address: str, words: str, capfd: pytest.CaptureFixture[str]):
+    pytest.importorskip("distributed")
+    with pytest.raises(UserError, match=re.escape(words)):
+        run_batch(tasks(folder, [folder / "p0.png"]), lambda outcome: None, Progress(), cluster=address)
+    gc.collect()  # what is half made may complain when it goes
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    "answer", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\0" * 100], ids=["silence", "HTTP", "noise"]
+)
+def test_what_is_no_scheduler_is_told(
+    folder: Path, answer: bytes, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    """Something else answers there, or takes the call and is silent."""
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(batch, "CONNECTING", 1)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        kept: list[socket.socket] = []
+
+        def serve() -> None:
+            with suppress(OSError):
+                while True:
+                    kept.append(server.accept()[0])
+                    kept[-1].sendall(answer)
+
+        threading.Thread(target=serve, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(UserError, match=f"no Dask scheduler answers at {address}"):
+            run_batch(tasks(folder, [folder / "p0.png"]), lambda outcome: None, Progress(), cluster=address)
+        for connection in kept:
+            connection.close()
+    gc.collect()
+    assert capfd.readouterr().err == ""
+
+
+def test_a_scheduler_without_workers_and_one_that_dies_are_told(folder: Path):
+    """A sentence each, and the number of pictures that are written."""
+    pytest.importorskip("distributed")
+    (folder / "a.toml").write_text(RECIPE.replace("duration = 0.2", "duration = 4"))
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    pictures = [f"p{number}.png" for number in range(6)]
+    with ExitStack() as running:
+
+        def start(*words: str, **options: Any) -> subprocess.Popen[str]:
+            command = [sys.executable, "-m", *words]
+            process = subprocess.Popen(command, cwd=folder, env=environment, text=True, **options)
+            running.callback(process.wait)
+            running.callback(process.kill)
+            return process
+
+        quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        local = ["--host", "127.0.0.1", "--no-dashboard"]
+        scheduler = start("dask", "scheduler", *local, "--port", "0", "--scheduler-file", "where.json", **quiet)
+        wait_until((folder / "where.json").exists)
+        address = json.loads((folder / "where.json").read_text())["address"]
+        job = start("app", "render", "a.toml", *pictures, "-o", "out", "--cluster", address, stderr=subprocess.PIPE)
+        assert job.stderr is not None
+        assert job.stderr.readline() == (
+            f"fluidwarp: the Dask scheduler at {address} has no worker, and is waited for; "
+            f"start one with: dask worker {address}\n"
+        )
+        assert sorted(os.listdir(folder / "out")) == []
+        worker = start("dask", "worker", address, *local, "--nthreads", "1", "--no-nanny", **quiet)
+        wait_until(lambda: len(finished(folder / "out")) >= 2)
+        scheduler.kill()
+        _, told = job.communicate(timeout=60)
+        worker.terminate()
+        worker.wait(60)
+    assert job.returncode == 1
+    found = re.fullmatch(
+        rf"fluidwarp: the Dask scheduler at {address} is gone; (\d) of 6 pictures are written, and its workers may "
+        r"still finish what they have in hand; start it again, and then this for the others\n",
+        told,
+    )
+    assert found, told
+    assert 2 <= int(found[1]) <= len(finished(folder / "out")) < 6
+
+
+def finished(folder: Path) -> list[str]:
+    """The pictures in a folder that has been made."""
+    return [name for name in os.listdir(folder) if not name.startswith(".")]
 
 
 # Parts of an animation ----------------------------------------------------------------------------------------------

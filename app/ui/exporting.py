@@ -15,6 +15,7 @@ from imgui_bundle.imgui import ImVec2
 from app.errors import UserError
 from app.export import Job, MapOutput
 from app.export_process import ExportProcess
+from app.leftovers import temporary_folder
 from app.pictures import read_picture
 from app.session import Session
 from app.ui.canvas import shown_pixels
@@ -177,7 +178,7 @@ class ExportDialog(Dialog):
         process = self._preview
         if process is None:
             if self._image is None and ui.button("Preview", width=96, height=30):
-                job, folder = self.job(), tempfile.TemporaryDirectory(prefix="fluidwarp-")
+                job, folder = self.job(), temporary_folder()
                 small = job.recipe.output.model_copy(update={"size": min(PREVIEW, self.size)})
                 recipe = job.recipe.edited(output=small)
                 self._folder = folder

@@ -1,0 +1,459 @@
+"""What an enemy hands over: recipes and projects made to cost much, and names made to be obeyed by a terminal."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import random
+import re
+import struct
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import inputs, toml
+from app.errors import MOST_SHOWN, UserError, shown
+from app.inputs import open_input, read_input
+from app.maps import holds, read_map
+from app.pictures import Picture, read_picture, write_picture
+from app.project import is_project, load
+from app.recipe import Recipe
+from app.ui.preferences import Preferences
+from app.video import read_clip
+
+ROOT = Path(__file__).parent.parent
+MOST_MEMORY = 300 * 2**20  # bytes, beside what the program has before it opens a file
+PATIENCE = 60  # seconds for each file; they take milliseconds, and a fault hours
+
+# Opens each file as the command line does, with so little memory that a fault ends it, and says what became of them.
+OPENING = f"""
+import json, resource, signal, sys
+from pathlib import Path
+import imagecodecs, tifffile, PIL.Image, OpenEXR
+from app.errors import UserError
+from app.opening import open_recipe
+
+pages = int(Path("/proc/self/statm").read_text().split()[0])
+most = pages * resource.getpagesize() + {MOST_MEMORY}
+resource.setrlimit(resource.RLIMIT_AS, (most, most))
+said = {{}}
+for name in sys.argv[1:]:
+    print(name, file=sys.stderr, flush=True)
+    signal.alarm({PATIENCE})
+    try:
+        open_recipe(name)
+        said[name] = ""
+    except UserError as error:
+        said[name] = str(error)
+print(json.dumps(said))
+"""
+
+
+def opened(paths: list[Path]) -> dict[str, str]:
+    """What was said of each: "" where it was taken."""
+    command = [sys.executable, "-c", OPENING, *map(str, paths)]
+    ran = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr[-3000:]
+    said: dict[str, str] = json.loads(ran.stdout)
+    assert list(said) == [str(path) for path in paths]
+    for sentence in said.values():
+        assert len(sentence) <= 10 * MOST_SHOWN  # its escapes are longer than what they stand for
+        assert sentence.isprintable()
+    return said
+
+
+# Recipes ------------------------------------------------------------------------------------------------------------
+
+
+def many(word: str, most: int, dice: random.Random) -> str:
+    """`word` a few times, or thousands of times, but no more than `most` characters of it."""
+    return word * max(1, min(most // len(word), int(10 ** dice.uniform(0, 5))))
+
+
+def hostile_text(dice: random.Random, most: int = 100_000) -> str:
+    """A TOML file of what costs parsers much, of what no recipe holds, and of what one does hold."""
+    text = ""
+    while len(text) < most and dice.random() < 0.8:
+        text += dice.choice(PIECES)(dice, most - len(text)) + dice.choice(["\n", "\r\n", "\n\n", " ", ""])
+    if dice.random() < 0.3:  # cut off, or with another piece in the middle of one
+        at = dice.randrange(len(text) + 1)
+        text = text[:at] + dice.choice(["", hostile_text(dice, 1000)])
+    return text[:most]
+
+
+def key(dice: random.Random, most: int) -> str:
+    part = dice.choice(["a", "stroke", "fluid", '"a.b"', "'\"'", '""', "1", "-", "\u00e9"])
+    joint = dice.choice([".", " . ", "\t.", ".."])
+    return dice.choice([part, many(part + joint, most, dice) + part, many("k", most, dice)])
+
+
+def value(dice: random.Random, most: int) -> str:
+    number = dice.choice(
+        ["0", "-1", "1.5", "1e999", "nan", "-inf", "9" * 5000, "0x" + "f" * 5000, "1_0", "1e" + "9" * 99]
+    )
+    escape = dice.choice(
+        ["\\u0000", "\\u001b[31m", "\\u202e", "\\n", "\\\\", '\\"', "\\U0010ffff", "\\ud800", "x", "\u0007"]
+    )
+    return dice.choice(
+        [
+            number,
+            many(dice.choice("0123456789"), most, dice),
+            '"' + many(escape, most, dice) + dice.choice(['"', ""]),
+            dice.choice(['"""', "'''"]) + many(dice.choice(['\\"', '"', "'", '""a', "[a.b]\n"]), most, dice) + '"""',
+            many("[", most, dice) + number + many("]", most, dice),
+            many("{a=", most, dice) + number + many("}", most, dice),
+            many("[" + " " * 50, most, dice),
+            "[" + many(dice.choice(["0,", "[],", "{},", "[0, 0.5, 0.5, 1.0],", "[[[0]]],", "''," ]), most, dice) + "]",
+            dice.choice(["1979-05-27T07:32:00Z", "0000-00-00", "25:61:61", "1979-13-41", "true", "tru"]),
+        ]
+    )  # fmt: skip
+
+
+def table(dice: random.Random, most: int) -> str:
+    head = dice.choice(["[{}]", "[[{}]]", "[{}", "[[{}]"]).format(key(dice, most // 2))
+    return many(head + "\n", most, dice)
+
+
+def known(dice: random.Random, most: int) -> str:
+    """Something that a recipe does hold, its values wrong, or far too much of it."""
+    name = dice.choice(["picture", "map", "name", "duration", "version", "edges", "mode", "stroke", "force", "fluid"])
+    formula = many(
+        dice.choice(["~", "-", "(", "not ", "1+", "sin(", "[", "1 is 1 or ", "'", "t**", "9**", "0_"]), 499, dice
+    )
+    inner = f'kind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\nformula = "{formula}1"'
+    return dice.choice(
+        [
+            f"{name} = {value(dice, most)}",
+            f"[[force]]\n{inner}",
+            many(f"[[stroke]]\ntool = 'push'\nsamples = [[{dice.randrange(9)}, 0.5, 0.5, 1.0]]\n", most, dice),
+            f"[[viscosity]]\nkind = 'picture'\npicture = {value(dice, most)}",
+            f"[[viscosity]]\nkind = 'constant'\nwindow = {value(dice, most)}\n",
+            many("#", most, dice),
+            "picture = '/dev/zero'",
+        ]
+    )
+
+
+PIECES: list[Callable[[random.Random, int], str]] = [
+    lambda dice, most: f"{key(dice, most)} = {value(dice, most)}",
+    lambda dice, most: "".join(f"k{number} = 0\n" for number in range(min(most // 10, int(10 ** dice.uniform(0, 4))))),
+    table,
+    known,
+    known,
+]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_hostile_recipes_are_taken_or_refused_in_a_sentence(tmp_path: Path, seed: int):
+    """Within the memory; and never in more than the time that such a length may take."""
+    dice = random.Random(seed)
+    paths = []
+    for number in range(150):
+        data = hostile_text(dice).encode("utf-8", "surrogatepass")
+        if dice.random() < 0.1:
+            data = b"\xef\xbb\xbf" + data + bytes([dice.randrange(256)])
+        paths.append(tmp_path / f"{number}.toml")
+        paths[-1].write_bytes(data)
+    said = opened(paths)
+    assert any(said.values())
+    assert not all(said.values())
+    for path, sentence in said.items():
+        assert not sentence or Path(path).name in sentence
+
+
+SMALL_AND_HARMFUL = {
+    "dotted key": ("a" + ".a" * 10_000 + " = 1", "line 1: a key of more than 16 parts"),
+    "dotted key with spaces": ("a" + " . 'a'" * 10_000 + " = 1", "line 1: a key of more than 16 parts"),
+    "dotted header": ("\n[" + "a." * 10_000 + "a]", "line 2: a key of more than 16 parts"),
+    "longer": ("a" + ".a" * 50_000 + " = 1", "line 1: a key of more than 16 parts"),
+    "arrays": ("a = " + "[" * 5000 + "]" * 5000, "line 1: lists or tables nested more than 16 deep"),
+    "tables": ("a = " + "{a=" * 5000 + "1" + "}" * 5000, "line 1: lists or tables nested more than 16 deep"),
+    "number": ("\n\nduration = " + "9" * 5000, "line 3: a number or a key of 5000 characters"),
+    "key": ("x" * 100_000 + " = 1", "line 1: a number or a key of 100000 characters"),
+    "text": (f"name = '{'x' * 100_000}'", "line 1: a text of 100002 characters"),
+    "quoted key": (f"'{'x' * 9000}' = 1", "unknown key"),
+    "NUL": ('picture = "a\\u0000b.png"', "line 1: picture: no file has a NUL in its name"),
+    "NUL in a layer": ('[[viscosity]]\nkind = "picture"\npicture = "\\u0000"', "no file has a NUL in its name"),
+    "no such date": ("name = 2024-13-41", "is not valid TOML"),
+    "unclosed quotes": ('name = "' + '\\"' * 50_000, "is not valid TOML"),
+    "spaces in a list": ("nope = [\n[" + " " * 99_000 + "\n]]", "line 1: unknown key 'nope'"),
+    "formula": (
+        "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\nformula = '" + "~" * 499 + "1'",
+        "not allowed in a formula",
+    ),
+}  # fmt: skip
+
+
+def test_what_was_once_an_accident(tmp_path: Path):
+    paths = [tmp_path / f"{name}.toml" for name in SMALL_AND_HARMFUL]
+    for path in paths:
+        path.write_text(SMALL_AND_HARMFUL[path.stem][0])
+    for name, sentence in opened(paths).items():
+        assert SMALL_AND_HARMFUL[Path(name).stem][1] in sentence
+
+
+def test_what_recipes_hold_is_looked_through_and_taken():
+    """Every shipped recipe, and nesting, texts and dots up to what is allowed."""
+    for path in [*ROOT.glob("assets/recipes/*.toml"), *ROOT.glob("assets/gallery/*.toml")]:
+        toml.parsed(path.read_text("utf-8"), path.name)
+    inside = '"' + r"a.b\"[[{" * 100 + '"'
+    deepest = "[" * toml.DEEPEST + "1" + "]" * toml.DEEPEST
+    text = f"""
+a{".b" * (toml.MOST_PARTS - 1)} = 1.5 # [[[[[[[[[[[[[[[[[[[[[[[ a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t.u
+c = {deepest}
+d = {inside}
+e = [[1, 0.1, 0.2, 1.0], [2, 1e-3, -0.25, 1], ]
+f = '''{"[" * 99}'''
+g = \"\"\"{"{" * 99}\\\"\"\"\"\"\"
+[[h.i]]
+[[h.i]]
+j = 2024-01-02T03:04:05.678Z
+"""
+    told = toml.parsed(text, "a.toml")
+    assert told["e"] == [[1, 0.1, 0.2, 1.0], [2, 1e-3, -0.25, 1]]
+    assert told["g"] == "{" * 99 + '"""'
+    assert len(told["h"]["i"]) == 2
+
+
+# Projects -----------------------------------------------------------------------------------------------------------
+
+PLAIN = 'version = 1\npicture = "a.png"\n'
+
+
+def packed(members: dict[str, bytes], how: int = zipfile.ZIP_DEFLATED) -> bytes:
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", how, compresslevel=1) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return data.getvalue()
+
+
+def hostile_project(dice: random.Random, picture: bytes) -> bytes:
+    """A project whose members are not what they seem."""
+    members = {"format.txt": b"fluidwarp project 1\n", "recipe.toml": PLAIN.encode(), "a.png": picture}
+    name = dice.choice(list(members))
+    match dice.randrange(6):
+        case 0:  # a bomb in one of its members
+            members[name] = dice.choice([b"\0", b"#", b"[a]\n", b"x"]) * int(10 ** dice.uniform(0, 7))
+        case 1:
+            members["recipe.toml"] = hostile_text(dice).encode("utf-8", "surrogatepass")
+        case 2:
+            inside = dice.choice(
+                ["b\\u0000", "../a.png", "a/../../b.png", "/etc/passwd", "x" * 5000, "recipe.toml", "a\\u001b.png"]
+            )
+            members["recipe.toml"] = f'picture = "{inside}"'.encode()
+            members[inside.replace("\\u0000", "\0").replace("\\u001b", "\x1b")] = picture
+        case 3:
+            members |= {f"{number}": b"" for number in range(dice.randrange(1000))}
+        case 4:
+            members["format.txt"] = dice.choice(
+                [b"", b"fluidwarp project", b"fluidwarp project " + b"9" * 5000, b"\xff"]
+            )
+        case _:
+            pass
+    ways = [zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA]
+    small = sum(map(len, members.values())) < 2**20  # or making it would take longer than reading it
+    data = packed(members, dice.choice(ways if small else ways[:1]))
+    if dice.random() < 0.5:  # its index lies about a size, a place, a way of compression, a flag ...
+        index = data.rfind(b"PK\1\2", 0, dice.choice([data.find(b"PK\5\6"), len(data)]))
+        at = index + dice.choice([8, 10, 16, 20, 24, 28, 42]) if dice.random() < 0.8 else data.rfind(b"PK\5\6") + 12
+        lie = struct.pack("<I", dice.choice([0, 1, 99, 0x7FFFFFFF, 0xFFFFFFFF, dice.randrange(2**32)]))
+        data = data[:at] + lie + data[at + 4 :]
+    return data
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> bytes:
+    write_picture(tmp_path / "picture.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    return (tmp_path / "picture.png").read_bytes()
+
+
+def test_hostile_projects_are_taken_or_refused_in_a_sentence(tmp_path: Path, picture: bytes):
+    dice = random.Random(0)
+    paths = []
+    for number in range(30):
+        paths.append(tmp_path / f"{number}.fluidwarp")
+        paths[-1].write_bytes(hostile_project(dice, picture))
+    said = opened(paths)
+    assert any(said.values())
+    assert not all(said.values())
+    for path, sentence in said.items():
+        assert not sentence or Path(path).name in sentence
+
+
+def test_a_project_unpacks_to_no_more_than_a_few_times_its_size(tmp_path: Path, picture: bytes):
+    """By its index, and whatever its index says."""
+    members = {"format.txt": b"fluidwarp project 1 ", "recipe.toml": PLAIN.encode(), "a.png": picture}
+    honest = []
+    for name, size in (("", 0), ("recipe.toml", 2**26), ("a.png", 2**28)):
+        honest.append(tmp_path / f"honest {name}.fluidwarp")
+        with zipfile.ZipFile(honest[-1], "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            for other, content in members.items():
+                archive.writestr(other, content + b"#" * (size if other == name else 0))
+    said = opened(honest)
+    assert [bool(sentence) for sentence in said.values()] == [False, True, True]
+    assert all(path.stat().st_size < 2**22 for path in honest)
+    lying = []
+    for how, size in ((zipfile.ZIP_DEFLATED, 2**29), (zipfile.ZIP_BZIP2, 2**26), (zipfile.ZIP_LZMA, 2**26)):
+        data = packed({"format.txt": b"fluidwarp project 1", "a.png": picture, "recipe.toml": b"#" * size}, how)
+        index = data.rfind(b"PK\1\2")
+        lying.append(tmp_path / f"lying {how}.fluidwarp")
+        lying[-1].write_bytes(data[: index + 24] + struct.pack("<I", 99) + data[index + 28 :])
+    assert all(opened(lying).values())
+
+
+# Files --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["a pipe", "a device", "a socket"])
+def endless(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], Path]:
+    """Makes something of any name whose reading never ends."""
+
+    def make(name: str) -> Path:
+        path = tmp_path / name
+        if request.param == "a pipe":
+            os.mkfifo(path)
+        elif request.param == "a device":
+            path.symlink_to("/dev/zero")
+        else:
+            import socket
+
+            with socket.socket(socket.AF_UNIX) as server:
+                server.bind(str(path))
+        return path
+
+    return make
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "a.toml": Recipe.load,
+    "a.fluidwarp": load,
+    "a.png": read_picture,
+    "a.mp4": read_clip,
+    "a.flo": read_map,
+    "a.npy": read_map,
+    "a.exr": read_map,
+    "a.tif": read_map,
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_only_ordinary_files_are_opened(endless: Callable[[str], Path], name: str):
+    path = endless(name)
+    with pytest.raises(UserError, match=rf"Cannot read {path}: it is a pipe or a device; save it as an ordinary file"):
+        READERS[name](path)
+    assert holds(path) in ("picture", "map")
+    assert is_project(path) == (path.suffix == ".fluidwarp")
+
+
+def test_files_are_of_a_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "a.toml"
+    with path.open("wb") as stream:
+        stream.truncate(10 * 2**40)  # on the disk it takes nothing
+    with pytest.raises(UserError, match=rf"{path}: it has more than 128 MB, the most that a recipe may have"):
+        Recipe.load(path)
+    with pytest.raises(UserError, match="has more than 5 bytes"):
+        read_input(path, "file", 5)
+    # One that tells a size of 0, and goes on.
+    with pytest.raises(UserError, match="has more than 5 bytes"):
+        read_input("/proc/self/status", "file", 5)
+    assert read_input("/proc/self/comm", "file", 99)
+    with pytest.raises(UserError, match="there is no such file"):
+        open_input(tmp_path / "none")
+    with pytest.raises(UserError, match="no file has a NUL in its name"):
+        open_input("a\0b")
+    with pytest.raises(UserError, match="it is a folder; give the name of a picture"):
+        open_input(tmp_path, "picture")
+    flo = tmp_path / "a.flo"
+    with flo.open("wb") as stream:
+        stream.write(struct.pack("<fii", 202021.25, 30_000, 30_000))
+        stream.truncate(12 + 30_000**2 * 8)
+    with pytest.raises(UserError, match="30000 x 30000 pixels are more than the limit"):
+        read_map(flo)
+    npy = tmp_path / "a.npy"
+    np.save(npy, np.zeros((2, 2, 2)))
+    npy.write_bytes(npy.read_bytes().replace(b"(2, 2, 2), }  ", b"(9, 999, 2), }")[:200])
+    with pytest.raises(UserError, match="it is truncated"):
+        read_map(npy)
+    npy.write_bytes(npy.read_bytes().replace(b"(9, 999, 2)", b"(-1, -1, 2)"))
+    with pytest.raises(UserError, match="is empty"):
+        read_map(npy)
+
+
+def test_a_pipe_that_takes_a_files_place_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "a"
+    path.touch()
+    check = inputs._check
+
+    def swap(name: Path, *others: object) -> None:
+        check(name, *others)  # type: ignore[arg-type]
+        if path.is_file():
+            path.unlink()
+            os.mkfifo(path)
+
+    monkeypatch.setattr(inputs, "_check", swap)
+    with pytest.raises(UserError, match="a pipe or a device"):
+        open_input(path)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"scale": NaN}', '{"recent": 5}', "[]", "\0", "9" * 5000])
+def test_preferences_that_are_hostile_are_as_by_default(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    path = tmp_path / "fluidwarp/preferences.json"
+    path.parent.mkdir()
+    path.write_text(text)
+    assert Preferences.load() == Preferences()
+    path.unlink()
+    os.mkfifo(path)
+    assert Preferences.load() == Preferences()
+
+
+# Messages -----------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_shown_is_one_line_that_no_terminal_obeys():
+    assert shown("Grüße, 你好 👩‍🚀: \\") == "Grüße, 你好 👩‍🚀: \\"  # as it is
+    assert shown("a\x1b[31m\n\t\r\0\x7f\x9b\u202e\u2028\udcff") == (r"a\x1b[31m\n\t\r\x00\x7f\x9b\u202e\u2028\udcff")
+    assert str(UserError("\x1b]0;title\x07")) == r"\x1b]0;title\x07"
+    long = str(UserError(f"Cannot read {'x' * 100_000}: there is no such file; check the name."))
+    assert len(long) < MOST_SHOWN + 10
+    assert re.fullmatch(r"Cannot read x+ \.\.\. x+: there is no such file; check the name\.", long)
+
+
+def test_names_reach_the_terminal_escaped_and_shortened(tmp_path: Path):
+    """In errors, in notices and in the lines of a batch."""
+    name = "\x1b[31mred\nline\u202e"
+    (tmp_path / "a.toml").write_text(
+        'duration = 0.02\n[fluid]\ngrid = 16\n[[viscosity]]\nkind = "picture"\n'
+        'picture = "\\u001b[31mred\\nline\\u202e.png"\nscale = 1\n'
+    )
+    write_picture(tmp_path / f"{name}.png", Picture(np.zeros((24, 32, 3), np.uint8)))
+    write_picture(tmp_path / "cat.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+
+    def fluidwarp(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "app", "render", *words]
+        return subprocess.run(
+            command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+        )
+
+    escaped = r"\x1b[31mred\nline\u202e"
+    ran = fluidwarp("a.toml", "-i", "cat.png", "-o", "out.png")
+    assert ran.stderr == f"fluidwarp: {escaped}.png is 32 x 24 and the picture 64 x 48: scaled to fit it\n"
+    ran = fluidwarp("a.toml", "cat.png", f"{name}.gone.png", "-o", "out")
+    assert ran.returncode == 1
+    assert ran.stderr.splitlines() == [
+        f"fluidwarp: cat.png: {escaped}.png is 32 x 24 and the picture 64 x 48: scaled to fit it".replace(
+            "cat.png", str(tmp_path / "cat.png"), 1
+        ),
+        f"fluidwarp: Cannot read {tmp_path}/{escaped}.gone.png: there is no such file; check the name.",
+        "fluidwarp: 1 of 2 pictures failed; all others are written",
+    ]
+    ran = fluidwarp("x" * 100_000, "-o", "out.png")
+    assert ran.returncode == 1
+    assert len(ran.stderr) < MOST_SHOWN + 50

@@ -1,0 +1,178 @@
+"""What a killed process leaves is swept by the next in that folder, and nothing else ever is."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import pytest
+
+from app import leftovers
+from app.files import replacing, replacing_many, temporary_beside
+from app.leftovers import sweep, temporary_folder, temporary_name
+
+ROOT = Path(__file__).parent.parent
+
+# Holds a file, a sequence of files and the folder of a project, half written, until it is killed.
+HOLDING = """
+import sys, time
+from pathlib import Path
+from app.files import replacing, replacing_many
+from app.leftovers import temporary_folder
+with replacing("a.png") as one, replacing_many(".", "f.%04d.png") as many:
+    kept = temporary_folder()
+    one.write_bytes(b"half")
+    (many / "f.0000.png").write_bytes(b"half")
+    print(one, many, kept.name, flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Everything in a folder of the test's own, and nothing remembered of others."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    monkeypatch.setattr(leftovers, "_swept", set())
+
+
+@pytest.fixture
+def at_work(tmp_path: Path) -> Iterator[Callable[[], tuple[subprocess.Popen[str], list[Path]]]]:
+    started: list[subprocess.Popen[str]] = []
+
+    def start() -> tuple[subprocess.Popen[str], list[Path]]:
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        started.append(
+            subprocess.Popen([sys.executable, "-c", HOLDING], env=environment, stdout=subprocess.PIPE, text=True)
+        )
+        assert started[-1].stdout is not None
+        return started[-1], [tmp_path / name for name in started[-1].stdout.readline().split()]
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def test_what_killed_processes_left_is_swept_by_the_next(
+    tmp_path: Path, at_work: Callable[[], tuple[subprocess.Popen[str], list[Path]]]
+):
+    """Also while nobody has heard yet that they died; and what another is at work on stays."""
+    living, held = at_work()
+    left = []
+    for _ in range(3):
+        process, paths = at_work()
+        process.kill()
+        left += paths
+    assert len({*held, *left}) == 12
+    assert all(path.exists() for path in held)
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # dead, and not yet buried
+    with replacing("b.png") as temporary:
+        temporary.write_bytes(b"whole")
+    assert not any(path.exists() for path in left)
+    assert all(path.exists() for path in held)
+    assert living.poll() is None
+    assert sorted(path.name for path in tmp_path.iterdir() if path not in held) == ["b.png"]
+
+
+@pytest.mark.parametrize("write", [lambda: replacing("b.png"), lambda: replacing_many(".", "b.%d.png")])
+def test_a_folder_is_swept_once_in_a_process(tmp_path: Path, write: Callable[[], AbstractContextManager[Path]]):
+    """A batch of thousands of pictures does not list its folder for each."""
+    name = owned(pid=dead())
+    for number in range(2):
+        (tmp_path / name).touch()
+        with write() as temporary:
+            if not temporary.is_dir():
+                temporary.touch()
+            assert (tmp_path / name).exists() == bool(number)
+
+
+def dead() -> int:
+    """The number of a process that is no more."""
+    process = subprocess.Popen(["true"])
+    process.wait()
+    return process.pid
+
+
+def owned(stem: str = "a", suffix: str = ".png", **parts: object) -> str:
+    """The name of a temporary file of this process, but for some of its parts."""
+    name = temporary_name(stem, suffix)
+    found = leftovers._OWNED.fullmatch(name)
+    assert found is not None
+    for part in sorted(parts, key=found.start, reverse=True):
+        name = name[: found.start(part)] + str(parts[part]) + name[found.end(part) :]
+    return name
+
+
+def test_nothing_else_is_swept(tmp_path: Path):
+    gone, mine = dead(), os.getpid()
+    since = leftovers._since(mine)
+    assert since is not None
+    away = [
+        owned(pid=gone),
+        owned(pid=mine, since=since - 1),  # another process had that number before
+        owned("x" * 300, pid=gone),
+        owned("\U0001f642" * 300, pid=gone),
+        owned("of.several dots\nand lines", pid=gone),
+        owned("a", "", pid=gone),
+        temporary_beside(Path(owned(pid=gone))).name.replace(f"-{mine}-", f"-{gone}-"),  # as a GIF's spool is called
+    ]
+    stays = [
+        owned(),
+        owned(pid=gone, host="0" * 8),  # of another host, which may be at work in this folder
+        owned(pid=gone, start="0" * 8),  # of a container beside this one, or of a copy of this host
+        owned(pid=gone)[1:],  # not hidden
+        owned(pid=gone).replace("fluidwarp", "fluidwarm"),
+        owned(pid=gone) + ".mine.png",
+        ".a.0123abcd.png",  # as they were once called: whose it is nobody knows
+        ".a.fluidwarp-notes.png",
+        "a.png",
+    ]
+    for name in away + stays:
+        (tmp_path / name).write_bytes(b"")
+    (tmp_path / "somebody's").mkdir()
+    (tmp_path / "somebody's/file").touch()
+    (tmp_path / owned(pid=gone)).symlink_to("somebody's")
+    links = [path.name for path in tmp_path.iterdir() if path.is_symlink()]
+    (tmp_path / (pipe := owned(pid=gone))).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / pipe)
+    sweep(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*stays, *links, pipe, "somebody's"])
+    assert (tmp_path / "somebody's/file").exists()
+
+
+def test_what_is_from_before_this_host_was_started_is_swept(tmp_path: Path):
+    started = leftovers._started()
+    assert 0 < started < time.time()
+    old, new = (tmp_path / owned(start="0" * 8) for _ in range(2))
+    for path, changed in ((old, started - 60), (new, started + 60)):
+        path.touch()
+        os.utime(path, (changed, changed))
+    sweep(tmp_path)
+    assert list(tmp_path.iterdir()) == [new]
+
+
+def test_without_a_list_of_processes_nothing_is_swept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(leftovers, "_PROC", tmp_path / "none")
+    path = tmp_path / owned(pid=dead())
+    path.touch()
+    sweep(tmp_path)
+    assert path.exists()
+
+
+def test_names_are_hidden_short_enough_and_keep_the_ending(tmp_path: Path):
+    for stem in ("a", "\U0001f642" * 60, ".a"):
+        path = temporary_beside(tmp_path / f"{stem}.webp")
+        path.touch()
+        assert re.fullmatch(r"\..+\.fluidwarp-.+\.webp", path.name)
+    kept = temporary_folder()
+    assert Path(kept.name).parent == tmp_path
+    sweep(tmp_path)
+    assert Path(kept.name).is_dir()
