@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from app.recipe import Recipe
 
@@ -31,6 +33,15 @@ class History:
         self.budget = budget
         self._entries = [Entry(name, recipe, _own_bytes(recipe, None))]
         self._index = 0
+
+    @classmethod
+    def restored(cls, entries: Sequence[Entry], index: int, budget: int = DEFAULT_BUDGET) -> History:
+        """A history of these entries, whose sizes are counted anew; `index` is the present."""
+        history = cls(entries[0].recipe, entries[0].name, budget)
+        for before, entry in pairwise(entries):
+            history._entries.append(replace(entry, nbytes=_own_bytes(entry.recipe, before.recipe)))
+        history.go_to(index)
+        return history
 
     @property
     def recipe(self) -> Recipe:

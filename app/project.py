@@ -108,19 +108,28 @@ def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
 
 
 def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) -> Project:
-    """Write a project whole or not at all; the project as it is saved.
+    """Write a project whole or not at all; the project as it is saved. What was there is kept as `backup_of(path)`.
 
     Raises:
         UserError: if it cannot be written, or a picture that belongs in it is gone.
     """
     path = Path(path)
     recipe, files = _packed(project) if embedded else (_referring(project, path), {})
-    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+    with (
+        replacing(path, backup_of(path)) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
         archive.writestr(FORMAT, f"fluidwarp project {VERSION}\n")
         archive.writestr(RECIPE, recipe.text())
         for name, data in files.items():
             archive.writestr(name, data, zipfile.ZIP_STORED)  # pictures are compressed already
     return replace(project, path=path, embedded=embedded)
+
+
+def backup_of(path: Path) -> Path:
+    """Where the project that was in `path` before the last one is kept, under the name that editors give it."""
+    target = Path(os.path.realpath(path))
+    return target.with_name(f"{target.name}~")
 
 
 def _read(path: Path, archive: zipfile.ZipFile, max_pixels: int) -> Project:

@@ -43,6 +43,7 @@ class Desk:
             **os.environ,
             "DISPLAY": f":{number}",
             "XDG_CONFIG_HOME": str(folder / "config"),
+            "XDG_STATE_HOME": str(folder / "state"),
             "HOME": str(folder),
             "PATH": os.environ["PATH"],
         }
