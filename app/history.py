@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 from app.recipe import Recipe
 
@@ -36,10 +35,9 @@ class History:
 
     @classmethod
     def restored(cls, entries: Sequence[Entry], index: int, budget: int = DEFAULT_BUDGET) -> History:
-        """A history of these entries, whose sizes are counted anew; `index` is the present."""
-        history = cls(entries[0].recipe, entries[0].name, budget)
-        for before, entry in pairwise(entries):
-            history._entries.append(replace(entry, nbytes=_own_bytes(entry.recipe, before.recipe)))
+        """The history that had these entries; `index` is the present."""
+        history = cls(entries[0].recipe, budget=budget)
+        history._entries = list(entries)
         history.go_to(index)
         return history
 

@@ -139,8 +139,8 @@ def continuation(work: Work, before: Work) -> bytes:
     return _line(record)
 
 
-def _told(entry: Entry, before: Recipe) -> tuple[str, dict[str, Any]]:
-    return entry.name, _difference(entry.recipe, before)
+def _told(entry: Entry, before: Recipe) -> tuple[str, int, dict[str, Any]]:
+    return entry.name, entry.nbytes, _difference(entry.recipe, before)
 
 
 def _difference(recipe: Recipe, before: Recipe) -> dict[str, Any]:
@@ -218,8 +218,8 @@ def _followed(work: Work, record: dict[str, Any]) -> Work:
         return replace(work, entries=(*entries[: work.index], amended))
     del entries[: record.get("drop", 0)]
     del entries[record.get("keep", len(entries)) :]
-    for name, changes in record.get("add", ()):
-        entries.append(Entry(name, _changed(entries[-1].recipe if entries else Recipe(), changes), 0))
+    for name, nbytes, changes in record.get("add", ()):
+        entries.append(Entry(name, _changed(entries[-1].recipe if entries else Recipe(), changes), nbytes))
     saved = work.saved if work.entries else entries[0].recipe
     if "saved" in record:
         nearest, changes = record["saved"]

@@ -170,7 +170,8 @@ class Journal:
     def _write(self, wanted: tuple[Project, Work]) -> None:
         project, work = wanted
         before = self._written
-        if self._file is None or before is None or self._size > self._most:
+        goes_on = before is not None and before[0] is project and before[1].saved is work.saved
+        if self._file is None or before is None or not goes_on or self._size > self._most:
             self._begin(project, work)
             return
         line = continuation(work, before[1])
@@ -292,7 +293,7 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
         try:
             one = _look_into(held)
         except Damaged:
-            notices.append(f"A journal of unsaved work is damaged and cannot be read; it is left in {folder}.")
+            notices.append(f"The journal of unsaved work in {folder} is damaged and cannot be read; it is left there.")
         except Newer:
             notices.append(f"There is unsaved work of a newer fluidwarp, which alone can restore it: {folder}.")
         except OSError as error:

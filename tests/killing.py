@@ -78,14 +78,14 @@ class Painter:
     """A process that paints without end, and tells every state of its work before its journal hears of it.
 
     Attributes:
-        root: the folder of its journals.
+        root: the folder of journals.
         shown: what the warp was when it had come to rest, by the digest of the recipe.
     """
 
-    def __init__(self, folder: Path, seed: int) -> None:
-        self.root = folder / "journals"
+    def __init__(self, folder: Path, root: Path, seed: int) -> None:
+        self.root = root
         self.shown: dict[str, str] = {}
-        command = [sys.executable, str(Path(__file__)), "--paint", str(folder), "--seed", str(seed)]
+        command = [sys.executable, str(Path(__file__)), "--paint", str(folder), str(root), "--seed", str(seed)]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
         self._states: dict[str, tuple[float, int]] = {}
         self._at_rest = threading.Event()
@@ -132,13 +132,13 @@ def _late(states: dict[str, tuple[float, int]], kept: int, when: float) -> tuple
     return sum(age > 1 for age in ages), max(ages, default=0.0)
 
 
-def paint(folder: Path, seed: int) -> None:
-    """Paint until somebody puts an end to it."""
+def paint(folder: Path, root: Path, seed: int) -> None:
+    """Paint on a picture made in `folder` until somebody puts an end to it."""
     from editing import Robot, small_project
     from solver.context import Device
 
     dice = random.Random(seed)
-    robot = Robot(Device.headless(), small_project(folder), size=(640, 480), journals=folder / "journals")
+    robot = Robot(Device.headless(), small_project(folder), size=(640, 480), journals=root)
     editor = robot.editor
     keep, seen = editor.recovery.keep, [""]
 
@@ -166,8 +166,7 @@ def paint(folder: Path, seed: int) -> None:
 
 
 def kill_windows(kills: int, seed: int) -> list[Outcome]:
-    """Kill the real editor, painted on with xdotool; its journals are read, and now and then its offer is looked at."""
-    from app.pictures import write_picture
+    """Kill the real editor, painted on with xdotool."""
     from editing import pattern
     from test_window import Desk
 
@@ -237,7 +236,7 @@ def kill_painters(kills: int, seed: int) -> list[Outcome]:
     dice = random.Random(seed)
     for number in range(kills):
         with tempfile.TemporaryDirectory() as name:
-            painter = Painter(Path(name), dice.randrange(10**6))
+            painter = Painter(Path(name), Path(name) / "journals", dice.randrange(10**6))
             painter.paint_for(dice.uniform(0, 4))
             outcomes.append(painter.kill())
             print(f"{number + 1}: {outcomes[-1]}", flush=True)
@@ -250,10 +249,11 @@ def main() -> int:
     parser.add_argument("--window", action="store_true")
     parser.add_argument("--busy", action="store_true")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--paint", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--paint", type=Path, nargs=2, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.paint is not None:
-        paint(given.paint, given.seed)
+        folder, root = given.paint
+        paint(folder, root, given.seed)
     with busy(2 if given.busy else 0):
         outcomes = (kill_windows if given.window else kill_painters)(given.kills, given.seed)
     strokes, lost = sum(one.strokes for one in outcomes), sum(one.lost for one in outcomes)

@@ -146,6 +146,21 @@ def test_after_saving_with_something_to_redo_nothing_is_offered(desk: Desk, tmp_
     assert is_all_of(found_in(desk.root), desk.document)
 
 
+def test_what_is_done_right_after_saving_belongs_to_what_was_saved(desk: Desk, tmp_path: Path) -> None:
+    """Before the journal has heard of the saving, too."""
+    path = tmp_path / "work.fluidwarp"
+    desk.push(2)
+    desk.write()
+    desk.project = projects.save(desk.project, path)
+    desk.document.saved(path)
+    desk.keep()
+    desk.push()
+    desk.die()
+    found = found_in(desk.root)
+    assert is_all_of(found, desk.document)
+    assert found.file == path
+
+
 def test_a_journal_does_not_grow_without_bound(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recovery, "SLACK", 5000)
     largest = 0
@@ -551,7 +566,7 @@ def test_a_kill_at_any_moment_loses_no_stroke(device: Device, starter: Starter, 
     dice = random.Random(os.getpid())
     compared = 0
     for seconds in (dice.uniform(0, 1), dice.uniform(2, 3)):
-        painter = Painter(tmp_path, seed=dice.randrange(1000))
+        painter = Painter(tmp_path, starter.root, dice.randrange(1000))
         painter.paint_for(seconds)
         outcome = painter.kill()
         assert outcome.is_exact, outcome
@@ -570,3 +585,21 @@ def test_a_kill_at_any_moment_loses_no_stroke(device: Device, starter: Starter, 
         starter.kill()
         assert files_in(starter.root) == []
     assert compared
+
+
+def test_two_editors_at_once_do_not_get_in_each_others_way(tmp_path: Path) -> None:
+    root = tmp_path / "journals"
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    one, other = Painter(tmp_path / "a", root, 1), Painter(tmp_path / "b", root, 2)
+    for painter in (one, other):
+        painter.paint_for(0.5)
+    outcome = one.kill()
+    # Nothing is found but what belongs to nobody any more.
+    assert outcome.is_exact, outcome
+    found = found_in(root)
+    assert found.file == tmp_path / "a" / "pattern.png"
+    found.discard()
+    outcome = other.kill()
+    assert outcome.is_exact, outcome
+    assert found_in(root).file == tmp_path / "b" / "pattern.png"
