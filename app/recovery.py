@@ -97,14 +97,13 @@ class Journal:
     def keep(self, project: Project, document: Document) -> None:
         """Take note of what the work is now; costs next to nothing where it is as it was."""
         history, saved = document.history, document.saved_recipe
-        before, self._seen = self._seen, (history.recipe, history.index, saved)
+        before, self._seen = self._seen, (project, history.recipe, history.index, saved)
         if before and all(a is b for a, b in zip(before, self._seen, strict=True)):
             return
-        if before and before[2] is not saved:
-            work = None  # just saved, or begun anew
-        else:
-            work = Work(history.entries, history.index, saved)
-            work = work if work.is_unsaved else None
+        work = Work(history.entries, history.index, saved)
+        is_just_saved = bool(before) and before[0] is not project
+        if is_just_saved or not work.is_unsaved:
+            work = None
         is_amended = (
             work is not None
             and self._wanted is not None
@@ -311,7 +310,7 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
 def _look_into(held: Held) -> Found | None:
     """What is in a folder; None where nothing would be lost with it."""
     path = held.folder / JOURNAL
-    if not path.exists():
+    if not path.is_file():
         return None
     origin, work = read(path.read_bytes())
     return Found(held, origin, work, datetime.fromtimestamp(path.stat().st_mtime)) if work.is_unsaved else None

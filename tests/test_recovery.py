@@ -18,9 +18,11 @@ from app import project as projects
 from app import recovery
 from app.document import Document
 from app.errors import UserError
+from app.history import History
 from app.locks import Lock
 from app.pictures import Picture, write_picture
 from app.project import Project
+from app.recipe import Recipe
 from app.recovery import Found, Journal, find
 from app.session import Session
 from app.strokes import Stroke
@@ -56,6 +58,11 @@ class Desk:
 
     def keep(self) -> None:
         self.journal.keep(self.project, self.document)
+
+    def save(self, path: Path) -> None:
+        self.project = projects.save(replace(self.project, recipe=self.document.recipe), path)
+        self.document.saved(path)
+        self.keep()
 
     def write(self) -> None:
         """Wait until all is on the disk."""
@@ -122,8 +129,7 @@ def test_nothing_is_written_where_nothing_would_be_lost(desk: Desk, tmp_path: Pa
     desk.write()
     assert len(files_in(desk.root)) == 3  # a redo would be lost
     desk.document.history.redo()
-    desk.document.saved(tmp_path / "work.fluidwarp")
-    desk.keep()
+    desk.save(tmp_path / "work.fluidwarp")
     desk.write()
     assert files_in(desk.root) == []
     desk.push()
@@ -136,8 +142,7 @@ def test_after_saving_with_something_to_redo_nothing_is_offered(desk: Desk, tmp_
     desk.push(2)
     desk.document.history.undo()
     desk.keep()
-    desk.document.saved(tmp_path / "work.fluidwarp")
-    desk.keep()
+    desk.save(tmp_path / "work.fluidwarp")
     desk.write()
     assert files_in(desk.root) == []
     desk.document.history.redo()
@@ -151,9 +156,7 @@ def test_what_is_done_right_after_saving_belongs_to_what_was_saved(desk: Desk, t
     path = tmp_path / "work.fluidwarp"
     desk.push(2)
     desk.write()
-    desk.project = projects.save(desk.project, path)
-    desk.document.saved(path)
-    desk.keep()
+    desk.save(path)
     desk.push()
     desk.die()
     found = found_in(desk.root)
@@ -161,11 +164,28 @@ def test_what_is_done_right_after_saving_belongs_to_what_was_saved(desk: Desk, t
     assert found.file == path
 
 
+def test_another_grid_for_all_of_it_is_no_saving(desk: Desk) -> None:
+    desk.push(2)
+    desk.document.history.undo()
+    desk.keep()
+    desk.write()
+    history = desk.document.history
+
+    def on_a_fine_grid(recipe: Recipe) -> Recipe:
+        return recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": 64}))
+
+    entries = [replace(entry, recipe=on_a_fine_grid(entry.recipe)) for entry in history.entries]
+    desk.document.restore(History.restored(entries, history.index), on_a_fine_grid(desk.document.saved_recipe))
+    desk.keep()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
 def test_a_journal_does_not_grow_without_bound(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recovery, "SLACK", 5000)
     largest = 0
     desk.push(3)
-    for _ in range(400):
+    for _ in range(200):
         desk.document.history.undo()
         desk.keep()
         desk.document.history.redo()
@@ -313,8 +333,7 @@ def test_a_picture_that_is_gone_is_told_and_the_work_kept(desk: Desk, tmp_path: 
 
 
 def test_a_picture_that_was_saved_in_the_project_may_go(desk: Desk, tmp_path: Path) -> None:
-    desk.project = projects.save(desk.project, tmp_path / "work.fluidwarp")
-    desk.document.saved(tmp_path / "work.fluidwarp")
+    desk.save(tmp_path / "work.fluidwarp")
     desk.push()
     desk.die()
     (tmp_path / "pattern.png").unlink()
@@ -367,7 +386,7 @@ def test_a_folder_that_cannot_be_written_is_told_and_tried_again(desk: Desk) -> 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
 def test_a_disk_that_is_full_loses_nothing_that_was_written(tmp_path: Path) -> None:
-    """In a process of its own, whose files may not grow beyond 20,000 bytes, as on a full disk."""
+    """In a process of its own, whose files may not grow beyond 10,000 bytes, as on a full disk."""
     code = f"""
 import resource, signal, sys
 from pathlib import Path
@@ -375,8 +394,8 @@ sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(Path(__file__).parent.paren
 from test_recovery import Desk, small_project
 desk = Desk(Path({str(tmp_path)!r}) / "journals", small_project(Path({str(tmp_path)!r})))
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-for number in range(60):
+resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+for number in range(30):
     desk.push(samples=20)
     desk.write()
     print(number + 1, desk.journal.trouble, flush=True)
@@ -384,7 +403,7 @@ for number in range(60):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     told = [line.split(" ", 1) for line in done.stdout.splitlines()]
     well = max(int(number) for number, trouble in told if trouble == "None")
-    assert 3 < well < 60
+    assert 3 < well < 30
     assert "cannot be written" in told[-1][1]
     assert found_in(tmp_path / "journals").work.strokes >= well
 
@@ -575,12 +594,13 @@ def test_a_kill_at_any_moment_loses_no_stroke(device: Device, starter: Starter, 
         robot = starter.start(tmp_path)
         answer(robot, "Restore")
         session = robot.editor.session
-        for number, entry in enumerate(session.document.history.entries):
-            if (warp := painter.shown.get(digest_of(entry.recipe))) is not None:
-                session.go_to(number)
-                robot.rest()
-                assert digest_of_warp(robot.warp()) == warp
-                compared += 1
+        entries = session.document.history.entries
+        shown = [n for n, entry in enumerate(entries) if digest_of(entry.recipe) in painter.shown]
+        for number in shown[-1:]:
+            session.go_to(number)
+            robot.rest()
+            assert digest_of_warp(robot.warp()) == painter.shown[digest_of(entries[number].recipe)]
+            compared += 1
         robot.editor.closed = True
         starter.kill()
         assert files_in(starter.root) == []
