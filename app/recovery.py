@@ -25,6 +25,7 @@ from app.project import Project
 JOURNAL = "work.journal"
 LOCK = "lock"
 SLACK = 4 * 2**20  # bytes that a journal may grow before it is begun anew; and as many again as it began with
+HANDING = 0.1  # seconds that a frame in which a stroke ends may wait for the journal: mostly it is less than one tick
 PAUSE = 0.25  # seconds in which the records of a fluid that comes to rest are put together; a stroke waits for nothing
 LEAVING = 5.0  # seconds that the disk may take when the program ends
 
@@ -69,9 +70,10 @@ class Held:
 
 
 class Journal:
-    """Writes down what becomes of one work, in a thread of its own: whoever draws frames never waits for the disk.
+    """Writes down what becomes of one work, in a thread of its own.
 
-    There is none on the disk as long as nothing would be lost.
+    A stroke is handed to the system at once, after which no kill takes it back, and then written through to the disk,
+    which nobody waits for. There is none on the disk as long as nothing would be lost.
 
     Args:
         root: the folder of all journals.
@@ -89,7 +91,7 @@ class Journal:
         self._wanted: tuple[Project, Work] | None = None
         self._written: tuple[Project, Work] | None = None
         self._leaving = False
-        self._changed, self._urgent = threading.Event(), threading.Event()
+        self._changed, self._urgent, self._handed = threading.Event(), threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
         self._file: int | None = None
         self._size = self._most = 0
@@ -111,8 +113,11 @@ class Journal:
         )
         if work is None and self._wanted is None and self._held is None:
             return
+        self._handed.clear()
         self._wanted = work and (project, work)
         self._wake(urgent=not is_amended)
+        if work is not None and not is_amended:
+            self._handed.wait(HANDING)
 
     @property
     def is_behind(self) -> bool:
@@ -147,7 +152,7 @@ class Journal:
         leaving = False
         while not leaving:
             self._changed.wait()
-            self._urgent.wait(PAUSE)
+            urgent = self._urgent.wait(PAUSE)
             self._changed.clear()
             self._urgent.clear()
             leaving, wanted = self._leaving, self._wanted
@@ -155,31 +160,34 @@ class Journal:
                 if wanted is None:
                     self._forget()
                 elif wanted is not self._written:
-                    self._write(wanted)
-                self._written = wanted
+                    self._write(*wanted)
+                if wanted is self._wanted:
+                    self._handed.set()
+                if self._file is not None and urgent:
+                    os.fsync(self._file)
             except Exception as error:
                 # What is in the file now is not known; with the next edit it is tried again, from the beginning.
                 self._close_file()
-                self._written = wanted
                 self.trouble = _trouble(error, self._root)
+                self._handed.set()
+            self._written = wanted
         self._close_file()
         if self._held is not None:
             self._held.lock.release()
 
-    def _write(self, wanted: tuple[Project, Work]) -> None:
-        project, work = wanted
-        before = self._written
-        goes_on = before is not None and before[0] is project and before[1].saved is work.saved
-        if self._file is None or before is None or not goes_on or self._size > self._most:
-            self._begin(project, work)
-            return
-        line = continuation(work, before[1])
-        _write_all(self._file, line)
-        os.fsync(self._file)
-        self._size += len(line)
+    def _write(self, project: Project, work: Work) -> None:
+        if self._file is not None and self._written is not None and self._size <= self._most:
+            before = self._written[1]
+            if self._written[0] is project and before.saved is work.saved:
+                line = continuation(work, before)
+                _write_all(self._file, line)
+                self._size += len(line)
+                return
+        self._begin(project, work)
 
     def _begin(self, project: Project, work: Work) -> None:
         """Write all of it into a new file, which takes the place of the one that is there."""
+        self._close_file()
         if self._held is None:
             self._held = Held.new(self._root)
         folder = self._held.folder
@@ -188,16 +196,16 @@ class Journal:
         try:
             for line in beginning(Origin.of(project), work):
                 _write_all(file, line)
-            os.fsync(file)
             self._size = os.fstat(file).st_size
+            if path.exists():
+                os.fsync(file)  # or a power cut could leave neither of them
         finally:
             os.close(file)
-        self._close_file()
         os.replace(temporary, path)
-        for changed in (folder, self._root):
-            sync(changed)
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND)
         self._most = 2 * self._size + SLACK
+        for changed in (folder, self._root):
+            sync(changed)
 
     def _forget(self) -> None:
         self._close_file()
