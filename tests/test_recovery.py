@@ -426,7 +426,7 @@ class Starter:
     def start(self, folder: Path) -> Robot:
         """An editor with the pattern in a folder; the one before it, if it is still there, is killed."""
         self.kill()
-        self._robot = Robot(self.device, small_project(folder), journals=self.root)
+        self._robot = Robot(self.device, small_project(folder), (720, 540), journals=self.root)
         self._robot.until(lambda: not self.robot.editor.recovery.is_busy)
         return self._robot
 
