@@ -269,7 +269,7 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     alone = jobs == 1 or cluster is not None  # no processes of ours, which would have to be waited for
     try:
         with on_terminal(f"{len(tasks)} pictures", len(tasks), leave if alone else None) as progress:
-            failures = run_batch(tasks, hear, progress, jobs, cluster, _say)
+            failures = run_batch(tasks, hear, progress, jobs, cluster, _tell)
     except Cancelled:
         _fail(f"cancelled; {written} of {len(tasks)} pictures are written, nothing is half-written", INTERRUPTED)
     if failures:

@@ -56,6 +56,16 @@ class Document:
         self.history.replace_all(lambda recipe: recipe.on_grid(cells))
         self._saved = self._saved.on_grid(cells)
 
+    @property
+    def saved_recipe(self) -> Recipe:
+        """The recipe as it was saved last, or opened."""
+        return self._saved
+
+    def restore(self, history: History, saved: Recipe) -> None:
+        """Go on with all the edits of a session that has ended; `saved` is what had been saved of them."""
+        self.history = history
+        self._saved = saved
+
     def saved(self, path: Path) -> None:
         """Take note that the work, as it is now, has been written to `path`."""
         self.path = path

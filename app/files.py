@@ -125,20 +125,51 @@ def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:
     return UserError(f"Cannot write {path}: {reason}.")
 
 
+def sync(path: Path) -> None:
+    """Wait until what is in a file, or which files are in a folder, is on the disk itself: a power cut leaves it."""
+    if path.is_dir() and os.name == "nt":
+        return  # there a folder cannot be opened, and is written at once
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Iterator[Path]:
     """Yield a temporary name beside `path`, which takes the place of `path` once the block has ended well.
 
     When the block raises, the temporary file goes and `path` is as it was. `OSError` becomes `UserError`.
+
+    backup: where what `path` was is kept, instead of what was kept there; both outlast a power cut then, and at every
+    moment there is a whole file under the name `path`.
     """
     target = writable(path)
     sweep(target.parent)
     try:
         with temporary_file(temporary_beside(target)) as temporary:
             yield temporary
+            if backup is not None:
+                sync(temporary)
+                if target.exists():
+                    _keep(target, backup)
             os.replace(temporary, target)
+            if backup is not None:
+                sync(target.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
+
+
+def _keep(path: Path, backup: Path) -> None:
+    """Let `backup` be what `path` is, which stays."""
+    with temporary_file(temporary_beside(backup)) as temporary:
+        try:
+            os.link(path, temporary)
+        except OSError:  # a disk without hard links
+            shutil.copy2(path, temporary)
+            sync(temporary)
+        os.replace(temporary, backup)
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from app.recipe import Recipe
@@ -32,6 +32,14 @@ class History:
         self.budget = budget
         self._entries = [Entry(name, recipe, _own_bytes(recipe, None))]
         self._index = 0
+
+    @classmethod
+    def restored(cls, entries: Sequence[Entry], index: int, budget: int = DEFAULT_BUDGET) -> History:
+        """The history that had these entries; `index` is the present."""
+        history = cls(entries[0].recipe, budget=budget)
+        history._entries = list(entries)
+        history.go_to(index)
+        return history
 
     @property
     def recipe(self) -> Recipe:

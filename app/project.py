@@ -71,7 +71,7 @@ def from_picture(path: str | os.PathLike[str], recipe: Recipe | None = None) -> 
     """
     path = Path(path)
     picture = read_picture(path)
-    return Project((recipe or Recipe()).edited(picture=path.name), picture, _picture_bytes(path), path.parent)
+    return Project((recipe or Recipe()).edited(picture=path.name), picture, picture_bytes(path), path.parent)
 
 
 def from_recipe(path: str | os.PathLike[str]) -> Project:
@@ -85,7 +85,7 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
     if recipe.picture is None:
         raise UserError(f"{path} names no picture; open a picture first, then apply the recipe to it")
     source = path.parent / recipe.picture
-    return Project(recipe, read_picture(source), _picture_bytes(source), path.parent)
+    return Project(recipe, read_picture(source), picture_bytes(source), path.parent)
 
 
 def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
@@ -107,14 +107,17 @@ def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
 
 
 def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) -> Project:
-    """Write a project whole or not at all; the project as it is saved.
+    """Write a project whole or not at all; the project as it is saved. What was there is kept as `backup_of(path)`.
 
     Raises:
         UserError: if it cannot be written, or a picture that belongs in it is gone.
     """
     path = Path(path)
     recipe, files = _packed(project) if embedded else (_referring(project, path), {})
-    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+    with (
+        replacing(path, backup_of(path)) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
         archive.writestr(FORMAT, f"fluidwarp project {VERSION}\n")
         archive.writestr(RECIPE, recipe.text())
         for name, data in files.items():
@@ -122,7 +125,14 @@ def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) 
     return replace(project, path=path, embedded=embedded)
 
 
-def _picture_bytes(file: Path) -> bytes:
+def backup_of(path: Path) -> Path:
+    """Where the project that was in `path` before the last one is kept, under the name that editors give it."""
+    target = Path(os.path.realpath(path))
+    return target.with_name(f"{target.name}~")
+
+
+def picture_bytes(file: Path) -> bytes:
+    """All of a picture's file. Raises `UserError`."""
     return read_input(file, "picture", MOST_BYTES)
 
 
@@ -146,7 +156,7 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     if not embedded:
         source = path.parent / recipe.picture
         picture = read_picture(source, max_pixels)
-        return Project(recipe, picture, _picture_bytes(source), path.parent, path, embedded=False)
+        return Project(recipe, picture, picture_bytes(source), path.parent, path, embedded=False)
     if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
         raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")
     keeper = temporary_folder()
@@ -174,7 +184,7 @@ def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
             files[inside] = project.data
         else:
             try:
-                files[inside] = _picture_bytes(project.folder / name)
+                files[inside] = picture_bytes(project.folder / name)
             except UserError as error:
                 raise UserError(f"Cannot save the project. {error}") from None
         new_names[name] = inside

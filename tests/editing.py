@@ -65,12 +65,13 @@ class Robot:
         scale: float = 1.0,
         preferences: Preferences | None = None,
         density: float = 1.0,
+        journals: Path | None = None,
     ) -> None:
         self.device, self.scale, self.density = device, scale, density
         self.size = size = round(size[0] * density), round(size[1] * density)
         self.texture = device.ctx.texture(size, 4)
         self.target = device.ctx.framebuffer([self.texture])
-        self.editor = Editor(device, project, preferences or Preferences(auto_quality=False))
+        self.editor = Editor(device, project, preferences or Preferences(auto_quality=False), journals)
         self.mods = Mods()
         self.frame()
         self.frame()

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import errno
+import os
+import subprocess
+import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -115,3 +119,66 @@ def test_names_that_lead_out_of_the_archive_are_kept_in(made: Project, tmp_path:
     with zipfile.ZipFile(tmp_path / "work.fluidwarp") as archive:
         assert all(".." not in name for name in archive.namelist())
     assert np.array_equal(projects.load(tmp_path / "work.fluidwarp").picture.pixels, made.picture.pixels)
+
+
+def renamed(project: Project, name: str) -> Project:
+    return replace(project, recipe=project.recipe.edited(name=name))
+
+
+def test_what_was_saved_before_is_kept_once(made: Project, tmp_path: Path) -> None:
+    path, backup = tmp_path / "work.fluidwarp", tmp_path / "work.fluidwarp~"
+    for number in range(3):
+        projects.save(renamed(made, str(number)), path)
+        assert projects.load(path).recipe.name == str(number)
+        assert backup.exists() == (number > 0)
+    assert projects.load(backup).recipe.name == "1"
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["photo.png", path.name, backup.name]
+
+
+def test_the_backup_is_kept_on_a_disk_without_hard_links(
+    made: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_links(*_: object) -> None:
+        raise OSError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", no_links)
+    path = tmp_path / "work.fluidwarp"
+    for number in range(3):
+        projects.save(renamed(made, str(number)), path)
+    assert projects.load(path).recipe.name == "2"
+    assert projects.load(tmp_path / "work.fluidwarp~").recipe.name == "1"
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_project_that_is_saved_is_whole_at_every_moment(made: Project, tmp_path: Path) -> None:
+    """As seen by another process, and what it finds is no older than the backup."""
+    path = tmp_path / "work.fluidwarp"
+    projects.save(renamed(made, "0"), path)
+    code = f"""
+import sys
+from pathlib import Path
+from app import project as projects
+path, seen = Path({str(path)!r}), 0
+print("looking", flush=True)
+while seen < 60:
+    now = int(projects.load(path).recipe.name)
+    assert now >= seen
+    seen = now
+"""
+    looker = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=Path(__file__).parent.parent)
+    assert looker.stdout is not None
+    assert looker.stdout.readline() == b"looking\n"
+    for number in range(1, 61):
+        projects.save(renamed(made, str(number)), path)
+    assert looker.wait(60) == 0
+
+
+def test_a_link_to_a_project_stays_one(made: Project, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    real, link = tmp_path / "elsewhere" / "real.fluidwarp", tmp_path / "work.fluidwarp"
+    projects.save(renamed(made, "0"), real)
+    link.symlink_to(real)
+    projects.save(renamed(made, "1"), link)
+    assert link.is_symlink()
+    assert projects.load(link).recipe.name == "1"
+    assert projects.load(tmp_path / "elsewhere" / "real.fluidwarp~").recipe.name == "0"

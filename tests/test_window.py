@@ -18,6 +18,7 @@ from PIL import Image
 from app import project as projects
 from app.pictures import read_picture, write_picture
 from app.recipe import Recipe
+from app.recovery import find
 from editing import pattern, small_project, write_foreign_map
 
 NEEDED = ("Xvfb", "xdotool")
@@ -43,6 +44,7 @@ class Desk:
             **os.environ,
             "DISPLAY": f":{number}",
             "XDG_CONFIG_HOME": str(folder / "config"),
+            "XDG_STATE_HOME": str(folder / "state"),
             "HOME": str(folder),
             "PATH": os.environ["PATH"],
         }
@@ -212,6 +214,42 @@ def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path
     command = [sys.executable, "-m", "app", "render", str(work), "-o", str(rendered)]
     subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
     assert exported.read_bytes() == rendered.read_bytes()
+
+
+def test_a_killed_editor_gives_the_work_back(desk: Desk, tmp_path: Path) -> None:
+    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
+    journals = tmp_path / "state" / "fluidwarp" / "journals"
+    write_picture(picture, pattern())
+    desk.open(picture)
+    for number in range(3):
+        desk.drag((400, 300 + 100 * number), (520, 300 + 100 * number))
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the pushes to be recorded")
+    time.sleep(1.5)
+    assert find(journals) == ([], [])  # while its editor lives
+    assert desk.editor is not None
+    desk.editor.kill()
+    desk.editor.wait()
+    (found,), notices = find(journals)
+    assert notices == []
+    assert [entry.name for entry in found.work.entries if entry.name == "Push"] == ["Push"] * 3
+    found.leave()
+
+    desk.window = ""
+    desk.open(picture)
+
+    def restore() -> None:
+        desk.do("mousemove", "846", "405", "sleep", "0.6", "click", "1", "sleep", "1")
+
+    desk.insist(restore, lambda: desk.title() == "pattern * - fluidwarp", "the work to be restored")
+    desk.save(work)
+    assert repr(projects.load(work).recipe) == repr(found.work.recipe)
+    assert list(journals.iterdir()) == []
+    desk.key("ctrl+q")
+    desk.until_gone()
+    desk.window = ""
+    desk.open(work)  # and is asked nothing
+    desk.key("ctrl+q")
+    desk.until_gone()
 
 
 def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:

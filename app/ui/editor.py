@@ -15,6 +15,7 @@ from imgui_bundle.imgui import internal
 
 from app.errors import UserError
 from app.project import Project
+from app.recovery import Found
 from app.session import Session
 from app.ui import panels, theme
 from app.ui.actions import ACTIONS, BY_KEY
@@ -31,6 +32,7 @@ from app.ui.messages import Messages
 from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
+from app.ui.recovering import Recovery
 from app.ui.state import LARGEST, SMALLEST, State
 from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
@@ -47,6 +49,7 @@ class Editor:
         device: the GL of the window, or a headless one.
         project: what is open first.
         preferences: what the person likes.
+        journals: the folder in which unsaved work outlasts a crash; None keeps nothing, for tests.
 
     Attributes:
         closed: the person has left.
@@ -54,7 +57,13 @@ class Editor:
         placeholder: work that is only there until something else has been read: untouched, it is nothing to go back to.
     """
 
-    def __init__(self, device: Device, project: Project, preferences: Preferences | None = None) -> None:
+    def __init__(
+        self,
+        device: Device,
+        project: Project,
+        preferences: Preferences | None = None,
+        journals: Path | None = None,
+    ) -> None:
         self.device = device
         self.preferences = preferences or Preferences()
         self.state = State(
@@ -71,6 +80,7 @@ class Editor:
         self.clock = Clock()
         self.quality = Quality(self)
         self.numbers = Numbers()
+        self.recovery = Recovery(self, journals)
         self.dialogs: list[Dialog] = []
         self.closed = False
         self.clipboard: Callable[[str], None] = imgui.set_clipboard_text
@@ -103,10 +113,10 @@ class Editor:
     def title(self) -> str:
         return f"{self.session.project.name}{' *' if self.is_dirty else ''} - fluidwarp"
 
-    def open(self, project: Project, pixels: np.ndarray | None = None) -> None:
+    def open(self, project: Project, pixels: np.ndarray | None = None, found: Found | None = None) -> None:
         """Work on another project; Undo at its very start comes back to this one.
 
-        `pixels`: the picture as the canvas shows it, if it is at hand.
+        `pixels`: the picture as the canvas shows it, if it is at hand. `found`: what the project was restored from.
         """
         canvas = Canvas(self.device, project.picture, pixels)
         try:
@@ -114,6 +124,9 @@ class Editor:
         except Exception:
             canvas.release()
             raise
+        if found is not None:
+            session.document.restore(found.work.history, found.work.saved)
+        self.recovery.opened(session, found)
         for old in self._sessions[self._index + 1 :]:
             self._close(*old)
         kept = self._sessions[: self._index + 1]
@@ -158,10 +171,12 @@ class Editor:
         if self._index >= 0:
             self.session.stop_recording()
             self.session.forget_grid()
+            self.recovery.keep()
         self._index = index
         self.view = Viewport(self.layout.canvas, self.canvas.size, self.ui.density)
 
     def _close(self, session: Session, canvas: Canvas) -> None:
+        self.recovery.closed(session)
         session.release_gpu()
         canvas.release()
 
@@ -190,10 +205,12 @@ class Editor:
         with self.clock.measure("frame"):
             self._lay_out((size[0] / density, size[1] / density), density, scale)
             self._hear(events)
+            self.recovery.keep()
             with self.clock.measure("simulate"):
                 self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
             self.quality.look(dt)
             self._draw(target, size, dt, events)
+            self.recovery.keep()
         self.clock.frame_done()
         if self.quality.is_measuring:
             self.quality.warm_up(begun)
@@ -208,7 +225,7 @@ class Editor:
         if self.wants_frame():
             return 0.0
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
-        elsewhere = self.exports.is_running or self.files.is_waiting or self.files.is_loading
+        elsewhere = self.exports.is_running or self.files.is_waiting or self.files.is_loading or self.recovery.is_busy
         if elsewhere or any(dialog.is_busy for dialog in self.dialogs):
             return 0.1
         return min(self.messages.next_in or 60.0, 60.0)
@@ -307,6 +324,7 @@ class Editor:
 
     def _draw_dialog(self) -> None:
         self.files.poll()
+        self.recovery.poll()
         if self.dialogs and not self.dialogs[-1].draw(self.ui, self):
             self.dialogs.pop()
 
@@ -427,6 +445,7 @@ class Editor:
         self.exports.cancel()
         self.preferences.hint = self.state.hint
         self.preferences.save()
+        self.recovery.release(discard=self.closed)
         for work in self._sessions:
             self._close(*work)
         self.host.release()

@@ -18,6 +18,7 @@ from app.maps import MAP_ENDINGS, holds
 from app.opening import PICTURE_ENDINGS, check_picture
 from app.project import SUFFIX, Project
 from app.recipe import Recipe
+from app.recovery import Found
 from app.ui.browser import Browser
 from app.ui.dialogs import PictureOrMap
 from app.ui.loading import Loading
@@ -91,6 +92,16 @@ class Files:
         recipe = self.editor.session.recipe
         self._open(path, lambda: projects.from_picture(path, recipe))
 
+    def restore(self, found: Found) -> None:
+        """Go on with work that was not saved when fluidwarp ended."""
+
+        def load() -> Project:
+            project = found.load()
+            check_picture(project.picture, project.recipe.fluid.grid)
+            return project
+
+        self._open(found.file, load, found)
+
     def start_from_map(self, path: Path) -> None:
         """Let what is done to the picture begin with a warp map instead of the picture as it is; can be undone.
 
@@ -102,10 +113,11 @@ class Files:
         editor.preferences.folder = str(path.parent)
         editor.messages.done(f"The picture now starts from {path.name}. Undo takes it away again.")
 
-    def _open(self, path: Path, load: Callable[[], Project]) -> None:
+    def _open(self, path: Path, load: Callable[[], Project], found: Found | None = None) -> None:
         """Read a file in the background, and open it then; what was being read before is not wanted any more."""
         editor = self.editor
-        self._loading = Loading(path, load, editor.canvas.largest, editor.session.document.recipe)
+        self.give_up_loading()
+        self._loading = Loading(path, load, editor.canvas.largest, editor.session.document.recipe, found)
         self._loading.is_done(AT_ONCE)
         self._look_at_loading()
 
@@ -116,6 +128,8 @@ class Files:
 
     def give_up_loading(self) -> None:
         """Open nothing; the thread ends by itself."""
+        if self._loading is not None:
+            self._leave(self._loading)
         self._loading = None
 
     def _look_at_loading(self) -> None:
@@ -125,6 +139,7 @@ class Files:
             return
         self._loading = None
         if loading.error:
+            self._leave(loading)
             editor.messages.warn(loading.error)
         elif editor.is_dirty and editor.session.document.recipe is not loading.recipe:
             editor.unless_unsaved(f"open {loading.path.name}", lambda: self._show(loading))
@@ -135,13 +150,29 @@ class Files:
         editor = self.editor
         assert loading.project is not None
         try:
-            editor.open(loading.project, loading.pixels)
+            editor.open(loading.project, loading.pixels, loading.found)
         except UserError as error:
+            self._leave(loading)
             editor.messages.warn(str(error))
             return
         editor.preferences.opened(loading.path)
         for notice in editor.session.pictures.notices:
             editor.messages.say(notice)
+        if loading.found is None:
+            return
+        if loading.found.is_as_it_was(loading.project):
+            editor.messages.done(f"“{editor.session.project.name}” is as it was. It has not been saved yet.")
+        else:
+            name = loading.project.recipe.picture
+            editor.messages.warn(
+                f"All strokes are here, but {name} is not the same picture any more as when they were made."
+            )
+
+    @staticmethod
+    def _leave(loading: Loading) -> None:
+        """What could not be restored, or was not wanted yet, is offered again."""
+        if loading.found is not None:
+            loading.found.leave()
 
     def draw(self, ui: Ui, canvas: Rect) -> None:
         """What is being read, with a button to give it up."""

@@ -12,6 +12,7 @@ import numpy as np
 from app.errors import UserError
 from app.project import Project
 from app.recipe import Recipe
+from app.recovery import Found
 from app.ui.canvas import shown_pixels
 
 
@@ -24,6 +25,7 @@ class Loading:
         load: reads it; runs in a thread of its own, and knows no GL.
         largest: pixels along a side of the picture as the canvas shows it.
         recipe: the work as it was when the person asked for the file.
+        found: what it is that is restored, where it is not just opened.
         project, pixels: what has been read, and the picture as the canvas shows it.
         error: why it could not be read, as a sentence.
     """
@@ -32,6 +34,7 @@ class Loading:
     load: Callable[[], Project]
     largest: int
     recipe: Recipe
+    found: Found | None = None
     project: Project | None = None
     pixels: np.ndarray | None = None
     error: str = ""

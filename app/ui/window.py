@@ -11,6 +11,7 @@ import glfw
 import moderngl
 
 from app.errors import UserError
+from app.recovery import default_folder
 from app.ui.editor import Editor
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
 from app.ui.files import load_any
@@ -220,7 +221,7 @@ def run(file: Path | None = None) -> None:
         load_any(file)
     window = Window()
     try:
-        editor = Editor(window.device, load_any(sample()), Preferences.load())
+        editor = Editor(window.device, load_any(sample()), Preferences.load(), default_folder())
         if file is not None:
             editor.placeholder = editor.session
             window.events.append(Drop((str(file),)))

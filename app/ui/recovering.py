@@ -1,0 +1,198 @@
+"""Offering work that was not saved when fluidwarp ended, and keeping journals of what is open now."""
+
+from __future__ import annotations
+
+import threading
+from datetime import date, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app import recovery
+from app.recovery import Found, Journal
+from app.session import Session
+from app.ui.dialogs import Dialog
+from app.ui.widgets import Ui
+
+if TYPE_CHECKING:
+    from app.ui.editor import Editor
+
+ROWS = 4  # works that are seen without scrolling
+HEIGHT = 74  # of a row
+
+
+class Recovery:
+    """The journals of the works that are open, and those that were found.
+
+    Args:
+        editor: whose works.
+        root: the folder of journals; None keeps none, for tests.
+    """
+
+    def __init__(self, editor: Editor, root: Path | None) -> None:
+        self.editor = editor
+        self._root = root
+        self._journals: dict[Session, Journal] = {}
+        self._ended: list[Journal] = []
+        self._has_warned = False
+        self._offered: list[Found] = []
+        self._notices: list[str] = []
+        self._search: threading.Thread | None = None
+        if root is not None:
+            self._search = threading.Thread(target=self._find, args=(root,), name="finding journals", daemon=True)
+            self._search.start()
+
+    @property
+    def is_busy(self) -> bool:
+        """Something goes on in another thread, of which there will be something to see."""
+        return self._search is not None or any(journal.is_behind for journal in self._journals.values())
+
+    # -- what is open -----------------------------------------------------------------------------------------------
+
+    def opened(self, session: Session, found: Found | None) -> None:
+        """A work has been opened; `found` where it was restored."""
+        if self._root is not None:
+            self._journals[session] = Journal(self._root, found and found.held)
+
+    def keep(self) -> None:
+        """Take note of what has been done to the work that is open."""
+        session = self.editor.session
+        journal = self._journals.get(session)
+        if journal is None:
+            return
+        journal.keep(session.project, session.document)
+        if journal.trouble is not None and not self._has_warned:
+            self._has_warned = True
+            self.editor.messages.warn(journal.trouble)
+
+    def closed(self, session: Session) -> None:
+        """A work that was open is given up."""
+        if session in self._journals:
+            self._ended.append(self._journals.pop(session))
+            self._ended[-1].end(discard=True)
+
+    def release(self, discard: bool) -> None:
+        """Stop; `discard` if the person has left, and not where the program fails."""
+        for journal in self._journals.values():
+            journal.end(discard)
+        for journal in (*self._ended, *self._journals.values()):
+            journal.join()
+        self._journals.clear()
+        self.later()
+
+    # -- what was found ---------------------------------------------------------------------------------------------
+
+    def _find(self, root: Path) -> None:
+        self._offered, self._notices = recovery.find(root)
+
+    def poll(self) -> None:
+        """Offer what has been found."""
+        if self._search is None or self._search.is_alive():
+            return
+        self._search = None
+        for notice in self._notices:
+            self.editor.messages.warn(notice)
+        if self._offered:
+            self.editor.dialogs.append(Offer(self))
+
+    @property
+    def offered(self) -> list[Found]:
+        """What can be restored, the newest first."""
+        return self._offered
+
+    def restore(self, found: Found) -> None:
+        """Open one of them, and keep the others for another start."""
+        self._offered.remove(found)
+        self.later()
+        self.editor.files.restore(found)
+
+    def discard(self, found: Found) -> None:
+        """Remove one of them for good."""
+        self._offered.remove(found)
+        found.discard()
+
+    def later(self) -> None:
+        """Keep them all for another start."""
+        for found in self._offered:
+            found.leave()
+        self._offered = []
+
+
+class Offer(Dialog):
+    """Asks what shall become of work that was not saved."""
+
+    width = 560
+
+    def __init__(self, recovery: Recovery) -> None:
+        super().__init__("Restore your work?")
+        self._recovery = recovery
+        self._doubted: Found | None = None  # its Discard has been pressed once
+
+    def body(self, ui: Ui, editor: Editor) -> bool:
+        offered = self._recovery.offered
+        ui.wrapped("fluidwarp ended before this was saved. It is here up to the last stroke.", ui.palette.dim, 14)
+        imgui.dummy(ImVec2(0, ui.px(4)))
+        imgui.begin_child("offered", ImVec2(0, ui.px(HEIGHT) * min(len(offered), ROWS)))
+        restored = discarded = None
+        for number, found in enumerate(offered):
+            imgui.push_id(number)
+            pressed = self._row(ui, found, ui.px(HEIGHT) * number)
+            restored = found if pressed == "restore" else restored
+            discarded = found if pressed == "discard" else discarded
+            imgui.pop_id()
+        imgui.end_child()
+        imgui.dummy(ImVec2(0, ui.px(2)))
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
+        later = ui.button("Later", width=96)
+        if restored is not None:
+            # Answered, whatever comes of it.
+            self.close()
+            self._recovery.restore(restored)
+            return False
+        if discarded is not None and discarded is not self._doubted:
+            self._doubted = discarded
+        elif discarded is not None:
+            self._recovery.discard(discarded)
+        if imgui.is_key_pressed(imgui.Key.escape) or later:
+            self._recovery.later()
+            return False
+        return bool(self._recovery.offered)
+
+    def _row(self, ui: Ui, found: Found, top: float) -> str:
+        """One of the works, at a height in the list; what has been pressed, or ""."""
+        imgui.set_cursor_pos(ImVec2(0, top))
+        right = imgui.get_content_region_avail().x
+        imgui.begin_group()
+        ui.text(found.origin.name, size=15, bold=True)
+        ui.dim(about(found, date.today()))
+        ui.dim(_shortened(str(found.file), right - ui.px(224)))
+        imgui.end_group()
+        imgui.set_cursor_pos(ImVec2(right - ui.px(208), top + ui.px(14)))
+        discard = ui.button("Really?" if found is self._doubted else "Discard", width=100)
+        imgui.same_line(0, ui.px(8))
+        restore = ui.button("Restore", primary=True, width=100)
+        return "restore" if restore else "discard" if discard else ""
+
+
+def about(found: Found, today: date) -> str:
+    """How much there is, and from when."""
+    strokes = found.work.strokes
+    count = "1 stroke" if strokes == 1 else f"{strokes} strokes" if strokes else "changes without a stroke"
+    return f"{count}, {_moment(found.when, today)}"
+
+
+def _moment(when: datetime, today: date) -> str:
+    days = (today - when.date()).days
+    day = {0: "today", 1: "yesterday"}.get(days, f"{when:%Y-%m-%d}")
+    return f"{day} at {when:%H:%M}"
+
+
+def _shortened(text: str, width: float) -> str:
+    """The end of it, as much as there is room for."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    while len(text) > 4 and imgui.calc_text_size(f"... {text}").x > width:
+        text = text[1:]
+    return f"... {text}"

@@ -1,0 +1,627 @@
+"""Unsaved work outlasts a kill: it is found by the next start, by one at a time, and by none while its owner lives."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from solver.context import Device
+
+from app import project as projects
+from app import recovery
+from app.document import Document
+from app.errors import UserError
+from app.history import History
+from app.locks import Lock
+from app.pictures import Picture, write_picture
+from app.project import Project
+from app.recipe import Recipe
+from app.recovery import Found, Journal, find
+from app.session import Session
+from app.strokes import Stroke
+from app.ui.recovering import Offer
+from editing import Robot, small_project
+from killing import Painter, digest_of, digest_of_warp
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+class Desk:
+    """A project that is open, and its journal."""
+
+    def __init__(self, root: Path, project: Project) -> None:
+        self.root = root
+        self.project = project
+        self.document = Document(project.picture, project.recipe, project.path)
+        self.journal = Journal(root)
+
+    def push(self, count: int = 1, samples: int = 3) -> None:
+        for _ in range(count):
+            now = self.document.recipe
+            places = tuple((now.ticks + k, 0.1 + k / (7 * samples), 0.5, 1.0) for k in range(samples))
+            stroke = Stroke(tool="push", samples=places)
+            self.document.edit("Push", stroke=(*now.stroke, stroke), duration=now.duration + 1 / 3)
+            self.keep()
+
+    def keep(self) -> None:
+        self.journal.keep(self.project, self.document)
+
+    def save(self, path: Path) -> None:
+        self.project = projects.save(replace(self.project, recipe=self.document.recipe), path)
+        self.document.saved(path)
+        self.keep()
+
+    def write(self) -> None:
+        """Wait until all is on the disk."""
+        until(lambda: not self.journal.is_behind)
+
+    def die(self) -> None:
+        """Leave the journal as a kill would."""
+        self.journal.end(discard=False)
+        self.journal.join()
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    return Desk(tmp_path / "state" / "journals", small_project(tmp_path))
+
+
+def found_in(root: Path) -> Found:
+    """The one work that is found; without a sentence about any other."""
+    found, notices = find(root)
+    assert notices == []
+    (one,) = found
+    return one
+
+
+def is_all_of(found: Found, document: Document) -> bool:
+    history = document.history
+    told = [repr((entry.name, entry.recipe)) for entry in history.entries]
+    same = [repr((entry.name, entry.recipe)) for entry in found.work.entries] == told
+    return same and found.work.index == history.index and found.work.saved == document.saved_recipe
+
+
+def files_in(root: Path) -> list[str]:
+    return sorted(str(path.relative_to(root)) for path in root.rglob("*")) if root.exists() else []
+
+
+# The journal of one work ---------------------------------------------------------------------------------------------
+
+
+def test_what_was_not_saved_is_found(desk: Desk) -> None:
+    desk.push(3)
+    desk.document.history.undo()
+    desk.keep()
+    desk.die()
+    found = found_in(desk.root)
+    assert is_all_of(found, desk.document)
+    assert found.work.strokes == 3
+    project = found.load()
+    assert project.recipe == desk.document.recipe
+    assert np.array_equal(project.picture.pixels, desk.project.picture.pixels)
+    assert (project.name, project.folder, project.path) == ("pattern", desk.project.folder, None)
+    assert found.is_as_it_was(project)
+
+
+def test_nothing_is_written_where_nothing_would_be_lost(desk: Desk, tmp_path: Path) -> None:
+    desk.keep()
+    desk.document.begin_with(desk.document.recipe.edited(duration=0.5))
+    desk.keep()
+    assert not desk.root.exists()
+    desk.push()
+    desk.write()
+    assert len(files_in(desk.root)) == 3
+    desk.document.history.undo()
+    desk.keep()
+    desk.write()
+    assert len(files_in(desk.root)) == 3  # a redo would be lost
+    desk.document.history.redo()
+    desk.save(tmp_path / "work.fluidwarp")
+    desk.write()
+    assert files_in(desk.root) == []
+    desk.push()
+    desk.journal.end(discard=True)
+    desk.journal.join()
+    assert files_in(desk.root) == []
+
+
+def test_after_saving_with_something_to_redo_nothing_is_offered(desk: Desk, tmp_path: Path) -> None:
+    desk.push(2)
+    desk.document.history.undo()
+    desk.keep()
+    desk.save(tmp_path / "work.fluidwarp")
+    desk.write()
+    assert files_in(desk.root) == []
+    desk.document.history.redo()
+    desk.keep()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_what_is_done_right_after_saving_belongs_to_what_was_saved(desk: Desk, tmp_path: Path) -> None:
+    """Before the journal has heard of the saving, too."""
+    path = tmp_path / "work.fluidwarp"
+    desk.push(2)
+    desk.write()
+    desk.save(path)
+    desk.push()
+    desk.die()
+    found = found_in(desk.root)
+    assert is_all_of(found, desk.document)
+    assert found.file == path
+
+
+def test_another_grid_for_all_of_it_is_no_saving(desk: Desk) -> None:
+    desk.push(2)
+    desk.document.history.undo()
+    desk.keep()
+    desk.write()
+    history = desk.document.history
+
+    def on_a_fine_grid(recipe: Recipe) -> Recipe:
+        return recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": 64}))
+
+    entries = [replace(entry, recipe=on_a_fine_grid(entry.recipe)) for entry in history.entries]
+    desk.document.restore(History.restored(entries, history.index), on_a_fine_grid(desk.document.saved_recipe))
+    desk.keep()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_a_journal_does_not_grow_without_bound(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recovery, "SLACK", 5000)
+    largest = 0
+    desk.push(3)
+    for _ in range(200):
+        desk.document.history.undo()
+        desk.keep()
+        desk.document.history.redo()
+        desk.keep()
+        desk.write()
+        file = next(desk.root.rglob(recovery.JOURNAL))
+        largest = max(largest, file.stat().st_size)
+    begun = len(b"".join(recovery.beginning(*_whole(desk))))
+    assert largest < 2 * begun + 5000 + 200
+    assert largest > begun + 4000  # and it had grown meanwhile
+    desk.push()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def _whole(desk: Desk) -> tuple[recovery.Origin, recovery.Work]:
+    history = desk.document.history
+    return recovery.Origin.of(desk.project), recovery.Work(history.entries, history.index, desk.document.saved_recipe)
+
+
+def test_a_journal_torn_anywhere_gives_what_was_whole(desk: Desk) -> None:
+    desk.push(6)
+    desk.write()
+    desk.die()
+    file = next(desk.root.rglob(recovery.JOURNAL))
+    whole = file.read_bytes()
+    dice = random.Random(1)
+    recipes = [repr(entry.recipe) for entry in desk.document.history.entries]
+    for _ in range(40):
+        file.write_bytes(whole[: dice.randrange(len(whole))])
+        found, notices = find(desk.root)
+        assert len(found) + len(notices) <= 1
+        for one in found:
+            kept = [repr(entry.recipe) for entry in one.work.entries]
+            assert kept == recipes[: len(kept)]
+            one.leave()
+        if not file.parent.exists():  # nothing but the beginning: nothing would be lost
+            file.parent.mkdir()
+
+
+def test_a_journal_goes_on_after_it_was_restored(desk: Desk) -> None:
+    """And at every moment of it there is one journal, with everything."""
+    desk.push(2)
+    desk.die()
+    with next(desk.root.rglob(recovery.JOURNAL)).open("ab") as file:
+        file.write(b"01234567 {torn")
+    found = found_in(desk.root)
+    folder = found.held.folder
+    again = Desk(desk.root, found.load())
+    again.document.restore(found.work.history, found.work.saved)
+    again.journal = Journal(desk.root, found.held)
+    assert again.document.is_dirty
+    again.keep()
+    again.push()
+    again.write()
+    assert [path.name for path in desk.root.iterdir()] == [folder.name]
+    again.die()
+    assert is_all_of(found_in(desk.root), again.document)
+
+
+# Whose it is ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_journal_belongs_to_one(desk: Desk, tmp_path: Path) -> None:
+    other = Desk(desk.root, small_project(tmp_path))
+    desk.push()
+    other.push(2)
+    desk.write()
+    other.write()
+    assert find(desk.root) == ([], [])  # both live
+    desk.die()
+    found = found_in(desk.root)
+    assert is_all_of(found, desk.document)
+    assert find(desk.root) == ([], [])  # somebody is being asked about it
+    found.leave()
+    again = found_in(desk.root)
+    assert is_all_of(again, desk.document)
+    again.discard()
+    assert find(desk.root) == ([], [])
+    other.push()
+    other.die()
+    assert is_all_of(found_in(desk.root), other.document)
+
+
+def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    code = (
+        "import sys, time; from pathlib import Path; from app.locks import Lock\n"
+        f"lock = Lock.take(Path({str(path)!r})); print(lock is not None, flush=True); time.sleep(600)"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=Path.cwd())
+    assert process.stdout is not None
+    assert process.stdout.readline() == "True\n"
+    assert Lock.take(path) is None
+    process.kill()
+    process.wait()
+    lock = Lock.take(path)
+    assert lock is not None
+    lock.release()
+
+
+def test_what_a_kill_leaves_before_the_first_record_is_swept(desk: Desk) -> None:
+    desk.push()
+    desk.write()
+    for name, files in {"a": (), "b": ("lock",), "c": ("lock", f"{recovery.JOURNAL}.new")}.items():
+        (desk.root / name).mkdir()
+        for file in files:
+            (desk.root / name / file).write_bytes(b"")
+    assert find(desk.root) == ([], [])
+    assert len(list(desk.root.iterdir())) == 1
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+# What goes wrong -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("data", "words"), [(b"fluidwarp journal 9 1\nx\n", "newer fluidwarp"), (b"\0\0\0", "damaged and cannot be read")]
+)
+def test_what_cannot_be_read_is_left_alone_with_a_sentence(desk: Desk, data: bytes, words: str) -> None:
+    desk.push()
+    desk.die()
+    file = next(desk.root.rglob(recovery.JOURNAL))
+    file.write_bytes(data)
+    found, notices = find(desk.root)
+    assert found == []
+    assert len(notices) == 1
+    assert words in notices[0]
+    assert str(file.parent) in notices[0]
+    assert file.read_bytes() == data
+
+
+def test_a_picture_that_is_gone_is_told_and_the_work_kept(desk: Desk, tmp_path: Path) -> None:
+    desk.push()
+    desk.die()
+    picture = tmp_path / "pattern.png"
+    picture.rename(tmp_path / "elsewhere.png")
+    found = found_in(desk.root)
+    with pytest.raises(UserError, match=r"There is no .*pattern\.png any more\. .* is kept; put the file back"):
+        found.load()
+    found.leave()
+    (tmp_path / "elsewhere.png").rename(picture)
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_a_picture_that_was_saved_in_the_project_may_go(desk: Desk, tmp_path: Path) -> None:
+    desk.save(tmp_path / "work.fluidwarp")
+    desk.push()
+    desk.die()
+    (tmp_path / "pattern.png").unlink()
+    found = found_in(desk.root)
+    project = found.load()
+    assert np.array_equal(project.picture.pixels, desk.project.picture.pixels)
+    assert project.path == tmp_path / "work.fluidwarp"
+    assert found.is_as_it_was(project)
+
+
+def test_a_picture_that_is_only_in_a_project_is_found_there(tmp_path: Path) -> None:
+    path = tmp_path / "work.fluidwarp"
+    projects.save(small_project(tmp_path), path)
+    (tmp_path / "pattern.png").unlink()
+    desk = Desk(tmp_path / "journals", projects.load(path))
+    desk.push()
+    desk.die()
+    found = found_in(desk.root)
+    project = found.load()
+    assert project.recipe == desk.document.recipe
+    assert project.keeper is not None
+    assert (project.name, project.path) == ("work", path)
+    assert found.is_as_it_was(project)
+    path.unlink()
+    with pytest.raises(UserError, match=r"There is no .*work\.fluidwarp any more"):
+        found.load()
+
+
+def test_another_picture_of_the_same_name_is_noticed(desk: Desk, tmp_path: Path) -> None:
+    desk.push()
+    desk.die()
+    write_picture(tmp_path / "pattern.png", Picture(np.zeros((180, 240, 3), np.uint8)))
+    found = found_in(desk.root)
+    assert not found.is_as_it_was(found.load())
+
+
+def test_a_folder_that_cannot_be_written_is_told_and_tried_again(desk: Desk) -> None:
+    desk.root.parent.mkdir()
+    desk.root.write_text("a file is in the way")
+    desk.push(2)
+    desk.write()
+    assert desk.journal.trouble is not None
+    assert str(desk.root) in desk.journal.trouble
+    desk.root.unlink()
+    desk.push()
+    desk.write()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
+def test_a_disk_that_is_full_loses_nothing_that_was_written(tmp_path: Path) -> None:
+    """In a process of its own, whose files may not grow beyond 10,000 bytes, as on a full disk."""
+    code = f"""
+import resource, signal, sys
+from pathlib import Path
+sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(Path(__file__).parent.parent)!r}]
+from test_recovery import Desk, small_project
+desk = Desk(Path({str(tmp_path)!r}) / "journals", small_project(Path({str(tmp_path)!r})))
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+for number in range(30):
+    desk.push(samples=20)
+    desk.write()
+    print(number + 1, desk.journal.trouble, flush=True)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    told = [line.split(" ", 1) for line in done.stdout.splitlines()]
+    well = max(int(number) for number, trouble in told if trouble == "None")
+    assert 3 < well < 30
+    assert "cannot be written" in told[-1][1]
+    assert found_in(tmp_path / "journals").work.strokes >= well
+
+
+# In the window -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    return tmp_path / "journals"
+
+
+class Starter:
+    """Starts editors, one at a time: imgui has room for one."""
+
+    def __init__(self, device: Device, root: Path) -> None:
+        self.device, self.root = device, root
+        self._robot: Robot | None = None
+
+    def start(self, folder: Path) -> Robot:
+        """An editor with the pattern in a folder; the one before it, if it is still there, is killed."""
+        self.kill()
+        self._robot = Robot(self.device, small_project(folder), (720, 540), journals=self.root)
+        self._robot.until(lambda: not self.robot.editor.recovery.is_busy)
+        return self._robot
+
+    @property
+    def robot(self) -> Robot:
+        assert self._robot is not None
+        return self._robot
+
+    def kill(self) -> None:
+        """End it as a kill would, with everything written that had to be."""
+        if self._robot is not None:
+            self._robot.close()
+            self._robot = None
+
+
+@pytest.fixture
+def starter(device: Device, root: Path) -> Iterator[Starter]:
+    starter = Starter(device, root)
+    yield starter
+    starter.kill()
+
+
+@pytest.fixture
+def before(starter: Starter, tmp_path: Path) -> Project:
+    """Work of two strokes whose editor was killed, as it was."""
+    robot = starter.start(tmp_path)
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.drag((0.5, 0.3), (0.5, 0.45))
+    robot.rest()
+    project = replace(robot.editor.session.project, recipe=robot.editor.session.document.recipe)
+    starter.kill()
+    return project
+
+
+def offer_of(robot: Robot) -> Offer:
+    (dialog,) = robot.editor.dialogs
+    assert isinstance(dialog, Offer)
+    return dialog
+
+
+def answer(robot: Robot, choice: str) -> None:
+    """Click one of the buttons of the only row, or the one below."""
+    rect = offer_of(robot).rect
+    x = {"Discard": rect.right - 180, "Restore": rect.right - 72, "Later": rect.right - 72}[choice]
+    y = rect.bottom - 36 if choice == "Later" else rect.y + 118
+    robot.click(x, y)
+    robot.until(lambda: not robot.editor.files.is_loading)
+
+
+def test_restored_work_is_as_it_was_and_unsaved(
+    device: Device, starter: Starter, before: Project, tmp_path: Path
+) -> None:
+    robot = starter.start(tmp_path)
+    answer(robot, "Restore")
+    robot.rest()
+    session = robot.editor.session
+    assert robot.editor.dialogs == []
+    assert session.document.recipe == before.recipe
+    assert repr(session.document.recipe) == repr(before.recipe)
+    assert robot.editor.title == "pattern * - fluidwarp"
+    assert [entry.name for entry in session.document.history.entries] == ["Open", "Push", "Push"]
+    seen = robot.warp()
+    again = Session(device, before)
+    again.settle()
+    assert np.array_equal(seen, again.replay.warp.read())
+    again.release_gpu()
+    robot.key("ctrl+z")
+    robot.key("ctrl+z")
+    robot.rest()
+    assert not session.document.is_dirty
+    assert np.abs(robot.warp()).max() == 0
+    robot.key("ctrl+y")
+    robot.key("ctrl+y")
+    robot.rest()
+    assert np.array_equal(robot.warp(), seen)
+    # It goes on, and outlasts another kill.
+    robot.drag((0.2, 0.2), (0.3, 0.2))
+    robot.until(lambda: not robot.editor.recovery.is_busy)
+    starter.kill()
+    assert found_in(starter.root).work.strokes == 3
+
+
+@pytest.mark.usefixtures("before")
+def test_work_that_is_put_off_is_offered_again_until_it_is_discarded(
+    starter: Starter, tmp_path: Path, root: Path
+) -> None:
+    robot = starter.start(tmp_path)
+    assert find(root) == ([], [])  # another fluidwarp that starts now asks nothing
+    answer(robot, "Later")
+    assert robot.editor.dialogs == []
+    robot = starter.start(tmp_path)
+    robot.key("escape")
+    robot.frame()
+    assert robot.editor.dialogs == []
+    robot = starter.start(tmp_path)
+    answer(robot, "Discard")
+    assert offer_of(robot)  # is still there, and asks once more
+    answer(robot, "Discard")
+    robot.frame()
+    assert robot.editor.dialogs == []
+    starter.kill()
+    assert files_in(root) == []
+
+
+def test_who_leaves_or_saves_is_offered_nothing(starter: Starter, tmp_path: Path, root: Path) -> None:
+    robot = starter.start(tmp_path)
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.until(lambda: not robot.editor.recovery.is_busy)
+    assert files_in(root) != []
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    robot.frame()
+    robot.until(lambda: not robot.editor.recovery.is_busy)
+    assert files_in(root) == []
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.editor.closed = True  # as after "Don't save"
+    starter.kill()
+    assert files_in(root) == []
+
+
+@pytest.mark.usefixtures("before")
+def test_a_picture_that_is_gone_is_told_in_the_window(starter: Starter, tmp_path: Path, root: Path) -> None:
+    away = tmp_path / "away"
+    away.mkdir()
+    robot = starter.start(away)
+    (tmp_path / "pattern.png").rename(tmp_path / "moved.png")
+    answer(robot, "Restore")
+    (message,) = robot.editor.messages.shown
+    assert f"There is no {tmp_path / 'pattern.png'} any more" in message.text
+    assert robot.editor.session.project.folder == away
+    assert found_in(root).work.strokes == 2
+
+
+def test_trouble_with_the_journal_is_told_once_and_painting_goes_on(
+    starter: Starter, tmp_path: Path, root: Path
+) -> None:
+    root.write_text("a file is in the way")
+    robot = starter.start(tmp_path)
+    for number in range(3):
+        robot.drag((0.4, 0.3 + 0.1 * number), (0.5, 0.3 + 0.1 * number))
+        robot.until(lambda: not robot.editor.recovery.is_busy)
+        if number == 0:
+            (message,) = robot.editor.messages.shown
+            assert "cannot be written" in message.text
+            robot.editor.messages.shown.clear()
+    assert robot.editor.messages.shown == []
+    assert len(robot.editor.session.recipe.stroke) == 3
+
+
+# Kills ---------------------------------------------------------------------------------------------------------------
+
+
+def test_a_kill_at_any_moment_loses_no_stroke(device: Device, starter: Starter, tmp_path: Path) -> None:
+    """Of an editor that paints; `python tests/killing.py` does it a hundred times, and in the real window."""
+    dice = random.Random(os.getpid())
+    compared = 0
+    for rests in (False, True):
+        painter = Painter.without_window(tmp_path, starter.root, dice.randrange(1000))
+        if rests:
+            painter.paint_until_rest()
+        painter.paint_for(dice.uniform(0, 1))
+        outcome = painter.kill()
+        assert outcome.is_exact, outcome
+        assert outcome.lost == 0, outcome
+        # What the killed editor showed when it had come to rest is seen again, to the byte.
+        robot = starter.start(tmp_path)
+        answer(robot, "Restore")
+        session = robot.editor.session
+        entries = session.document.history.entries
+        shown = [n for n, entry in enumerate(entries) if digest_of(entry.recipe) in painter.shown]
+        for number in shown[-1:]:
+            session.go_to(number)
+            robot.rest()
+            assert digest_of_warp(robot.warp()) == painter.shown[digest_of(entries[number].recipe)]
+            compared += 1
+        robot.editor.closed = True
+        starter.kill()
+        assert files_in(starter.root) == []
+    assert compared
+
+
+def test_two_editors_at_once_do_not_get_in_each_others_way(tmp_path: Path) -> None:
+    root = tmp_path / "journals"
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    one, other = (Painter.without_window(tmp_path / name, root, 1) for name in "ab")
+    for painter in (one, other):
+        painter.paint_for(0.5)
+    outcome = one.kill()
+    # Nothing is found but what belongs to nobody any more.
+    assert outcome.is_exact, outcome
+    found = found_in(root)
+    assert found.file == tmp_path / "a" / "pattern.png"
+    found.discard()
+    outcome = other.kill()
+    assert outcome.is_exact, outcome
+    assert found_in(root).file == tmp_path / "b" / "pattern.png"
