@@ -32,10 +32,11 @@ pytestmark = pytest.mark.skipif(
 class Desk:
     """A virtual screen with the editor on it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, size: tuple[int, int] = (1280, 800)) -> None:
         self.folder = folder
         # The server takes a display that nobody has, and tells its number once it listens.
-        command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"]
+        command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size[0]}x{size[1]}x24", "-noreset", "-nolisten", "tcp"]
+        command += ["-fbdir", str(folder)]
         self.screen = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         assert self.screen.stdout is not None
         number = int(self.screen.stdout.readline())
@@ -66,6 +67,15 @@ class Desk:
 
     def _find(self) -> list[str]:
         return self.do("search", "--onlyvisible", "--name", "fluidwarp").split()
+
+    def seen(self) -> np.ndarray:
+        """The screen as it is now, (h, w, 3) int, from the file in which the server keeps it."""
+        data = (self.folder / "Xvfb_screen0").read_bytes()
+        # The header of an X window dump: 25 numbers, then the window's name up to its own length, then the colours.
+        head = np.frombuffer(data, ">u4", 25)
+        start, width, height, row, colours = (int(head[at]) for at in (0, 4, 5, 12, 19))
+        rows = np.frombuffer(data, np.uint8, row * height, start + 12 * colours).reshape(height, row)
+        return rows[:, : 4 * width].reshape(height, width, 4)[..., 2::-1].astype(int)
 
     def title(self) -> str:
         return self.do("getwindowname", self.window or (self._find() or ["0"])[0]).strip()

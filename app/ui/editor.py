@@ -19,7 +19,7 @@ from app.session import Session
 from app.ui import panels, theme
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.canvas import Canvas
-from app.ui.clock import Clock
+from app.ui.clock import PACE, Clock
 from app.ui.dialogs import Dialog, Preferring, Shortcuts, Unsaved
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Wheel
 from app.ui.exporting import ExportDialog, Exports, StillExporting
@@ -186,6 +186,8 @@ class Editor:
             scale: of the interface, as the screen asks for; the preferences' own comes on top.
         """
         begun = time.perf_counter()
+        self.clock.elapse(dt)
+        self.messages.elapse(dt)
         with self.clock.measure("frame"):
             self._lay_out((size[0] / density, size[1] / density), density, scale)
             self._hear(events)
@@ -193,18 +195,19 @@ class Editor:
                 self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
             self.quality.look(dt)
             self._draw(target, size, dt, events)
-        self.clock.frame_done()
         if self.quality.is_measuring:
             self.quality.warm_up(begun)
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
-        return self.quality.is_measuring or self.session.is_moving or self.clock.settling > 0
+        return self.quality.is_measuring or self.session.is_moving or self.clock.settling
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""
         if self.wants_frame():
             return 0.0
+        if self.clock.hovering:
+            return PACE
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
         elsewhere = self.exports.is_running or self.files.is_waiting or self.files.is_loading
         if elsewhere or any(dialog.is_busy for dialog in self.dialogs):
@@ -217,6 +220,7 @@ class Editor:
         styled = (self.preferences.theme, self.ui.scale)
         if styled != self._styled:
             self._styled = styled
+            self.clock.stir()
             self.ui.palette = theme.PALETTES[self.preferences.theme]
             theme.apply(self.ui.palette, self.ui.scale)
         self.layout = Layout.of(*size, self.ui.scale, self.state.inspector)
@@ -224,11 +228,11 @@ class Editor:
 
     def _hear(self, events: Sequence[Event]) -> None:
         for event in events:
-            self.clock.settling = 3
+            self.clock.stir()
             try:
                 self._hear_one(event)
             except UserError as error:
-                self.messages.warn(str(error))
+                self.messages.warn(error.in_window)
 
     def _hear_one(self, event: Event) -> None:
         match event:
@@ -267,7 +271,7 @@ class Editor:
         try:
             action.run(self)
         except UserError as error:
-            self.messages.warn(str(error))
+            self.messages.warn(error.in_window)
 
     def _draw(self, target: moderngl.Framebuffer, size: tuple[int, int], dt: float, events: Sequence[Event]) -> None:
         target.viewport = (0, 0, *size)
@@ -288,13 +292,13 @@ class Editor:
                     self.session.notice = None
                 self.exports.draw(self.ui, self.layout.canvas)
                 self.files.draw(self.ui, self.layout.canvas)
-                self.messages.draw(self.ui, self.layout.canvas, dt)
+                self.messages.draw(self.ui, self.layout.canvas)
                 self._draw_dialog()
             names, self._once_typed = self._once_typed, []
             for name in names:
                 self.do(name)
         except UserError as error:
-            self.messages.warn(str(error))
+            self.messages.warn(error.in_window)
         io = imgui.get_io()
         self._held_by_imgui = io.want_capture_mouse
         self._is_typing_now = io.want_text_input
@@ -320,7 +324,7 @@ class Editor:
         """True if nothing lies over the canvas at a point of the screen."""
         if self.dialogs or self._popup_open or not self.layout.canvas.contains(x, y):
             return False
-        return not any(rect.contains(x, y) for rect in panels.floating_rects())
+        return not any(rect.contains(x, y) for rect in self.ui.covers)
 
     @property
     def shows_ring(self) -> bool:
@@ -392,7 +396,9 @@ class Editor:
 
     def ask_export(self) -> None:
         self.session.release()
-        self.dialogs.append(ExportDialog(self.session, self.preferences.folder))
+        likes = self.preferences
+        folder = next((name for name in (likes.export_folder, likes.folder) if name and Path(name).is_dir()), "")
+        self.dialogs.append(ExportDialog(self.session, folder))
 
     def ask_quit(self) -> None:
         """Leave, after having asked about what is not saved and what is being exported."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.replay import Replay
 from app.strokes import Stroke
-from app.ui.files import fresh_recipe
+from app.ui.files import fresh_recipe, settings_of
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
@@ -76,7 +76,9 @@ class Quality:
         session = self.editor.session
         # Who has undone everything may want it back: what can be redone was made on the grid as it is.
         history = session.document.history
-        fresh = len(history.entries) == 1 and history.recipe.edited(picture=None) == fresh_recipe()
+        fresh = len(history.entries) == 1 and history.recipe.edited(picture=None) == fresh_recipe(
+            settings_of(history.recipe.fluid)
+        )
         if self._speed is None or not self.editor.state.auto_quality or not fresh:
             return
         grid = min(self._speed.best_grid, self._limit)

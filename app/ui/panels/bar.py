@@ -12,6 +12,7 @@ from app.presets import FEELS
 from app.tools import BrushSettings
 from app.ui.actions import ACTIONS
 from app.ui.state import LARGEST, SMALLEST
+from app.ui.units import PERCENT, Unit
 from app.ui.widgets import Ui, keys_shown
 
 if TYPE_CHECKING:
@@ -101,9 +102,9 @@ def _brush(ui: Ui, editor: Editor) -> None:
 def _slider(ui: Ui, editor: Editor, setting: Setting, width: float) -> None:
     brush, is_size = editor.state.brush, setting.name == "radius"
     value: float = getattr(brush, setting.name)
-    shown = f"{value * max(editor.canvas.size) * 2:.0f} px" if is_size else f"{value:.0%}"
+    unit = Unit(" px", 2 * max(editor.canvas.size)) if is_size else PERCENT
     slid = ui.slider(
-        setting.name, setting.label, value, setting.low, setting.high, shown, getattr(DEFAULTS, setting.name),
+        setting.name, setting.label, value, setting.low, setting.high, unit, getattr(DEFAULTS, setting.name),
         logarithmic=is_size, width=width, title=setting.title, key=setting.key, more=setting.more,
     )  # fmt: skip
     if slid.changed:

@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.ui.theme import Colour, blend, packed, rgb
+from app.ui.units import PERCENT
 from app.ui.widgets import Ui
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def draw(ui: Ui, editor: Editor) -> None:
         part = session.target / session.end if some else 1.0
         with ui.enabled(some):
             slid = ui.slider(
-                "amount", "Amount", part, 0, 1, f"{part:.0%}", 1.0, width=168, title="Amount of the warp",
+                "amount", "Amount", part, 0, 1, PERCENT, 1.0, width=168, title="Amount of the warp",
                 more="Goes back along the way the picture came, so that nothing folds on the way.",
             )  # fmt: skip
         if slid.changed and some:
