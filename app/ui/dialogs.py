@@ -87,7 +87,7 @@ class Dialog(ABC):
                 ui.wrapped(self.problem, ui.palette.accent, 14)
                 imgui.dummy(ImVec2(0, ui.px(4)))
             self._take_note(imgui.get_window_pos(), imgui.get_window_size(), editor)
-            # Escape belongs to the field that is being typed in, or to the topmost dialog: there may be another by then.
+            # Escape belongs to the field that is being typed in, or to the topmost dialog: there may be one more now.
             escaped = imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active()
             going_on = self.body(ui, editor) and self._open
             if escaped and editor.dialogs[-1] is self:
