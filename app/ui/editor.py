@@ -16,6 +16,7 @@ from imgui_bundle.imgui import internal
 from app.errors import UserError
 from app.project import Project
 from app.session import Session
+from app.tools import TOOLS
 from app.ui import panels, theme
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.canvas import Canvas
@@ -26,9 +27,10 @@ from app.ui.exporting import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
 from app.ui.hand import Hand
 from app.ui.host import Host
-from app.ui.layout import Layout
+from app.ui.layout import NARROW, Layout
 from app.ui.messages import Messages
 from app.ui.numbers import Numbers
+from app.ui.panels.strip import GROUP_ENDS
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
 from app.ui.state import LARGEST, SMALLEST, State
@@ -74,7 +76,7 @@ class Editor:
         self.dialogs: list[Dialog] = []
         self.closed = False
         self.clipboard: Callable[[str], None] = imgui.set_clipboard_text
-        self.layout = Layout.of(1280, 800, 1.0, True)
+        self.layout = self._layout(1280, 800)
         self._styled: tuple[object, ...] = ()
         self._held_by_imgui = False
         self._popup_open = False
@@ -223,8 +225,13 @@ class Editor:
             self.clock.stir()
             self.ui.palette = theme.PALETTES[self.preferences.theme]
             theme.apply(self.ui.palette, self.ui.scale)
-        self.layout = Layout.of(*size, self.ui.scale, self.state.inspector)
+        self.layout = self._layout(*size)
         self.view = replace(self.view, canvas=self.layout.canvas, density=density)
+
+    def _layout(self, width: float, height: float) -> Layout:
+        self._is_narrow = width < NARROW * self.ui.scale
+        inspector = self.state.over_narrow if self._is_narrow else self.state.inspector
+        return Layout.of(width, height, self.ui.scale, inspector, len(TOOLS), len(GROUP_ENDS) + 1)
 
     def _hear(self, events: Sequence[Event]) -> None:
         for event in events:
@@ -368,6 +375,9 @@ class Editor:
         self.state.split = 0.5 if self.state.split is None else None
 
     def toggle_inspector(self) -> None:
+        if self._is_narrow:
+            self.state.over_narrow = not self.state.over_narrow
+            return
         self.state.inspector = self.preferences.inspector = not self.state.inspector
         self.preferences.save()
 

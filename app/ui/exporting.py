@@ -311,8 +311,11 @@ class Exports:
         with ui.floating("exporting", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
             imgui.begin_group()
             state = f": {process.state}" if process.state else ""
+            width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
+            imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
             ui.text(f"Exporting {process.job.target.name}{state}", size=14)
-            corner, width = imgui.get_cursor_screen_pos(), ui.px(280)
+            imgui.pop_text_wrap_pos()
+            corner = imgui.get_cursor_screen_pos()
             lines = imgui.get_window_draw_list()
             high = ImVec2(corner.x + width, corner.y + ui.px(5))
             lines.add_rect_filled(corner, high, packed(ui.palette.pressed), ui.px(3))

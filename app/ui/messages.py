@@ -64,7 +64,7 @@ class Messages:
             y -= self._draw_one(ui, canvas, message, len(self.shown) - number, y) + ui.px(8)
 
     def _draw_one(self, ui: Ui, canvas: Rect, message: Message, number: int, y: float) -> float:
-        width = min(ui.px(440), canvas.width - ui.px(32))
+        width = min(ui.px(440), max(canvas.width - ui.px(32), ui.px(240)))
         imgui.set_next_window_pos(ImVec2(canvas.x + canvas.width / 2, y), imgui.Cond_.always, ImVec2(0.5, 1.0))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(14), ui.px(10)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(9))

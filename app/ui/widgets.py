@@ -218,6 +218,13 @@ class Ui:
         imgui.pop_font()
         return clicked
 
+    def segmented_width(self, choices: Sequence[str]) -> float:
+        """What `segmented` takes if no width is asked for."""
+        imgui.push_font(self.fonts.regular, 13.5)
+        width = sum(imgui.calc_text_size(choice).x + self.px(20) for choice in choices)
+        imgui.pop_font()
+        return width
+
     def segmented(self, name: str, choices: Sequence[str], index: int, width: float = 0.0) -> int:
         """One of a few choices side by side; the index that is chosen now."""
         palette, draw = self.palette, imgui.get_window_draw_list()

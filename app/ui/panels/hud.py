@@ -15,6 +15,7 @@ from app.ui.widgets import Ui
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
+ZOOM, HINT = 180.0, 280.0  # points of the canvas's width that what lies on it needs
 WHITE, BLACK = rgb("ffffff"), rgb("000000")
 
 
@@ -30,8 +31,9 @@ def draw(ui: Ui, editor: Editor) -> None:
     if editor.shows_ring:
         _ring(ui, editor, lines)
     lines.pop_clip_rect()
-    _zoom(ui, editor)
-    if editor.state.hint:
+    if canvas.width > ui.px(ZOOM):
+        _zoom(ui, editor)
+    if editor.state.hint and canvas.width > ui.px(HINT):
         _hint(ui, editor)
     if editor.state.statistics:
         _statistics(ui, editor)
@@ -156,7 +158,9 @@ def _zoom(ui: Ui, editor: Editor) -> None:
 
 def _hint(ui: Ui, editor: Editor) -> None:
     canvas = editor.layout.canvas
-    with ui.floating("hint", canvas.x + canvas.width / 2, canvas.bottom - ui.px(14), (0.5, 1), 0.9):
+    # Beside the zoom, or above it.
+    bottom = canvas.bottom - ui.px(14 if canvas.width > ui.px(HINT + 2 * ZOOM) else 54)
+    with ui.floating("hint", canvas.x + canvas.width / 2, bottom, (0.5, 1), 0.9):
         top = imgui.get_cursor_pos_y()
         imgui.dummy(ImVec2(ui.px(4), ui.px(24)))
         imgui.same_line(0, 0)
