@@ -87,10 +87,9 @@ class Dialog(ABC):
                 ui.wrapped(self.problem, ui.palette.accent, 14)
                 imgui.dummy(ImVec2(0, ui.px(4)))
             self._take_note(imgui.get_window_pos(), imgui.get_window_size(), editor)
-            # Escape belongs to the field that is being typed in, or to the topmost dialog: there may be one more now.
-            escaped = imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active()
             going_on = self.body(ui, editor) and self._open
-            if escaped and editor.dialogs[-1] is self:
+            # Only the topmost dialog hears Escape; it may just have opened another one.
+            if imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active() and editor.dialogs[-1] is self:
                 going_on = False
             if not going_on or editor.dialogs[-1] is not self:
                 imgui.close_current_popup()
@@ -121,6 +120,15 @@ class Dialog(ABC):
         elif self._top is None:
             self._top = rect.y
         self.rect = rect
+
+
+def beside(ui: Ui, left: float, right: float) -> None:
+    """Go to the right end of a row that begins with `left` points, or of the next one if `right` more do not fit."""
+    start = imgui.get_window_width() - ui.px(24 + right)
+    if start >= ui.px(24 + left + 8):
+        imgui.same_line(start)
+    else:
+        imgui.set_cursor_pos_x(max(start, ui.px(24)))
 
 
 class Unsaved(Dialog):
@@ -166,7 +174,7 @@ class PictureOrMap(Dialog):
         imgui.dummy(ImVec2(0, ui.px(8)))
         if ui.button("Cancel", width=96):
             return False
-        imgui.same_line(imgui.get_window_width() - ui.px(24 + 144 + 8 + 112))
+        beside(ui, 96, 144 + 8 + 112)
         chosen = None
         if ui.button("Use as map", width=112):
             chosen = self._use

@@ -17,7 +17,7 @@ from app.export_process import ExportProcess
 from app.pictures import read_picture
 from app.session import Session
 from app.ui.canvas import shown_pixels
-from app.ui.dialogs import Dialog
+from app.ui.dialogs import Dialog, beside
 from app.ui.messages import Messages
 from app.ui.theme import packed
 from app.ui.units import SECONDS, Unit
@@ -246,7 +246,7 @@ class StillExporting(Dialog):
         if ui.button("Stop it and quit", width=132):
             self._leave()
             return False
-        imgui.same_line(imgui.get_window_width() - ui.px(24 + 96 + 8 + 148))
+        beside(ui, 132, 96 + 8 + 148)
         if ui.button("Cancel##leaving", width=96):
             return False
         imgui.same_line()

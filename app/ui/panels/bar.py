@@ -182,6 +182,8 @@ def _right(ui: Ui, editor: Editor) -> None:
 
 def _menu(ui: Ui, editor: Editor) -> None:
     imgui.set_next_window_pos(ImVec2(ui.px(8), editor.layout.bar.height))
+    below = imgui.get_io().display_size.y - editor.layout.bar.height - ui.px(8)
+    imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(imgui.get_io().display_size.x, below))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(7)))
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(8), ui.px(8)))
     if imgui.begin_popup("main menu"):

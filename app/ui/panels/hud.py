@@ -15,7 +15,7 @@ from app.ui.widgets import Ui
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-ZOOM, HINT = 180.0, 280.0  # points of the canvas's width that what lies on it needs
+ZOOM, HINT = 160.0, 260.0  # points of the canvas's width that what lies on it needs
 WHITE, BLACK = rgb("ffffff"), rgb("000000")
 
 
