@@ -137,11 +137,11 @@ def test_the_wheel_goes_through_the_history(desk: Desk) -> None:
     desk.until(lambda: differs(desk.seen(), before, 1016, 570, 1270, 690), "the history to move")
 
 
-@pytest.mark.parametrize("name", ["pattern.png", "render", "work.toml"])
+@pytest.mark.parametrize("name", ["pattern.png", "render", "pattern.toml"])
 def test_a_file_alone_is_opened(tmp_path: Path, name: str) -> None:
     write_picture(tmp_path / "pattern.png", pattern())
     (tmp_path / "render").write_bytes((tmp_path / "pattern.png").read_bytes())
-    (tmp_path / "work.toml").write_text('picture = "pattern.png"\nduration = 0.1\n')
+    (tmp_path / "pattern.toml").write_text('picture = "pattern.png"\nduration = 0.1\n')
     desk = Desk(tmp_path)
     try:
         desk.open(tmp_path / name)
