@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Optional
 
 import typer
+from typer.core import TyperGroup
 
 from app.errors import Cancelled, UserError, shown
 from app.progress import INTERRUPTED
@@ -19,8 +20,26 @@ if TYPE_CHECKING:
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
+
+class CommandOrFile(TyperGroup):
+    """The commands; what is none of them is a file, which the editor opens."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name = args[0]
+        # A command stays one whatever lies in the folder: a file of that name is ./render.
+        if name in self.commands or name.startswith("-"):
+            return super().resolve_command(ctx, args)
+        if os.path.exists(name):
+            return super().resolve_command(ctx, ["edit", *args])
+        if Path(name).suffix or Path(name).name != name:
+            raise UserError(f"{name} does not exist; check the name of the picture, recipe or project")
+        raise UserError(f"{name} is neither a file nor a command; the commands are {', '.join(self.commands)}", 2)
+
+
 cli = typer.Typer(
     name="fluidwarp",
+    cls=CommandOrFile,
+    subcommand_metavar="[FILE | COMMAND [ARGS]...]",
     help="Warp pictures by pushing them about as a fluid of varying viscosity.",
     no_args_is_help=False,
     add_completion=False,
@@ -74,7 +93,7 @@ def start(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Say which version this is.")] = False,
 ) -> None:
-    """Without a command, opens the editor."""
+    """Without a command, opens the editor; with a picture, a recipe or a project alone, on that."""
     if version:
         from importlib.metadata import version as installed
 

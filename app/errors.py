@@ -25,12 +25,13 @@ class UserError(Exception):
     """Something a user can mend: one line naming the file, key or number, and the mend.
 
     What it says is `shown`, whatever names are in it. The command line prints it and exits with `status`; the window
-    shows it in a message.
+    shows it as `in_window`, where that differs: it has none of the command line's options.
     """
 
-    def __init__(self, message: str, status: int = 1) -> None:
+    def __init__(self, message: str, status: int = 1, in_window: str = "") -> None:
         super().__init__(shown(message))
         self.status = status
+        self.in_window = shown(in_window or message)
 
 
 class Cancelled(Exception):

@@ -85,6 +85,6 @@ def _work(job: Job, pipe: Connection, wish: Any) -> None:
     except Cancelled:
         pipe.send(("cancelled", ""))
     except UserError as error:
-        pipe.send(("error", str(error)))
+        pipe.send(("error", error.in_window))
     except Exception as error:
         pipe.send(("error", f"The export failed: {error}"))

@@ -59,7 +59,8 @@ def check_picture(picture: Picture, cells: int) -> None:
         needed = math.ceil(SMALLEST_GRID * longer / shorter)
         if needed > FINEST_GRID:
             raise UserError(f"{size}, too narrow for any grid; crop it")
-        raise UserError(f"{size}, too narrow for a grid of {cells}; use --grid {needed} or more, or crop it")
+        narrow = f"{size}, too narrow for a grid of {cells}"
+        raise UserError(f"{narrow}; use --grid {needed} or more, or crop it", in_window=f"{narrow}; crop it")
 
 
 @dataclass(frozen=True)

@@ -306,9 +306,10 @@ def unheld(path: str | os.PathLike[str], picture: Picture) -> str:
 def check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
     """Raise `UserError` for more than `max_pixels`, telling how to raise the limit."""
     if width * height > max_pixels:
+        size = f"Cannot read {file}: {width} x {height} pixels are more than the limit of {max_pixels}"
         raise UserError(
-            f"Cannot read {file}: {width} x {height} pixels are more than the limit of {max_pixels}; "
-            f"if you trust the file, raise it with --max-pixels {width * height}."
+            f"{size}; if you trust the file, raise it with --max-pixels {width * height}.",
+            in_window=f"{size}; make it smaller first.",
         )
 
 

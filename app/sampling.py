@@ -72,7 +72,11 @@ class Pictures:
         if name not in self._maps:
             given = read_map(self.folder / name)
             if given.forward:
-                raise UserError(f"{name} tells where each point goes; turn it round with: fluidwarp convert --invert")
+                goes = f"{name} tells where each point goes"
+                raise UserError(
+                    f"{goes}; turn it round with: fluidwarp convert --invert",
+                    in_window=f"{goes}, and what is needed is where it comes from; write it the other way round.",
+                )
             self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
             if folded := folds(self._maps[name]):
                 self.notice(f"{name} folds over itself in {folded} of its pixels")

@@ -172,9 +172,8 @@ def tell_states() -> None:
 
 def paint(folder: Path, root: Path, seed: int) -> None:
     """Paint on a picture made in `folder`, without a window, until somebody puts an end to it."""
-    from solver.context import Device
-
     from editing import Robot, small_project
+    from solver.gl.device import Device
 
     tell_states()
     dice = random.Random(seed)

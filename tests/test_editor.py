@@ -599,7 +599,7 @@ def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_pat
     rect = dialog.rect
     robot.click(rect.x + 100, rect.y + 130)
     assert not dialog.embed
-    robot.click(rect.right - 60, rect.bottom - 36)
+    robot.click(dialog.rect.right - 60, dialog.rect.bottom - 36)
     robot.frame(count=2)
     assert not robot.editor.dialogs
     small = projects.load(tmp_path / "small.fluidwarp")

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from solver.context import Device
 
 from app import project as projects
 from app import recovery
@@ -30,6 +29,7 @@ from app.strokes import Stroke
 from app.ui.recovering import Offer
 from editing import Robot, small_project
 from killing import Painter, digest_of, digest_of_warp
+from solver.gl.device import Device
 
 
 def until(condition: Callable[[], bool]) -> None:

@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 SLOWEST = 0.1  # seconds of one frame that count: after a pause, time does not leap
+FRAMES = 4  # until sizes have come to rest that follow from one another: of a window that fits what is in it
+HOVERING = 0.7  # seconds; longer than the pointer has to rest on anything before something happens
+PACE = 0.05  # seconds between frames that only wait for that
 
 
 class Clock:
@@ -14,21 +17,23 @@ class Clock:
 
     Attributes:
         milliseconds: of the parts of a frame, smoothed.
-        settling: frames to draw yet after the last event, for what imgui shows a frame late.
     """
 
     def __init__(self) -> None:
         self.milliseconds: dict[str, float] = {}
-        self.settling = 3
+        self._frames, self._hovering = FRAMES, HOVERING
         self._owed = 0.0
+        self._moved = False
 
     def ticks(self, dt: float, tick: float, moving: bool) -> int:
         """Ticks of `tick` seconds that `dt` seconds are worth, at most two; what is left over is kept."""
         if not moving:
             # The first frame of a movement makes a tick at once: what is done is seen in the very next frame.
-            self._owed = tick
+            self._owed, self._moved = tick, False
             return 0
-        self._owed = min(self._owed + min(dt, SLOWEST), 2.5 * tick)
+        # Nor does the rest before a movement count.
+        self._owed = min(self._owed + min(dt, SLOWEST if self._moved else tick), 2.5 * tick)
+        self._moved = True
         # A little early rather than a frame late: screens and ticks are never quite in step.
         count = int(self._owed / tick + 0.1)
         self._owed -= count * tick
@@ -42,5 +47,21 @@ class Clock:
         before = self.milliseconds.get(name, spent)
         self.milliseconds[name] = before + 0.15 * (spent - before)
 
-    def frame_done(self) -> None:
-        self.settling = max(self.settling - 1, 0)
+    def stir(self) -> None:
+        """Something has happened, of which imgui shows a part some frames or a hover delay later."""
+        self._frames, self._hovering = FRAMES, HOVERING
+
+    @property
+    def settling(self) -> bool:
+        """Sizes may still change."""
+        return self._frames > 0
+
+    @property
+    def hovering(self) -> bool:
+        """What comes to a pointer that rests may still come."""
+        return self._hovering > 0
+
+    def elapse(self, dt: float) -> None:
+        """A frame begins, `dt` seconds after the last one."""
+        self._frames = max(self._frames - 1, 0)
+        self._hovering = max(self._hovering - dt, 0.0)

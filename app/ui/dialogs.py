@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.errors import UserError
 from app.ui.actions import ACTIONS
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui, keys_shown
@@ -21,15 +22,22 @@ class Dialog(ABC):
     """A window over everything, until it is answered or Escape is pressed.
 
     Attributes:
+        width, height: in points of the design; a height of 0 is that of what is in it.
+        tallest: to which it may grow; it begins as high up as leaves room for that.
         rect: where it was drawn last.
+        problem: why what the person wanted of it could not be done.
     """
 
     width, height = 480.0, 0.0
+    tallest = 0.0
 
     def __init__(self, title: str) -> None:
         self.title = title
         self.rect = Rect(0, 0, 0, 0)
+        self.problem = ""
         self._open = True
+        self._top: float | None = None
+        self._placed_for: tuple[float, float, float] | None = None
 
     @property
     def is_busy(self) -> bool:
@@ -38,6 +46,15 @@ class Dialog(ABC):
 
     def close(self) -> None:
         self._open = False
+
+    def attempt(self, doing: Callable[[], object]) -> bool:
+        """Do what the person wants; True if it went well. What went wrong is told here: a message would lie below."""
+        self.problem = ""
+        try:
+            doing()
+        except UserError as error:
+            self.problem = error.in_window
+        return not self.problem
 
     @abstractmethod
     def body(self, ui: Ui, editor: Editor) -> bool:
@@ -48,11 +65,11 @@ class Dialog(ABC):
         name = f"###dialog{id(self)}"
         if not imgui.is_popup_open(name):
             imgui.open_popup(name)
-        display = imgui.get_io().display_size
-        imgui.set_next_window_pos(ImVec2(display.x / 2, display.y / 2), imgui.Cond_.always, ImVec2(0.5, 0.5))
-        width = min(ui.px(self.width), display.x - ui.px(32))
-        height = min(ui.px(self.height), display.y - ui.px(32)) if self.height else 0.0
-        imgui.set_next_window_size(ImVec2(width, height))
+        display, edge = imgui.get_io().display_size, ui.px(16)
+        self._place(ui, display, edge)
+        width, highest = min(ui.px(self.width), display.x - 2 * edge), max(display.y - 2 * edge, 1.0)
+        imgui.set_next_window_size(ImVec2(width, min(ui.px(self.height), highest)))
+        imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, highest))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(24), ui.px(20)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(12))
         flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
@@ -66,8 +83,10 @@ class Dialog(ABC):
         try:
             ui.text(self.title, size=19, bold=True)
             imgui.dummy(ImVec2(0, ui.px(4)))
-            corner, size = imgui.get_window_pos(), imgui.get_window_size()
-            self.rect = Rect(corner.x, corner.y, size.x, size.y)
+            if self.problem:
+                ui.wrapped(self.problem, ui.palette.accent, 14)
+                imgui.dummy(ImVec2(0, ui.px(4)))
+            self._take_note(imgui.get_window_pos(), imgui.get_window_size(), editor)
             going_on = self.body(ui, editor) and self._open
             # Only the topmost dialog hears Escape; it may just have opened another one.
             if imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active() and editor.dialogs[-1] is self:
@@ -80,6 +99,36 @@ class Dialog(ABC):
             editor.dialogs.remove(self)
             return True
         return going_on
+
+    def _place(self, ui: Ui, display: ImVec2, edge: float) -> None:
+        """In the middle, and then with its head where it is: what is in it changes under a pointer that rests."""
+        if self._placed_for != (display.x, display.y, ui.scale):
+            self._placed_for, self._top = (display.x, display.y, ui.scale), None
+            if self.tallest:
+                self._top = max((display.y - ui.px(self.tallest)) / 2, edge)
+        if self._top is None:
+            imgui.set_next_window_pos(ImVec2(display.x / 2, display.y / 2), imgui.Cond_.always, ImVec2(0.5, 0.5))
+        else:
+            top = max(min(self._top, display.y - edge - self.rect.height), edge)
+            imgui.set_next_window_pos(ImVec2(display.x / 2, top), imgui.Cond_.always, ImVec2(0.5, 0.0))
+
+    def _take_note(self, corner: ImVec2, size: ImVec2, editor: Editor) -> None:
+        """Remember where it is; its size follows what is in it a frame later."""
+        rect = Rect(corner.x, corner.y, size.x, size.y)
+        if (rect.width, rect.height) != (self.rect.width, self.rect.height):
+            editor.clock.stir()
+        elif self._top is None:
+            self._top = rect.y
+        self.rect = rect
+
+
+def beside(ui: Ui, left: float, right: float) -> None:
+    """Go to the right end of a row that begins with `left` points, or of the next one if `right` more do not fit."""
+    start = imgui.get_window_width() - ui.px(24 + right)
+    if start >= ui.px(24 + left + 8):
+        imgui.same_line(start)
+    else:
+        imgui.set_cursor_pos_x(max(start, ui.px(24)))
 
 
 class Unsaved(Dialog):
@@ -125,7 +174,7 @@ class PictureOrMap(Dialog):
         imgui.dummy(ImVec2(0, ui.px(8)))
         if ui.button("Cancel", width=96):
             return False
-        imgui.same_line(imgui.get_window_width() - ui.px(24 + 144 + 8 + 112))
+        beside(ui, 96, 144 + 8 + 112)
         chosen = None
         if ui.button("Use as map", width=112):
             chosen = self._use
@@ -168,7 +217,8 @@ class Shortcuts(Dialog):
         ]
         columns = (("File", "Edit", "Time"), ("Tools", "Brush"), ("View", "Help", "Mouse"))
         imgui.begin_child("keys", ImVec2(0, -ui.px(44)))
-        if imgui.begin_table("sheet", 3, imgui.TableFlags_.sizing_stretch_same):
+        across = min(max(int(imgui.get_content_region_avail().x / ui.px(230)), 1), len(columns))
+        if imgui.begin_table("sheet", across, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_row()
             for column in columns:
                 imgui.table_next_column()

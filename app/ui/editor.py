@@ -17,19 +17,21 @@ from app.errors import UserError
 from app.project import Project
 from app.recovery import Found
 from app.session import Session
+from app.tools import TOOLS
 from app.ui import panels, theme
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.canvas import Canvas
-from app.ui.clock import Clock
+from app.ui.clock import PACE, Clock
 from app.ui.dialogs import Dialog, Preferring, Shortcuts, Unsaved
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Wheel
 from app.ui.exporting import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
 from app.ui.hand import Hand
 from app.ui.host import Host
-from app.ui.layout import Layout
+from app.ui.layout import NARROW, Layout
 from app.ui.messages import Messages
 from app.ui.numbers import Numbers
+from app.ui.panels.strip import GROUP_ENDS
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
 from app.ui.recovering import Recovery
@@ -84,7 +86,7 @@ class Editor:
         self.dialogs: list[Dialog] = []
         self.closed = False
         self.clipboard: Callable[[str], None] = imgui.set_clipboard_text
-        self.layout = Layout.of(1280, 800, 1.0, True)
+        self.layout = self._layout(1280, 800)
         self._styled: tuple[object, ...] = ()
         self._held_by_imgui = False
         self._popup_open = False
@@ -202,6 +204,8 @@ class Editor:
             scale: of the interface, as the screen asks for; the preferences' own comes on top.
         """
         begun = time.perf_counter()
+        self.clock.elapse(dt)
+        self.messages.elapse(dt)
         with self.clock.measure("frame"):
             self._lay_out((size[0] / density, size[1] / density), density, scale)
             self._hear(events)
@@ -211,19 +215,20 @@ class Editor:
             self.quality.look(dt)
             self._draw(target, size, dt, events)
             self.recovery.keep()
-        self.clock.frame_done()
         if self.quality.is_measuring:
             self.quality.warm_up(begun)
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
         busy = self.quality.is_measuring or self.quality.is_preparing
-        return busy or self.session.is_moving or self.clock.settling > 0
+        return busy or self.session.is_moving or self.clock.settling
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""
         if self.wants_frame():
             return 0.0
+        if self.clock.hovering:
+            return PACE
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
         elsewhere = self.exports.is_running or self.files.is_waiting or self.files.is_loading or self.recovery.is_busy
         if elsewhere or any(dialog.is_busy for dialog in self.dialogs):
@@ -236,18 +241,24 @@ class Editor:
         styled = (self.preferences.theme, self.ui.scale)
         if styled != self._styled:
             self._styled = styled
+            self.clock.stir()
             self.ui.palette = theme.PALETTES[self.preferences.theme]
             theme.apply(self.ui.palette, self.ui.scale)
-        self.layout = Layout.of(*size, self.ui.scale, self.state.inspector)
+        self.layout = self._layout(*size)
         self.view = replace(self.view, canvas=self.layout.canvas, density=density)
+
+    def _layout(self, width: float, height: float) -> Layout:
+        self._is_narrow = width < NARROW * self.ui.scale
+        inspector = self.state.over_narrow if self._is_narrow else self.state.inspector
+        return Layout.of(width, height, self.ui.scale, inspector, len(TOOLS), len(GROUP_ENDS) + 1)
 
     def _hear(self, events: Sequence[Event]) -> None:
         for event in events:
-            self.clock.settling = 3
+            self.clock.stir()
             try:
                 self._hear_one(event)
             except UserError as error:
-                self.messages.warn(str(error))
+                self.messages.warn(error.in_window)
 
     def _hear_one(self, event: Event) -> None:
         match event:
@@ -286,7 +297,7 @@ class Editor:
         try:
             action.run(self)
         except UserError as error:
-            self.messages.warn(str(error))
+            self.messages.warn(error.in_window)
 
     def _draw(self, target: moderngl.Framebuffer, size: tuple[int, int], dt: float, events: Sequence[Event]) -> None:
         target.viewport = (0, 0, *size)
@@ -307,13 +318,13 @@ class Editor:
                     self.session.notice = None
                 self.exports.draw(self.ui, self.layout.canvas)
                 self.files.draw(self.ui, self.layout.canvas)
-                self.messages.draw(self.ui, self.layout.canvas, dt)
+                self.messages.draw(self.ui, self.layout.canvas)
                 self._draw_dialog()
             names, self._once_typed = self._once_typed, []
             for name in names:
                 self.do(name)
         except UserError as error:
-            self.messages.warn(str(error))
+            self.messages.warn(error.in_window)
         io = imgui.get_io()
         self._held_by_imgui = io.want_capture_mouse
         self._is_typing_now = io.want_text_input
@@ -340,7 +351,7 @@ class Editor:
         """True if nothing lies over the canvas at a point of the screen."""
         if self.dialogs or self._popup_open or not self.layout.canvas.contains(x, y):
             return False
-        return not any(rect.contains(x, y) for rect in panels.floating_rects())
+        return not any(rect.contains(x, y) for rect in self.ui.covers)
 
     @property
     def shows_ring(self) -> bool:
@@ -384,6 +395,9 @@ class Editor:
         self.state.split = 0.5 if self.state.split is None else None
 
     def toggle_inspector(self) -> None:
+        if self._is_narrow:
+            self.state.over_narrow = not self.state.over_narrow
+            return
         self.state.inspector = self.preferences.inspector = not self.state.inspector
         self.preferences.save()
 
@@ -412,7 +426,9 @@ class Editor:
 
     def ask_export(self) -> None:
         self.session.release()
-        self.dialogs.append(ExportDialog(self.session, self.preferences.folder))
+        likes = self.preferences
+        folder = next((name for name in (likes.export_folder, likes.folder) if name and Path(name).is_dir()), "")
+        self.dialogs.append(ExportDialog(self.session, folder))
 
     def ask_quit(self) -> None:
         """Leave, after having asked about what is not saved and what is being exported."""

@@ -12,16 +12,16 @@ import moderngl
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.errors import UserError
 from app.export import Job, MapOutput
 from app.export_process import ExportProcess
 from app.leftovers import temporary_folder
 from app.pictures import read_picture
 from app.session import Session
 from app.ui.canvas import shown_pixels
-from app.ui.dialogs import Dialog
+from app.ui.dialogs import Dialog, beside
 from app.ui.messages import Messages
 from app.ui.theme import packed
+from app.ui.units import SECONDS, Unit
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 
@@ -47,7 +47,7 @@ class ExportDialog(Dialog):
         offsets: an EXR or TIFF map holds offsets in pixels.
     """
 
-    width = 500
+    width, tallest = 500, 560
 
     def __init__(self, session: Session, folder: str) -> None:
         super().__init__("Export")
@@ -110,25 +110,29 @@ class ExportDialog(Dialog):
         return Job(recipe, self.picture, session.project.folder, self.output)
 
     def body(self, ui: Ui, editor: Editor) -> bool:
+        # Enter belongs to the field that is being typed in, or to what the arrows have gone to.
+        entered = imgui.is_key_pressed(imgui.Key.enter, False)
+        entered = entered and not imgui.is_any_item_active() and not imgui.get_io().nav_visible
         self._choose(ui.segmented("kind", [label for label, _ in KINDS], self.kind, -1))
         choices = KINDS[self.kind][1]
         self.format[self.kind] = ui.segmented("format", [label for label, _ in choices], self.format[self.kind], -1)
         own = max(self.picture.width, self.picture.height)
         width, height = (round(side * self.size / own) for side in (self.picture.width, self.picture.height))
-        slid = ui.slider("size", "Size", self.size, 16, max(own * 2, 64), f"{width} x {height} pixels", own)
+        unit, shown = Unit(" pixels", self.picture.width / own), f"{width} x {height} pixels"
+        slid = ui.slider("size", "Size", self.size, 16, max(own * 2, 64), unit, own, shown)
         self.size = round(slid.value)
         if self.ending in (".jpg", ".mp4"):
-            slid = ui.slider("quality", "Quality", self.quality, 1, 100, f"{self.quality}", 90)
+            slid = ui.slider("quality", "Quality", self.quality, 1, 100, default=90)
             self.quality = round(slid.value)
         if self.kind == MAP:
             self._ask_about_map(ui)
         if self.animation:
             seconds = self.session.end * self.session.dt
-            slid = ui.slider("fps", "Frames a second", self.fps, 1, 60, f"{self.fps:g}", 30)
+            slid = ui.slider("fps", "Frames a second", self.fps, 1, 60, default=30)
             self.fps = float(round(slid.value))
             if seconds > 0:
-                self.start = ui.slider("from", "From", self.start, 0, seconds, f"{self.start:.2f} s", 0.0).value
-                self.end = ui.slider("to", "To", self.end, 0, seconds, f"{self.end:.2f} s", seconds).value
+                self.start = ui.slider("from", "From", self.start, 0, seconds, SECONDS, 0.0).value
+                self.end = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds).value
         ui.dim("Simulate on the grid")
         self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
         if self.finer and self.kind != MAP:
@@ -149,10 +153,9 @@ class ExportDialog(Dialog):
         if ui.button("Cancel", width=96):
             return False
         imgui.same_line()
-        with ui.enabled(bool(self.name.strip()) and not editor.exports.is_running):
-            entered = imgui.is_key_pressed(imgui.Key.enter) and not imgui.is_any_item_active()
-            if ui.button("Export", primary=True, width=96) or entered:
-                return not self._start(editor)
+        with ui.enabled(self._can_start(editor)):
+            if ui.button("Export", primary=True, width=96) or (entered and self._can_start(editor)):
+                return not self.attempt(lambda: self._start(editor))
         return True
 
     def _choose(self, kind: int) -> None:
@@ -188,9 +191,8 @@ class ExportDialog(Dialog):
             ui.dim(f"Making a preview: {process.part:.0%}")
             if process.is_done:
                 self._preview = None
-                if process.error:
-                    editor.messages.warn(process.error)
-                else:
+                self.problem = process.error
+                if not process.error:
                     self._image = _texture(editor, process.job.target)
         if self._image is not None:
             width = imgui.get_content_region_avail().x
@@ -198,14 +200,12 @@ class ExportDialog(Dialog):
             across = height * self._image.width / self._image.height
             imgui.image(imgui.ImTextureRef(self._image.glo), ImVec2(across, height))
 
-    def _start(self, editor: Editor) -> bool:
-        try:
-            editor.exports.start(self.job())
-        except UserError as error:
-            editor.messages.warn(str(error))
-            return False
-        editor.preferences.folder = str(self.folder)
-        return True
+    def _can_start(self, editor: Editor) -> bool:
+        return bool(self.name.strip()) and not editor.exports.is_running
+
+    def _start(self, editor: Editor) -> None:
+        editor.exports.start(self.job())
+        editor.preferences.exported(self.output)
 
     def _chosen(self, path: Path) -> None:
         name = path.name
@@ -247,7 +247,7 @@ class StillExporting(Dialog):
         if ui.button("Stop it and quit", width=132):
             self._leave()
             return False
-        imgui.same_line(imgui.get_window_width() - ui.px(24 + 96 + 8 + 148))
+        beside(ui, 132, 96 + 8 + 148)
         if ui.button("Cancel##leaving", width=96):
             return False
         imgui.same_line()
@@ -314,8 +314,11 @@ class Exports:
         with ui.floating("exporting", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
             imgui.begin_group()
             state = f": {process.state}" if process.state else ""
+            width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
+            imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
             ui.text(f"Exporting {process.job.target.name}{state}", size=14)
-            corner, width = imgui.get_cursor_screen_pos(), ui.px(280)
+            imgui.pop_text_wrap_pos()
+            corner = imgui.get_cursor_screen_pos()
             lines = imgui.get_window_draw_list()
             high = ImVec2(corner.x + width, corner.y + ui.px(5))
             lines.add_rect_filled(corner, high, packed(ui.palette.pressed), ui.px(3))

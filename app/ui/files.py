@@ -17,7 +17,7 @@ from app.errors import UserError
 from app.maps import MAP_ENDINGS, holds
 from app.opening import PICTURE_ENDINGS, check_picture
 from app.project import SUFFIX, Project
-from app.recipe import Recipe
+from app.recipe import FluidSettings, Recipe
 from app.recovery import Found
 from app.ui.browser import Browser
 from app.ui.dialogs import PictureOrMap
@@ -85,7 +85,13 @@ class Files:
 
     def open_work(self, path: Path) -> None:
         """Open a picture, a recipe or a project, after asking about unsaved work."""
-        self.editor.unless_unsaved("open something else", lambda: self._open(path, lambda: load_any(path)))
+        fluid = self._feel()
+        self.editor.unless_unsaved("open something else", lambda: self._open(path, lambda: load_any(path, fluid)))
+
+    def _feel(self) -> dict[str, Any]:
+        """What the person has set of the fluid; a recipe with forces of its own has been set by nobody here."""
+        session = self.editor.session
+        return {} if session.recipe.force else settings_of(session.recipe.fluid_at(session.tick))
 
     def apply(self, path: Path) -> None:
         """Do to another picture what has been done to this one."""
@@ -153,7 +159,7 @@ class Files:
             editor.open(loading.project, loading.pixels, loading.found)
         except UserError as error:
             self._leave(loading)
-            editor.messages.warn(str(error))
+            editor.messages.warn(error.in_window)
             return
         editor.preferences.opened(loading.path)
         for notice in editor.session.pictures.notices:
@@ -203,9 +209,21 @@ class Files:
         self.editor.dialogs.append(SaveDialog(self.editor, path, then))
 
     def save_as(self, path: Path, embed: bool | None = None) -> bool:
-        """Save the project; True if it could be done. What is still moving comes to rest first.
+        """Save the project as `write` does; True if it could be done."""
+        try:
+            self.write(path, embed)
+        except UserError as error:
+            self.editor.messages.warn(error.in_window)
+            return False
+        return True
+
+    def write(self, path: Path, embed: bool | None = None) -> None:
+        """Save the project. What is still moving comes to rest first.
 
         `embed`: the picture is kept in it; None is as it was saved last, or else as the person likes.
+
+        Raises:
+            UserError: if it cannot be done.
         """
         from dataclasses import replace
 
@@ -217,14 +235,9 @@ class Files:
         project = replace(session.project, recipe=session.document.recipe)
         if embed is None:
             embed = project.embedded if project.path is not None else editor.preferences.embed
-        try:
-            session.saved(projects.save(project, path, embed))
-        except UserError as error:
-            editor.messages.warn(str(error))
-            return False
+        session.saved(projects.save(project, path, embed))
         editor.preferences.opened(path)
         editor.messages.done(f"Saved {path.name}")
-        return True
 
     # -- choosing a file --------------------------------------------------------------------------------------------
 
@@ -300,8 +313,10 @@ class Files:
         return found
 
 
-def load_any(path: Path) -> Project:
+def load_any(path: Path, fluid: dict[str, Any] | None = None) -> Project:
     """The project behind a picture, a recipe or a project file.
+
+    `fluid`: settings with which the work on a picture begins.
 
     Raises:
         UserError: if it is none of them, or cannot be read.
@@ -311,15 +326,20 @@ def load_any(path: Path) -> Project:
     elif projects.is_project(path):
         project = projects.load(path)
     else:
-        project = projects.from_picture(path, fresh_recipe())
+        project = projects.from_picture(path, fresh_recipe(fluid))
     check_picture(project.picture, project.recipe.fluid.grid)
     return project
 
 
-def fresh_recipe() -> Recipe:
-    """What a picture that is newly opened starts with."""
+def settings_of(fluid: FluidSettings) -> dict[str, Any]:
+    """What the inspector sets of a fluid."""
+    return {name: getattr(fluid, name) for name in ("viscosity", "drag", "walls")}
+
+
+def fresh_recipe(settings: dict[str, Any] | None = None) -> Recipe:
+    """What a picture that is newly opened starts with: the default, and what of the fluid the person has set."""
     from app.presets import DEFAULT
-    from app.recipe import FluidSettings
 
     fluid = FluidSettings(dt=1 / 30, viscosity=DEFAULT.viscosity, drag=DEFAULT.drag)
+    fluid = fluid.model_copy(update=settings or {})
     return Recipe(duration=fluid.dt, fluid=fluid, edges="clamp")

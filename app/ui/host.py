@@ -40,6 +40,8 @@ class Host:
         # Events are taken as they come: spread over frames by imgui, a fast drag would lag behind the pointer.
         io.config_input_trickle_event_queue = True
         io.config_nav_cursor_visible_auto = True
+        # At rest nothing is drawn, and a cursor that blinks might rest while it is not to be seen.
+        io.config_input_text_cursor_blink = False
         self.fonts = theme.load_fonts()
         imgui.backends.opengl3_init("#version 330")
 
@@ -51,6 +53,9 @@ class Host:
         # Only in dialogs and menus: elsewhere Space, Tab and the arrows are the editor's.
         through = imgui.ConfigFlags_.nav_enable_keyboard.value
         io.config_flags = io.config_flags | through if by_keys else io.config_flags & ~through
+        # imgui goes through number fields by Tab without that flag too; it may from one that is being typed in.
+        if not (by_keys or io.want_text_input):
+            events = [event for event in events if not (isinstance(event, Key) and event.key == "tab")]
         io.display_size = imgui.ImVec2(*size)
         io.display_framebuffer_scale = imgui.ImVec2(density, density)
         io.delta_time = max(dt, 1e-4)

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from app.ui.viewport import Rect
 
 BAR, STRIP, INSPECTOR, TIMEBAR = 48.0, 48.0, 272.0, 56.0
+# In a window narrower than this the inspector would leave the picture too little; it comes when it is asked for.
+NARROW = 720.0
+TOOL, BETWEEN, GROUP = 40.0, 4.0, 10.0  # heights in the strip: of a tool, between two, and more between two groups
 
 
 @dataclass(frozen=True)
@@ -18,16 +21,37 @@ class Layout:
     inspector: Rect | None
     timebar: Rect
     canvas: Rect
+    columns: int
 
     @classmethod
-    def of(cls, width: float, height: float, scale: float, inspector: bool) -> Layout:
-        bar, strip, time = BAR * scale, STRIP * scale, TIMEBAR * scale
-        side = INSPECTOR * scale if inspector and width > 860 * scale else 0.0
+    def of(cls, width: float, height: float, scale: float, inspector: bool, tools: int, groups: int) -> Layout:
+        """The layout of a window.
+
+        Args:
+            width, height: of the window, in points.
+            scale: of the interface.
+            inspector: it is open.
+            tools, groups: how many tools there are, and groups of them.
+        """
+        bar, time = BAR * scale, TIMEBAR * scale
         middle = max(height - bar - time, 1.0)
+        columns = _columns(middle / scale, tools, groups)
+        strip = (STRIP + (columns - 1) * (TOOL + BETWEEN)) * scale
+        side = min(INSPECTOR * scale, width - strip) if inspector else 0.0
         return cls(
+            columns=columns,
             bar=Rect(0, 0, width, bar),
             strip=Rect(0, bar, strip, middle),
             inspector=Rect(width - side, bar, side, middle) if side else None,
             timebar=Rect(0, height - time, width, time),
             canvas=Rect(strip, bar, max(width - strip - side, 1.0), middle),
         )
+
+
+def _columns(height: float, tools: int, groups: int) -> int:
+    """Into how many columns the tools go so that all are seen; one if they fit below each other."""
+    room = height - 16
+    if tools * (TOOL + BETWEEN) - BETWEEN + (groups - 1) * GROUP <= room:
+        return 1
+    rows = max(int((room + BETWEEN) / (TOOL + BETWEEN)), 1)
+    return max(-(-tools // rows), 2)

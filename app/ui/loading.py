@@ -56,7 +56,7 @@ class Loading:
             self.pixels = shown_pixels(project.picture, self.largest)
             self.project = project
         except UserError as error:
-            self.error = str(error)
+            self.error = error.in_window
         except MemoryError:
             self.error = f"There is not enough memory to open {self.path}."
         except Exception as error:

@@ -44,29 +44,27 @@ class Messages:
         self._add(Message(text, "check"))
 
     @property
-    def is_passing(self) -> bool:
-        """True while time has to go on for a message to go."""
-        return any(message.left is not None for message in self.shown)
-
-    @property
     def next_in(self) -> float | None:
         """Seconds until the next message goes."""
         waits = [message.left for message in self.shown if message.left is not None]
         return min(waits) if waits else None
 
-    def draw(self, ui: Ui, canvas: Rect, dt: float) -> None:
-        """Draw them on the canvas, the newest lowest."""
+    def elapse(self, dt: float) -> None:
+        """Let `dt` seconds go by."""
         for message in list(self.shown):
             if message.left is not None:
                 message.left -= dt
                 if message.left <= 0:
                     self.shown.remove(message)
+
+    def draw(self, ui: Ui, canvas: Rect) -> None:
+        """Draw them on the canvas, the newest lowest."""
         y = canvas.bottom - ui.px(60)
         for number, message in enumerate(reversed(self.shown)):
             y -= self._draw_one(ui, canvas, message, len(self.shown) - number, y) + ui.px(8)
 
     def _draw_one(self, ui: Ui, canvas: Rect, message: Message, number: int, y: float) -> float:
-        width = min(ui.px(440), canvas.width - ui.px(32))
+        width = min(ui.px(440), max(canvas.width - ui.px(32), ui.px(240)))
         imgui.set_next_window_pos(ImVec2(canvas.x + canvas.width / 2, y), imgui.Cond_.always, ImVec2(0.5, 1.0))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(14), ui.px(10)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(9))
@@ -87,6 +85,7 @@ class Messages:
         imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() - ui.px(2))
         if ui.icon_button(f"close {number}", "close", size=22, icon_size=13):
             self.shown.remove(message)
+        ui.cover()
         height = imgui.get_window_height()
         imgui.end()
         return height

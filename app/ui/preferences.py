@@ -24,6 +24,8 @@ class Preferences:
         scale: of the interface, 1 as the screen asks for.
         recent: paths of what was opened lately, newest first.
         embed: projects hold their picture.
+        folder: of what was opened or saved last.
+        export_folder: of what was exported last.
     """
 
     theme: str = "dark"
@@ -34,6 +36,7 @@ class Preferences:
     hint: bool = True
     recent: list[str] = field(default_factory=list)
     folder: str = ""
+    export_folder: str = ""
     path: Path | None = field(default=None, compare=False)
 
     @classmethod
@@ -75,4 +78,9 @@ class Preferences:
         name = str(path.resolve())
         self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
         self.folder = str(path.resolve().parent)
+        self.save()
+
+    def exported(self, path: Path) -> None:
+        """Take note of where something was exported to."""
+        self.export_folder = str(path.resolve().parent)
         self.save()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.replay import Replay
 from app.strokes import Stroke
-from app.ui.files import fresh_recipe
+from app.ui.files import fresh_recipe, settings_of
 
 if TYPE_CHECKING:
     from app.session import Session
@@ -93,7 +93,8 @@ class Quality:
     def opened(self) -> None:
         """Something new is open; of an untouched picture, nobody has chosen the grid."""
         session = self.editor.session
-        session.is_grid_automatic = session.recipe.edited(picture=None) == fresh_recipe()
+        recipe = session.recipe
+        session.is_grid_automatic = recipe.edited(picture=None) == fresh_recipe(settings_of(recipe.fluid))
         self._begin()
 
     def _begin(self) -> None:

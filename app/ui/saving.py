@@ -82,7 +82,7 @@ class SaveDialog(Dialog):
     def _save(self, editor: Editor) -> bool:
         if not self.must_embed:
             editor.preferences.embed = self.embed
-        saved = editor.files.save_as(self.path, self.embed)
+        saved = self.attempt(lambda: editor.files.write(self.path, self.embed))
         if saved and self._then is not None:
             self._then()
         return saved

@@ -40,7 +40,8 @@ class State:
         brush: shared by all tools, so that changing the tool does not change its size.
         opposite: tools that are switched to their other direction.
         overlays: by name, in the order of their keys.
-        inspector: the inspector is open.
+        inspector: the inspector is open, in a window that has room for it.
+        over_narrow: it is open in one that has not.
         sections: which of its sections are open.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
@@ -54,6 +55,7 @@ class State:
     opposite: dict[str, bool] = field(default_factory=dict)
     overlays: dict[str, Overlay] = field(default_factory=_overlays)
     inspector: bool = True
+    over_narrow: bool = False
     sections: dict[str, bool] = field(default_factory=dict)
     before: bool = False
     split: float | None = None

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 from imgui_bundle import imgui
@@ -12,6 +13,7 @@ from imgui_bundle.imgui import ImVec2, internal
 
 from app.ui import icons
 from app.ui.theme import GRID, Colour, Fonts, Palette, packed
+from app.ui.units import PLAIN, Unit
 from app.ui.viewport import Rect
 
 PANEL = int(
@@ -38,13 +40,19 @@ class Slid:
 
 @dataclass
 class Ui:
-    """What every panel draws with: colours, letters and the interface's scale."""
+    """What every panel draws with: colours, letters and the interface's scale.
+
+    Attributes:
+        covers: where the canvas is covered by something that can be clicked, as of the last frame.
+    """
 
     palette: Palette
     fonts: Fonts
     scale: float
     density: float = 1.0
+    covers: list[Rect] = field(default_factory=list)
     _slid: tuple[str, float] = ("", -1.0)  # the slider that was let go of last, and when
+    _untyped: dict[str, float] = field(default_factory=dict)  # values of sliders before one is typed
 
     def px(self, points: float) -> float:
         """Points of the design on this screen."""
@@ -82,8 +90,14 @@ class Ui:
         imgui.pop_style_var(2)
         try:
             yield
+            self.cover()
         finally:
             imgui.end()
+
+    def cover(self) -> None:
+        """Take note that the window being drawn lies on the canvas."""
+        place, size = imgui.get_window_pos(), imgui.get_window_size()
+        self.covers.append(Rect(place.x, place.y, size.x, size.y))
 
     @contextmanager
     def enabled(self, condition: bool) -> Iterator[None]:
@@ -204,6 +218,13 @@ class Ui:
         imgui.pop_font()
         return clicked
 
+    def segmented_width(self, choices: Sequence[str]) -> float:
+        """What `segmented` takes if no width is asked for."""
+        imgui.push_font(self.fonts.regular, 13.5)
+        width = sum(imgui.calc_text_size(choice).x + self.px(20) for choice in choices)
+        imgui.pop_font()
+        return width
+
     def segmented(self, name: str, choices: Sequence[str], index: int, width: float = 0.0) -> int:
         """One of a few choices side by side; the index that is chosen now."""
         palette, draw = self.palette, imgui.get_window_draw_list()
@@ -270,16 +291,28 @@ class Ui:
         value: float,
         low: float,
         high: float,
-        shown: str,
+        unit: Unit = PLAIN,
         default: float | None = None,
+        shown: str = "",
         logarithmic: bool = False,
         width: float = -1.0,
         title: str = "",
         key: str = "",
         more: str = "",
     ) -> Slid:
-        """A slider with its label and value inside; Ctrl+click types a number, a double click takes the default."""
-        palette = self.palette
+        """A slider with its label and value inside; Ctrl+click types a number, a double click takes the default.
+
+        Args:
+            name: of its own.
+            label: stands in it.
+            value, low, high, default: as the program has them.
+            unit: in which the value is shown, dragged and typed.
+            shown: stands in it instead of the value in its unit.
+            logarithmic: equal ways are equal ratios.
+            width: in points of the design, -1 all there is.
+            title, key, more: of its tooltip.
+        """
+        palette, shown = self.palette, shown or unit.text(value)
         across = imgui.get_content_region_avail().x if width < 0 else self.px(width)
         corner = imgui.get_cursor_screen_pos()
         ident = f"##{name}"
@@ -294,7 +327,16 @@ class Ui:
         if logarithmic:
             flags |= imgui.SliderFlags_.logarithmic
         imgui.push_font(self.fonts.regular, 14.0)
-        changed, new = imgui.slider_float(ident, value, low, high, "%.5g", flags)
+        # It holds the number that is shown, so that this is what Ctrl+click offers; a unit typed after it is ignored.
+        changed, told = imgui.slider_float(ident, unit.number(value), low * unit.per, high * unit.per, "%.6g", flags)
+        new = value
+        if not typing:
+            self._untyped[name] = value
+            new = unit.value(unit.number(told / unit.per)) if changed else value
+        elif changed and isfinite(told):
+            # The number that was offered, as after Escape, is the value from before, with all its digits.
+            before = self._untyped.get(name, value)
+            new = before if unit.value(told) == unit.value(unit.number(before)) else unit.value(told)
         done = imgui.is_item_deactivated_after_edit()
         hovered, held, again = imgui.is_item_hovered(), imgui.is_item_active(), False
         if hovered and default is not None and imgui.is_mouse_double_clicked(0) and not typing:

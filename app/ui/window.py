@@ -111,14 +111,14 @@ class Window:
         editor.files.native = True
         screen = self.device.ctx.detect_framebuffer(0)
         while not editor.closed:
-            # The first frame after a rest starts the clock anew.
-            rested = self._wait(editor)
-            events, self.events = self.events, []
+            self._wait(editor)
             if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
+                # What has happened waits too.
+                glfw.wait_events_timeout(0.1)
                 continue
+            events, self.events = self.events, []
             now = time.perf_counter()
-            dt = 1 / 60 if rested else now - last
-            last = now
+            dt, last = now - last, now
             editor.frame(screen, self.size, dt, events, self.density, self.scale)
             self._must_draw = False
             self._show_title(editor)
@@ -137,16 +137,15 @@ class Window:
 
     # -- what happens in it -----------------------------------------------------------------------------------------
 
-    def _wait(self, editor: Editor) -> bool:
-        """Wait until there is something to draw; True if there was nothing for a while."""
+    def _wait(self, editor: Editor) -> None:
+        """Wait until there is something to draw."""
         glfw.poll_events()
-        if self.events or self._must_draw or editor.wants_frame():
-            return False
         started = time.perf_counter()
-        glfw.wait_events_timeout(min(editor.wait(), 1.0))
-        while not (self.events or self._must_draw) and time.perf_counter() - started < editor.wait():
-            glfw.wait_events_timeout(1.0)
-        return True
+        while not (self.events or self._must_draw):
+            left = editor.wait() - (time.perf_counter() - started)
+            if left <= 0:
+                return
+            glfw.wait_events_timeout(min(left, 1.0))
 
     def _listen(self) -> None:
         handle = self.handle

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from app.ui.panels import bar, hud, inspector, strip, timebar
-from app.ui.panels.hud import floating_rects
 from app.ui.widgets import Ui
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-__all__ = ["draw", "floating_rects"]
-
 
 def draw(ui: Ui, editor: Editor) -> None:
     """Draw all panels."""
+    ui.covers.clear()
     hud.draw(ui, editor)
     strip.draw(ui, editor)
     inspector.draw(ui, editor)

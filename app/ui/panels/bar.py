@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from app.presets import FEELS
 from app.tools import BrushSettings
 from app.ui.actions import ACTIONS
 from app.ui.state import LARGEST, SMALLEST
+from app.ui.units import PERCENT, Unit
 from app.ui.widgets import Ui, keys_shown
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ MENU = (
 
 @dataclass(frozen=True)
 class Setting:
-    """A slider for a part of the brush, shown where the bar is more than `room` points wide."""
+    """A slider for a part of the brush."""
 
     name: str
     label: str
@@ -34,18 +36,18 @@ class Setting:
     high: float
     key: str
     more: str
-    room: float = 0.0
 
 
 SETTINGS = (
     Setting("radius", "Size", "Size of the brush", SMALLEST, LARGEST, "[",
             "] makes it larger. Or drag with the right button."),
     Setting("hardness", "Hardness", "Hardness", 0.0, 1.0, "{",
-            "} makes it harder. A soft brush bends the picture gently.", room=820),
+            "} makes it harder. A soft brush bends the picture gently."),
     Setting("strength", "Strength", "Strength", 0.05, 1.0, ";",
-            "' makes it stronger. Full strength moves the picture with the pointer.", room=920),
+            "' makes it stronger. Full strength moves the picture with the pointer."),
 )  # fmt: skip
 DEFAULTS = BrushSettings()
+RIGHT = 4 * 32 + 3 * 4 + 17 + 96 + 8  # points, of what is at the right end of the bar
 
 
 def draw(ui: Ui, editor: Editor) -> None:
@@ -55,55 +57,88 @@ def draw(ui: Ui, editor: Editor) -> None:
             imgui.open_popup("main menu")
         _menu(ui, editor)
         ui.divider()
-        tool = editor.state.tool
-        if tool.gesture is not None:
-            _brush(ui, editor)
-        else:
-            _aligned(ui, tool.label, tool.hint)
+        room = imgui.get_window_width() - ui.px(RIGHT)
+        has_brush = editor.state.tool.gesture is not None
+        _title(ui, editor, room - ui.px(48) * has_brush)
+        if has_brush:
+            _brush(ui, editor, room)
         _right(ui, editor)
 
 
-def _aligned(ui: Ui, title: str, hint: str = "") -> None:
-    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(8.5))
-    ui.text(title, bold=True)
-    if hint:
-        imgui.same_line(0, ui.px(12))
-        ui.dim(hint, 14)
-
-
-def _brush(ui: Ui, editor: Editor) -> None:
-    state, tool = editor.state, editor.state.tool
-    wide = imgui.get_window_width() > ui.px(1080)
-    label = tool.label
+def _title(ui: Ui, editor: Editor, room: float) -> None:
+    """The tool's name, if there is room for it, and what a tool without a brush does."""
+    tool = editor.state.tool
+    start = imgui.get_cursor_pos_x()
+    imgui.push_font(ui.fonts.bold, 0)
+    width = imgui.calc_text_size(tool.label).x
+    imgui.pop_font()
     imgui.begin_group()
-    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(8.5))
-    ui.text(label, bold=True)
+    if start + width <= room:
+        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(8.5))
+        ui.text(tool.label, bold=True)
+        start += width + ui.px(12)
+        if tool.gesture is None and start + imgui.calc_text_size(tool.hint).x <= room:
+            imgui.same_line(0, ui.px(12))
+            ui.dim(tool.hint, 14)
     imgui.end_group()
-    if tool.directions:
-        imgui.same_line(0, ui.px(16))
-        imgui.begin_group()
+
+
+def _brush(ui: Ui, editor: Editor, room: float) -> None:
+    """What can be set about the brush, up to `room`; for the rest there is a button."""
+    across = 148 if imgui.get_window_width() > ui.px(1080) else 112
+    parts: list[tuple[float, Callable[[float], None]]] = [
+        (ui.px(across), lambda width, setting=setting: _slider(ui, editor, setting, width)) for setting in SETTINGS
+    ]
+    if editor.state.tool.directions:
+        width = ui.segmented_width(editor.state.tool.directions)
+        parts.insert(0, (width, lambda width: _directions(ui, editor, width)))
+    button, gap = ui.px(32), ui.px(16)
+    for number, (width, draw) in enumerate(parts):
+        imgui.same_line(0, gap)
+        last = number == len(parts) - 1
+        if imgui.get_cursor_pos_x() + width + (0 if last else ui.px(8) + button) > room:
+            _more(ui, [draw for _, draw in parts[number:]])
+            return
         imgui.set_cursor_pos_y(ui.px(10))
-        back = state.opposite.get(tool.name, False)
-        state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(back)))
-        imgui.end_group()
-        ui.tooltip("Direction", f"shift+{tool.key}", "Hold Alt for the other one.")
-    for place, setting in enumerate(SETTINGS):
-        if imgui.get_window_width() > ui.px(setting.room):
-            imgui.same_line(0, ui.px(8 if place else 16))
-            imgui.set_cursor_pos_y(ui.px(10))
-            _slider(ui, editor, setting, 148 if wide else 112)
-    if imgui.get_window_width() > ui.px(1180) and not editor.state.inspector:
+        draw(across)
+        gap = ui.px(16 if number == 0 and len(parts) > len(SETTINGS) else 8)
+    if imgui.get_window_width() > ui.px(1180) and editor.layout.inspector is None:
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(10))
         feels(ui, editor, "bar feel")
 
 
+def _more(ui: Ui, parts: list[Callable[[float], None]]) -> None:
+    """A button for what the bar has no room for."""
+    imgui.set_cursor_pos_y(ui.px(8))
+    if ui.icon_button("more", "sliders", "More about the brush"):
+        imgui.open_popup("more of the brush")
+    low = imgui.get_item_rect_min()
+    imgui.set_next_window_pos(ImVec2(low.x, ui.px(48)))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(12), ui.px(12)))
+    if imgui.begin_popup("more of the brush"):
+        for draw in parts:
+            draw(220)
+        imgui.end_popup()
+    imgui.pop_style_var()
+
+
+def _directions(ui: Ui, editor: Editor, width: float) -> None:
+    state, tool = editor.state, editor.state.tool
+    assert tool.directions is not None
+    imgui.begin_group()
+    back = state.opposite.get(tool.name, False)
+    state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(back)))
+    imgui.end_group()
+    ui.tooltip("Direction", f"shift+{tool.key}", "Hold Alt for the other one.")
+
+
 def _slider(ui: Ui, editor: Editor, setting: Setting, width: float) -> None:
     brush, is_size = editor.state.brush, setting.name == "radius"
     value: float = getattr(brush, setting.name)
-    shown = f"{value * max(editor.canvas.size) * 2:.0f} px" if is_size else f"{value:.0%}"
+    unit = Unit(" px", 2 * max(editor.canvas.size)) if is_size else PERCENT
     slid = ui.slider(
-        setting.name, setting.label, value, setting.low, setting.high, shown, getattr(DEFAULTS, setting.name),
+        setting.name, setting.label, value, setting.low, setting.high, unit, getattr(DEFAULTS, setting.name),
         logarithmic=is_size, width=width, title=setting.title, key=setting.key, more=setting.more,
     )  # fmt: skip
     if slid.changed:
@@ -122,9 +157,8 @@ def feels(ui: Ui, editor: Editor, name: str, width: float = 0.0) -> None:
 
 
 def _right(ui: Ui, editor: Editor) -> None:
-    width = ui.px(4 * 32 + 3 * 4 + 17 + 96 + 8)
     imgui.same_line()
-    imgui.set_cursor_pos(ImVec2(max(imgui.get_window_width() - width, imgui.get_cursor_pos_x()), ui.px(8)))
+    imgui.set_cursor_pos(ImVec2(max(imgui.get_window_width() - ui.px(RIGHT), imgui.get_cursor_pos_x()), ui.px(8)))
     history = editor.session.document.history
     undo, redo = history.undo_name, history.redo_name
     if ui.icon_button("undo", "undo", f"Undo {undo}" if undo else "Undo", "ctrl+z", enabled=editor.can_undo):
@@ -138,7 +172,7 @@ def _right(ui: Ui, editor: Editor) -> None:
     if ui.icon_button("split", "compare", "Compare", "y", more, active=editor.state.split is not None):
         editor.do("split")
     imgui.same_line(0, ui.px(4))
-    if ui.icon_button("inspector", "inspector", "Inspector", "tab", active=editor.state.inspector):
+    if ui.icon_button("inspector", "inspector", "Inspector", "tab", active=editor.layout.inspector is not None):
         editor.do("inspector")
     ui.divider()
     if ui.button("Export", primary=True, width=92, icon="export"):
@@ -148,6 +182,8 @@ def _right(ui: Ui, editor: Editor) -> None:
 
 def _menu(ui: Ui, editor: Editor) -> None:
     imgui.set_next_window_pos(ImVec2(ui.px(8), editor.layout.bar.height))
+    below = imgui.get_io().display_size.y - editor.layout.bar.height - ui.px(8)
+    imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(imgui.get_io().display_size.x, below))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(7)))
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(8), ui.px(8)))
     if imgui.begin_popup("main menu"):

@@ -10,26 +10,19 @@ from imgui_bundle.imgui import ImVec2
 
 from app.ui.state import Overlay
 from app.ui.theme import Colour, packed, rgb
-from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-_rects: list[Rect] = []
 BEHIND = 12  # ticks from which on it is told that the simulation is behind
 MOST_WAITING = 100  # strokes that are drawn
+ZOOM, HINT = 160.0, 260.0  # points of the canvas's width that what lies on it needs
 WHITE, BLACK = rgb("ffffff"), rgb("000000")
-
-
-def floating_rects() -> list[Rect]:
-    """Where the canvas is covered by something that can be clicked, as of the last frame."""
-    return _rects
 
 
 def draw(ui: Ui, editor: Editor) -> None:
     """Everything that lies on the canvas."""
-    _rects.clear()
     canvas = editor.layout.canvas
     lines = imgui.get_background_draw_list()
     lines.push_clip_rect(ImVec2(canvas.x, canvas.y), ImVec2(canvas.right, canvas.bottom), True)
@@ -41,8 +34,9 @@ def draw(ui: Ui, editor: Editor) -> None:
     if editor.shows_ring:
         _ring(ui, editor, lines)
     lines.pop_clip_rect()
-    _zoom(ui, editor)
-    if editor.state.hint:
+    if canvas.width > ui.px(ZOOM):
+        _zoom(ui, editor)
+    if editor.state.hint and canvas.width > ui.px(HINT):
         _hint(ui, editor)
     if editor.state.statistics:
         _statistics(ui, editor)
@@ -176,12 +170,13 @@ def _zoom(ui: Ui, editor: Editor) -> None:
         fitted = editor.view.zoom is None
         if ui.icon_button("fit", "fit", "Fit", "0", size=24, icon_size=15, active=fitted):
             editor.do("fit")
-        _remember()
 
 
 def _hint(ui: Ui, editor: Editor) -> None:
     canvas = editor.layout.canvas
-    with ui.floating("hint", canvas.x + canvas.width / 2, canvas.bottom - ui.px(14), (0.5, 1), 0.9):
+    # Beside the zoom, or above it.
+    bottom = canvas.bottom - ui.px(14 if canvas.width > ui.px(HINT + 2 * ZOOM) else 54)
+    with ui.floating("hint", canvas.x + canvas.width / 2, bottom, (0.5, 1), 0.9):
         top = imgui.get_cursor_pos_y()
         imgui.dummy(ImVec2(ui.px(4), ui.px(24)))
         imgui.same_line(0, 0)
@@ -195,7 +190,6 @@ def _hint(ui: Ui, editor: Editor) -> None:
         imgui.set_cursor_pos_y(top)
         if ui.icon_button("no hint", "close", size=24, icon_size=12):
             editor.state.hint = False
-        _remember()
 
 
 def _statistics(ui: Ui, editor: Editor) -> None:
@@ -224,8 +218,3 @@ def _catching_up(ui: Ui, editor: Editor) -> None:
     with ui.floating("catching up", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9):
         imgui.dummy(ImVec2(0, 0))
         ui.dim(f"  Simulating: {session.tick} of {session.target} steps  ", 13.5)
-
-
-def _remember() -> None:
-    place, size = imgui.get_window_pos(), imgui.get_window_size()
-    _rects.append(Rect(place.x, place.y, size.x, size.y))

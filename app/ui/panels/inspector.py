@@ -11,6 +11,7 @@ from imgui_bundle.imgui import ImVec2
 from app.presets import DEFAULT, FEELS
 from app.session import Session
 from app.ui.theme import packed
+from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS
 from app.ui.widgets import Slid, Ui
 
 if TYPE_CHECKING:
@@ -56,13 +57,13 @@ def _fluid(ui: Ui, editor: Editor) -> None:
     ui.dim(f"{now.line}." if now else "Your own mixture.")
     viscosity = max(fluid.viscosity, 1e-5)
     slid = ui.slider(
-        "viscosity", "Viscosity", viscosity, 1e-5, 10.0, f"{viscosity:.2g}", DEFAULT.viscosity, logarithmic=True,
+        "viscosity", "Viscosity", viscosity, 1e-5, 10.0, THREE_DIGITS, DEFAULT.viscosity, logarithmic=True,
         title="Viscosity",
         more="How thick the fluid is. Thin fluids swirl on, thick ones move as one piece and stop at once.",
     )  # fmt: skip
     _set(session, "Viscosity", slid, viscosity=slid.value)
     slid = ui.slider(
-        "drag", "Drag", fluid.drag, 0.0, 10.0, f"{fluid.drag:.1f} / s", DEFAULT.drag,
+        "drag", "Drag", fluid.drag, 0.0, 10.0, PER_SECOND, DEFAULT.drag,
         title="Drag", more="How fast all motion dies away. At 0 only viscosity brings it to rest.",
     )  # fmt: skip
     _set(session, "Drag", slid, drag=slid.value)
@@ -88,7 +89,7 @@ def _view(ui: Ui, editor: Editor) -> None:
     for overlay in editor.state.overlays.values():
         overlay.shown = ui.check(f"{overlay.label}##overlay", overlay.shown, overlay.key)
         if overlay.shown:
-            slid = ui.slider(f"opacity {overlay.name}", "Opacity", overlay.opacity, 0, 1, f"{overlay.opacity:.0%}", 0.7)
+            slid = ui.slider(f"opacity {overlay.name}", "Opacity", overlay.opacity, 0, 1, PERCENT, 0.7)
             overlay.opacity = slid.value
     imgui.pop_style_var()
 

@@ -8,27 +8,31 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.tools import TOOLS
+from app.ui.layout import BETWEEN, GROUP, TOOL
 from app.ui.widgets import Ui
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
 
-GROUP_ENDS = ("pinch", "bloat", "smooth", "restore")
+GROUP_ENDS = ("bloat", "smooth", "restore")
 
 
 def draw(ui: Ui, editor: Editor) -> None:
     """One button for each tool."""
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, ui.px(4)))
+    columns = editor.layout.columns
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(BETWEEN), ui.px(BETWEEN)))
     with ui.panel("tools", editor.layout.strip, (4, 8)):
-        for tool in TOOLS:
+        for number, tool in enumerate(TOOLS):
+            if number % columns:
+                imgui.same_line()
             active = editor.state.tool_name == tool.name
             more = tool.hint
             if tool.directions:
                 more += f". Alt: {tool.directions[1].lower()}."
-            if ui.icon_button(tool.name, tool.name, tool.label, tool.key, more, active, size=40, icon_size=22):
+            if ui.icon_button(tool.name, tool.name, tool.label, tool.key, more, active, size=TOOL, icon_size=22):
                 editor.choose_tool(tool.name, editor.state.opposite.get(tool.name, False))
-            if tool.name in GROUP_ENDS:
-                corner, width = imgui.get_cursor_screen_pos(), ui.px(40)
+            if tool.name in GROUP_ENDS and columns == 1:
+                corner, width = imgui.get_cursor_screen_pos(), ui.px(TOOL)
                 ui.rule(corner + ImVec2(ui.px(8), ui.px(3)), corner + ImVec2(width - ui.px(8), ui.px(4)))
-                imgui.dummy(ImVec2(width, ui.px(6)))
+                imgui.dummy(ImVec2(width, ui.px(GROUP - BETWEEN)))
     imgui.pop_style_var()

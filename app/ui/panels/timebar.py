@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.ui.theme import Colour, blend, packed, rgb
+from app.ui.units import PERCENT
 from app.ui.widgets import Ui
 
 if TYPE_CHECKING:
@@ -37,16 +38,18 @@ def draw(ui: Ui, editor: Editor) -> None:
         if ui.icon_button("step", "step", "One step on", ".", enabled=some):
             editor.do("step")
         imgui.same_line(0, ui.px(10))
-        _time(ui, session.target * session.dt, session.end * session.dt)
-        imgui.same_line(0, ui.px(16))
-        amount = ui.px(168)
+        if imgui.get_window_width() > ui.px(560):
+            _time(ui, session.target * session.dt, session.end * session.dt)
+            imgui.same_line(0, ui.px(16))
+        across = min(168, 0.3 * imgui.get_window_width() / ui.scale)
+        amount = ui.px(across)
         _track(ui, editor, imgui.get_content_region_avail().x - amount - ui.px(16))
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(14))
         part = session.target / session.end if some else 1.0
         with ui.enabled(some):
             slid = ui.slider(
-                "amount", "Amount", part, 0, 1, f"{part:.0%}", 1.0, width=168, title="Amount of the warp",
+                "amount", "Amount", part, 0, 1, PERCENT, 1.0, width=across, title="Amount of the warp",
                 more="Goes back along the way the picture came, so that nothing folds on the way.",
             )  # fmt: skip
         if slid.changed and some:

@@ -1,0 +1,491 @@
+"""What a person does with the window's widgets, messages and dialogs, without a window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import project as projects
+from app.pictures import Picture, write_picture
+from app.presets import PUTTY, WATER
+from app.tools import TOOLS
+from app.ui.clock import HOVERING
+from app.ui.events import LEFT, Button, Key, Mods, Move, Wheel
+from app.ui.exporting import ANIMATION, ExportDialog
+from app.ui.files import load_any
+from app.ui.preferences import Preferences
+from app.ui.saving import SaveDialog
+from app.ui.viewport import Rect
+from editing import Robot, pattern, small_project
+from solver.gl.device import Device
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    robot = Robot(device, small_project(tmp_path))
+    yield robot
+    robot.close()
+
+
+def live(robot: Robot, seconds: float) -> int:
+    """Let time go by as the window does it, which draws only when the editor wants it; how often it has drawn."""
+    drawn, gone = 0, 0.0
+    while gone < seconds:
+        wait = max(robot.editor.wait(), 1 / 60)
+        if gone + wait > seconds:
+            return drawn
+        robot.frame(dt=wait)
+        gone, drawn = gone + wait, drawn + 1
+    return drawn
+
+
+def ctrl_click(robot: Robot, x: float, y: float) -> None:
+    robot.mods = Mods(ctrl=True)
+    robot.click(x, y)
+    robot.mods = Mods()
+    robot.frame(Key("", False))
+
+
+def type_into(robot: Robot, x: float, y: float, text: str) -> None:
+    """Ctrl+click a slider, type, and take it by Enter."""
+    ctrl_click(robot, x, y)
+    robot.type(text)
+    robot.frame(count=2)
+    robot.key("enter")
+    robot.frame(count=2)
+
+
+# Rest and motion ----------------------------------------------------------------------------------------------------
+
+
+def test_a_tooltip_comes_to_a_pointer_that_rests(robot: Robot) -> None:
+    live(robot, 5)
+    robot.frame(Move(24, 130))
+    before = robot.pixels().astype(int)
+    live(robot, 5)
+    shown = np.abs(robot.pixels() - before)[140:200, 40:200].max(axis=-1) > 20
+    assert shown.sum() > 200
+
+
+def test_at_rest_nothing_is_drawn(robot: Robot) -> None:
+    robot.frame(Move(24, 130))
+    live(robot, 5)
+    assert live(robot, 59) == 0
+    assert robot.editor.wait() == 60
+
+
+def test_a_message_stays_for_five_seconds(robot: Robot) -> None:
+    live(robot, 5)
+    robot.key("ctrl+shift+c")
+    assert len(robot.editor.messages.shown) == 1
+    gone = 0.0
+    while robot.editor.messages.shown:
+        wait = max(robot.editor.wait(), 1 / 60)
+        robot.frame(dt=wait)
+        gone += wait
+    assert gone == pytest.approx(5, abs=0.2)
+
+
+def test_a_message_after_a_long_rest_is_not_over_at_once(robot: Robot) -> None:
+    live(robot, 5)
+    robot.frame(Key("c", True, Mods(ctrl=True, shift=True)), dt=100)
+    assert len(robot.editor.messages.shown) == 1
+
+
+def test_the_rest_before_a_stroke_does_not_count_to_it(robot: Robot) -> None:
+    live(robot, 5)
+    robot.move(*robot.at(0.5, 0.5))
+    robot.frame(dt=30)
+    robot.frame(Button(LEFT, True), dt=30)
+    assert robot.editor.session.tick <= 2
+
+
+@pytest.mark.parametrize("scale", [1.25, 2.0])
+def test_a_dialog_of_another_size_comes_to_rest(robot: Robot, scale: float) -> None:
+    robot.key("ctrl+,")
+    live(robot, 3)
+    robot.editor.preferences.scale = scale
+    robot.frame(Move(5, 5))
+    live(robot, 3)
+    seen = robot.pixels().astype(int)
+    robot.frame(count=10)
+    assert np.abs(robot.pixels() - seen).max() == 0
+
+
+# Numbers ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("typed", "pixels"), [("60", 60), ("60 px", 60), ("60px", 60), ("48,5", 48.5)])
+def test_the_brush_is_typed_in_pixels(robot: Robot, typed: str, pixels: float) -> None:
+    type_into(robot, 300, 24, typed)
+    assert robot.editor.state.brush.radius * 2 * 240 == pytest.approx(pixels)
+
+
+@pytest.mark.parametrize("typed", ["80", "80%", "80 %"])
+@pytest.mark.parametrize(("x", "name"), [(460, "hardness"), (620, "strength")])
+def test_shares_are_typed_in_percent(robot: Robot, typed: str, x: float, name: str) -> None:
+    type_into(robot, x, 24, typed)
+    assert getattr(robot.editor.state.brush, name) == pytest.approx(0.8)
+
+
+def test_what_is_offered_is_what_is_shown_and_taking_it_changes_nothing(robot: Robot) -> None:
+    radius = 0.14987
+    robot.editor.state.brush = replace(robot.editor.state.brush, radius=radius)
+    for typed, ending in (("72", "enter"), ("20", "escape")):
+        robot.frame(count=20)  # no double click
+        ctrl_click(robot, 300, 24)
+        robot.type(typed)
+        robot.frame(count=2)
+        robot.key(ending)
+        robot.frame(count=2)
+        assert robot.editor.state.brush.radius == radius
+
+
+@pytest.mark.parametrize("typed", ["nan", "banana", ""])
+def test_what_is_no_number_changes_nothing(robot: Robot, typed: str) -> None:
+    before = robot.editor.session.recipe
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    type_into(robot, rect.x + 120, rect.y + 111, typed)
+    assert robot.editor.session.recipe.fluid.viscosity == before.fluid.viscosity
+
+
+def test_dragging_stops_at_numbers_that_are_shown(robot: Robot) -> None:
+    robot.move(300, 24)
+    robot.press()
+    for x in range(301, 331, 7):
+        robot.move(x, 24)
+        pixels = robot.editor.state.brush.radius * 2 * 240
+        assert pixels == pytest.approx(round(pixels), abs=1e-6)
+    robot.release()
+
+
+@pytest.mark.parametrize(("width", "height", "typed"), [(240, 180, 120), (180, 240, 90)])
+def test_the_size_of_an_export_is_typed_as_it_is_shown(
+    device: Device, tmp_path: Path, width: int, height: int, typed: int
+) -> None:
+    write_picture(tmp_path / "a.png", pattern(width, height))
+    robot = Robot(device, load_any(tmp_path / "a.png"))
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, ExportDialog)
+    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 146, f"{typed} pixels")
+    assert dialog.size == 120
+    robot.close()
+
+
+# Keys ---------------------------------------------------------------------------------------------------------------
+
+
+def test_tab_opens_and_closes_the_inspector_and_nothing_else(robot: Robot) -> None:
+    for _ in range(4):
+        robot.key("tab")
+        robot.frame(count=2)
+        assert not robot.editor._is_typing
+    robot.key("f")
+    assert robot.editor.state.tool_name == "freeze"
+
+
+def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robot, tmp_path: Path) -> None:
+    robot.editor.preferences.export_folder = str(tmp_path)
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, ExportDialog)
+    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 146, "100")
+    assert dialog.size == 100
+    assert not robot.editor.exports.is_running
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 268)
+    robot.key("end")
+    robot.type("2")
+    robot.frame(count=2)
+    robot.key("enter")
+    robot.frame(count=2)
+    assert dialog.name.endswith("2")
+    assert robot.editor.dialogs == [dialog]
+    assert not robot.editor.exports.is_running
+    # Nothing is being typed now.
+    robot.key("enter")
+    assert not robot.editor.dialogs
+    robot.until(lambda: not robot.editor.exports.is_running)
+    assert (tmp_path / f"{dialog.name}.png").exists()
+
+
+def test_the_wheel_goes_through_the_history(robot: Robot) -> None:
+    for number in range(12):
+        robot.drag((0.3 + 0.03 * number, 0.4), (0.35 + 0.03 * number, 0.45), steps=2)
+    robot.rest()
+    robot.frame(Move(1140, 640))
+    live(robot, 3)
+    before = robot.pixels().astype(int)
+    robot.frame(Wheel(0, 2))
+    live(robot, 3)
+    changed = np.abs(robot.pixels() - before)[570:690, 1016:1270].max(axis=-1) > 20
+    assert changed.sum() > 1000
+    assert robot.editor.view.zoom is None
+
+
+# Over the picture ---------------------------------------------------------------------------------------------------
+
+
+def is_untouched(robot: Robot) -> bool:
+    session = robot.editor.session
+    return session.recipe.stroke == () and len(session.document.history.entries) == 1
+
+
+def test_closing_a_message_does_not_paint(robot: Robot) -> None:
+    robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
+    robot.frame(count=3)
+    rect = robot.editor.ui.covers[-1]
+    x, y = rect.right - 14 - 11, rect.y + 10 + 9
+    robot.move(x, y)
+    assert not robot.editor.shows_ring
+    robot.press()
+    robot.frame(count=2)
+    robot.release()
+    robot.frame(count=2)
+    assert not robot.editor.messages.shown
+    assert is_untouched(robot)
+    robot.frame(count=2)
+    assert robot.editor.shows_ring
+
+
+def test_cancelling_an_export_does_not_paint(robot: Robot, tmp_path: Path) -> None:
+    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    robot.editor.exports.start(dialog.job())
+    robot.frame(count=3)
+    rect = robot.editor.ui.covers[-1]
+    robot.move(rect.right - 40, rect.y + 20)
+    assert not robot.editor.shows_ring
+    robot.press()
+    robot.frame(count=2)
+    robot.release()
+    robot.frame(count=2)
+    assert not robot.editor.exports.is_running
+    assert is_untouched(robot)
+
+
+def test_the_wheel_over_the_statistics_does_not_zoom(robot: Robot) -> None:
+    robot.key("ctrl+i")
+    robot.frame(count=3)
+    robot.move(100, 80)
+    robot.wheel(3)
+    assert robot.editor.view.zoom is None
+
+
+# Dialogs ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (800, 600), (800, 520)])
+def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, size: tuple[int, int]) -> None:
+    robot = Robot(device, small_project(tmp_path), size)
+    robot.drag((0.4, 0.4), (0.5, 0.4))
+    robot.rest()
+    robot.key("ctrl+e")
+    robot.frame(count=5)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, ExportDialog)
+    top, heights = dialog.rect.y, set()
+    for kind in (1, 2, 0, 1):
+        robot.click(dialog.rect.x + 100 + 150 * kind, top + 73)
+        robot.frame(count=5)
+        assert dialog.kind == kind
+        assert dialog.rect.y == top
+        assert dialog.rect.bottom <= size[1]
+        heights.add(dialog.rect.height)
+    assert len(heights) > 1
+    robot.close()
+
+
+def test_what_goes_wrong_in_a_dialog_is_told_in_it(robot: Robot, tmp_path: Path) -> None:
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    export = robot.editor.dialogs[-1]
+    assert isinstance(export, ExportDialog)
+    export.folder = tmp_path / "nowhere"
+    robot.frame(count=2)
+    before = export.rect.height
+    robot.key("enter")
+    robot.frame(count=3)
+    assert robot.editor.dialogs == [export]
+    assert "nowhere" in export.problem
+    assert not robot.editor.messages.shown
+    assert export.rect.height > before
+    robot.key("escape")
+    robot.frame(count=2)
+
+    robot.key("ctrl+s")
+    robot.frame(count=3)
+    save = robot.editor.dialogs[-1]
+    assert isinstance(save, SaveDialog)
+    save.folder = tmp_path / "nowhere"
+    robot.key("enter")
+    robot.frame(count=3)
+    assert "nowhere" in save.problem
+    assert not robot.editor.messages.shown
+    save.folder = tmp_path
+    robot.click(save.rect.right - 60, save.rect.bottom - 36)
+    robot.frame(count=3)
+    assert not robot.editor.dialogs
+    assert (tmp_path / "pattern.fluidwarp").exists()
+
+
+# What is remembered -------------------------------------------------------------------------------------------------
+
+
+def test_opening_a_picture_keeps_the_feel_and_the_export_folder(robot: Robot, tmp_path: Path) -> None:
+    out, pictures = tmp_path / "out", tmp_path / "pictures"
+    out.mkdir()
+    pictures.mkdir()
+    write_picture(pictures / "other.png", pattern(100, 60))
+    session = robot.editor.session
+    session.change(WATER.name, viscosity=WATER.viscosity, drag=WATER.drag)
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, ExportDialog)
+    assert dialog.folder == tmp_path
+    dialog.folder = out
+    robot.key("enter")
+    robot.until(lambda: not robot.editor.exports.is_running)
+    robot.drop(pictures / "other.png")
+    assert robot.editor.canvas.size == (100, 60)
+    assert WATER.fits(robot.editor.session.recipe.fluid)
+    assert not robot.editor.can_redo
+    assert not robot.editor.is_dirty
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, ExportDialog)
+    assert dialog.folder == out
+
+
+def test_the_grid_is_chosen_for_a_picture_with_another_feel_too(device: Device, tmp_path: Path) -> None:
+    from app.ui.quality import Speed
+
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    robot = Robot(device, small_project(tmp_path), preferences=Preferences(auto_quality=True))
+    robot.editor.quality._speed = Speed(1.0, 1000.0, 1.0)
+    robot.editor.session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    robot.drop(tmp_path / "other.png")
+    assert PUTTY.fits(robot.editor.session.recipe.fluid)
+    assert robot.editor.session.recipe.fluid.grid == robot.editor.quality._speed.best_grid
+    robot.close()
+
+
+def test_messages_of_the_window_name_no_options_of_the_command_line(robot: Robot, tmp_path: Path) -> None:
+    write_picture(tmp_path / "strip.png", Picture(np.zeros((8, 400, 3), np.uint8)))
+    forward = np.zeros((18, 24, 2), np.float32)
+    np.save(tmp_path / "offsets.npy", forward)
+    projects.save(robot.editor.session.project, tmp_path / "work.fluidwarp", True)
+    robot.drop(tmp_path / "strip.png")
+    text = robot.editor.messages.shown[-1].text
+    assert "narrow" in text
+    assert "--" not in text
+
+
+# Small windows ------------------------------------------------------------------------------------------------------
+
+SIZES = [(800, 600, 1.0), (800, 520, 1.0), (1280, 800, 2.0), (800, 600, 2.0), (800, 520, 2.0)]
+
+
+@pytest.fixture(params=SIZES, ids=lambda size: f"{size[0]}x{size[1]} at {size[2]:.0%}")
+def small(device: Device, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Robot]:
+    width, height, scale = request.param
+    likes = Preferences(auto_quality=False, scale=scale)
+    robot = Robot(device, small_project(tmp_path), (width, height), preferences=likes)
+    robot.frame(count=3)
+    yield robot
+    robot.close()
+
+
+def scaled(robot: Robot, rect: Rect) -> Rect:
+    scale = robot.editor.ui.scale
+    return Rect(rect.x / scale, rect.y / scale, rect.width / scale, rect.height / scale)
+
+
+def test_every_tool_can_be_clicked_in_a_small_window(small: Robot) -> None:
+    strip, scale = small.editor.layout.strip, small.editor.ui.scale
+    chosen = set()
+    y = strip.y + 20 * scale
+    while y < strip.bottom:
+        for column in range(small.editor.layout.columns):
+            small.click(strip.x + (24 + 44 * column) * scale, y)
+            chosen.add(small.editor.state.tool_name)
+        y += 20 * scale
+    assert chosen == {tool.name for tool in TOOLS}
+
+
+def test_the_inspector_comes_in_a_small_window(small: Robot) -> None:
+    wide = scaled(small, small.editor.layout.canvas).width
+    if small.editor.layout.inspector is None:
+        small.key("tab")
+    rect = small.editor.layout.inspector
+    small.frame(count=2)
+    rect = small.editor.layout.inspector
+    assert rect is not None
+    assert scaled(small, rect).width >= 200
+    assert rect.right <= small.size[0]
+    small.key("tab")
+    small.frame()
+    assert small.editor.layout.inspector is None
+    assert scaled(small, small.editor.layout.canvas).width >= min(wide, 200)
+
+
+def test_everything_about_the_brush_can_be_set_in_a_small_window(small: Robot) -> None:
+    """What the bar has no room for is behind the button that ends it."""
+    scale, width = small.editor.ui.scale, small.size[0]
+    changed = set()
+    for x in range(60, int(width / scale) - 270, 16):
+        small.editor.state.brush = before = replace(small.editor.state.brush, radius=0.1, hardness=0.5, strength=0.5)
+        small.click(x * scale, 24 * scale)
+        changed |= differing(small, before)
+        small.frame(count=2)
+        if small.editor._popup_open:
+            for y in range(60, 200, 12):
+                small.editor.state.brush = before
+                small.click((x + 30) * scale, y * scale)
+                if small.editor._popup_open:
+                    changed |= differing(small, before)
+            small.key("escape")
+            small.frame(count=2)
+    assert changed == {"radius", "hardness", "strength"}
+
+
+def differing(robot: Robot, before: object) -> set[str]:
+    now = robot.editor.state.brush
+    return {name for name in ("radius", "hardness", "strength") if getattr(now, name) != getattr(before, name)}
+
+
+def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> None:
+    small.key("ctrl+e")
+    small.frame(count=4)
+    dialog = small.editor.dialogs[-1]
+    assert isinstance(dialog, ExportDialog)
+    dialog.kind = ANIMATION
+    small.frame(count=4)
+    assert dialog.rect.bottom <= small.size[1]
+    assert dialog.rect.y >= 0
+    small.move(dialog.rect.x + dialog.rect.width / 2, dialog.rect.y + dialog.rect.height / 2)
+    for _ in range(12):
+        small.wheel(-3)
+        small.frame()
+    scale = small.editor.ui.scale
+    # Cancel, left of Export in the lower right corner.
+    small.click(dialog.rect.right - (24 + 96 + 8 + 48) * scale, dialog.rect.bottom - 36 * scale)
+    small.frame(count=2)
+    assert not small.editor.dialogs
+
+
+def test_waking_lasts_longer_than_the_hover_delays(robot: Robot) -> None:
+    from imgui_bundle import imgui
+
+    style = imgui.get_style()
+    assert max(style.hover_stationary_delay + style.hover_delay_short, style.hover_delay_normal) < HOVERING

@@ -1,0 +1,191 @@
+"""The real window in the hands of a person who rests, types, clicks beside the picture and has little room."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import project as projects
+from app.pictures import write_picture
+from editing import pattern
+from test_window import Desk, pytestmark  # noqa: F401
+
+RESTED = 2.0  # seconds in which everything that comes by itself has come, also on a busy machine
+
+
+@pytest.fixture(params=[False, True], ids=["idle", "busy"])
+def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
+    """A screen with the pattern in the editor, on a machine that has nothing else to do, or has."""
+    others = [subprocess.Popen(["yes"], stdout=subprocess.DEVNULL) for _ in range(2 * request.param)]
+    desk = Desk(tmp_path)
+    try:
+        write_picture(tmp_path / "pattern.png", pattern())
+        desk.open(tmp_path / "pattern.png")
+        still(desk)
+        yield desk
+    finally:
+        desk.close()
+        for other in others:
+            other.kill()
+            other.wait()
+
+
+def still(desk: Desk) -> np.ndarray:
+    """What is seen once it does not change any more."""
+    before, since = desk.seen(), time.monotonic()
+    while time.monotonic() - since < RESTED:
+        time.sleep(0.1)
+        seen = desk.seen()
+        if not np.array_equal(seen, before):
+            before, since = seen, time.monotonic()
+    return before
+
+
+def differs(seen: np.ndarray, before: np.ndarray, left: int, top: int, right: int, bottom: int) -> bool:
+    return bool((np.abs(seen - before)[top:bottom, left:right].max(axis=-1) > 20).sum() > 100)
+
+
+def test_tooltips_and_menus_come_to_a_pointer_that_rests(desk: Desk) -> None:
+    desk.do("mousemove", "24", "400")
+    time.sleep(RESTED)
+    before = desk.seen()
+    desk.do("mousemove", "24", "120")
+    desk.until(lambda: differs(desk.seen(), before, 60, 100, 300, 200), "the tooltip")
+    desk.do("mousemove", "24", "24", "click", "1", "sleep", "0.5")
+    desk.until(lambda: differs(desk.seen(), before, 20, 200, 280, 320), "the menu")
+    menu = still(desk)
+    desk.do("mousemove", "80", "86")
+    desk.until(lambda: differs(desk.seen(), menu, 300, 72, 390, 100), "what was opened lately")
+
+
+def test_a_message_goes_by_itself(desk: Desk) -> None:
+    desk.do("mousemove", "1140", "780")
+    before = still(desk)
+    desk.key("ctrl+shift+c")
+    desk.until(lambda: differs(desk.seen(), before, 300, 600, 760, 690), "the message")
+    shown = time.monotonic()
+    desk.until(lambda: not differs(desk.seen(), before, 300, 600, 760, 690), "the message to go")
+    assert time.monotonic() - shown < 20
+
+
+def test_a_dialog_is_whole_after_the_interface_has_changed_its_size(desk: Desk) -> None:
+    desk.key("ctrl+comma")
+    before = still(desk)
+    # 150 % of the five sizes.
+    desk.do("mousemove", "730", "365", "sleep", "0.3", "click", "1")
+    desk.until(lambda: differs(desk.seen(), before, 300, 100, 980, 700), "the new size")
+    seen = still(desk)
+    # Nothing has been left for later: a key that does nothing draws some frames more.
+    for _ in range(5):
+        desk.key("shift")
+    assert not differs(still(desk), seen, 300, 100, 980, 700)
+
+
+def test_a_number_is_typed_in_the_unit_that_is_shown(desk: Desk, tmp_path: Path) -> None:
+    def strokes(path: Path) -> list[float]:
+        return [stroke.radius for stroke in projects.load(path).recipe.stroke]
+
+    def type_size(text: str) -> None:
+        desk.do("mousemove", "300", "24", "sleep", "0.3", "keydown", "ctrl", "sleep", "0.2", "click", "1")
+        desk.do("sleep", "0.2", "keyup", "ctrl", "sleep", "0.5")
+        desk.type(text)
+        desk.key("Return")
+
+    type_size("60 px")
+    desk.drag((400, 400), (440, 400))
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
+    desk.save(tmp_path / "work.fluidwarp")
+    assert strokes(tmp_path / "work.fluidwarp")[0] == pytest.approx(60 / 2 / 240)
+
+
+def test_clicks_beside_the_picture_do_not_paint(desk: Desk, tmp_path: Path) -> None:
+    # Tab twice is the inspector and back; the next keys are still the editor's.
+    desk.key("Tab")
+    desk.key("Tab")
+    before = still(desk)
+    desk.key("f")
+    desk.until(lambda: differs(desk.seen(), before, 50, 0, 220, 48), "the tool")
+    (tmp_path / "no.png").write_bytes(b"no picture")
+    command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(tmp_path / "no.png")]
+    desk.do("mousemove", "1140", "780")
+    before = still(desk)
+    subprocess.run(command, env=desk.env, check=True, timeout=60)
+    desk.until(lambda: differs(desk.seen(), before, 300, 600, 760, 690), "the message")
+    message = still(desk)
+    changed = np.abs(message - before)[560:700, 300:800].max(axis=-1) > 20
+    rows, columns = np.nonzero(changed)
+    right, top = int(columns.max()) + 300, int(rows.min()) + 560
+    desk.do("mousemove", str(right - 25), str(top + 20), "sleep", "0.5", "click", "1", "sleep", "0.5")
+    desk.do("mousemove", "1140", "780")
+    desk.until(lambda: not differs(desk.seen(), before, 300, 600, 760, 690), "the message to be closed")
+    assert desk.title() == "pattern - fluidwarp"
+
+
+def test_the_wheel_goes_through_the_history(desk: Desk) -> None:
+    for step in range(12):
+        desk.drag((300 + 20 * step, 300), (330 + 20 * step, 300))
+    desk.do("mousemove", "1140", "640")
+    before = still(desk)
+    desk.do("click", "4", "sleep", "0.1", "click", "4", "sleep", "0.1", "click", "4")
+    desk.until(lambda: differs(desk.seen(), before, 1016, 570, 1270, 690), "the history to move")
+
+
+@pytest.mark.parametrize("name", ["pattern.png", "render", "pattern.toml"])
+def test_a_file_alone_is_opened(tmp_path: Path, name: str) -> None:
+    write_picture(tmp_path / "pattern.png", pattern())
+    (tmp_path / "render").write_bytes((tmp_path / "pattern.png").read_bytes())
+    (tmp_path / "pattern.toml").write_text('picture = "pattern.png"\nduration = 0.1\n')
+    desk = Desk(tmp_path)
+    try:
+        desk.open(tmp_path / name)
+        assert desk.title() == f"{Path(name).stem} - fluidwarp"
+    finally:
+        desk.close()
+
+
+def test_with_little_room_everything_is_reached(tmp_path: Path) -> None:
+    write_picture(tmp_path / "pattern.png", pattern())
+    desk = Desk(tmp_path, (800, 520))
+    try:
+        desk.open(tmp_path / "pattern.png")
+        seen = still(desk)
+        # The last tool, in the second column.
+        desk.do("mousemove", "70", "252", "sleep", "0.3", "click", "1")
+        desk.until(lambda: differs(desk.seen(), seen, 50, 0, 540, 48), "the tool")
+        desk.key("p")
+        seen = still(desk)
+        # What the bar has no room for.
+        desk.do("mousemove", "488", "24", "sleep", "0.3", "click", "1", "sleep", "0.5")
+        desk.until(lambda: differs(desk.seen(), seen, 480, 60, 700, 110), "the rest of the bar")
+    finally:
+        desk.close()
+
+
+def told(folder: Path, *words: str) -> tuple[int, str]:
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent)}
+    done = subprocess.run([sys.executable, "-m", "app", *words], cwd=folder, env=env, capture_output=True, text=True)
+    return done.returncode, done.stderr
+
+
+def test_a_file_that_is_not_there_and_a_command_that_is_none_are_told_in_a_sentence(tmp_path: Path) -> None:
+    for word, status, said in (
+        ("nonesuch.png", 1, "nonesuch.png does not exist"),
+        ("./nonesuch", 1, "does not exist"),
+        ("rendr", 2, "neither a file nor a command; the commands are edit, render"),
+    ):
+        code, text = told(tmp_path, word)
+        assert code == status
+        assert said in text
+        assert len(text.strip().splitlines()) == 1
+    # A command stays one, whatever lies in the folder.
+    (tmp_path / "doctor").write_text("no picture")
+    code, text = told(tmp_path, "doctor", "--nonesuch")
+    assert code == 2
+    assert "No such option" in text
