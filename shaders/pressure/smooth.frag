@@ -1,24 +1,28 @@
-// One sweep of weighted Jacobi:  p += weight (A p - r) / (sum of the openness of the cell's faces; 4 with WHOLE, where the
-// eigenvalues of A / 4 go from 0 to 2 whatever the walls).
-// in:  u_pressure   pressure / h at blocks, lengths / s;  u_residual   right-hand side r, lengths / s
-//      u_left, u_up, u_far, u_span   faces;  u_weight   of this sweep, from the roots of a Chebyshev polynomial
-// out: pressure / h
+// Half a sweep of red-black Gauss-Seidel: the cells of one colour solved for, with their neighbours as they are.
+//   p = (sum of links times p beyond - r) / (sum of links)
+// in:  u_pressure   p at blocks, none with FROM_ZERO (p = 0);  u_residual   r at blocks;  links of lib/block.glsl
+// With RED: the cells x and w of a block, else y and z.
+// out: p at blocks
 // reads: 9
-#include "lib/block_faces.glsl"
+#include "lib/block.glsl"
 
 uniform sampler2D u_pressure;
 uniform sampler2D u_residual;
-uniform float u_weight;
 
+in vec2 v_uv;
 out vec4 out_pressure;
 
 void main() {
-    Faces f = faces();
-    vec4 p = texture(u_pressure, v_uv);
-#ifdef WHOLE
-    float weight = 0.25 * u_weight;
-#else
-    vec4 sum = openness(f), weight = u_weight * vec4(greaterThan(sum, vec4(0.0))) / max(sum, 1e-3);
+    Links f = links_of(floor(gl_FragCoord.xy), v_uv);
+    vec4 sum = diagonal(f), here = vec4(0.0), around = vec4(0.0);
+#ifndef FROM_ZERO
+    here = texture(u_pressure, v_uv);
+    around = neighbours(u_pressure, v_uv, here, f);
 #endif
-    out_pressure = p + weight * (laplacian(u_pressure, p, f) - texture(u_residual, v_uv));
+    vec4 solved = (around - texture(u_residual, v_uv)) * vec4(greaterThan(sum, vec4(0.0))) / max(sum, 1e-6);
+#ifdef RED
+    out_pressure = vec4(solved.x, here.yz, solved.w);
+#else
+    out_pressure = vec4(here.x, solved.yz, here.w);
+#endif
 }
