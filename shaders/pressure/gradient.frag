@@ -1,14 +1,23 @@
 // The gradient of the pressure, the pressure to keep, and the one to expect next, by its trend.
 // The pressure comes as a sum that is taken only after the differences, which keeps the digits of the smaller part.
+// Velocities are rounded anew in each step, noise from cell to cell that a trend of two steps would more than double. So
+// where there is a trend, what has changed is smoothed a little before it is kept, and more before it makes the trend.
 // in:  u_base, u_change   the two parts of the pressure;  u_before   the one kept before;  u_trend   1, or 0 for none
+//      links of lib/block.glsl
 // out: across, down   p - p_left and p - p_up at the blocks' four cells, lengths / s
 //      last           base + change
-//      expected       last + trend (last - before), at blocks, lengths / s
-// reads: 7
+//      expected       last + trend (base - before + change), at blocks, lengths / s
+// reads: 13
+#include "lib/block.glsl"
+
 uniform sampler2D u_base;
 uniform sampler2D u_change;
 uniform sampler2D u_before;
 uniform float u_trend;
+
+// Parts of A p that are added to the change: at 1/8 nothing is left of a checkerboard. A trend of which nothing came in
+// would never fade.
+const float KEPT = 0.0625, TREND = 0.12;
 
 in vec2 v_uv;
 layout(location = 0) out vec4 out_across;
@@ -27,6 +36,7 @@ void main() {
     differences(u_change, change, across, down);
     out_across += across;
     out_down += down;
-    out_last = base + change;
-    out_expected = out_last + u_trend * (out_last - texture(u_before, v_uv));
+    vec4 bend = u_trend * laplacian(u_change, v_uv, change, links_of(floor(gl_FragCoord.xy), v_uv));
+    out_last = base + change + KEPT * bend;
+    out_expected = out_last + u_trend * (base - texture(u_before, v_uv) + change + TREND * bend);
 }

@@ -10,10 +10,10 @@ vec4 at(sampler2D list, float index) {
 
 // A p of an unknown, `row` its texel of u_rows and `here` its p.
 float laplacian(sampler2D p, sampler2D links, vec4 row, float here) {
-    float sum = -row.z * here;
+    float sum = 0.0;
     for (float k = 0.0; k < row.y; k++) {
         vec2 link = at(links, row.x + k).xy;
-        sum += link.y * at(p, link.x).r;
+        sum += link.y * (at(p, link.x).r - here);
     }
     return sum;
 }

@@ -1,5 +1,5 @@
 // Half a sweep of red-black Gauss-Seidel: the cells of one colour solved for, with their neighbours as they are.
-//   p = (sum of links times p beyond - r) / (sum of links)
+//   p += (A p - r) / (sum of links)
 // in:  u_pressure   p at blocks, none with FROM_ZERO (p = 0);  u_residual   r at blocks;  links of lib/block.glsl
 // With RED: the cells x and w of a block, else y and z.
 // out: p at blocks
@@ -14,12 +14,12 @@ out vec4 out_pressure;
 
 void main() {
     Links f = links_of(floor(gl_FragCoord.xy), v_uv);
-    vec4 sum = diagonal(f), here = vec4(0.0), around = vec4(0.0);
+    vec4 sum = diagonal(f), here = vec4(0.0), change = -texture(u_residual, v_uv);
 #ifndef FROM_ZERO
     here = texture(u_pressure, v_uv);
-    around = neighbours(u_pressure, v_uv, here, f);
+    change += laplacian(u_pressure, v_uv, here, f);
 #endif
-    vec4 solved = (around - texture(u_residual, v_uv)) * vec4(greaterThan(sum, vec4(0.0))) / max(sum, 1e-6);
+    vec4 solved = here + change * vec4(greaterThan(sum, vec4(0.0))) / max(sum, 1e-6);
 #ifdef RED
     out_pressure = vec4(solved.x, here.yz, solved.w);
 #else

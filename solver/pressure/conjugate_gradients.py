@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 # Iterations that none of a thousand masks of any kind has needed; see tests/properties/pressure.py.
 MOST_ITERATIONS = 40
 
+# Of a residual, what sums in float32 still tell from nothing.
+ROUNDING = 1e-6
+
 
 class ConjugateGradients:
     """Solves A p = r on the finest level, until little enough of r is left.
@@ -41,7 +44,8 @@ class ConjugateGradients:
         return self._pressure.read
 
     def solve(
-        self, cycle: Cycle, residual: DoubleField, squares: float, wanted: float, iterations: int | None = None
+        self, cycle: Cycle, residual: DoubleField, squares: float, wanted: float, sweeps: int,
+        iterations: int | None = None,
     ) -> int:
         """Solve for `pressure`, and take from the residual what it accounts for; waits for the GPU.
 
@@ -50,14 +54,17 @@ class ConjugateGradients:
             residual: r at blocks.
             squares: the sum of its squares.
             wanted: and what is wanted of it.
-            iterations: so many of them, whatever is left.
+            sweeps: of the smoother before and after each correction.
+            iterations: so many of them, or until only rounding is left.
 
         Returns:
             The number of iterations.
         """
         count, rz = 0, 0.0
-        while count < (iterations or MOST_ITERATIONS) and (iterations or squares > wanted):
-            z = cycle.solve(residual.read)
+        if iterations is not None:
+            wanted = ROUNDING**2 * squares
+        while count < (iterations or MOST_ITERATIONS) and squares > wanted:
+            z = cycle.solve(residual.read, sweeps)
             first: dict[str, Any] = {"FIRST": 1} if count == 0 else {}
             before: dict[str, Any] = {}
             if not first:
@@ -69,8 +76,7 @@ class ConjugateGradients:
             cycle.finest.draw("apply_operator", targets, first, z=z, residual=residual.read, **before)
             self._direction.swap()
             rz, curvature, rq, qq = self.add_up(self.products).tolist()
-            # The matrix is negative definite. What is left is rounding, if float32 no longer shows it.
-            if not curvature < 0.0:
+            if curvature == 0.0:
                 break
             alpha = rz / curvature
             so_far = {} if first else {"pressure": self._pressure.read}

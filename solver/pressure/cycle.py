@@ -48,9 +48,9 @@ class Cycle:
         assert isinstance(level, GridLevel)
         return level
 
-    def solve(self, residual: Field) -> Field:
+    def solve(self, residual: Field, sweeps: int) -> Field:
         """One cycle from zero: the pressure, at blocks, that roughly accounts for the `residual`."""
-        self._visit(0, residual, from_zero=True)
+        self._visit(0, residual, sweeps, from_zero=True)
         return self.levels[0].pressure.read
 
     def release(self) -> None:
@@ -58,21 +58,23 @@ class Cycle:
         for item in (*self.levels, self._direct):
             item.release()
 
-    def _visit(self, number: int, residual: Field, from_zero: bool) -> None:
+    def _visit(self, number: int, residual: Field, sweeps: int, from_zero: bool) -> None:
         level = self.levels[number]
         if number == len(self.levels) - 1:
             self._direct.solve(residual, level.pressure.read)
             return
         coarse = self.levels[number + 1]
-        level.smooth(residual, from_zero=from_zero)
+        for sweep in range(sweeps):
+            level.smooth(residual, from_zero=from_zero and sweep == 0)
         level.restrict(residual, coarse)  # pyright: ignore[reportArgumentType]
-        self._visit(number + 1, coarse.residual, from_zero=True)
+        self._visit(number + 1, coarse.residual, sweeps, from_zero=True)
         # A second visit would find nothing left on the last level, and on the first would cost as much as a cycle.
         if number > 0 and number + 2 < len(self.levels):
             for _ in range(1, self._visits):
-                self._visit(number + 1, coarse.residual, from_zero=False)
+                self._visit(number + 1, coarse.residual, sweeps, from_zero=False)
         level.prolong(coarse)  # pyright: ignore[reportArgumentType]
-        level.smooth(residual, backwards=True)
+        for _ in range(sweeps):
+            level.smooth(residual, backwards=True)
 
     def _coarsen_box(self, device: Device, size: tuple[int, int], aspect: float) -> FastDiagonalization:
         span = float(size[0]), float(size[1])
