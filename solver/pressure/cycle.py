@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from solver.gl.field import Field
 
 # A graph of no more unknowns than this is solved by a dense matrix: its inversion takes some 10 ms.
-DIRECT = 512
+DIRECT = 256
 
 
 class Cycle:
@@ -34,8 +34,6 @@ class Cycle:
 
     def __init__(self, device: Device, size: tuple[int, int], aspect: float, solid: np.ndarray | None) -> None:
         self.levels: list[GridLevel | GraphLevel] = []
-        # Without solids one visit a level will do; the error that thin walls leave on coarse levels needs two.
-        self._visits = 1 if solid is None else 2
         self._direct = (
             self._coarsen_box(device, size, aspect)
             if solid is None
@@ -68,10 +66,9 @@ class Cycle:
             level.smooth(residual, from_zero=from_zero and sweep == 0)
         level.restrict(residual, coarse)  # pyright: ignore[reportArgumentType]
         self._visit(number + 1, coarse.residual, sweeps, from_zero=True)
-        # A second visit would find nothing left on the last level, and on the first would cost as much as a cycle.
-        if number > 0 and number + 2 < len(self.levels):
-            for _ in range(1, self._visits):
-                self._visit(number + 1, coarse.residual, sweeps, from_zero=False)
+        # Among thin walls one visit leaves too much to smooth; the last level has nothing left after it.
+        if isinstance(level, GraphLevel) and number + 2 < len(self.levels):
+            self._visit(number + 1, coarse.residual, sweeps, from_zero=False)
         level.prolong(coarse)  # pyright: ignore[reportArgumentType]
         for _ in range(sweeps):
             level.smooth(residual, backwards=True)

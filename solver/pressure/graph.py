@@ -52,8 +52,7 @@ def has_one_piece_a_block(left: np.ndarray, up: np.ndarray) -> bool:
 def coarsen_links(left: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The links between blocks of 2 x 2 cells."""
     left, up = even(left), even(up)
-    left, up = left[::2, ::2] + left[1::2, ::2], up[::2, ::2] + up[::2, 1::2]
-    return left / OVERCORRECTION, up / OVERCORRECTION
+    return 0.5 * (left[::2, ::2] + left[1::2, ::2]), 0.5 * (up[::2, ::2] + up[::2, 1::2])
 
 
 @dataclass(frozen=True)
