@@ -35,15 +35,15 @@ Links links_of(vec2 block, vec2 uv) {
 #endif
 }
 
-// The sum of each cell's links.
-vec4 diagonal(Links f) { return f.left + f.right + f.up + f.down; }
-
-// A p of a block: the sum over the links of their weight times the difference across, in the unit of p. 4 reads.
-// Taken of differences, it is as exact as these are, however large the pressure.
-vec4 laplacian(sampler2D p, vec2 uv, vec4 here, Links f) {
-    vec2 texel = 1.0 / vec2(textureSize(p, 0));
-    vec4 l = texture(p, uv - vec2(texel.x, 0.0)), r = texture(p, uv + vec2(texel.x, 0.0));
-    vec4 u = texture(p, uv - vec2(0.0, texel.y)), d = texture(p, uv + vec2(0.0, texel.y));
+// A p of a block: the sum over the links of their weight times the difference across, in the unit of p; `l`, `r`, `u` and
+// `d` are p of the blocks around it. Taken of differences, it is as exact as these are, however large the pressure.
+vec4 laplacian(vec4 l, vec4 r, vec4 u, vec4 d, vec4 here, Links f) {
     return f.left * (vec4(l.y, here.x, l.w, here.z) - here) + f.right * (vec4(here.y, r.x, here.w, r.z) - here)
          + f.up * (vec4(u.zw, here.xy) - here) + f.down * (vec4(here.zw, d.xy) - here);
+}
+
+// 4 reads.
+vec4 laplacian(sampler2D p, vec2 uv, vec4 here, Links f) {
+    vec2 texel = 1.0 / vec2(textureSize(p, 0)), across = vec2(texel.x, 0.0), down = vec2(0.0, texel.y);
+    return laplacian(texture(p, uv - across), texture(p, uv + across), texture(p, uv - down), texture(p, uv + down), here, f);
 }

@@ -2,7 +2,7 @@
 //   r = u_right - u_left + aspect (v_down - v_up) [- s] [- A p]          A p = r is to be solved
 // in:  u_velocity   MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/block.glsl packs it
 //      links of lib/block.glsl
-// With SOURCE: u_source, the side times the wanted divergence, at cells, lengths / s, without a mean over closed regions.
+// With SOURCE: u_source, the side times the wanted divergence, at cells, lengths / s, 0 in the mean over closed regions.
 // With EXPECTED: u_expected, p at blocks, lengths / s.
 // out: r at blocks, lengths / s;  squares summed over the block: R without what is expected, G of r
 // reads: 20
@@ -52,9 +52,10 @@ void main() {
     out_residual = f.right * right - f.left * left + (f.down * down - f.up * up) / u_aspect;
 #ifdef SOURCE
     vec2 texel = 1.0 / vec2(textureSize(u_source, 0)), a = (2.0 * floor(gl_FragCoord.xy) + 0.5) * texel, b = a + texel;
-    vec4 wanted = vec4(texture(u_source, a).r, texture(u_source, vec2(b.x, a.y)).r,
-                       texture(u_source, vec2(a.x, b.y)).r, texture(u_source, b).r);
-    out_residual -= wanted * vec4(greaterThan(diagonal(f), vec4(0.0)));
+    vec2 inside = vec2(lessThan(b, vec2(1.0)));  // a block at the edge may have cells beyond it
+    out_residual -= vec4(texture(u_source, a).r, texture(u_source, vec2(b.x, a.y)).r,
+                         texture(u_source, vec2(a.x, b.y)).r, texture(u_source, b).r)
+                  * vec2(1.0, inside.x).xyxy * vec2(1.0, inside.y).xxyy;
 #endif
     out_squares = vec4(dot(out_residual, out_residual));
 #ifdef EXPECTED

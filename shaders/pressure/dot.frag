@@ -1,6 +1,5 @@
 // The dot products r . z and r . r, summed over the block.
 // in:  u_residual, u_z   r and z at blocks
-// out: products: R of r . z, G of r . r
 // reads: 2
 uniform sampler2D u_residual;
 uniform sampler2D u_z;

@@ -47,7 +47,7 @@ class ConjugateGradients:
         self, cycle: Cycle, residual: DoubleField, squares: float, wanted: float, sweeps: int,
         iterations: int | None = None,
     ) -> int:
-        """Solve for `pressure`, and take from the residual what it accounts for; waits for the GPU.
+        """Solve for `pressure`; waits for the GPU. The residual is used up.
 
         Args:
             cycle: the preconditioner.
@@ -60,34 +60,46 @@ class ConjugateGradients:
         Returns:
             The number of iterations.
         """
-        count, rz = 0, 0.0
+        most = iterations or MOST_ITERATIONS
         if iterations is not None:
             wanted = ROUNDING**2 * squares
-        while count < (iterations or MOST_ITERATIONS) and squares > wanted:
-            z = cycle.solve(residual.read, sweeps)
+        count, rz = 0, 0.0
+        while count < most and squares > wanted:
+            z = direction = cycle.solve(residual.read, sweeps)
+            targets = self.products, self._applied
             first: dict[str, Any] = {"FIRST": 1} if count == 0 else {}
             before: dict[str, Any] = {}
-            if not first:
+            so_far: dict[str, Any] = {}
+            if count > 0:
                 self.device.pass_("pressure/dot.frag")(self.products, residual=residual.read, z=z)
                 rz_before = rz
                 rz, squares, *_ = self.add_up(self.products).tolist()
+                if squares <= wanted:
+                    break
                 before = {"before": self._direction.read, "beta": rz / rz_before}
-            targets = self._direction.write, self._applied, self.products
+                so_far = {"pressure": self._pressure.read}
+                direction = self._direction.write
+                targets = *targets, direction
             cycle.finest.draw("apply_operator", targets, first, z=z, residual=residual.read, **before)
-            self._direction.swap()
             rz, curvature, rq, qq = self.add_up(self.products).tolist()
             if curvature == 0.0:
                 break
             alpha = rz / curvature
-            so_far = {} if first else {"pressure": self._pressure.read}
-            self.device.pass_("pressure/update.frag", **first)(
-                (self._pressure.write, residual.write), residual=residual.read, direction=self._direction.read,
-                applied=self._applied, alpha=alpha, **so_far,
-            )  # fmt: skip
-            self._pressure.swap()
-            residual.swap()
             squares = max(squares - 2.0 * alpha * rq + alpha**2 * qq, 0.0)
             count += 1
+            if count == most or squares <= wanted:
+                last = self.device.pass_("pressure/update.frag", LAST=1, **first)
+                last(self._pressure.write, direction=direction, alpha=alpha, **so_far)
+            else:
+                if first:
+                    self._direction.write.copy_from(z)
+                self._direction.swap()
+                self.device.pass_("pressure/update.frag", **first)(
+                    (self._pressure.write, residual.write), residual=residual.read, direction=self._direction.read,
+                    applied=self._applied, alpha=alpha, **so_far,
+                )  # fmt: skip
+                residual.swap()
+            self._pressure.swap()
         if count == 0:
             self._pressure.read.clear()
         return count

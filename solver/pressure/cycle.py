@@ -66,8 +66,9 @@ class Cycle:
             level.smooth(residual, from_zero=from_zero and sweep == 0)
         level.restrict(residual, coarse)  # pyright: ignore[reportArgumentType]
         self._visit(number + 1, coarse.residual, sweeps, from_zero=True)
-        # Among thin walls one visit leaves too much to smooth; the last level has nothing left after it.
-        if isinstance(level, GraphLevel) and number + 2 < len(self.levels):
+        # Among thin walls one visit leaves too much to smooth. A second one of the last level would find nothing, and of the
+        # first coarse one it would cost as much as another cycle.
+        if isinstance(coarse, GraphLevel) and 0 < number < len(self.levels) - 2:
             self._visit(number + 1, coarse.residual, sweeps, from_zero=False)
         level.prolong(coarse)  # pyright: ignore[reportArgumentType]
         for _ in range(sweeps):

@@ -44,7 +44,7 @@ class GridLevel:
         self.pressure = device.double_field(self.size, 4, f"{label} pressure")
         self.inputs: dict[str, Any] = {"aspect": aspect}
         self.defines: dict[str, Any] = {}
-        self._links: list[Field] = []
+        self._textures: dict[str, Field] = {}
         if links is None:
             self.defines["OPEN"] = 1
             self.inputs["span"] = span
@@ -52,11 +52,14 @@ class GridLevel:
             left, up = (np.pad(even(weights), ((0, 2), (0, 2))) for weights in links)
             right, down = left[:-2, 2::2], up[2::2, :-2]
             far = np.stack([right[::2], right[1::2], down[:, ::2], down[:, 1::2]], axis=-1)
-            for name, texels in (("left", packed(left)), ("up", packed(up)), ("far", far)):
-                height, width = self.size[1], self.size[0]
-                field = device.upload(texels[:height, :width], f"{label} {name}", "f2")
-                self._links.append(field)
-                self.inputs[name] = field
+            total = left[:-2, :-2] + left[:-2, 1:-1] + aspect**2 * (up[:-2, :-2] + up[1:-1, :-2])
+            inverse = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
+            textures = {"left": packed(left), "up": packed(up), "far": far, "inverse": packed(inverse)}
+            for name, texels in textures.items():
+                texels = texels[: self.size[1], : self.size[0]]
+                self._textures[name] = device.upload(texels, f"{label} {name}", "f2")
+            self.inputs |= {name: self._textures[name] for name in ("left", "up", "far")}
+        self._smoothing = {name: field for name, field in self._textures.items() if name == "inverse"}
 
     def draw(self, shader: str, target: Target, defines: dict[str, Any] | None = None, **inputs: Any) -> None:
         """Draw a pass that needs the links of the level."""
@@ -64,11 +67,14 @@ class GridLevel:
 
     def smooth(self, residual: Field, backwards: bool = False, from_zero: bool = False) -> None:
         """A sweep over the red cells and the black ones; backwards the black ones first."""
-        colours = ({"RED": 1}, {})
-        for defines in reversed(colours) if backwards else colours:
-            zero = {"FROM_ZERO": 1} if from_zero and "RED" in defines else {}
-            read = {} if zero else {"pressure": self.pressure.read}
-            self.draw("smooth", self.pressure.write, {**defines, **zero}, residual=residual, **read)
+        if from_zero:
+            self.draw("smooth", self.pressure.write, {"FROM_ZERO": 1}, residual=residual, **self._smoothing)
+            self.pressure.swap()
+            return
+        colours: tuple[dict[str, Any], ...] = ({"RED": 1}, {})
+        for colour in reversed(colours) if backwards else colours:
+            self.draw("smooth", self.pressure.write, colour,
+                      pressure=self.pressure.read, residual=residual, **self._smoothing)  # fmt: skip
             self.pressure.swap()
 
     def restrict(self, residual: Field, coarse: GridLevel | GraphLevel) -> None:
@@ -88,7 +94,7 @@ class GridLevel:
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self.residual, self.pressure, *self._links):
+        for item in (self.residual, self.pressure, *self._textures.values()):
             item.release()
 
 
