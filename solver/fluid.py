@@ -15,7 +15,7 @@ from solver.gl.field import DoubleField, Field
 from solver.grid import Grid
 from solver.packing import PackedFaces
 from solver.params import FluidParams
-from solver.pressure.projection import Pressure
+from solver.pressure.projection import Projection
 from solver.viscosity.solve import Viscosity
 
 # Cells along the edges of what departs that depend on the walls.
@@ -92,7 +92,7 @@ class Fluid:
         self._coefficients_of: object = None
         self._packed: PackedFaces | None = None  # w2, then w3, between the stages of a step
         self._viscosity_solver = Viscosity(device, grid.size)
-        self._pressure_solver = Pressure(device, grid.size)
+        self._pressure_solver = Projection(device, grid.size)
 
     # -- the paper's step -------------------------------------------------------------------------------------------
 

@@ -1,12 +1,12 @@
-// Right-hand side of the pressure equation: what flows out of each cell, per face length; h times the divergence.
-//   r = u_right - u_left + v_down - v_up  [- (s - mean)]          sum over open faces of (p' - p) = r
+// Right-hand side of the pressure equation: the side of a cell times the divergence, less what is wanted and expected.
+//   r = u_right - u_left + aspect (v_down - v_up) [- s] [- A p]          A p = r is to be solved
 // in:  u_velocity   MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/block.glsl packs it
-//      u_left, u_up, u_far, u_span   faces
-// With WITH_SOURCE: u_source, h s at blocks, lengths / s; u_mean, its mean over the fluid.
-// With EXPECTED: u_expected, a pressure / h at blocks, lengths / s, that is subtracted: r - A p; and a second output.
-// out: r at blocks, lengths / s;  squares: R of r, G of r - A p, over the block
-// reads: 16
-#include "lib/block_faces.glsl"
+//      links of lib/block.glsl
+// With SOURCE: u_source, the side times the wanted divergence, at cells, lengths / s, 0 in the mean over closed regions.
+// With EXPECTED: u_expected, p at blocks, lengths / s.
+// out: r at blocks, lengths / s;  squares summed over the block: R without what is expected, G of r
+// reads: 20
+#include "lib/block.glsl"
 
 #ifdef PACKED
 uniform sampler2D u_u;
@@ -14,22 +14,12 @@ uniform sampler2D u_v;
 #else
 uniform sampler2D u_velocity;
 #endif
-#ifdef WITH_SOURCE
 uniform sampler2D u_source;
-uniform float u_mean;
-#endif
-
-layout(location = 0) out vec4 out_residual;
-#ifdef EXPECTED
 uniform sampler2D u_expected;
-layout(location = 1) out vec4 out_squares;
 
-// Sum of the squares, and that of what differs from the block's mean.
-vec2 squares(vec4 r) {
-    float whole = dot(r, r), sum = dot(r, vec4(1.0));
-    return vec2(whole, whole - 0.25 * sum * sum);
-}
-#endif
+in vec2 v_uv;
+layout(location = 0) out vec4 out_residual;
+layout(location = 1) out vec4 out_squares;
 
 // The velocity at the four cells' left, right, upper and lower faces.
 void read_faces(out vec4 left, out vec4 right, out vec4 up, out vec4 down) {
@@ -55,16 +45,21 @@ void read_faces(out vec4 left, out vec4 right, out vec4 up, out vec4 down) {
 }
 
 void main() {
-    Faces f = faces();
+    Links f = links_of(floor(gl_FragCoord.xy), v_uv);
     vec4 left, right, up, down;
     read_faces(left, right, up, down);
-    out_residual = f.right * right - f.left * left + f.down * down - f.up * up;
-#ifdef WITH_SOURCE
-    out_residual -= texture(u_source, v_uv) - u_mean * live(f);
+    // The weights down hold the aspect squared.
+    out_residual = f.right * right - f.left * left + (f.down * down - f.up * up) / u_aspect;
+#ifdef SOURCE
+    vec2 texel = 1.0 / vec2(textureSize(u_source, 0)), a = (2.0 * floor(gl_FragCoord.xy) + 0.5) * texel, b = a + texel;
+    vec2 inside = vec2(lessThan(b, vec2(1.0)));  // a block at the edge may have cells beyond it
+    out_residual -= vec4(texture(u_source, a).r, texture(u_source, vec2(b.x, a.y)).r,
+                         texture(u_source, vec2(a.x, b.y)).r, texture(u_source, b).r)
+                  * vec2(1.0, inside.x).xyxy * vec2(1.0, inside.y).xxyy;
 #endif
+    out_squares = vec4(dot(out_residual, out_residual));
 #ifdef EXPECTED
-    out_squares.xy = squares(out_residual);
-    out_residual -= laplacian(u_expected, texture(u_expected, v_uv), f);
-    out_squares.zw = squares(out_residual);
+    out_residual -= laplacian(u_expected, v_uv, texture(u_expected, v_uv), f);
+    out_squares.y = dot(out_residual, out_residual);
 #endif
 }

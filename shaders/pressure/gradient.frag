@@ -3,22 +3,23 @@
 // Velocities are rounded anew in each step, noise from cell to cell that a trend of two steps would more than double. So
 // where there is a trend, what has changed is smoothed a little before it is kept, and more before it makes the trend.
 // in:  u_base, u_change   the two parts of the pressure;  u_before   the one kept before;  u_trend   1, or 0 for none
-//      u_left, u_up, u_far, u_span   faces
+//      links of lib/block.glsl
 // out: across, down   p - p_left and p - p_up at the blocks' four cells, lengths / s
 //      last           base + change
-//      expected       last + trend (base - before + change), all of them pressure / h at blocks, lengths / s
-// reads: 12
-#include "lib/block_faces.glsl"
+//      expected       last + trend (base - before + change), at blocks, lengths / s
+// reads: 13
+#include "lib/block.glsl"
 
 uniform sampler2D u_base;
 uniform sampler2D u_change;
 uniform sampler2D u_before;
 uniform float u_trend;
 
-// Parts of the Laplacian that are added to the change: at 1/8 nothing is left of a checkerboard. A trend of which nothing
-// came in would never fade.
+// Parts of A p that are added to the change: at 1/8 nothing is left of a checkerboard. A trend of which nothing came in
+// would never fade.
 const float KEPT = 0.0625, TREND = 0.12;
 
+in vec2 v_uv;
 layout(location = 0) out vec4 out_across;
 layout(location = 1) out vec4 out_down;
 layout(location = 2) out vec4 out_last;
@@ -35,7 +36,7 @@ void main() {
     differences(u_change, change, across, down);
     out_across += across;
     out_down += down;
-    vec4 bend = u_trend * laplacian(u_change, change, faces());
+    vec4 bend = u_trend * laplacian(u_change, v_uv, change, links_of(floor(gl_FragCoord.xy), v_uv));
     out_last = base + change + KEPT * bend;
     out_expected = out_last + u_trend * (base - texture(u_before, v_uv) + change + TREND * bend);
 }

@@ -1,25 +1,36 @@
-// Right-hand side of the coarser level: the sum of the residual over what each coarse cell stands for.
-// (The coarse cells' sides are twice as long, which the factor 4 of the sum over the mean accounts for.)
-// in:  u_residual   at blocks of the finer level;  u_links   see links.frag, not needed with OPEN (no solids)
-// out: right-hand side at blocks of the coarser level, the same unit
-// reads: 8
+// Right-hand side of the coarser level: what is left of the residual, r - A p, summed over each coarse unknown's cells.
+// in:  u_pressure, u_residual   p and r at blocks of the finer level;  links of lib/block.glsl of the finer level
+// With GRAPH the coarser level is a graph: u_cells, for each unknown the block of its cells, (x, y), and which they are,
+// the sum of 1, 2, 4, 8 for x, y, z, w.
+// out: right-hand side of the coarser level, at blocks or unknowns
+// reads: 36
+#include "lib/block.glsl"
+
+uniform sampler2D u_pressure;
 uniform sampler2D u_residual;
-uniform sampler2D u_links;
+uniform sampler2D u_cells;
 
 out vec4 out_residual;
 
-float total(vec2 block, vec2 size) {
-    vec2 uv = block / size;
-    // The coarser level is padded to an even number of cells.
-    vec4 members = vec4(all(lessThan(block, size)));
-#ifndef OPEN
-    int inside = int(texture(u_links, uv).r * 255.0 + 0.5);
-    members *= vec4(inside & 1, (inside >> 1) & 1, (inside >> 2) & 1, (inside >> 3) & 1);
-#endif
-    return dot(texture(u_residual, uv), members);
+vec4 left_of(vec2 block) {
+    vec2 uv = (block + 0.5) / vec2(textureSize(u_pressure, 0));
+    return texture(u_residual, uv) - laplacian(u_pressure, uv, texture(u_pressure, uv), links_of(block, uv));
+}
+
+#ifdef GRAPH
+void main() {
+    vec3 cells = texelFetch(u_cells, ivec2(gl_FragCoord.xy), 0).xyz;
+    int bits = int(cells.z);
+    out_residual = vec4(dot(left_of(cells.xy), vec4(bits & 1, (bits >> 1) & 1, (bits >> 2) & 1, (bits >> 3) & 1)));
+}
+#else
+// The coarser level is padded to an even number of cells.
+float total(vec2 block) {
+    return dot(left_of(block), vec4(all(lessThan(block, vec2(textureSize(u_pressure, 0))))));
 }
 
 void main() {
-    vec2 size = vec2(textureSize(u_residual, 0)), a = 2.0 * floor(gl_FragCoord.xy) + 0.5, b = a + 1.0;
-    out_residual = vec4(total(a, size), total(vec2(b.x, a.y), size), total(vec2(a.x, b.y), size), total(b, size));
+    vec2 a = 2.0 * floor(gl_FragCoord.xy), b = a + 1.0;
+    out_residual = vec4(total(a), total(vec2(b.x, a.y)), total(vec2(a.x, b.y)), total(b));
 }
+#endif

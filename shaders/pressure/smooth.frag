@@ -1,24 +1,45 @@
-// One sweep of weighted Jacobi:  p += weight (A p - r) / (sum of the openness of the cell's faces; 4 with WHOLE, where the
-// eigenvalues of A / 4 go from 0 to 2 whatever the walls).
-// in:  u_pressure   pressure / h at blocks, lengths / s;  u_residual   right-hand side r, lengths / s
-//      u_left, u_up, u_far, u_span   faces;  u_weight   of this sweep, from the roots of a Chebyshev polynomial
-// out: pressure / h
-// reads: 9
-#include "lib/block_faces.glsl"
+// Red-black Gauss-Seidel: the cells of one colour solved for, with their neighbours as they are.
+//   p += (A p - r) / (sum of links)
+// in:  u_pressure   p at blocks;  u_residual   r at blocks;  links of lib/block.glsl
+//      u_inverse    of each cell one over the sum of its links, 0 without any; with OPEN that of an inner cell serves all
+// With RED: the cells x and w of a block, else y and z. With FROM_ZERO p is 0, and the red ones come first, then the black.
+// out: p at blocks
+// reads: 13
+#include "lib/block.glsl"
 
 uniform sampler2D u_pressure;
 uniform sampler2D u_residual;
-uniform float u_weight;
+uniform sampler2D u_inverse;
 
+in vec2 v_uv;
 out vec4 out_pressure;
 
-void main() {
-    Faces f = faces();
-    vec4 p = texture(u_pressure, v_uv);
-#ifdef WHOLE
-    float weight = 0.25 * u_weight;
+vec4 inverse_at(vec2 uv) {
+#ifdef OPEN
+    return vec4(0.5 / (1.0 + u_aspect * u_aspect));
 #else
-    vec4 sum = openness(f), weight = u_weight * vec4(greaterThan(sum, vec4(0.0))) / max(sum, 1e-3);
+    return texture(u_inverse, uv);
 #endif
-    out_pressure = p + weight * (laplacian(u_pressure, p, f) - texture(u_residual, v_uv));
+}
+
+vec4 from_zero(vec2 uv) { return -inverse_at(uv) * texture(u_residual, uv); }
+
+void main() {
+    Links f = links_of(floor(gl_FragCoord.xy), v_uv);
+    vec4 inverse = inverse_at(v_uv), residual = texture(u_residual, v_uv);
+#ifdef FROM_ZERO
+    const vec4 red = vec4(1.0, 0.0, 0.0, 1.0);
+    vec2 texel = 1.0 / vec2(textureSize(u_residual, 0)), across = vec2(texel.x, 0.0), down = vec2(0.0, texel.y);
+    vec4 here = -red * inverse * residual;
+    vec4 applied = laplacian(from_zero(v_uv - across), from_zero(v_uv + across), from_zero(v_uv - down),
+                             from_zero(v_uv + down), here, f);
+#else
+    vec4 here = texture(u_pressure, v_uv), applied = laplacian(u_pressure, v_uv, here, f);
+#endif
+    vec4 solved = here + inverse * (applied - residual);
+#ifdef RED
+    out_pressure = vec4(solved.x, here.yz, solved.w);
+#else
+    out_pressure = vec4(here.x, solved.yz, here.w);
+#endif
 }

@@ -1,7 +1,7 @@
-// The velocity made free of divergence:  u - (p - p_left),  v - (p - p_up),  and 0 on closed faces.
+// The velocity made free of divergence:  u - (p - p_left),  v - aspect (p - p_up),  and 0 on closed faces.
 // in:  u_velocity         MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/block.glsl packs it
 //      u_across, u_down   p - p_left and p - p_up at blocks, lengths / s
-//      u_left, u_up       faces of the blocks, not needed with OPEN (no solids)
+//      u_left, u_up       faces of lib/block.glsl, not needed with OPEN (no solids);  u_aspect   see there
 // With CARRY: u_carried, gradients at MAC faces, lengths / s, and a second output.
 // out: MAC velocity, lengths / s;  the mean of u_carried and of this gradient
 // reads: 4
@@ -15,6 +15,7 @@ uniform sampler2D u_across;
 uniform sampler2D u_down;
 uniform sampler2D u_left;
 uniform sampler2D u_up;
+uniform float u_aspect;
 
 in vec2 v_uv;
 layout(location = 0) out vec2 out_velocity;
@@ -32,7 +33,7 @@ void main() {
 #else
     vec2 open = vec2(dot(texture(u_left, uv), mine), dot(texture(u_up, uv), mine));
 #endif
-    vec2 gradient = vec2(dot(texture(u_across, uv), mine), dot(texture(u_down, uv), mine));
+    vec2 gradient = vec2(dot(texture(u_across, uv), mine), u_aspect * dot(texture(u_down, uv), mine));
 #ifdef PACKED
     vec2 at = (block + 1.5) / vec2(textureSize(u_u, 0)), velocity = vec2(dot(texture(u_u, at), mine), dot(texture(u_v, at), mine));
 #else

@@ -1,4 +1,4 @@
-// A matrix times the rows of a level, or with DOWN its columns: one direction of the solve of solver/gl/separable.py.
+// A matrix times the rows of a level, or with DOWN its columns: one direction of the solve of solver/pressure/transform.py.
 //   out(k, y) = sum over j of M(k, j) in(j, y);  with SCALED the sum times u_scale(k, y)
 // in:  u_field, u_scale   at blocks
 //      u_matrix           a texel at (j, k) holds M's 2 x 2 entries from blocks j to blocks k, row after row

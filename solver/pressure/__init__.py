@@ -1,1 +1,1 @@
-"""The projection: makes a velocity on the MAC grid free of divergence."""
+"""The pressure projection."""

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import sparse
+from scipy import ndimage, sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 from solver import Fluid
 from solver.gl.device import Device
-from solver.gl.separable import Separable
+from solver.gl.field import Field
 from solver.grid import Grid
-from solver.pressure.projection import Level, Pressure
+from solver.pressure.level import GridLevel
+from solver.pressure.projection import Projection
+from solver.pressure.transform import FastDiagonalization
 
 SIZES = [(8, 8), (9, 13), (64, 64), (61, 40), (100, 23)]
 
@@ -101,7 +103,7 @@ def project(
 ) -> np.ndarray:
     """The velocity after a projection on the GPU from a cold start."""
     size = solid.shape[1], solid.shape[0]
-    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    pressure, field = Projection(device, size), device.double_field(size, 2)
     frozen = device.upload(solid.astype(np.uint8) * 255) if solid.any() else None
     wanted = None if source is None else device.upload(source)
     pressure.set_solids(frozen)
@@ -140,21 +142,27 @@ def test_small_grids_without_solids_are_solved_in_one_cycle(device: Device, size
 
 
 @pytest.mark.parametrize("span", [(42.625, 64.0), (13.5, 9.25), (7.0, 25.75)])
-def test_grids_with_narrow_last_cells_are_solved_exactly(device: Device, span: tuple[float, float]) -> None:
-    level = Level(device, span, 1)
-    solver = Separable(device, span, level.size)
-    applied = device.field(level.size, 4)
-    residual = np.random.default_rng(6).standard_normal((level.size[1], level.size[0], 4))
-    # What some pressure accounts for: its Laplacian.
-    level.pressure.read.set(residual)
-    laplacian = device.pass_("pressure/residual.frag", OPEN=1, ONLY_LAPLACIAN=1)
-    laplacian(level.residual.read, span=span, pressure=level.pressure.read)
-    solver.solve(level.residual.read, level.pressure.read)
-    laplacian(applied, span=span, pressure=level.pressure.read)
-    wanted = level.residual.read.get()
-    assert np.linalg.norm(applied.get() - wanted) <= 1e-5 * np.linalg.norm(wanted)
-    solver.release()
-    level.release()
+@pytest.mark.parametrize("aspect", [1.0, 1.1])
+def test_grids_with_cells_less_than_whole_are_solved_exactly(
+    device: Device, span: tuple[float, float], aspect: float
+) -> None:
+    level = GridLevel(device, span, aspect, 1)
+    solver = FastDiagonalization(device, span, level.size, aspect)
+    # What some pressure accounts for, A p: the residual of -p.
+    random = device.upload(np.random.default_rng(6).standard_normal((level.size[1], level.size[0], 4)))
+    applied, products = device.field(level.size, 4), device.field(level.size, 4)
+
+    def laplacian(pressure: Field) -> np.ndarray:
+        targets = level.pressure.write, applied, products
+        level.draw("apply_operator", targets, {"FIRST": 1}, z=pressure, residual=level.residual)
+        return applied.get()
+
+    wanted = laplacian(random)
+    level.residual.set(wanted)
+    solver.solve(level.residual, level.pressure.read)
+    assert np.linalg.norm(laplacian(level.pressure.read) - wanted) <= 1e-5 * np.linalg.norm(wanted)
+    for item in (solver, level, random, applied, products):
+        item.release()
 
 
 SIZES_TO_REACH = [(512, 512), (333, 217), (512, 100), (257, 255)]
@@ -162,7 +170,7 @@ SIZES_TO_REACH = [(512, 512), (333, 217), (512, 100), (257, 255)]
 
 def worst_left_over(device: Device, grid: Grid, solid: np.ndarray, seeds: range) -> float:
     """What the projection leaves of the divergence after the cycles it takes itself, relative."""
-    pressure, field = Pressure(device, grid.size), device.double_field(grid.size, 2)
+    pressure, field = Projection(device, grid.size), device.double_field(grid.size, 2)
     frozen = device.upload(solid.astype(np.uint8) * 255)
     pressure.set_solids(frozen if solid.any() else None)
     left = []
@@ -197,7 +205,7 @@ def test_three_cycles_do_and_four_with_thin_walls(device: Device, size: tuple[in
 
 def test_faces_worked_out_are_the_faces_stored(device: Device) -> None:
     size = (333, 217)
-    velocity, pressure = device.double_field(size, 2), Pressure(device, size)
+    velocity, pressure = device.double_field(size, 2), Projection(device, size)
     results = []
     nowhere = device.field(size, 1, "nowhere solid", "f1")
     for solid in (None, nowhere):
@@ -263,7 +271,7 @@ def test_a_source_makes_its_divergence_less_the_mean(device: Device) -> None:
 
 def test_the_pressure_is_what_was_subtracted(device: Device) -> None:
     size = (61, 40)
-    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    pressure, field = Projection(device, size), device.double_field(size, 2)
     velocity = np.random.default_rng(4).standard_normal((40, 61, 2)).astype(np.float32)
     field.read.set(velocity)
     pressure.project(field, 4)
@@ -274,7 +282,7 @@ def test_the_pressure_is_what_was_subtracted(device: Device) -> None:
 def test_a_warm_start_is_never_worse(device: Device) -> None:
     """Two steps with the same impulse, then a third with another multiple of it."""
     size = (128, 96)
-    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    pressure, field = Projection(device, size), device.double_field(size, 2)
     field.read.set(brush(size, 8.0))
     pressure.project(field, 1)
     cold = pressure.divergence_norm(field.read)
@@ -290,7 +298,7 @@ def test_a_warm_start_is_never_worse(device: Device) -> None:
 
 def test_what_changes_steadily_takes_one_cycle(device: Device) -> None:
     size = (128, 96)
-    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    pressure, field = Projection(device, size), device.double_field(size, 2)
     cycles = []
     for step in range(6):
         field.read.set((1.0 + 0.1 * step) * brush(size, 8.0))
@@ -298,36 +306,33 @@ def test_what_changes_steadily_takes_one_cycle(device: Device) -> None:
         cycles.append(pressure.project(field, warm=True))
         assert pressure.divergence_norm(field.read) <= 1e-3 * before
     assert cycles[0] > 1
-    assert cycles[3:] == [1, 1, 1]
+    assert max(cycles[3:]) <= 1
 
 
 def test_the_norm_is_the_root_mean_square(device: Device) -> None:
     size = (61, 40)
-    pressure, field = Pressure(device, size), device.field(size, 2)
+    pressure, field = Projection(device, size), device.field(size, 2)
     velocity = closed(brush(size, 5.0), np.zeros((40, 61), bool))
     field.set(velocity)
     expected = np.sqrt((divergence(velocity) ** 2).mean()) * max(size)
     assert pressure.divergence_norm(field) == pytest.approx(expected, rel=1e-5)
 
 
-def test_a_source_in_a_closed_pocket_is_given_up_soon(device: Device) -> None:
-    """What is wanted there cannot be had, and more cycles would hardly bring it nearer."""
+def test_a_source_in_a_closed_pocket_loses_its_mean_there(device: Device) -> None:
+    """Nothing flows out of the pocket, and outside of it nothing has to make up for what is wanted inside."""
     size = (96, 72)
     x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
     distance = np.hypot(x - 40, y - 36)
     solid = (distance > 12) & (distance < 16)
-    wanted = np.where(distance < 6, 1.0, 0.0)
-    source, frozen = device.upload(wanted.astype(np.float32)), device.upload(solid.astype(np.uint8) * 255)
-    wanted = np.where(solid, 0.0, wanted - wanted[~solid].mean()) / max(size)
-    left = []
-    for cycles in (None, 20):
-        pressure, field = Pressure(device, size), device.double_field(size, 2)
-        pressure.set_solids(frozen)
-        taken = pressure.project(field, cycles, source)
-        assert taken == cycles if cycles else taken <= 4
-        left.append(np.linalg.norm(divergence(field.read.get()) - wanted))
-    assert left[0] <= 1.02 * left[1]
-    assert left[0] < 0.9 * np.linalg.norm(wanted)
+    solid |= (abs(x - 80) + abs(y - 60)) == 1  # and a single cell in a pocket of its own
+    asked = np.where(distance < 6, 1.0, 0.0) + np.where((x > 60) & (y < 30), 0.5, 0.0) + (x == 80) * (y == 60)
+    wanted = asked.copy()
+    region, _ = ndimage.label(~solid)
+    for number in range(1, region.max() + 1):
+        wanted[region == number] -= asked[region == number].mean()
+    wanted = np.where(solid, 0.0, wanted) / max(size)
+    result = project(device, np.zeros((72, 96, 2), np.float32), solid, None, asked.astype(np.float32))
+    assert np.linalg.norm(divergence(result) - wanted) <= 1e-3 * np.linalg.norm(wanted)
 
 
 def test_step_after_step_leaves_little_over_a_stiff_mask(device: Device) -> None:
@@ -353,11 +358,11 @@ def test_step_after_step_leaves_little_over_a_stiff_mask(device: Device) -> None
 def test_a_trend_does_not_carry_noise_on(device: Device) -> None:
     """Noise that is new in each step, as rounding is: of three steps' the trend alone would add up sqrt(6) times it."""
     size, rng, parts = (128, 96), np.random.default_rng(6), []
-    pressure, field = Pressure(device, size), device.double_field(size, 2)
+    pressure, field = Projection(device, size), device.double_field(size, 2)
     for step in range(24):
         noise = 1e-3 * rng.standard_normal((96, 128, 2)).astype(np.float32)
         field.read.set((1.0 + 0.01 * step) * brush(size, 8.0) + noise)
-        norm, _, (left, _) = pressure._try_expected({"velocity": field.read}, None)
-        parts.append(left * norm / np.linalg.norm(divergence(closed(noise, np.zeros((96, 128), bool)))))
+        _, left = pressure._take_divergence({"velocity": field.read}, expected=pressure.state()[1])
+        parts.append(np.sqrt(left) / np.linalg.norm(divergence(closed(noise, np.zeros((96, 128), bool)))))
         pressure.project(field, 4, warm=True)
     assert max(parts[12:]) < 1.6

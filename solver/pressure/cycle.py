@@ -1,0 +1,97 @@
+"""The multigrid cycle: a symmetric negative definite approximation of the inverse of the pressure's matrix."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.pressure.graph import Graph, coarsen_links, graphs_below, has_one_piece_a_block, links_of
+from solver.pressure.level import DirectSolve, GraphLevel, GridLevel
+from solver.pressure.transform import FastDiagonalization
+
+if TYPE_CHECKING:
+    from solver.gl.device import Device
+    from solver.gl.field import Field
+
+# A graph of no more unknowns than this is solved by a dense matrix: its inversion takes some 10 ms.
+DIRECT = 256
+
+
+class Cycle:
+    """Levels from the finest to one that is solved directly.
+
+    An unknown of a level stands for a block of 2 x 2 cells of the finer one, or among solids for each connected piece of
+    it, so that no wall is leaked through. Interpolation is constant, restriction its transpose, and the smoothing after
+    the correction is that before it backwards: with that the cycle is symmetric, as conjugate gradients ask.
+
+    Args:
+        device: the device.
+        size: (nx, ny) cells.
+        aspect: side of a cell along x over that along y.
+        solid: (ny, nx), true where a cell is solid; None for no solids.
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], aspect: float, solid: np.ndarray | None) -> None:
+        self.levels: list[GridLevel | GraphLevel] = []
+        self._direct = (
+            self._coarsen_box(device, size, aspect)
+            if solid is None
+            else self._coarsen_around(device, solid, aspect)
+        )
+
+    @property
+    def finest(self) -> GridLevel:
+        level = self.levels[0]
+        assert isinstance(level, GridLevel)
+        return level
+
+    def solve(self, residual: Field, sweeps: int) -> Field:
+        """One cycle from zero: the pressure, at blocks, that roughly accounts for the `residual`."""
+        self._visit(0, residual, sweeps, from_zero=True)
+        return self.levels[0].pressure.read
+
+    def release(self) -> None:
+        """Free the textures."""
+        for item in (*self.levels, self._direct):
+            item.release()
+
+    def _visit(self, number: int, residual: Field, sweeps: int, from_zero: bool) -> None:
+        level = self.levels[number]
+        if number == len(self.levels) - 1:
+            self._direct.solve(residual, level.pressure.read)
+            return
+        coarse = self.levels[number + 1]
+        for sweep in range(sweeps):
+            level.smooth(residual, from_zero=from_zero and sweep == 0)
+        level.restrict(residual, coarse)  # pyright: ignore[reportArgumentType]
+        self._visit(number + 1, coarse.residual, sweeps, from_zero=True)
+        # Among thin walls one visit leaves too much to smooth. A second one of the last level would find nothing, and of the
+        # first coarse one it would cost as much as another cycle.
+        if isinstance(coarse, GraphLevel) and 0 < number < len(self.levels) - 2:
+            self._visit(number + 1, coarse.residual, sweeps, from_zero=False)
+        level.prolong(coarse)  # pyright: ignore[reportArgumentType]
+        for _ in range(sweeps):
+            level.smooth(residual, backwards=True)
+
+    def _coarsen_box(self, device: Device, size: tuple[int, int], aspect: float) -> FastDiagonalization:
+        span = float(size[0]), float(size[1])
+        self.levels.append(GridLevel(device, span, aspect, 0))
+        while not FastDiagonalization.is_worth(self.levels[-1].size):
+            span = span[0] / 2, span[1] / 2
+            self.levels.append(GridLevel(device, span, aspect, len(self.levels)))
+        return FastDiagonalization(device, span, self.levels[-1].size, aspect)
+
+    def _coarsen_around(self, device: Device, solid: np.ndarray, aspect: float) -> DirectSolve:
+        left, up = links_of(solid)
+        self.levels.append(GridLevel(device, solid.shape[::-1], aspect, 0, (left, up)))
+        # As long as no block falls apart the coarser level is a grid as well, which costs less than a graph.
+        while left.size > 4 * DIRECT and has_one_piece_a_block(left, up):
+            left, up = coarsen_links(left, up)
+            self.levels.append(GridLevel(device, left.shape[::-1], aspect, len(self.levels), (left, up)))
+        graphs, parents = graphs_below(Graph.of_cells(left, up, aspect), DIRECT)
+        grid = left.shape[1], left.shape[0]
+        for k, graph in enumerate(graphs):
+            above = parents[k + 1] if k + 1 < len(parents) else None
+            self.levels.append(GraphLevel(device, graph, len(self.levels), parents[k], None if k else grid, above))
+        return DirectSolve(device, graphs[-1])

@@ -1,0 +1,146 @@
+"""The coarse unknowns among solids, in NumPy: what is connected within blocks of 2 x 2, and the links between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# The links of a coarser level are those of the finer one, added up, over this. A constant interpolation makes smooth
+# errors cost twice their energy: 2 is right where they are linear, and above it a second visit of a level could diverge.
+OVERCORRECTION = 1.8
+
+
+def components(count: int, ends: np.ndarray) -> np.ndarray:
+    """Of `count` items the smallest that each is connected with, by links between `ends`, (m, 2)."""
+    smallest = np.arange(count)
+    while True:
+        least = smallest[ends].min(axis=1)
+        if (smallest[ends] == least[:, None]).all():
+            return smallest
+        # Links are hung on the representatives, and the ways to these halved: the rounds grow as the logarithm.
+        for side in (0, 1):
+            np.minimum.at(smallest, smallest[ends[:, side]], least)
+        while (smallest[smallest] != smallest).any():
+            smallest = smallest[smallest]
+
+
+def links_of(solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """1 for every left and every upper face between two fluid cells, else 0, each (ny, nx)."""
+    left, up = np.zeros(solid.shape, np.float32), np.zeros(solid.shape, np.float32)
+    left[:, 1:] = ~(solid[:, 1:] | solid[:, :-1])
+    up[1:] = ~(solid[1:] | solid[:-1])
+    return left, up
+
+
+def even(cells: np.ndarray) -> np.ndarray:
+    """The cells with zeros up to even numbers of rows and columns."""
+    return np.pad(cells, ((0, cells.shape[0] % 2), (0, cells.shape[1] % 2)))
+
+
+def has_one_piece_a_block(left: np.ndarray, up: np.ndarray) -> bool:
+    """True if the linked cells of each block of 2 x 2 are connected within it."""
+    left, up = even(left) > 0.0, even(up) > 0.0
+    linked = left | up
+    linked[:, :-1] |= left[:, 1:]
+    linked[:-1] |= up[1:]
+    cells = sum(linked[j::2, i::2].astype(int) for j in (0, 1) for i in (0, 1))
+    inside = left[::2, 1::2].astype(int) + left[1::2, 1::2] + up[1::2, ::2] + up[1::2, 1::2]
+    return bool((cells - inside + (inside == 4) <= 1).all())
+
+
+def coarsen_links(left: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The links between blocks of 2 x 2 cells."""
+    left, up = even(left), even(up)
+    return 0.5 * (left[::2, ::2] + left[1::2, ::2]), 0.5 * (up[::2, ::2] + up[::2, 1::2])
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Unknowns and the links between them.
+
+    Attributes:
+        place: cell (x, y) of its level that each unknown lies in, (n, 2).
+        ends: the two unknowns of each link, (m, 2).
+        weight: of each link, (m,).
+    """
+
+    place: np.ndarray
+    ends: np.ndarray
+    weight: np.ndarray
+
+    @classmethod
+    def of_cells(cls, left: np.ndarray, up: np.ndarray, aspect: float) -> Graph:
+        """The cells of a grid, row after row; its links down count `aspect` squared times their weight."""
+        ny, nx = left.shape
+        number = np.arange(ny * nx).reshape(ny, nx)
+        x, y = np.meshgrid(np.arange(nx), np.arange(ny))
+        across, down = left > 0.0, up > 0.0
+        here, there = np.r_[number[across], number[down]], np.r_[number[across] - 1, number[down] - nx]
+        weight = np.r_[left[across], aspect**2 * up[down]]
+        return cls(np.stack([x.ravel(), y.ravel()], axis=1), np.stack([here, there], axis=1), weight)
+
+    def coarsen(self) -> tuple[Graph, np.ndarray]:
+        """The graph of the connected pieces of blocks, and of each unknown its piece; -1 where a piece has no links."""
+        count, block = len(self.place), self.place // 2
+        inside = (block[self.ends[:, 0]] == block[self.ends[:, 1]]).all(axis=1)
+        first = components(count, self.ends[inside])
+        ends = first[self.ends[~inside]]
+        pieces = np.unique(ends)
+        piece = np.full(count, -1)
+        piece[pieces] = np.arange(len(pieces))
+        low, high = np.sort(piece[ends], axis=1).T
+        pairs, which = np.unique(low * len(pieces) + high, return_inverse=True)
+        weight = np.bincount(which, self.weight[~inside], len(pairs)) / OVERCORRECTION
+        ends = np.stack(np.divmod(pairs, max(len(pieces), 1)), axis=1)
+        return Graph(block[pieces], ends, weight), piece[first]
+
+    def renumber(self, order: np.ndarray) -> Graph:
+        """The same graph with the unknown `order[k]` as number k."""
+        number = np.empty_like(order)
+        number[order] = np.arange(len(order))
+        return Graph(self.place[order], number[self.ends], self.weight)
+
+    def neighbours(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of each unknown its first neighbour in a list and their number; and the list of (neighbour, weight)."""
+        here, there = np.r_[self.ends[:, 0], self.ends[:, 1]], np.r_[self.ends[:, 1], self.ends[:, 0]]
+        order = np.argsort(here, kind="stable")
+        number = np.bincount(here, minlength=len(self.place))
+        listed = np.stack([there[order], np.r_[self.weight, self.weight][order]], axis=1)
+        return np.cumsum(number) - number, number, listed
+
+    def inverse(self) -> np.ndarray:
+        """Of the matrix A, sum of weight times difference, in float64, for right-hand sides that sum to 0 where closed.
+
+        Each component leaves the pressure's constant open; its mean is held at 0.
+        """
+        count = len(self.place)
+        matrix = np.zeros((count, count))
+        np.add.at(matrix, (self.ends[:, 0], self.ends[:, 1]), self.weight)
+        matrix += matrix.T
+        matrix -= np.diag(matrix.sum(axis=1))
+        label = components(count, self.ends)
+        together = label[:, None] == label
+        return np.linalg.inv(matrix - together / together.sum(axis=1))
+
+
+def graphs_below(cells: Graph, most: int) -> tuple[list[Graph], list[np.ndarray]]:
+    """The graphs of pieces below a grid's cells, down to one of at most so many unknowns.
+
+    Returns:
+        graphs: from the finest on; the finer ones of every unknown stand next to each other.
+        parents: for the cells and for every graph but the last, the unknowns of the next that theirs belong to, or -1.
+    """
+    graphs, parents = [cells], []
+    while len(graphs) == 1 or len(graphs[-1].place) > most:
+        graph, parent = graphs[-1].coarsen()
+        graphs.append(graph)
+        parents.append(parent)
+    for k in range(len(graphs) - 2, 0, -1):
+        # Those that stand for nothing on the next level come last.
+        order = np.argsort(np.where(parents[k] < 0, len(graphs[k + 1].place), parents[k]), kind="stable")
+        graphs[k], parents[k] = graphs[k].renumber(order), parents[k][order]
+        number = np.empty_like(order)
+        number[order] = np.arange(len(order))
+        parents[k - 1] = np.where(parents[k - 1] < 0, -1, number[parents[k - 1]])
+    return graphs[1:], parents
