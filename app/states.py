@@ -17,11 +17,11 @@ import numpy as np
 from app.errors import UserError
 from app.files import cannot_write, replacing
 from app.recipe import Recipe
-from app.replay import Replay, Snapshot
+from app.replay import Replay
 
 EVERY = 64  # ticks between two states
 BUDGET = 4 * 2**30  # bytes of a folder
-FORMAT = 1
+FORMAT = 2
 SUFFIX = ".state.npz"
 NOT_SIMULATED = {"name", "time", "stop", "output", "edges"}  # parts of a recipe that the fluid knows nothing of
 
@@ -67,13 +67,10 @@ class StoredStates:
             return
         if path.exists() and tick not in self._damaged:
             return
-        snapshot = self._replay.snapshot()
-        parts: dict[str, Any] = {f"field{number}": field for number, field in enumerate(snapshot.fields)}
-        if snapshot.held is not None:
-            parts["held"] = snapshot.held
+        parts: dict[str, Any] = self._replay.snapshot()
         try:
             with replacing(path) as temporary, temporary.open("wb") as stream:
-                np.savez(stream, about=np.array(self._about(tick)), steps=np.array(snapshot.steps), **parts)
+                np.savez(stream, about=np.array(self._about(tick)), **parts)
         except UserError as error:  # the animation does not depend on it
             self._notice(f"No more states are kept: {error}")
             self._failed = True
@@ -85,10 +82,7 @@ class StoredStates:
             with np.load(path, allow_pickle=False) as stored:  # a zip file, whose checksums NumPy looks at
                 if str(stored["about"]) != self._about(tick):
                     raise ValueError("it is of another simulation")
-                count = sum(name.startswith("field") for name in stored.files)
-                fields = tuple(stored[f"field{number}"] for number in range(count))
-                held = stored["held"] if "held" in stored.files else None
-                self._replay.resume(tick, Snapshot(fields, int(stored["steps"]), held))
+                self._replay.resume(tick, {name: stored[name] for name in stored.files if name != "about"})
             os.utime(path)
         except FileNotFoundError:  # another process has just tidied it up
             return False

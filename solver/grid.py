@@ -44,6 +44,11 @@ class Grid:
         return 1.0 / max(self.nx, self.ny)
 
     @property
+    def spacing(self) -> tuple[float, float]:
+        """(hx, hy): the sides of a cell, in longer sides of the picture."""
+        return self.h, self.h
+
+    @property
     def extent(self) -> tuple[float, float]:
         """(width, height) of the domain, the longer of them 1."""
         return self.nx * self.h, self.ny * self.h
