@@ -10,9 +10,9 @@
 // u_brush_velocity: lengths / s; u_carried: radii that something is carried before the push slips, and the least that it
 // gives for that reason; u_strain: where it begins to slip, and gives nothing; FINE: see solver/brush/push.py.
 // reads: 1157
+#include "lib/brush.glsl"
 uniform sampler2D u_around;
 uniform vec2 u_brush_velocity;
-uniform float u_radius;
 uniform vec2 u_carried;
 uniform vec2 u_strain;
 uniform vec2 u_place;
@@ -29,20 +29,14 @@ float by_way(vec2 back, vec2 ahead) {
     return mix(u_carried.y, 1.0, 1.0 / (1.0 + 2.0 * beyond * beyond));
 }
 
-// The flow of a soft brush at r, in radii: curl of its falloff times ahead x r.
-vec2 flow(vec2 r, vec2 ahead) {
-    float w = max(1.0 - dot(r, r), 0.0);
-    return w * w * (w * ahead + 6.0 * (ahead.x * r.y - ahead.y * r.x) * vec2(-r.y, r.x));
-}
-
 float strain(ivec2 node, vec2 ahead) {
     const vec2 e = vec2(1.0 / float(FINE), 0.0);
     const float scale = 0.5 * float(FINE);
     vec2 r = vec2(node) * e.x;
     vec2 jx = vec2(1.0, 0.0) + scale * (displacement(node + ivec2(1, 0)) - displacement(node - ivec2(1, 0)));
     vec2 jy = vec2(0.0, 1.0) + scale * (displacement(node + ivec2(0, 1)) - displacement(node - ivec2(0, 1)));
-    vec2 vx = scale * (flow(r + e.xy, ahead) - flow(r - e.xy, ahead));
-    vec2 vy = scale * (flow(r + e.yx, ahead) - flow(r - e.yx, ahead));
+    vec2 vx = scale * (brush_flow(r + e.xy, ahead) - brush_flow(r - e.xy, ahead));
+    vec2 vy = scale * (brush_flow(r + e.yx, ahead) - brush_flow(r - e.yx, ahead));
     float xx = dot(jx, jx), xy = dot(jx, jy), yy = dot(jy, jy);
     float growth = -2.0 * (xx * vx.x + xy * (vx.y + vy.x) + yy * vy.y) / max(xx + yy, 1e-6);
     return sqrt(0.5 * (xx + yy)) * max(growth, 0.0);

@@ -83,10 +83,9 @@ class Brush:
             spacing=(hx, hy),
         )
         if isinstance(motion, Push):
-            if warp is None:
-                self._slip.hold()
-            else:
-                self._slip.find(motion, warp)
+            self._slip.find(motion, warp)
+            at_brush = {"velocity": velocity, "impulse": fluid.impulse.field, "motion": self._motion}
+            self._slip.restrain(motion, fluid.grid, **at_brush)
 
     def _draw(
         self, fluid: Scheme, motion: Motion, faces: Field, gain: float, attenuation: dict[str, Any] | None = None
@@ -94,5 +93,5 @@ class Brush:
         paint = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {}))
         inputs = motion.tip.inputs(fluid.grid) | motion.inputs() | {"motion": self._motion, "gain": gain}
         if isinstance(motion, Push):
-            inputs["slip"] = self._slip.factor
+            inputs |= {"slip": self._slip.factor, "part": self._slip.part}
         paint(faces, add=True, region=motion.tip.region(fluid.grid), **inputs, **(attenuation or {}))

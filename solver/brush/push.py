@@ -9,6 +9,7 @@ from typing import Any
 from solver.brush.tip import Point, Tip
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.grid import Grid
 from solver.scheme import check_finite, check_step
 from solver.warp.map import WarpMap
 
@@ -27,6 +28,10 @@ SLIPPING, HELD_OFF = 4.0, 5.25
 # less for every radius that the fluid will go on without the brush, after the first. Found, as all of these, by making
 # the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
 BEGINNING, GAINING, COASTING = 0.68, 6.0, 2.0
+
+# 4. By energy: it gives nothing to a fluid that has, under the brush, so many times the energy of the brush's own flow
+#    already. That is more than a stroke makes of it by itself, and keeps what is stirred for long below twice the speed.
+MOST_ENERGY = 1.5
 
 # A brush's own flow is damped by viscosity as a mode of k^2 = 12 / radius^2 (measured), and no more is put in for it
 # than so many times what is wanted.
@@ -113,15 +118,24 @@ class Push:
 
 
 class Slip:
-    """How firmly a push holds what it has carried and stretched already: the second and third law, on the GPU."""
+    """How firmly a push holds: the laws that look at the map and at the fluid, on the GPU.
+
+    Attributes:
+        factor: the part of its speed that it gives, by what it has carried and stretched: the second and third law.
+        part: the part of what the fluid lacks that it gives, by energy: the fourth.
+    """
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.factor = device.field((1, 1), 1, "slip factor")
+        self.part = device.field((1, 1), 1, "part of the push")
         self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
 
-    def find(self, push: Push, warp: WarpMap) -> None:
-        """Set `factor` for a push on the picture of a map."""
+    def find(self, push: Push, warp: WarpMap | None) -> None:
+        """Set `factor` for a push on the picture of a map; without one it holds as firmly as it can."""
+        if warp is None:
+            self.factor.clear(1.0)
+            return
         width, height = warp.extent
         x, y = (min(max(at, 0.0), far) for at, far in zip(push.tip.start, warp.extent, strict=True))
         step = push.tip.radius / FINE
@@ -137,10 +151,12 @@ class Slip:
             extent=warp.extent,
         )
 
-    def hold(self) -> None:
-        """Let a push hold as firmly as it can."""
-        self.factor.clear(1.0)
+    def restrain(self, push: Push, grid: Grid, **at_brush: Field) -> None:
+        """Set `part`, after `factor`, for a push on a fluid: its velocity, impulse and motion at the brush."""
+        inputs = push.tip.inputs(grid) | push.inputs() | {"slip": self.factor, "most": MOST_ENERGY}
+        self.device.pass_("brush/restrain.frag")(self.part, **at_brush, **inputs)
 
     def release(self) -> None:
         self.factor.release()
+        self.part.release()
         self._around.release()
