@@ -17,6 +17,12 @@ uniform sampler2D u_held;
 #endif
 layout(location = 0) out vec2 out_displacement;
 
+// Where nothing is beyond the limits, nothing is added, so that the identity stays one to the bit.
+vec2 within_limits(vec2 place, vec2 moved) {
+    vec2 there = place * u_extent + moved;
+    return moved + (clamp(there, u_limits.xy, u_limits.zw) - there);
+}
+
 void main() {
     vec2 place = fragment_place();
 #ifdef HELD
@@ -26,20 +32,18 @@ void main() {
         mat2 slope;
         vec2 p = place * vec2(textureSize(u_accumulated, 0)), texel = floor(p) + 0.5;
         p = mix(p, texel, lessThan(abs(p - texel), vec2(1.0 / 512.0)));
-        out_displacement = cubic_displacement(u_accumulated, p, slope);
+        out_displacement = within_limits(place, cubic_displacement(u_accumulated, p, slope));
         return;
     }
 #endif
     vec2 moved = cubic_displacement(u_submap, place * vec2(textureSize(u_submap, 0)));
     vec2 there = place + moved / u_extent, kept = clamp(there, 0.0, 1.0);
     vec2 p = kept * vec2(textureSize(u_accumulated, 0));
-    // Inside, nothing is added, so that the identity stays one to the bit.
     moved += (kept - there) * u_extent;
 #ifdef CUBIC
     moved += cubic_displacement(u_accumulated, p);
 #else
     moved += quintic_displacement(u_accumulated, p);
 #endif
-    vec2 looked_up = place * u_extent + moved;
-    out_displacement = moved + (clamp(looked_up, u_limits.xy, u_limits.zw) - looked_up);
+    out_displacement = within_limits(place, moved);
 }
