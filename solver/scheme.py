@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ Vector = np.ndarray | Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray
 
 # A force, lengths / s^2: a vector, or a field on faces with its time law integrated over the step, seconds.
 Force = Vector | tuple[Field, float]
-Forces = Force | Iterable[Force]
+Forces = Vector | Iterable[Force]
 
 
 @dataclass(frozen=True)
@@ -332,9 +333,8 @@ class Scheme(ABC):
 
     def _acting(self, forces: Forces, dt: float) -> tuple[list[tuple[Field, float]], np.ndarray | None]:
         """Forces as fields with their impulses, and the velocity, (ny, nx, 2), that all others make in `dt`."""
-        several = [forces] if isinstance(forces, np.ndarray | tuple) and _is_one(forces) or callable(forces) else forces
         fields, total = list[tuple[Field, float]](), None
-        for force in several:  # pyright: ignore[reportGeneralTypeIssues]
+        for force in [forces] if isinstance(forces, np.ndarray) or callable(forces) else forces:
             if isinstance(force, tuple):
                 field, impulse = force
                 check_field("a force", field, self.grid)
@@ -347,10 +347,10 @@ class Scheme(ABC):
                 total = faces if total is None else total + faces
         return fields, total
 
-    def _wall_defines(self) -> dict[str, object]:
+    def _wall_defines(self) -> dict[str, Any]:
         return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
 
-    def _wall_inputs(self) -> dict[str, object]:
+    def _wall_inputs(self) -> dict[str, Any]:
         return {"wall_speed": self.params.walls.speed} if self.params.walls.slip == "none" else {}
 
 
@@ -405,10 +405,3 @@ def check_field(what: str, field: Field, grid: Grid) -> None:
     """Make sure that a field is a vector on the faces of a grid."""
     if field.size != grid.size or field.components != 2:
         raise ValueError(f"{what} is {field}, {grid.nx} x {grid.ny} x 2 is wanted")
-
-
-def _is_one(forces: object) -> bool:
-    """True for one force, and not a tuple of several."""
-    return isinstance(forces, np.ndarray) or (
-        isinstance(forces, tuple) and len(forces) == 2 and isinstance(forces[0], Field)
-    )

@@ -13,9 +13,6 @@ import random
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
-
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import properties
 from solver.gl.device import Device
@@ -52,7 +49,10 @@ def main() -> int:
                     print(f"{name} fails with seed {seed}: {type(error).__name__}: {error}".splitlines()[0], flush=True)
             took = time.perf_counter() - start
             figures = ", ".join(f"{figure} {value:.4g}" for figure, value in worst.items())
-            print(f"{name}: {options.seeds} seeds from {first}, {len(bad)} failed, {took:.0f} s; worst: {figures}", flush=True)
+            print(
+                f"{name}: {options.seeds} seeds from {first}, {len(bad)} failed, {took:.0f} s; worst: {figures}",
+                flush=True,
+            )
             failed += len(bad)
     return 1 if failed else 0
 

@@ -13,7 +13,6 @@ from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
-from solver.params import FluidParams, Walls
 from solver.resample.sampler import Sampler
 from solver.warp.map import WarpMap
 

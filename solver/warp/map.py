@@ -212,7 +212,7 @@ class WarpMap:
         if (columns - rows) * (width - height) < 0:
             given.release()
             raise FieldError(
-                f"a map of {columns} x {rows} was given for a picture of {width:.4g} x {height:.4g}: it seems transposed"
+                f"a map of {columns} x {rows} was given for a picture of {width:.4g} x {height:.4g}: is it transposed?"
             )
         self.reset()
         self._resample(given, self._accumulated.read, (0.0, 0.0), self._accumulated.read.texel)
@@ -274,9 +274,10 @@ class WarpMap:
     # -- reading it -------------------------------------------------------------------------------------------------
 
     def composed(self, scale: int | None = None, exact: bool = False) -> Field:
-        """The whole map's displacement on `scale` texels a cell, by default the accumulated map's; valid until it changes.
+        """The whole map's displacement on `scale` texels a cell, by default the accumulated map's.
 
-        To be looked up between its texels by the cubic; unless `exact`, the accumulated map is looked up by the cubic for it too.
+        Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, the accumulated
+        map is looked up by the cubic for it too.
         """
         scale = scale or self.scale
         if scale == self.scale and self._steps == 0:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -23,7 +24,6 @@ from scipy import ndimage
 from solver import Device, Fluid, Grid, PaperFluid, PaperWarpMap, WarpMap
 from solver.gl.field import Field
 from solver.gl.program import FULL_SCREEN_VERTEX, assemble
-from solver.scheme import Scheme
 
 JACOBI = """#version 330 core
 uniform sampler2D u_p; uniform vec2 u_texel; in vec2 v_uv; out float out_p;
@@ -164,12 +164,12 @@ def step_rows(device: Device, cells: int, rounds: int, table: Table) -> None:
     jobs: dict[str, tuple[Callable[[], None], int]] = {}
     fluids: dict[str, Fluid | PaperFluid] = {}
     for name, (kind, map_kind, viscosity) in cases.items():
-        fluid = kind(device, grid)
+        fluid: Any = kind(device, grid)
         fluid.set_viscosity(viscosity)
         fluid.set_velocity(start)
         warp = map_kind(device, grid)
 
-        def step(fluid: Scheme = fluid, warp: WarpMap = warp) -> None:
+        def step(fluid: Any = fluid, warp: WarpMap = warp) -> None:
             fluid.step(dt, [(force, 1e-3)])
             with device.stage("warp map"):
                 warp.follow(fluid, dt)

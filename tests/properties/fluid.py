@@ -5,10 +5,12 @@ Each `check_<name>(device, seed)` asserts, and gives figures that tell how near 
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from scipy import ndimage
 
-from solver.brush.brush import Brush
+from solver.brush.brush import Brush, Motion
 from solver.brush.masks import Masks
 from solver.brush.push import Push, gain_compensation
 from solver.brush.tip import Tip
@@ -71,7 +73,7 @@ def check_energy_of_unforced_flow(device: Device, seed: int, steps: int = 400) -
 
 
 def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[str, float]:
-    """Random forces, brushes, masks, walls and steps: finite, no faster than what was put in, no place off the picture."""
+    """Random forces, brushes, masks, walls and steps: finite, no more than was put in, no place off the picture."""
     rng = np.random.default_rng(seed)
     grid = Grid(*SIZES[rng.integers(len(SIZES))])
     width, height = grid.extent
@@ -84,7 +86,7 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
         end = start + rng.normal(0, 0.1, 2)
         return Tip(tuple(start), tuple(end), 10 ** rng.uniform(-2, -0.3), rng.uniform(0, 1))
 
-    def steer(velocity: Field) -> None:
+    def steer(velocity: Field, motion: Motion) -> None:
         nonlocal put_in
         before = velocity.get()
         brush.make_up(fluid, motion, velocity, warp)
@@ -116,7 +118,7 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
             brush.expand(fluid, tip(), rng.normal() / dt)
             # The flow that makes room: |grad phi| <= |lap phi| L / pi, and L is 1 or, round solids, less than 3.
             put_in += float(np.linalg.norm(fluid.source.field.get()))
-        fluid.step(dt, forces, steer if motion and rng.random() < 0.5 else None)
+        fluid.step(dt, forces, partial(steer, motion=motion) if motion and rng.random() < 0.5 else None)
         warp.follow(fluid, dt)
         if step % 50 == 49:
             speed = float(np.sqrt(energy(fluid)))
@@ -168,7 +170,7 @@ TURNS = ("x", "y", "xy", "t", "tx", "ty", "txy")
 
 
 def turned(faces: np.ndarray, turn: str) -> np.ndarray:
-    """A vector on MAC faces as it is in the mirror, transposed first if that is asked for; far walls' faces are zero."""
+    """A vector on MAC faces in the mirror, transposed first if that is asked for; far walls' faces are zero."""
     u, v = np.pad(faces[..., 0], ((0, 0), (0, 1))), np.pad(faces[..., 1], ((0, 1), (0, 0)))
     if "t" in turn:
         u, v = v.T, u.T
@@ -230,10 +232,12 @@ def check_symmetry(device: Device, seed: int, masked: bool = False) -> dict[str,
         fluid.set_viscosity(turned_cells(viscosity, turn))
         fluid.set_solid(turned_cells(solid, turn))
         fluid.set_velocity(turned(start, turn))
-        mirrored = (len(turn) + ("t" in turn) * 0) % 2 == 1
+        mirrored = len(turn) % 2 == 1
         pull = turned(force, turn)
         for tick in range(ticks):
-            points = [middle + reach * np.array([np.cos(a), np.sin(a)]) for a in (angle + 0.05 * (tick + n) for n in (0, 1))]
+            points = [
+                middle + reach * np.array([np.cos(a), np.sin(a)]) for a in (angle + 0.05 * (tick + n) for n in (0, 1))
+            ]
             tip = Tip(place(points[0], turn), place(points[1], turn), radius, 0.5)
             still = place(middle, turn)
             motion = Push(tip, dt)
