@@ -2,45 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from app.recipe import Recipe
-from solver.gl.device import Device
-from solver.gl.field import Field
-from solver.warp.map import MapState
+from solver.scheme import State
 
 DEFAULT_BUDGET = 512 * 2**20
 
 
 @dataclass(frozen=True)
-class State:
-    """Everything that later steps depend on, copied."""
+class Moment:
+    """The states of all parts of a simulation, by name; whoever has it releases it."""
 
-    fields: tuple[Field, ...]
-    warp: MapState
+    states: dict[str, State]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Everything in it off the GPU, named `part/name`."""
+        return {f"{part}/{name}": a for part, state in self.states.items() for name, a in state.arrays().items()}
+
+    def with_arrays(self, arrays: Mapping[str, np.ndarray]) -> Moment:
+        """This moment filled with what `arrays()` gave.
+
+        Raises:
+            ValueError: if that was of another simulation.
+        """
+        filled = {}
+        for part, state in self.states.items():
+            own = {name.removeprefix(f"{part}/"): a for name, a in arrays.items() if name.startswith(f"{part}/")}
+            filled[part] = state.with_arrays(own)
+        return Moment(filled)
 
     @cached_property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(field.nbytes for field in self.fields) + self.warp.nbytes
+        return sum(state.nbytes for state in self.states.values())
 
     def release(self) -> None:
         """Free the textures."""
-        for field in self.fields:
-            field.release()
-        self.warp.release()
-
-
-def copies(device: Device, fields: Iterable[Field]) -> tuple[Field, ...]:
-    """New fields that hold what `fields` hold."""
-    made = []
-    for field in fields:
-        copy = device.field(field.size, field.components, f"{field.label}, saved", field.dtype)
-        copy.copy_from(field)
-        made.append(copy)
-    return tuple(made)
+        for state in self.states.values():
+            state.release()
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Checkpoint:
 
     recipe: Recipe
     tick: int
-    state: State
+    moment: Moment
 
     def is_valid_for(self, recipe: Recipe) -> bool:
         return self.recipe.agrees_until(recipe) >= self.tick
@@ -71,7 +75,7 @@ class Checkpoints:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(checkpoint.state.nbytes for checkpoint in self._kept)
+        return sum(checkpoint.moment.nbytes for checkpoint in self._kept)
 
     def nearest(self, recipe: Recipe, tick: int) -> Checkpoint | None:
         """The last checkpoint at or before `tick` that is valid for `recipe`."""
@@ -108,4 +112,4 @@ class Checkpoints:
 
     def _drop(self, checkpoint: Checkpoint) -> None:
         self._kept.remove(checkpoint)
-        checkpoint.state.release()
+        checkpoint.moment.release()

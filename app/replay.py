@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from math import exp, hypot
+from math import hypot
 
 import numpy as np
 
-from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, State, copies
+from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.errors import UserError
 from app.forces import BuiltForce, build
 from app.masks import solid, viscosity
@@ -18,8 +18,11 @@ from app.sampling import Pictures, channels
 from app.strokes import Change, Dab, Stroke
 from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
-from solver.brush.brush import Brush, Push, Tip, Twirl
+from solver.brush.brush import Brush, Motion
 from solver.brush.masks import Masks
+from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
+from solver.brush.tip import Tip
+from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
@@ -27,7 +30,7 @@ from solver.grid import Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
 from solver.warp.density import Density
-from solver.warp.map import MapState, WarpMap
+from solver.warp.map import WarpMap
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought
@@ -38,18 +41,6 @@ GROWTH = 2.0  # of area, per second
 BLOW = 0.5  # longer sides per second along a curve
 THICKENING = 4.0  # decades of viscosity per second
 RESTORING = 6.0  # per second, the part of the displacement that is taken away
-
-MOST_HEADWAY = 20.0
-
-# How a push slips: radii of its path that it holds fast, and the part of its speed that it gives in the end.
-FIRM = 0.7
-LOOSEST = 0.3
-# How much it strains before it slips: at the beginning of a stroke, as part of the most; in how many radii of its way
-# as much is added; and how much less for every radius that the fluid will go on without it, after the first. Found by
-# making the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
-START = 0.68
-MORE = 6.0
-COASTING = 3.0
 
 # What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
 FARTHEST = 2.0
@@ -96,15 +87,6 @@ class LoadedForce:
             raise UserError(f"{self.label}: at t = {time:.3g} s it {grown}; {mend}")
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """Everything that later steps depend on, in arrays; `steps` of the map since its last fold, `held` its cells."""
-
-    fields: tuple[np.ndarray, ...]
-    steps: int
-    held: np.ndarray | None
-
-
 class Replay:
     """A recipe's simulation at a tick, which can go to any other tick.
 
@@ -131,8 +113,8 @@ class Replay:
         self.tick = self.steps = 0
         self.checkpoints = Checkpoints(budget)
         self._brush = Brush(device)
-        self._passing: State | None = None
-        self._leading: list[Push | Twirl] = []
+        self._passing: Moment | None = None
+        self._leading: list[Motion] = []
         self._build()
 
     # -- going through time -----------------------------------------------------------------------------------------
@@ -157,7 +139,7 @@ class Replay:
         while self.tick < whole:
             self.advance()
         if part:
-            self._passing = self._state()
+            self._passing = self._save()
             self._step(part)
 
     def head_for(self, tick: int) -> None:
@@ -188,33 +170,26 @@ class Replay:
         self._leave_passing()
         self._keep(self.recipe)
 
-    def snapshot(self) -> Snapshot:
-        """A copy of this moment off the GPU, for `resume`."""
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """A copy of this moment off the GPU, by name, for `resume`."""
         self._leave_passing()
-        state = self._state()
-        fields = tuple(field.get() for field in (*state.fields, *state.warp.fields))
-        taken = Snapshot(fields, state.warp.steps, state.warp.held)
-        state.release()
-        return taken
+        moment = self._save()
+        arrays = moment.arrays()
+        moment.release()
+        return arrays
 
-    def resume(self, tick: int, snapshot: Snapshot) -> None:
+    def resume(self, tick: int, snapshot: dict[str, np.ndarray]) -> None:
         """Go to a tick by a snapshot taken there, of the same simulation.
 
         Raises:
-            ValueError: if its fields are not those of this simulation.
+            ValueError: if it is not of this simulation.
         """
         self._leave_passing()
-        state = self._state()
+        moment = self._save()
         try:
-            fields = (*state.fields, *state.warp.fields)
-            kinds = [(field.get().shape, field.get().dtype) for field in fields]
-            if kinds != [(array.shape, array.dtype) for array in snapshot.fields]:
-                raise ValueError("its fields are of another size")
-            for field, array in zip(fields, snapshot.fields, strict=True):
-                field.set(array)
-            self._restore(State(state.fields, MapState(state.warp.fields, snapshot.steps, snapshot.held)))
+            self._restore(moment.with_arrays(snapshot))
         finally:
-            state.release()
+            moment.release()
         self.tick = tick
 
     def release(self) -> None:
@@ -337,8 +312,9 @@ class Replay:
         pressed = sum(amount for _, amount in tips) / len(tips)
         match stroke.tool:
             case "push":
-                far = stroke.travelled(self.tick, self.grid.extent) / stroke.radius
-                self._lead(Push(whole, dt, pressed, grip(far), patience(self.settings, whole, far)))
+                far, fluid = stroke.travelled(self.tick, self.grid.extent) / stroke.radius, self.settings
+                limit = strain_limit(whole, dt, far, fluid.drag, fluid.viscosity)
+                self._lead(Push(whole, dt, pressed, slip_factor(far), limit))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
@@ -353,22 +329,24 @@ class Replay:
             case "restore":
                 for tip, amount in tips:
                     share = 1 - np.exp(-RESTORING * abs(amount) * dt * part / len(tips))
-                    self.warp.restore(tip.end, tip.radius, tip.hardness, float(share))
+                    self.warp.restore_under(tip.end, tip.radius, tip.hardness, float(share))
             case _:
                 for tip, amount in tips:
                     self._paint(stroke, tip, amount, dt / len(tips))
                 return True
         return False
 
-    def _lead(self, motion: Push | Twirl) -> None:
+    def _lead(self, motion: Motion) -> None:
         """Let a brush lead the fluid: with what viscosity and drag will take of it, and again once they have."""
-        self._brush.lead(self.fluid, motion, headway(self.settings, motion.tip.radius), warp=self.warp)
+        fluid = self.settings
+        gain = gain_compensation(motion.tip.radius, fluid.dt, fluid.drag, fluid.viscosity)
+        self._brush.lead(self.fluid, motion, gain, self.warp)
         self._leading.append(motion)
 
-    def _steer(self) -> None:
+    def _steer(self, velocity: Field) -> None:
         with self.device.stage("brush"):
             for motion in self._leading:
-                self._brush.lead(self.fluid, motion, yielding=True, warp=self.warp)
+                self._brush.make_up(self.fluid, motion, velocity, self.warp)
 
     def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
         match stroke.tool:
@@ -436,21 +414,17 @@ class Replay:
             if thing is not None:
                 thing.release()
 
-    def _fields(self) -> list[Field]:
-        density = self.density.state() if self.density is not None else ()
-        return [*self.fluid.state(), *self.masks.state(), *density]
+    def _parts(self) -> dict[str, Fluid | PaperFluid | Masks | Density | WarpMap]:
+        """All that has a state, by name."""
+        parts = {"fluid": self.fluid, "masks": self.masks, "density": self.density, "warp": self.warp}
+        return {name: part for name, part in parts.items() if part is not None}
 
-    def _state(self) -> State:
-        return State(copies(self.device, self._fields()), self.warp.save())
+    def _save(self) -> Moment:
+        return Moment({name: part.save() for name, part in self._parts().items()})
 
-    def _restore(self, state: State) -> None:
-        fields = list(state.fields)
-        for part in (self.fluid, self.masks, self.density):
-            if part is not None:
-                count = len(part.state())
-                part.load(fields[:count])
-                del fields[:count]
-        self.warp.load(state.warp)
+    def _restore(self, moment: Moment) -> None:
+        for name, part in self._parts().items():
+            part.restore(moment.states[name])
         # Which base the masks were painted over then is worked out anew.
         self._viscosity_in_force = None
 
@@ -460,12 +434,12 @@ class Replay:
             self._build()
             self.tick = 0
         else:
-            self._restore(checkpoint.state)
+            self._restore(checkpoint.moment)
             self.tick = checkpoint.tick
 
     def _keep(self, recipe: Recipe) -> None:
         if self.checkpoints.budget and not self.checkpoints.has(recipe, self.tick):
-            self.checkpoints.add(Checkpoint(recipe, self.tick, self._state()))
+            self.checkpoints.add(Checkpoint(recipe, self.tick, self._save()))
 
     def _leave_passing(self) -> None:
         """Come back to the whole tick from between two."""
@@ -480,35 +454,3 @@ class Replay:
             *(change.tick for change in self.recipe.change),
         )
         return self.tick in events
-
-
-def grip(far: float) -> float:
-    """The part of its speed that a push gives to the picture, `far` radii after it began: all at first, then it slips.
-
-    Else a long stroke would draw out what lay at its start into a thread thinner than a cell, where the map folds.
-    """
-    return LOOSEST + (1 - LOOSEST) / (1 + 2 * max(far - FIRM, 0.0) ** 2)
-
-
-def patience(settings: FluidSettings, tip: Tip, far: float) -> float:
-    """The part of the most strain at which a push slips, `far` radii after it began.
-
-    All that a stroke strains by itself it may; one that begins where the picture is strained already slips soon. So
-    does one in a fluid that will go on by itself for about the brush's radius, because then there is no brush to slip.
-    Nothing depends on the grid: a recipe gives the same warp on any.
-    """
-    speed = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1]) / settings.dt
-    # The rate at which the fluid comes to rest: drag's, and viscosity's on a brush's own motion, as in `headway`.
-    slowing = max(settings.drag + 12 * settings.viscosity / tip.radius**2, 1e-6)
-    coasting = speed / slowing / tip.radius
-    begin = START / (1 + coasting / 2)
-    return min(begin + far / MORE, 1.0) / (1 + coasting / 4 + COASTING * max(coasting - 1, 0.0))
-
-
-def headway(settings: FluidSettings, radius: float) -> float:
-    """How many times a brush's motion is put in, so that about all of it is left after a tick of viscosity and drag.
-
-    An implicit step leaves 1 / (1 + dt mu k^2) of a mode k; a brush's own k^2 is about 12 / radius^2 (measured).
-    """
-    held = exp(settings.drag * settings.dt) * (1 + 12 * settings.dt * settings.viscosity / radius**2)
-    return min(held, MOST_HEADWAY)

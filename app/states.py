@@ -18,11 +18,11 @@ from app.errors import UserError
 from app.files import cannot_write, replacing
 from app.inputs import Archive, open_input
 from app.recipe import Recipe
-from app.replay import Replay, Snapshot
+from app.replay import Replay
 
 EVERY = 64  # ticks between two states
 BUDGET = 4 * 2**30  # bytes of a folder
-FORMAT = 1
+FORMAT = 2
 SUFFIX = ".state.npz"
 NOT_SIMULATED = {"name", "time", "stop", "output", "edges"}  # parts of a recipe that the fluid knows nothing of
 
@@ -68,13 +68,10 @@ class StoredStates:
             return
         if path.exists() and tick not in self._damaged:
             return
-        snapshot = self._replay.snapshot()
-        parts: dict[str, Any] = {f"field{number}": field for number, field in enumerate(snapshot.fields)}
-        if snapshot.held is not None:
-            parts["held"] = snapshot.held
+        parts: dict[str, Any] = self._replay.snapshot()
         try:
             with replacing(path) as temporary, temporary.open("wb") as stream:
-                np.savez(stream, about=np.array(self._about(tick)), steps=np.array(snapshot.steps), **parts)
+                np.savez(stream, about=np.array(self._about(tick)), **parts)
         except UserError as error:  # the animation does not depend on it
             self._notice(f"No more states are kept: {error}")
             self._failed = True
@@ -91,10 +88,7 @@ class StoredStates:
             with open_input(path) as stream, np.load(stream, allow_pickle=False) as stored:
                 if str(stored["about"]) != self._about(tick):
                     raise ValueError("it is of another simulation")
-                count = sum(name.startswith("field") for name in stored.files)
-                fields = tuple(stored[f"field{number}"] for number in range(count))
-                held = stored["held"] if "held" in stored.files else None
-                self._replay.resume(tick, Snapshot(fields, int(stored["steps"]), held))
+                self._replay.resume(tick, {name: stored[name] for name in stored.files if name != "about"})
             os.utime(path)
         except Exception as error:  # of damaged files the readers raise anything
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__

@@ -11,8 +11,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from solver.brush.brush import Brush, Tip
+    from solver.brush.brush import Brush
     from solver.brush.masks import Masks
+    from solver.brush.tip import Tip
     from solver.fluid import Fluid
     from solver.gl.device import ContextError, Device
     from solver.grid import Grid
@@ -39,8 +40,9 @@ __all__ = [
 
 # Loaded when first asked for: a recipe needs `solver.grid` and must not bring all of GL along.
 _MODULES = {
-    "brush.brush": ("Brush", "Tip"),
+    "brush.brush": ("Brush",),
     "brush.masks": ("Masks",),
+    "brush.tip": ("Tip",),
     "fluid": ("Fluid",),
     "gl.device": ("ContextError", "Device"),
     "grid": ("Grid",),

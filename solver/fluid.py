@@ -3,160 +3,119 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from solver.gl.device import Device
-from solver.gl.field import DoubleField, Field
+from solver.gl.field import Field
+from solver.gl.reduction import Reduction
 from solver.grid import Grid
 from solver.packing import PackedFaces
 from solver.params import FluidParams
 from solver.pressure.projection import Projection
+from solver.scheme import (
+    LARGEST_SPEED,
+    Forces,
+    Residuals,
+    Scheme,
+    State,
+    Vector,
+    check_size,
+    check_step,
+    on_faces,
+)
 from solver.viscosity.solve import Viscosity
 
-# Cells along the edges of what departs that depend on the walls.
-RIM = 3
-
-# A force field on the grid's faces, and its time law integrated over the tick (seconds).
-Force = tuple[Field, float]
+# How far the rows of faces that are advected reach beyond the grid, columns and rows on either side.
+BEYOND = 1, 2
 
 
 @dataclass(frozen=True)
-class Residuals:
-    """What the two solves of the last step left; see `Fluid.measuring`.
+class Departing:
+    """w1, as advection takes it: on MAC faces, and the same four faces of a row a texel (see `lay_rows.frag`)."""
 
-    Attributes:
-        divergence_before, divergence_after: root mean square over the cells, 1 / s, less what brushes ask for.
-        viscous_residual: of the implicit viscous step, relative; None where the scheme does not tell.
-    """
-
-    divergence_before: float = 0.0
-    divergence_after: float = 0.0
-    viscous_residual: float | None = None
-
-    @property
-    def divergence_left(self) -> float:
-        """The part of the divergence that the projection has left."""
-        return self.divergence_after / self.divergence_before if self.divergence_before else 0.0
+    faces: Field
+    rows: tuple[Field, Field]
 
 
 @dataclass(frozen=True)
-class Motion:
-    """How fast the fluid moves: what stop conditions and statistics look at."""
+class Trace:
+    """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells."""
 
-    kinetic_energy: float
-    largest_speed: float
+    field: Field
+    dt: float
 
 
-class Fluid:
-    """An incompressible fluid of spatially varying viscosity on a MAC grid.
+class Fluid(Scheme):
+    """An incompressible fluid of spatially varying viscosity on a MAC grid; see solver/README.md.
 
-    Everything is in the units of CONTRIBUTING.md: the longer side of the picture is 1, y points down, velocities are
-    lengths per second. Paper: section 3, equation (4).
-
-    Args:
-        device: where it lives.
-        grid: its cells; see `Grid.for_picture`.
-        params: walls, drag, cycles; may be replaced between steps.
+    Paper: section 3, equation (4). See `Scheme` for its arguments and what is put in and read out.
 
     Attributes:
-        impulse: what brushes have drawn on MAC faces for the next step, lengths / s.
-        measuring: let every step leave its `residuals`; it changes no result, and is slow.
+        velocity: on MAC faces, lengths / s: `read` is what it is now.
     """
 
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
-        self.device = device
-        self.grid = grid
-        self.params = params or FluidParams()
+        super().__init__(device, grid, params)
         self.velocity = device.double_field(grid.size, 2, "velocity")
-        self.viscosity = device.field(grid.size, 1, "viscosity")
-        self.solid = device.field(grid.size, 1, "solid", "f1")
-        self.source = device.field(grid.size, 1, "divergence source")
-        self.impulse = device.field(grid.size, 2, "impulse")
-        self._trace = device.field(grid.size, 2, "trace")
-        # Two cells more on every side, for what walls make of the velocity there.
-        self._departing = device.field((grid.nx + 4, grid.ny + 4), 2, "departing velocity")
+        # Half the last pressure gradient, which the next step takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
-        self.measuring = False
-        self.residuals = Residuals()
-        self._has_impulse = False
-        self._has_source = False
-        self._traced_dt: float | None = None  # of what `_trace` holds for the velocity as it is
-        self._is_diffused = False  # between diffusion and projection: w3 is in place
-        self._solids_changed = True
-        self._solids_of: np.ndarray | None = None
-        self._coefficients_of: object = None
-        self._packed: PackedFaces | None = None  # w2, then w3, between the stages of a step
+        rows = grid.nx + 2 * BEYOND[0], grid.ny + 2 * BEYOND[1]
+        self._departing = Departing(
+            device.field(grid.size, 2, "departing velocity"),
+            (device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")),
+        )
+        self._trace_field = device.field(grid.size, 2, "trace")
+        self._trace: Trace | None = None  # of the velocity as it is
+        blocks = -(-grid.nx // 2), -(-grid.ny // 2)
+        self._squares = device.field(blocks, 2, "energies")
+        self._sum_of_squares = Reduction(device, blocks, 2, "sum")
+        self._limited = PackedFaces(device, (blocks[0] + 2, blocks[1] + 2), "limited velocity")
         self._viscosity_solver = Viscosity(device, grid.size)
-        self._pressure_solver = Projection(device, grid.size)
+        self._pressure_solver = Projection(device, grid.size, grid.spacing)
+        # What the solvers hold of the masks; None if they have to look.
+        self._coefficients_of: object = None
+        self._solids_of: np.ndarray | None = None
+        self._has_new_solids = True
 
     # -- the paper's step -------------------------------------------------------------------------------------------
 
-    def step(self, dt: float, forces: Iterable[Force] = (), steer: Callable[[], None] | None = None) -> None:
+    def step(self, dt: float, forces: Forces = (), steer: Callable[[Field], None] | None = None) -> None:
         """Advance by `dt` seconds: w0 -> add force -> w1 -> advect -> w2 -> diffuse -> w3 -> project -> w4.
 
-        `steer` is called with w3 in place: brushes that lead the picture by hand make up there for what viscosity took.
+        See `Scheme.step`. Unconditionally stable: without forces the energy never grows (equation S6).
         """
-        self.add_force(forces)
-        self.advect(dt)
-        self.diffuse(dt, unpack=steer is not None or self.measuring)
+        dt = check_step(dt)
+        w1 = self._add_force(forces, dt)
+        w2 = self._advect(w1, dt)
+        w3 = self._diffuse(w2, dt)
+        viscous_residual = self._viscous_residual(w3) if self.measuring else None
+        w3 = self._bound_energy(w1, w3)
+        self._project(w3 if steer is None else self._steered(w3, steer))
         if self.measuring:
-            self.residuals = Residuals(viscous_residual=self._viscous_residual())
-        if steer is not None:
-            self._is_diffused = True
-            steer()
-            self._is_diffused = False
-        with self._watching_projection():
-            self.project()
-        self._traced_dt = None
+            self.residuals = replace(self.residuals, viscous_residual=viscous_residual)
+        self.time += dt
 
-    def add_force(self, forces: Iterable[Force]) -> None:
-        """w1 = w0 + dt f, f the sum of the forces and of what brushes have drawn; laid out to be advected.
+    def _add_force(self, forces: Forces, dt: float) -> Departing:
+        """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn.
 
-        Half the last pressure gradient is subtracted where the fluid departs, so that with the projection, where it
-        arrives, pressure acts along the path by the trapezoidal rule: second order in time, where the paper's splitting
-        is first order and dissipates (it takes dt^2 |grad p|^2 of energy a step). Xiu and Karniadakis, J. Comput. Phys.
-        172 (2001), treat such schemes.
+        g is half the last pressure gradient: with the projection, where the fluid arrives, pressure then acts along the
+        path by the trapezoidal rule, second order in time, where the paper's splitting is first order and dissipates
+        (it takes dt^2 |grad p|^2 of energy a step). Xiu and Karniadakis, J. Comput. Phys. 172 (2001), treat such
+        schemes.
         """
+        self._check_source()
+        fields = self._fields_of(forces, dt)
         with self.device.stage("add force"):
-            acting = [(force, impulse) for force, impulse in forces if impulse != 0.0]
-            if self._has_impulse or len(acting) > 1:
-                add = self.device.pass_("step/add_force.frag")
-                for force, impulse in acting:
-                    add(self.impulse, add=True, force=force, impulse=impulse)
-                acting, self._has_impulse = [(self.impulse, 1.0)], True
-            inputs: dict[str, Any] = {"velocity": self.velocity.read, "carried": self._carried.read}
-            defines: dict[str, Any] = {}
-            for force, impulse in acting:
-                inputs |= {"force": force, "impulse": impulse}
-                defines = {"FORCE": 1}
-            width, height = self._departing.size
-            inside = (RIM, RIM, width - 2 * RIM, height - 2 * RIM)
-            around = [(0, 0, width, RIM), (0, height - RIM, width, RIM)]
-            around += [(x, RIM, RIM, height - 2 * RIM) for x in (0, width - RIM)]
-            self.device.pass_("step/depart.frag", **defines)(self._departing, region=inside, **inputs)
-            edges = self.device.pass_("step/depart.frag", EDGES=1, **defines, **self._wall_defines())
-            edges(self._departing, region=around, **inputs, **self._wall_inputs())
-            self._forget_impulse()
+            departing, add_force = self._departing.faces, self.device.pass_("step/add_force.frag")
+            add_force(departing, velocity=self.velocity.read, carried=self._carried.read)
+            self._add_fields(departing, fields)
+        return self._lay_rows(departing)
 
-    def add_impulse(self, draw: Callable[[Field], None]) -> None:
-        """Let `draw` add a change of velocity, lengths / s, to the field of MAC faces it is handed.
-
-        It acts in the next step, with the forces; on w3 while a step is being steered.
-        """
-        with self.device.stage("add force"):
-            if self._is_diffused:
-                draw(self.velocity.read)
-            else:
-                draw(self.impulse)
-                self._has_impulse = True
-
-    def advect(self, dt: float) -> None:
-        """w2(x) = w1(x - dt w0(x)): second-order backtrace, cubic interpolation; drag acts on the way.
+    def _advect(self, departing: Departing, dt: float) -> PackedFaces:
+        """w2(x) = w1(x_d): second-order backtrace, cubic interpolation, each component from where it departs; and drag.
 
         Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has
         just been carried by it, so that the trace is there already.
@@ -164,186 +123,216 @@ class Fluid:
         trace = self.trace(dt)
         self._take_up_masks(dt)
         with self.device.stage("advect"):
-            self._packed = self._viscosity_solver.given
-            packing = self._viscosity_solver.packing
+            advected, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
             advect = self.device.pass_("step/advect.frag", **packing.defines)
-            decay = math.exp(-self.params.drag * dt)
-            advect(self._packed.fields, region=packing.region, departing=self._departing, trace=trace, decay=decay,
-                   **packing.open)  # fmt: skip
+            advect(advected.fields, region=packing.region, rows_u=departing.rows[0], rows_v=departing.rows[1],
+                   trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
+        return advected
+
+    def _diffuse(self, advected: PackedFaces, dt: float) -> PackedFaces:
+        """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled."""
+        assert advected is self._viscosity_solver.v_star
+        self._take_up_masks(dt)
+        with self.device.stage("diffuse"):
+            return self._viscosity_solver.solve()
+
+    def _bound_energy(self, departing: Departing, diffused: PackedFaces) -> PackedFaces:
+        """w3, made smaller where it has more energy than departed: advection moves energy and viscosity takes it.
+
+        A semi-Lagrangian step reads some places more often than others and so may make energy; see equation (S6). Walls
+        that move may besides bring all of the fluid to their own speed.
+
+        Raises:
+            ValueError: if what departed is not finite, or beyond all measure; the velocity stays as it was.
+        """
+        with self.device.stage("diffuse"):
+            energy = self.device.pass_("step/energy.frag")
+            energy(self._squares, **diffused.inputs(), departing=departing.faces)
+            after, before = self._sum_of_squares(self._squares).tolist()
+            cells = self.grid.nx * self.grid.ny
+            if not before <= cells * LARGEST_SPEED**2:
+                self._forget_last_step()
+                raise ValueError("the forces and brushes of this step are beyond all measure")
+            moved = max(map(abs, self.params.walls.speed)) if self.params.walls.slip == "none" else 0.0
+            most = math.sqrt(before) + moved * math.sqrt(cells)
+            if math.sqrt(after) <= most:
+                return diffused
+            scale = self.device.pass_("step/scale.frag")
+            scale(self._limited.fields, **diffused.inputs(), factor=most / math.sqrt(after))
+            return self._limited
+
+    def _steered(self, diffused: PackedFaces, steer: Callable[[Field], None]) -> None:
+        """w3 in the hand of brushes: from here on it is what `velocity` holds."""
+        self._unpack(diffused)
+        steer(self.velocity.read)
+
+    def _project(self, diffused: PackedFaces | None, carried: bool = True) -> None:
+        """w4 = w3 - grad q with lap q = div w3 - source; w3 is what `velocity` holds, if it is not given."""
+        if self.measuring and diffused is not None:
+            self._unpack(diffused)
+            diffused = None
+        wanted = self.source.field.get() if self.measuring else None
+        before = self._divergence_norm(wanted)
+        with self.device.stage("project"):
+            self._take_up_solids()
+            source = None if self.source.is_empty else self.source.field
+            self._pressure_solver.project(
+                self.velocity,
+                self.params.pressure_cycles,
+                source,
+                warm=True,
+                carried=self._carried if carried else None,
+                packed=diffused,
+            )
+            self.source.clear()
+            self._trace = None
+        self.residuals = Residuals(before, self._divergence_norm(wanted))
+
+    # -- its stages, each alone -------------------------------------------------------------------------------------
+
+    def add_force(self, forces: Forces, dt: float) -> None:
+        """Add forces, and what brushes have drawn, to the velocity; see `step`."""
+        self._add_fields(self.velocity.read, self._fields_of(forces, check_step(dt)))
+        self._trace = None
+
+    def advect(self, dt: float) -> None:
+        """Let the velocity carry itself for `dt` seconds; the result is not free of divergence."""
+        dt = check_step(dt)
+        self._unpack(self._advect(self._lay_rows(self.velocity.read), dt))
+
+    def diffuse(self, dt: float) -> None:
+        """Let viscosity act on the velocity for `dt` seconds; the result is not free of divergence."""
+        self._take_up_masks(check_step(dt))
+        with self.device.stage("diffuse"):
+            self._viscosity_solver.diffuse(self.velocity)
+            self._trace = None
+
+    def project(self) -> None:
+        """Make the velocity free of divergence, but for what brushes ask for."""
+        self._check_source()
+        self._project(None, carried=False)
 
     def trace(self, dt: float) -> Field:
         """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells.
 
-        Valid until the velocity changes.
+        Valid until the velocity changes. The warp map and the next step both follow it.
         """
-        if dt != self._traced_dt:
+        if self._trace is None or self._trace.dt != dt:
+            hx, hy = self.grid.spacing
             with self.device.stage("trace"):
                 trace = self.device.pass_("step/trace.frag", **self._wall_defines())
-                trace(self._trace, velocity=self.faces(), dt_over_h=dt / self.grid.h, **self._wall_inputs())
-            self._traced_dt = dt
-        return self._trace
-
-    def carry(self, displacement: DoubleField, dt: float) -> None:
-        """Carry a displacement at the cells' centres, longer sides, along `dt` seconds of the velocity.
-
-        What is carried first after a step is drawn together with the trace, which the next step takes over.
-        """
-        inputs: dict[str, Any] = {"displacement": displacement.read, "h": self.grid.h}
-        if dt == self._traced_dt:
-            self.device.pass_("warp/advance.frag")(displacement.write, trace=self._trace, **inputs)
-        else:
-            advance = self.device.pass_("warp/advance.frag", TRACE=1, **self._wall_defines())
-            inputs |= {"velocity": self.faces(), "dt_over_h": dt / self.grid.h, **self._wall_inputs()}
-            advance((displacement.write, self._trace), **inputs)
-            self._traced_dt = dt
-        displacement.swap()
-
-    def diffuse(self, dt: float, unpack: bool = True) -> None:
-        """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled.
-
-        Without `unpack` w3 stays as the viscous solver packs it, for the projection, and `velocity` is w0 until then.
-        """
-        with self.device.stage("diffuse"):
-            self._packed = self._viscosity_solver.solve()
-            if unpack:
-                self._viscosity_solver.unpack(self._packed, self.velocity.read)
-                self._packed = None
-
-    def project(self) -> None:
-        """w4 = w3 - grad q with lap q = div w3 - source: divergence-free but for the brushes' sources."""
-        with self.device.stage("project"):
-            self._take_up_solids()
-            source = self.source if self._has_source else None
-            packed, self._packed = self._packed, None
-            self._pressure_solver.project(
-                self.velocity, self.params.pressure_cycles, source, warm=True, carried=self._carried, packed=packed
-            )
-            if self._has_source:
-                self.source.clear()
-                self._has_source = False
-            self._traced_dt = None
+                trace(self._trace_field, velocity=self.faces(), cells_a_speed=(dt / hx, dt / hy), **self._wall_inputs())
+            self._trace = Trace(self._trace_field, dt)
+        return self._trace.field
 
     # -- what is put in ---------------------------------------------------------------------------------------------
 
-    def set_velocity(self, array: np.ndarray) -> None:
-        """Set u on left faces and v on upper faces from (ny, nx, 2); the walls' own faces become zero."""
-        faces = np.array(array, np.float32)
+    def set_velocity(self, velocity: Vector) -> None:
+        """Set u on left faces and v on upper faces from (ny, nx, 2) or a function (x, y, t); walls' faces become zero.
+
+        Raises:
+            ValueError: on another shape, or a value that is not finite or beyond all measure.
+        """
+        faces = on_faces("a velocity", velocity, self.grid, self.time)
+        check_size("a velocity", faces)
         faces[:, 0, 0] = 0.0
         faces[0, :, 1] = 0.0
         self.velocity.read.set(faces)
         self._forget_last_step()
-
-    def set_viscosity(self, viscosity: np.ndarray | float) -> None:
-        """Set the viscosity of the cells, lengths^2 / s, from (ny, nx) or one number.
-
-        Raises:
-            ValueError: if a value is negative or not finite.
-        """
-        array = np.broadcast_to(np.asarray(viscosity, np.float32), (self.grid.ny, self.grid.nx))
-        if not (np.isfinite(array).all() and (array >= 0).all()):
-            raise ValueError("viscosity must be finite and not negative everywhere")
-        self.viscosity.set(array)
-        self.masks_changed()
-
-    def set_solid(self, solid: np.ndarray) -> None:
-        """Freeze the cells where the (ny, nx) array is true or non-zero: their faces do not move."""
-        self.solid.set(np.where(np.asarray(solid), 255, 0).astype(np.uint8))
-        self.masks_changed()
-
-    def masks_changed(self) -> None:
-        """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
-        self._coefficients_of = None
-        self._solids_changed = True
-
-    def add_source(self, source: Field, amount: float = 1.0) -> None:
-        """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
-        self.device.pass_("step/add_source.frag")(self.source, add=True, source=source, amount=amount)
-        self.source_drawn()
-
-    def source_drawn(self) -> None:
-        """Say that something was drawn into `source`; the next projection uses it up."""
-        self._has_source = True
-
-    # -- what is read out -------------------------------------------------------------------------------------------
-
-    def faces(self) -> Field:
-        """The velocity on MAC faces, as the warp map, the overlays and the density take it."""
-        return self.velocity.read
-
-    def velocity_at_centres(self) -> np.ndarray:
-        """Velocity at cell centres, (ny, nx, 2) float32."""
-        faces = np.pad(self.faces().get(), ((0, 1), (0, 1), (0, 0)))
-        return 0.5 * np.stack([faces[:-1, :-1, 0] + faces[:-1, 1:, 0], faces[:-1, :-1, 1] + faces[1:, :-1, 1]], axis=-1)
-
-    def divergence(self) -> np.ndarray:
-        """Divergence of the velocity, (ny, nx) float32, 1 / s."""
-        faces = np.pad(self.velocity.read.get(), ((0, 1), (0, 1), (0, 0)))
-        across, down = np.diff(faces[:-1, :, 0], axis=1), np.diff(faces[:, :-1, 1], axis=0)
-        return (across + down) / np.float32(self.grid.h)
-
-    def pressure(self) -> np.ndarray:
-        """The last projection's q, (ny, nx) float32, lengths^2 / s: pressure times dt."""
-        return self._pressure_solver.pressure
-
-    def motion(self) -> Motion:
-        """Kinetic energy (integral of |v|^2 / 2) and largest speed; reads the velocity back."""
-        speed = np.linalg.norm(self.velocity_at_centres().astype(np.float64), axis=-1)
-        return Motion(float(0.5 * (speed**2).sum() * self.grid.h**2), float(speed.max()))
-
-    @contextmanager
-    def _watching_projection(self) -> Iterator[None]:
-        if not self.measuring:
-            yield
-            return
-        wanted = self.source.get()
-        norms = [self._divergence_norm(wanted)]
-        yield
-        norms.append(self._divergence_norm(wanted))
-        self.residuals = replace(self.residuals, divergence_before=norms[0], divergence_after=norms[1])
-
-    def _divergence_norm(self, wanted: np.ndarray) -> float:
-        return float(np.sqrt(np.mean((self.divergence().astype(np.float64) - wanted) ** 2)))
-
-    def _viscous_residual(self) -> float | None:
-        return self._viscosity_solver.residual_norm(self.velocity.read)
-
-    # -- checkpoints ------------------------------------------------------------------------------------------------
-
-    def state(self) -> Sequence[Field]:
-        """The fields that a later step depends on, for checkpoints: copies of them bring this moment back exactly."""
-        solvers = *self._viscosity_solver.state(), *self._pressure_solver.state()
-        return self.velocity.read, self._carried.read, *solvers, self.viscosity, self.solid
-
-    def load(self, state: Sequence[Field]) -> None:
-        """Go back to copies of `state()` taken earlier."""
-        for field, saved in zip(self.state(), state, strict=True):
-            field.copy_from(saved)
-        self._traced_dt = None
-        self._forget_impulse()
-        self.masks_changed()
 
     def clear_velocity(self) -> None:
         """Stop all motion."""
         self.velocity.read.clear()
         self._forget_last_step()
 
-    def release(self) -> None:
-        """Free the textures."""
-        for item in (self.velocity, self.viscosity, self.solid, self.source):
-            item.release()
-        for item in (self.impulse, self._trace, self._departing, self._carried):
-            item.release()
-        self._viscosity_solver.release()
-        self._pressure_solver.release()
+    def masks_changed(self) -> None:
+        """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
+        self._coefficients_of = None
+        self._has_new_solids = True
 
-    def _forget_impulse(self) -> None:
-        if self._has_impulse:
-            self.impulse.clear()
-            self._has_impulse = False
+    # -- what is read out -------------------------------------------------------------------------------------------
+
+    def faces(self) -> Field:
+        return self.velocity.read
+
+    def velocity_at_centres(self) -> np.ndarray:
+        u, v = self.u, self.v
+        return 0.5 * np.stack([u[:, :-1] + u[:, 1:], v[:-1] + v[1:]], axis=-1)
+
+    def divergence(self) -> np.ndarray:
+        hx, hy = self.grid.spacing
+        return np.diff(self.u, axis=1) / np.float32(hx) + np.diff(self.v, axis=0) / np.float32(hy)
+
+    def pressure(self) -> np.ndarray:
+        return self._pressure_solver.pressure
+
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def restore(self, state: State) -> None:
+        super().restore(state)
+        self._trace = None
+
+    def release(self) -> None:
+        super().release()
+        for item in (self.velocity, self._carried, self._departing.faces, *self._departing.rows, self._trace_field):
+            item.release()
+        for item in (self._squares, self._sum_of_squares, self._limited, self._viscosity_solver, self._pressure_solver):
+            item.release()
+
+    def _live(self) -> dict[str, Field]:
+        solvers = {"viscosity solver": self._viscosity_solver.state(), "pressure solver": self._pressure_solver.state()}
+        kept = {f"{name} {number}": part for name, parts in solvers.items() for number, part in enumerate(parts)}
+        fields = {"velocity": self.velocity.read, "carried": self._carried.read}
+        return {**fields, **kept, "viscosity": self.viscosity, "solid": self.solid}
+
+    # -- parts of the stages ----------------------------------------------------------------------------------------
+
+    def _fields_of(self, forces: Forces, dt: float) -> list[tuple[Field, float]]:
+        """All that acts in a step as fields with their impulses; arrays and functions go where brushes draw."""
+        fields, faces = self._acting(forces, dt)
+        if faces is not None:
+            upload = self.device.upload(faces, "force")
+            add = self.device.pass_("step/add_impulse.frag")
+            self.impulse.add(lambda target: add(target, add=True, force=upload, impulse=1.0))
+            upload.release()
+        return fields if self.impulse.is_empty else [*fields, (self.impulse.field, 1.0)]
+
+    def _add_fields(self, target: Field, fields: list[tuple[Field, float]]) -> None:
+        add = self.device.pass_("step/add_impulse.frag")
+        for force, impulse in fields:
+            add(target, add=True, force=force, impulse=impulse)
+        self.impulse.clear()
+
+    def _lay_rows(self, faces: Field) -> Departing:
+        with self.device.stage("advect"):
+            rows = self._departing.rows
+            width, height = rows[0].size
+            # A texel holds the faces from one before its own to two behind.
+            left, right, above = BEYOND[0] + 1, BEYOND[0] + 2, BEYOND[1]
+            inside = (left, above, width - left - right, height - 2 * above)
+            around = [(0, 0, width, above), (0, height - above, width, above)]
+            around += [(0, above, left, height - 2 * above), (width - right, above, right, height - 2 * above)]
+            self.device.pass_("step/lay_rows.frag")(rows, region=inside, velocity=faces)
+            edges = self.device.pass_("step/lay_rows.frag", EDGES=1, **self._wall_defines())
+            edges(rows, region=around, velocity=faces, **self._wall_inputs())
+            return Departing(faces, rows)
+
+    def _unpack(self, faces: PackedFaces) -> None:
+        """Let packed faces be the velocity."""
+        self._viscosity_solver.unpack(faces, self.velocity.read)
+        self._trace = None
+
+    def _check_source(self) -> None:
+        if not self.source.is_empty:
+            check_size("the divergence that brushes ask for", self.source.field.get())
+
+    def _viscous_residual(self, diffused: PackedFaces) -> float:
+        self._viscosity_solver.unpack(diffused, self.velocity.write)
+        return self._viscosity_solver.residual_norm(self.velocity.write)
 
     def _forget_last_step(self) -> None:
-        self._forget_impulse()
-        self._traced_dt = None
+        self.impulse.clear()
+        self._trace = None
         self._carried.read.clear()
         self._viscosity_solver.forget()
         self._pressure_solver.forget()
@@ -358,15 +347,9 @@ class Fluid:
 
     def _take_up_solids(self) -> None:
         """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""
-        if self._solids_changed:
+        if self._has_new_solids:
             solid = self.solid.get()
             if self._solids_of is None or not np.array_equal(solid, self._solids_of):
                 self._pressure_solver.set_solids(self.solid if solid.any() else None)
                 self._solids_of = solid
-            self._solids_changed = False
-
-    def _wall_defines(self) -> dict[str, Any]:
-        return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
-
-    def _wall_inputs(self) -> dict[str, Any]:
-        return {"wall_speed": self.params.walls.speed} if self.params.walls.slip == "none" else {}
+            self._has_new_solids = False

@@ -3,53 +3,81 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 
-from solver.fluid import Fluid, Force
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
 from solver.params import FluidParams
+from solver.scheme import Forces, Residuals, Scheme, Vector, check_shape, check_size, check_step
 from solver.warp.map import Velocity, WarpMap
 
 
-class PaperFluid(Fluid):
-    """`Fluid` with every stage as the paper discretises it.
+class PaperFluid(Scheme):
+    """The fluid with every stage as the paper discretises it.
 
     Velocity at cell centres, first-order backtrace, Appendix A (its misprints mended) and the Poisson equation by
-    `params.sweeps` Jacobi sweeps each. As in the paper it diverges at hard viscosity edges of high contrast; what
-    overflows is set to rest, so that no NaN reaches a texture. Walls that move are not part of it.
+    `params.sweeps` Jacobi sweeps each. Advection is stable at any step, and the rest is not: at hard edges of the
+    viscosity, from a contrast of about a thousand on, the sweeps of Appendix A diverge, and the velocity can blow up
+    until it is no number any more. Walls that move are not part of it. Cells are taken to be square.
+
+    Attributes:
+        velocity: at cell centres, lengths / s: `read` is what it is now.
     """
 
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
         super().__init__(device, grid, params)
+        self.velocity = device.double_field(grid.size, 2, "paper velocity")
         self._pressure = device.double_field(grid.size, 1, "paper pressure")
         self._divergence = device.field(grid.size, 1, "paper divergence")
         self._before = device.field(grid.size, 2, "paper right-hand side")
         self._faces = device.field(grid.size, 2, "paper velocity on faces")
 
-    def add_force(self, forces: Iterable[Force]) -> None:
-        with self.device.stage("add force"):
-            add = self.device.pass_("paper/add_force.frag")
-            for force, impulse in forces:
-                if impulse != 0.0:
-                    add(self.velocity.read, add=True, force=force, impulse=impulse)
+    # -- the paper's step -------------------------------------------------------------------------------------------
 
-    def add_impulse(self, draw: Callable[[Field], None]) -> None:
-        self._faces.clear()
-        draw(self._faces)
-        self.add_force([(self._faces, 1.0)])
+    def step(self, dt: float, forces: Forces = (), steer: Callable[[Field], None] | None = None) -> None:
+        dt = check_step(dt)
+        self.add_force(forces, dt)
+        self.advect(dt)
+        self.diffuse(dt)
+        if steer is not None:
+            self._faces.clear()
+            steer(self._faces)
+            self._add(self._faces, 1.0)
+        wanted = self.source.field.get() if self.measuring else None
+        before = self._divergence_norm(wanted)
+        self.project()
+        self.residuals = Residuals(before, self._divergence_norm(wanted))
+        self.time += dt
+
+    def add_force(self, forces: Forces, dt: float) -> None:
+        """w1 = w0 + dt f, f the sum of the forces and of what brushes have drawn."""
+        fields, faces = self._acting(forces, check_step(dt))
+        with self.device.stage("add force"):
+            if faces is not None:
+                upload = self.device.upload(faces, "force")
+                self._add(upload, 1.0)
+                upload.release()
+            if not self.impulse.is_empty:
+                fields.append((self.impulse.field, 1.0))
+            for force, impulse in fields:
+                self._add(force, impulse)
+            self.impulse.clear()
 
     def advect(self, dt: float) -> None:
+        """w2(x) = decay w1(x - dt w1(x)): first-order backtrace, bilinear."""
+        dt = check_step(dt)
         with self.device.stage("advect"):
             advect = self.device.pass_("paper/advect.frag", **self._wall_defines())
             decay = math.exp(-self.params.drag * dt)
             advect(self.velocity.write, velocity=self.velocity.read, dt_over_h=dt / self.grid.h, decay=decay)
             self.velocity.swap()
 
-    def diffuse(self, dt: float, unpack: bool = True) -> None:
+    def diffuse(self, dt: float) -> None:
+        """Appendix A."""
+        dt = check_step(dt)
         with self.device.stage("diffuse"):
             self._before.copy_from(self.velocity.read)
             sweep = self.device.pass_("paper/diffuse.frag", **self._wall_defines())
@@ -65,10 +93,10 @@ class PaperFluid(Fluid):
                 self.velocity.swap()
 
     def project(self) -> None:
+        """w4 = w3 - grad q with lap q = div w3 - source, by central differences."""
         with self.device.stage("project"):
-            defines, h = self._wall_defines(), self.grid.h
-            divergence = self.device.pass_("paper/divergence.frag", **defines)
-            divergence(self._divergence, velocity=self.velocity.read, source=self.source, h=h)
+            h = self.grid.h
+            self._find_divergence()
             self._pressure.read.clear()
             sweep = self.device.pass_("paper/pressure.frag")
             for _ in range(self.params.sweeps):
@@ -79,14 +107,28 @@ class PaperFluid(Fluid):
                 self.velocity.write, velocity=self.velocity.read, pressure=self._pressure.read, solid=self.solid, h=h
             )
             self.velocity.swap()
-            if self._has_source:
-                self.source.clear()
-                self._has_source = False
+            self.source.clear()
 
-    def set_velocity(self, array: np.ndarray) -> None:
-        """Set the velocity at cell centres from (ny, nx, 2)."""
-        self.velocity.read.set(np.asarray(array, np.float32))
-        self._forget_last_step()
+    # -- what is put in ---------------------------------------------------------------------------------------------
+
+    def set_velocity(self, velocity: Vector) -> None:
+        """Set the velocity at cell centres from (ny, nx, 2) or a function (x, y, t)."""
+        if callable(velocity):
+            velocity = np.stack(velocity(*self.grid.centres(), self.time), axis=-1)
+        array = np.asarray(velocity, np.float32)
+        check_shape("a velocity", array, (self.grid.ny, self.grid.nx, 2))
+        check_size("a velocity", array)
+        self.velocity.read.set(array)
+        self.impulse.clear()
+
+    def clear_velocity(self) -> None:
+        self.velocity.read.clear()
+        self.impulse.clear()
+
+    def masks_changed(self) -> None:
+        """Nothing: every sweep reads the masks as they are."""
+
+    # -- what is read out -------------------------------------------------------------------------------------------
 
     def faces(self) -> Field:
         self.device.pass_("paper/to_faces.frag", **self._wall_defines())(self._faces, velocity=self.velocity.read)
@@ -97,55 +139,67 @@ class PaperFluid(Fluid):
 
     def divergence(self) -> np.ndarray:
         """Divergence by central differences, (ny, nx) float32, 1 / s."""
-        divergence = self.device.pass_("paper/divergence.frag", **self._wall_defines())
-        divergence(self._divergence, velocity=self.velocity.read, source=self.source, h=self.grid.h)
-        return self._divergence.get() / np.float32(self.grid.h)
+        self._find_divergence()
+        return self._divergence.get() / np.float32(self.grid.h) + self.source.field.get()
 
     def pressure(self) -> np.ndarray:
         return self._pressure.read.get()
 
-    def _viscous_residual(self) -> float | None:
-        return None
+    # -- its state --------------------------------------------------------------------------------------------------
 
     def release(self) -> None:
         super().release()
-        for item in (self._pressure, self._divergence, self._before, self._faces):
+        for item in (self.velocity, self._pressure, self._divergence, self._before, self._faces):
             item.release()
+
+    def _live(self) -> dict[str, Field]:
+        return {"velocity": self.velocity.read, "viscosity": self.viscosity, "solid": self.solid}
+
+    def _add(self, faces: Field, impulse: float) -> None:
+        add = self.device.pass_("paper/add_force.frag")
+        add(self.velocity.read, add=True, force=faces, impulse=impulse)
+
+    def _find_divergence(self) -> None:
+        divergence = self.device.pass_("paper/divergence.frag", **self._wall_defines())
+        divergence(self._divergence, velocity=self.velocity.read, source=self.source.field, h=self.grid.h)
 
 
 class PaperWarpMap(WarpMap):
-    """The paper's warp map: coordinates advected like a density, first-order backtrace and bilinear, never folded.
+    """The paper's warp map: coordinates advected like a density, first-order backtrace and bilinear, never remapped.
 
     It blurs a little at every step, which is what the default map is measured against. Velocities are at cell centres.
     """
 
     def __init__(self, device: Device, grid: Grid) -> None:
-        super().__init__(device, grid, base_scale=1)
+        super().__init__(device, grid, scale=1)
 
     def hold(self, solid: Field) -> None:
         """Nothing: the paper's map is what its scheme makes of it."""
 
-    def follow(self, fluid: Fluid, dt: float) -> None:
+    def follow(self, fluid: Scheme, dt: float) -> None:
+        if not isinstance(fluid, PaperFluid):
+            raise TypeError("a PaperWarpMap follows a PaperFluid")
         self.advance(fluid.velocity.read, dt)
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity at cell centres, such as `PaperFluid.velocity.read`."""
         advance = self.device.pass_("paper/advance_coordinates.frag")
         advance(
-            self._near.write,
-            displacement=self._near.read,
+            self._submap.write,
+            displacement=self._submap.read,
             velocity=velocity,
-            dt_over_h=dt / self.grid.h,
+            dt_over_h=check_step(dt) / self.grid.h,
             h=self.grid.h,
         )
-        self._near.swap()
-        self._steps += 1  # the whole map is not the base
+        self._submap.swap()
+        self._steps += 1  # the whole map is not the accumulated one
         self._changed()
 
     def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
         """Carry the map from `time` to `time + dt` by a function (x, y, t) or an array (ny, nx, 2), at cell centres."""
         if not isinstance(velocity, np.ndarray):
             velocity = np.stack(velocity(*self.grid.centres(), time + 0.5 * dt), axis=-1)
+        check_shape("a velocity", velocity, (self.grid.ny, self.grid.nx, 2))
         field = self.device.upload(velocity.astype(np.float32), "prescribed velocity")
         self.advance(field, dt)
         field.release()

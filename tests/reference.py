@@ -36,27 +36,19 @@ def padded_faces(
     return u[:, :-1], v[:-1]
 
 
-def interpolate(
-    values: np.ndarray, x: np.ndarray, y: np.ndarray, order: str, corner: tuple[np.ndarray, ...] | None = None
-) -> np.ndarray:
-    """Values at fractional indices (x, y) of an array padded by PAD, linear or by the cubic of `cubic_displacement`.
-
-    The points lie around `corner`, by default the whole part of (x, y)."""
-    i, j = (np.floor(a).astype(int) for a in corner or (x, y))
+def interpolate(values: np.ndarray, x: np.ndarray, y: np.ndarray, order: str) -> np.ndarray:
+    """Values at fractional indices (x, y) of an array padded by PAD, linear or cubic both ways."""
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = x - i, y - j
     rows, columns = values.shape
-
-    def product(across: tuple[int, ...], down: tuple[int, ...]) -> np.ndarray:
-        total = np.zeros_like(x, np.float64)
-        for dy in down:
-            for dx in across:
-                row = np.clip(j + dy + PAD, 0, rows - 1)
-                column = np.clip(i + dx + PAD, 0, columns - 1)
-                total += _lagrange(across, dx, fx) * _lagrange(down, dy, fy) * values[row, column]
-        return total
-
-    two, four = (0, 1), (-1, 0, 1, 2)
-    return product(two, two) if order == "linear" else product(four, two) + product(two, four) - product(two, two)
+    nodes = (0, 1) if order == "linear" else (-1, 0, 1, 2)
+    total = np.zeros_like(x, np.float64)
+    for dy in nodes:
+        for dx in nodes:
+            row = np.clip(j + dy + PAD, 0, rows - 1)
+            column = np.clip(i + dx + PAD, 0, columns - 1)
+            total += _lagrange(nodes, dx, fx) * _lagrange(nodes, dy, fy) * values[row, column]
+    return total
 
 
 def _lagrange(nodes: tuple[int, ...], k: int, f: np.ndarray) -> np.ndarray:
@@ -96,12 +88,10 @@ def advect(faces: Faces, dt_over_h: float, added: Faces | float = 0.0, **walls: 
     left = np.concatenate([back[:, :1], back[:, :-1]], axis=1)
     above = np.concatenate([back[:1], back[:-1]], axis=0)
     to_u, to_v = 0.5 * (back + left), 0.5 * (back + above)
-    # Both components are read around one place, as the shader does.
-    corner = column + 0.5 * (to_u + to_v)[..., 0], row + 0.5 * (to_u + to_v)[..., 1]
     result = np.stack(
         [
-            interpolate(u, column + to_u[..., 0], row + to_u[..., 1], "cubic", corner),
-            interpolate(v, column + to_v[..., 0], row + to_v[..., 1], "cubic", corner),
+            interpolate(u, column + to_u[..., 0], row + to_u[..., 1], "cubic"),
+            interpolate(v, column + to_v[..., 0], row + to_v[..., 1], "cubic"),
         ],
         axis=-1,
     )
@@ -202,20 +192,32 @@ def texel_centres(size: tuple[int, int], texels: tuple[int, int]) -> tuple[np.nd
     return tuple(np.meshgrid(x, y))  # pyright: ignore[reportReturnType]
 
 
-def advance_map(near: np.ndarray, trace: np.ndarray, h: float) -> np.ndarray:
-    """near'(x) = (x_d - x) + near(x_d), with x_d - x = `trace` in cells."""
-    x, y = texel_centres(near.shape[1::-1], near.shape[1::-1])
-    return trace * h + cubic_displacement(near, x + trace[..., 0], y + trace[..., 1])
+def advance_map(submap: np.ndarray, trace: np.ndarray, h: float) -> np.ndarray:
+    """submap'(x) = (x_d - x) + submap(x_d), with x_d - x = `trace` in cells, no place outside the picture."""
+    ny, nx = submap.shape[:2]
+    x, y = texel_centres((nx, ny), (nx, ny))
+    moved = trace + cubic_displacement(submap, x + trace[..., 0], y + trace[..., 1]) / h
+    return h * np.stack([np.clip(moved[..., 0], -x, nx - x), np.clip(moved[..., 1], -y, ny - y)], axis=-1)
 
 
-def compose_map(near: np.ndarray, base: np.ndarray, extent: tuple[float, float], size: tuple[int, int]) -> np.ndarray:
-    """near(x) + base(x + near(x)) at the centres of a `size` lattice."""
-    moved = cubic_displacement(near, *texel_centres(size, near.shape[1::-1]))
-    width, height = base.shape[1::-1]
-    x, y = texel_centres(size, (width, height))
-    x = np.clip(x + moved[..., 0] / extent[0] * width, 0, width)
-    y = np.clip(y + moved[..., 1] / extent[1] * height, 0, height)
-    return moved + lagrange(base, x, y, (6, 6), 6)
+def compose_map(
+    submap: np.ndarray,
+    accumulated: np.ndarray,
+    extent: tuple[float, float],
+    size: tuple[int, int],
+    limits: tuple[float, float, float, float],
+) -> np.ndarray:
+    """submap(x) + accumulated(x + submap(x)) at the centres of a `size` lattice, the first place kept in the picture
+    and the second within `limits` (left, top, right, bottom)."""
+    x, y = texel_centres(size, (1, 1))
+    x, y = x * extent[0], y * extent[1]
+    moved = cubic_displacement(submap, *texel_centres(size, submap.shape[1::-1]))
+    there_x, there_y = np.clip(x + moved[..., 0], 0, extent[0]), np.clip(y + moved[..., 1], 0, extent[1])
+    width, height = accumulated.shape[1::-1]
+    further = lagrange(accumulated, there_x / extent[0] * width, there_y / extent[1] * height, (6, 6), 6)
+    left, top, right, bottom = limits
+    there_x, there_y = np.clip(there_x + further[..., 0], left, right), np.clip(there_y + further[..., 1], top, bottom)
+    return np.stack([there_x - x, there_y - y], axis=-1)
 
 
 def follow(

@@ -60,7 +60,7 @@ def replay(device: Device) -> Iterator[Replay]:
 
 
 def moment(replay: Replay) -> bytes:
-    return b"".join(field.get().tobytes() for field in replay.fluid.state()) + replay.warp.read().tobytes()
+    return b"".join(array.tobytes() for array in replay.snapshot().values()) + replay.warp.read().tobytes()
 
 
 @pytest.fixture(scope="module")

@@ -39,17 +39,16 @@ def test_trace_and_advect(
     force = reference.smooth_velocity(nx, ny, seed=nx + 2)
     velocity, back = device.upload(faces), device.field((nx, ny), 2)
     defines, inputs = wall_inputs(no_slip, speed)
-    device.pass_("step/trace.frag", **defines)(back, velocity=velocity, dt_over_h=courant, **inputs)
+    trace = device.pass_("step/trace.frag", **defines)
+    trace(back, velocity=velocity, cells_a_speed=(courant, courant), **inputs)
     traced = reference.trace(faces, courant, no_slip=no_slip, speed=speed)
     assert relative(back.get(), traced) < 1e-4
     fluid = Fluid(device, Grid(nx, ny), FluidParams(walls=Walls("none" if no_slip else "free", speed), drag=0.5))
     fluid.set_velocity(faces)
     fluid._carried.read.set(carried)
     dt = courant * fluid.grid.h
-    fluid.add_force([(device.upload(force), 0.3)])
-    fluid.advect(dt)
-    assert fluid._packed is not None
-    fluid._viscosity_solver.unpack(fluid._packed, fluid.velocity.read)
+    departing = fluid._add_force([(device.upload(force), 0.3)], dt)
+    fluid._viscosity_solver.unpack(fluid._advect(departing, dt), fluid.velocity.read)
     after = fluid.velocity.read.get()
     wanted = reference.advect(faces, courant, 0.3 * force - carried, no_slip=no_slip, speed=speed) * np.exp(-0.5 * dt)
     assert relative(after, wanted) < 1e-4
@@ -61,7 +60,7 @@ def test_trace_and_advect(
 def test_add_force_and_source(device: Device) -> None:
     faces = reference.smooth_velocity(20, 14, seed=3).astype(np.float32)
     velocity, force = device.upload(faces), device.upload(faces[::-1].copy())
-    device.pass_("step/add_force.frag")(velocity, add=True, force=force, impulse=0.25)
+    device.pass_("step/add_impulse.frag")(velocity, add=True, force=force, impulse=0.25)
     np.testing.assert_allclose(velocity.get(), faces + np.float32(0.25) * faces[::-1], rtol=1e-6)
 
 

@@ -78,7 +78,7 @@ class Canvas:
         replay = session.replay
         texture, displacement = self._texture, self._still
         if replay.density is not None:
-            texture = replay.density.state()[0].texture
+            texture = replay.density.values.texture
         elif not state.before:
             # The fine map is dearer than the rest of the frame; while things move, nobody sees the difference.
             displacement = self._seen(session)

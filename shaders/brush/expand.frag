@@ -3,9 +3,9 @@
 // reads: 0
 #include "lib/brush.glsl"
 uniform float u_rate;
-uniform float u_h;
+uniform vec2 u_spacing;
 layout(location = 0) out float out_source;
 
 void main() {
-    out_source = u_rate * brush_weight(gl_FragCoord.xy * u_h);
+    out_source = u_rate * brush_weight(gl_FragCoord.xy * u_spacing);
 }

@@ -8,12 +8,12 @@ uniform float u_more;
 uniform float u_mix;
 uniform float u_towards;
 uniform vec2 u_limits;
-uniform float u_h;
+uniform vec2 u_spacing;
 in vec2 v_uv;
 layout(location = 0) out float out_mask;
 
 void main() {
-    float w = brush_weight(gl_FragCoord.xy * u_h);
+    float w = brush_weight(gl_FragCoord.xy * u_spacing);
     float value = texture(u_mask, v_uv).r;
     out_mask = clamp(mix(value + w * u_more, u_towards, w * u_mix), u_limits.x, u_limits.y);
 }

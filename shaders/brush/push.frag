@@ -1,32 +1,33 @@
 // Push: make the fluid under the brush move with it, drawn with additive blending.
-//   dv = curl psi,  psi = g (dF x r),  dF = headway strength (grip v_brush - v_fluid(centre)),
+//   dv = curl psi,  psi = g (dF x r),  dF = gain part strength (slip v_brush - v_fluid(centre)),
 //   r from the nearest point of the path
 // the discrete curl of a stream function at the nodes, so exactly divergence-free; at the path dv = dF
 // (regularised dipole; numerics of brushes as in de Goes and James 2017 for the fluid limit).
-// u_motion: the fluid's motion at the brush, from probe; u_grip: from grip; u_brush_velocity: lengths / s.
-// reads: 2, and 19 when YIELDING
+// u_motion: the fluid's motion at the brush, from probe; u_slip: from slip; u_part: from restrain; u_brush_velocity: lengths / s.
+// reads: 3, and 20 when ATTENUATED
 #include "lib/brush.glsl"
-#include "lib/yielding.glsl"
+#include "lib/attenuation.glsl"
 uniform sampler2D u_motion;
-uniform sampler2D u_grip;
+uniform sampler2D u_slip;
+uniform sampler2D u_part;
 uniform vec2 u_brush_velocity;
 uniform float u_strength;
-uniform float u_headway;
-uniform float u_h;
+uniform float u_gain;
+uniform vec2 u_spacing;
 layout(location = 0) out vec2 out_velocity;
 
 float stream(vec2 node, vec2 force, float viscosity) {
-    vec2 x = node * u_h, r = x - brush_nearest(x);
-    return brush_falloff(length(r)) * (force.x * r.y - force.y * r.x) * yielding(node, viscosity);
+    vec2 x = node * u_spacing, r = x - brush_nearest(x);
+    return brush_falloff(length(r)) * (force.x * r.y - force.y * r.x) * attenuation(node, viscosity);
 }
 
 void main() {
     vec2 cell = floor(gl_FragCoord.xy);
     vec4 motion = texelFetch(u_motion, ivec2(0), 0);
-    float grip = texelFetch(u_grip, ivec2(0), 0).r;
-    vec2 force = u_headway * u_strength * leeway() * (grip * u_brush_velocity - motion.xy);
+    float slip = texelFetch(u_slip, ivec2(0), 0).r;
+    vec2 force = u_gain * texelFetch(u_part, ivec2(0), 0).r * u_strength * unobstructed() * (slip * u_brush_velocity - motion.xy);
     float corner = stream(cell, force, motion.w);
     vec2 velocity = vec2(stream(cell + vec2(0.0, 1.0), force, motion.w) - corner,
                          corner - stream(cell + vec2(1.0, 0.0), force, motion.w));
-    out_velocity = velocity / u_h * vec2(greaterThan(cell, vec2(0.5)));
+    out_velocity = velocity / u_spacing.yx * vec2(greaterThan(cell, vec2(0.5)));
 }

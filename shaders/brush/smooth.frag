@@ -4,7 +4,7 @@
 #include "lib/brush.glsl"
 uniform sampler2D u_mask;
 uniform float u_strength;
-uniform float u_h;
+uniform vec2 u_spacing;
 in vec2 v_uv;
 layout(location = 0) out float out_mask;
 
@@ -13,5 +13,5 @@ void main() {
     float sum = 0.0;
     for (int j = -2; j <= 2; ++j)
         for (int i = -2; i <= 2; ++i) sum += texture(u_mask, v_uv + vec2(i, j) * texel).r;
-    out_mask = mix(texture(u_mask, v_uv).r, sum / 25.0, u_strength * brush_weight(gl_FragCoord.xy * u_h));
+    out_mask = mix(texture(u_mask, v_uv).r, sum / 25.0, u_strength * brush_weight(gl_FragCoord.xy * u_spacing));
 }

@@ -30,15 +30,10 @@ vec2 mac_centre(sampler2D velocity, vec2 p) {
     return 0.5 * (texture(velocity, uv).rg + beyond * vec2(lessThan(p + 1.0, size)));
 }
 
-// Where the fluid at position p (in cells) was `dt_over_h` ago: second-order (midpoint) backtrace, kept in the grid.
-// `here` is the velocity at p.
-vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, float dt_over_h) {
+// Where the fluid at position p (in cells) was one step ago: second-order (midpoint) backtrace, kept in the grid.
+// `here` is the velocity at p; `cells_a_speed` is dt / spacing.
+vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
     vec2 edge = vec2(textureSize(velocity, 0));
-    vec2 middle = clamp(p - 0.5 * dt_over_h * here, vec2(0.0), edge);
-    return clamp(p - dt_over_h * mac_velocity(velocity, middle), vec2(0.0), edge);
-}
-
-// The same for the centre of the cell at p, as a displacement, cells.
-vec2 mac_trace(sampler2D velocity, vec2 p, float dt_over_h) {
-    return mac_backtrace(velocity, p, mac_centre(velocity, p), dt_over_h) - p;
+    vec2 middle = clamp(p - 0.5 * cells_a_speed * here, vec2(0.0), edge);
+    return clamp(p - cells_a_speed * mac_velocity(velocity, middle), vec2(0.0), edge);
 }

@@ -1,15 +1,16 @@
-// Steepness: |grad D|^2 at every second cell both ways, by central differences; at the edges, where the cells outside read
-// as those inside, by half of the one-sided ones.
-// u_displacement (D): cell centres, longer sides; u_h: distance of the centres, longer sides.
+// Steepness: |grad D|^2 at the corner in the middle of every block of 2 x 2 cells, by the differences of their means; where
+// a block reaches beyond the edge, the cells outside read as those inside.
+// u_displacement (D): cell centres, longer sides; u_spacing: distances of the centres, longer sides.
 // reads: 4
 uniform sampler2D u_displacement;
-uniform float u_h;
+uniform vec2 u_spacing;
 layout(location = 0) out float out_steepness;
 
-vec2 change(vec2 place, vec2 step) { return texture(u_displacement, place + step).rg - texture(u_displacement, place - step).rg; }
-
 void main() {
-    vec2 texel = 1.0 / vec2(textureSize(u_displacement, 0)), place = (2.0 * gl_FragCoord.xy - 0.5) * texel;
-    vec4 slope = vec4(change(place, vec2(texel.x, 0.0)), change(place, vec2(0.0, texel.y))) / (2.0 * u_h);
+    vec2 texel = 1.0 / vec2(textureSize(u_displacement, 0)), a = (2.0 * gl_FragCoord.xy - 0.5) * texel, b = a + texel;
+    vec2 upper_left = texture(u_displacement, a).rg, upper_right = texture(u_displacement, vec2(b.x, a.y)).rg;
+    vec2 lower_left = texture(u_displacement, vec2(a.x, b.y)).rg, lower_right = texture(u_displacement, b).rg;
+    vec2 across = upper_right + lower_right - upper_left - lower_left, down = lower_left + lower_right - upper_left - upper_right;
+    vec4 slope = 0.5 * vec4(across, down) / u_spacing.xxyy;
     out_steepness = dot(slope, slope);
 }

@@ -1,108 +1,18 @@
-"""Brushes: what a stroke does to the fluid in one tick, drawn over the part of the grid it touches."""
+"""Brushes of motion: what a stroke does to the fluid in one tick, drawn over the part of the grid it touches."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import Any
 
-from solver.fluid import Fluid
+from solver.brush.push import Push, Slip
+from solver.brush.tip import Tip
+from solver.brush.twirl import Twirl
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.passes import Region
-from solver.grid import Grid
+from solver.scheme import Scheme, check_finite
 from solver.warp.map import WarpMap
 
-Point = tuple[float, float]
-
-# Of the lattice on which a push looks at the map: texels along the brush's radius, and along the lattice, which reaches
-# one beyond the brush on either side.
-FINE = 8
-AROUND = 2 * (FINE + 1) + 1
-
-# Of a brush's hardness, for a push: all that the core of its stream function moves has to flow back beside it, and with
-# little room left there it would do so many times faster than the brush moves. With .3 a stroke of Putty folds there.
-HARDEST_PUSH = 0.15
-
-
-@dataclass(frozen=True)
-class Tip:
-    """A brush tip on its way from `start` to `end` within one tick.
-
-    Attributes:
-        start, end: places, in lengths (the longer side of the picture is 1), y down.
-        radius: in lengths.
-        hardness: 0 is a soft falloff, 1 a core of nine tenths of the radius.
-    """
-
-    start: Point
-    end: Point
-    radius: float
-    hardness: float = 0.0
-
-    def inputs(self, grid: Grid) -> dict[str, Any]:
-        """The uniforms of `lib/brush.glsl`."""
-        return {
-            "segment": (*self.start, *self.end),
-            "radius": self.radius,
-            "hardness": min(max(self.hardness, 0.0), 1.0),
-            "h": grid.h,
-        }
-
-    def region(self, grid: Grid) -> Region:
-        """The cells it touches, with one to spare."""
-        low = [math.floor((min(a, b) - self.radius) / grid.h) - 1 for a, b in zip(self.start, self.end, strict=True)]
-        high = [math.ceil((max(a, b) + self.radius) / grid.h) + 2 for a, b in zip(self.start, self.end, strict=True)]
-        return low[0], low[1], high[0] - low[0], high[1] - low[1]
-
-
-@dataclass(frozen=True)
-class Push:
-    """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it.
-
-    `grip` is the part of its own speed that the tip gives to the fluid, however long it leads it; `patience` the part
-    of the strain that a push may put on the picture at which it slips.
-    """
-
-    tip: Tip
-    dt: float
-    strength: float = 1.0
-    grip: float = 1.0
-    patience: float = 1.0
-
-    @property
-    def shader(self) -> str:
-        return "brush/push.frag"
-
-    @property
-    def velocity(self) -> Point:
-        """What it gives to the fluid: against the drag at the whole speed, and no stronger than along it."""
-        (x0, y0), (x1, y1) = self.tip.start, self.tip.end
-        speed = (self.grip if self.strength > 0 else -self.grip) / self.dt
-        return (x1 - x0) * speed, (y1 - y0) * speed
-
-    def inputs(self, grip: Field) -> dict[str, Any]:
-        return {
-            "brush_velocity": self.velocity,
-            "strength": abs(self.strength),
-            "hardness": HARDEST_PUSH * min(max(self.tip.hardness, 0.0), 1.0),
-            "grip": grip,
-        }
-
-
-@dataclass(frozen=True)
-class Twirl:
-    """Turn the fluid under the tip at `rate` rad/s, positive clockwise."""
-
-    tip: Tip
-    rate: float
-
-    @property
-    def shader(self) -> str:
-        return "brush/twirl.frag"
-
-    def inputs(self, grip: Field) -> dict[str, Any]:
-        return {"rate": self.rate}
+Motion = Push | Twirl
 
 
 class Brush:
@@ -115,88 +25,73 @@ class Brush:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._motion = device.field((1, 1), 4, "motion at the brush")
-        self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
-        self._leeway = device.field((1, 1), 1, "leeway of the brush")
-        self._grip = device.field((1, 1), 1, "grip of the brush")
-        self._gripping: Push | None = None
+        self._obstruction = device.field((1, 1), 1, "obstruction factor")
+        self._slip = Slip(device)
 
-    def lead(
-        self,
-        fluid: Fluid,
-        motion: Push | Twirl,
-        headway: float = 1.0,
-        yielding: bool = False,
-        warp: WarpMap | None = None,
-    ) -> None:
-        """Add what the fluid lacks of a motion, `headway` times.
+    def lead(self, fluid: Scheme, motion: Motion, gain: float = 1.0, warp: WarpMap | None = None) -> None:
+        """Add to the fluid's next step what it lacks of a motion, `gain` times (see `gain_compensation`).
 
         With `warp`, the picture's map, a push lets slip what has come a long way with it already, and what it would
         stretch too far.
-        With `yielding` it spares what is thicker than the fluid at the tip, and does less the more of the brush lies on
-        what is thicker or frozen: for the last touch before the projection, which viscosity does not spread any more.
         """
-        h, tip = fluid.grid.h, motion.tip
-        at = (tip.end[0] / h, tip.end[1] / h)
-        reach = max(0.25 * tip.radius / h, 0.5)
-        probe = self.device.pass_("brush/probe.frag")
-        probe(self._motion, velocity=fluid.faces(), impulse=fluid.impulse, viscosity=fluid.viscosity,
-              at=at, reach=reach, h=h)  # fmt: skip
-        # The map does not change before the last touch of the same push.
-        if isinstance(motion, Push) and motion is not self._gripping:
-            self._find_grip(motion, warp)
-            self._gripping = motion
-        region = tip.region(fluid.grid)
-        inputs = tip.inputs(fluid.grid) | motion.inputs(self._grip) | {"motion": self._motion, "headway": headway}
-        masks = {}
-        if yielding:
-            masks = {"viscosity": fluid.viscosity, "leeway": self._leeway}
-            leeway = self.device.pass_("brush/leeway.frag")
-            leeway(
-                self._leeway,
-                motion=self._motion,
-                viscosity=fluid.viscosity,
-                solid=fluid.solid,
-                **tip.inputs(fluid.grid),
-            )
-        paint = self.device.pass_(motion.shader, **({"YIELDING": 1} if yielding else {}))
-        fluid.add_impulse(lambda faces: paint(faces, add=True, region=region, **masks, **inputs))
+        check_finite("a gain", gain)
+        self._look(fluid, motion, fluid.faces(), warp)
+        fluid.impulse.add(lambda faces: self._draw(fluid, motion, faces, gain))
 
-    def _find_grip(self, push: Push, warp: WarpMap | None) -> None:
-        """How firmly a push holds what it has carried and stretched already; without a map, as firmly as it can."""
-        if warp is None:
-            self._grip.clear(1.0)
-            return
-        width, height = warp.extent
-        x, y = (min(max(at, 0.0), far) for at, far in zip(push.tip.start, warp.extent, strict=True))
-        step = push.tip.radius / FINE
-        warp.probe(self._around, (x / width, y / height), (step / width, step / height))
-        self.device.pass_("brush/grip.frag")(
-            self._grip,
-            around=self._around,
-            brush_velocity=push.velocity,
-            radius=push.tip.radius,
-            patience=push.patience,
-            place=(x, y),
-            extent=warp.extent,
-        )
+    def make_up(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None = None) -> None:
+        """Add to a velocity on MAC faces what it lacks of a motion: the last touch before the projection.
 
-    def push(self, fluid: Fluid, tip: Tip, dt: float, strength: float = 1.0) -> None:
+        Viscosity does not spread that any more. So it spares what is thicker than the fluid at the tip, and does less
+        the more of the brush lies on what is thicker or frozen. For `steer` of `Scheme.step`.
+        """
+        self._look(fluid, motion, velocity, warp)
+        obstruct, tip = self.device.pass_("brush/obstruct.frag"), motion.tip.inputs(fluid.grid)
+        obstruct(self._obstruction, motion=self._motion, viscosity=fluid.viscosity, solid=fluid.solid, **tip)
+        attenuation = {"viscosity": fluid.viscosity, "obstruction": self._obstruction}
+        self._draw(fluid, motion, velocity, 1.0, attenuation)
+
+    def push(self, fluid: Scheme, tip: Tip, dt: float, strength: float = 1.0) -> None:
         """Carry the fluid under the tip along; see `Push`."""
         self.lead(fluid, Push(tip, dt, strength))
 
-    def twirl(self, fluid: Fluid, tip: Tip, rate: float) -> None:
+    def twirl(self, fluid: Scheme, tip: Tip, rate: float) -> None:
         """Turn the fluid under the tip; see `Twirl`."""
         self.lead(fluid, Twirl(tip, rate))
 
-    def expand(self, fluid: Fluid, tip: Tip, rate: float) -> None:
+    def expand(self, fluid: Scheme, tip: Tip, rate: float) -> None:
         """Let the area under the tip grow (or, negative, shrink) at `rate` 1/s in the next projection."""
-        self.device.pass_("brush/expand.frag")(
-            fluid.source, add=True, region=tip.region(fluid.grid), rate=rate, **tip.inputs(fluid.grid)
-        )
-        fluid.source_drawn()
+        check_finite("a rate", rate)
+        expand, region = self.device.pass_("brush/expand.frag"), tip.region(fluid.grid)
+        fluid.source.add(lambda source: expand(source, add=True, region=region, rate=rate, **tip.inputs(fluid.grid)))
 
     def release(self) -> None:
-        self._motion.release()
-        self._around.release()
-        self._grip.release()
-        self._leeway.release()
+        """Free the textures."""
+        for item in (self._motion, self._obstruction, self._slip):
+            item.release()
+
+    def _look(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None) -> None:
+        """Find how the fluid moves at the brush, and how firmly a push holds the picture."""
+        (hx, hy), tip = fluid.grid.spacing, motion.tip
+        probe = self.device.pass_("brush/probe.frag")
+        probe(
+            self._motion,
+            velocity=velocity,
+            impulse=fluid.impulse.field,
+            viscosity=fluid.viscosity,
+            at=(tip.end[0] / hx, tip.end[1] / hy),
+            reach=tuple(max(0.25 * tip.radius / h, 0.5) for h in (hx, hy)),
+            spacing=(hx, hy),
+        )
+        if isinstance(motion, Push):
+            self._slip.find(motion, warp)
+            at_brush = {"velocity": velocity, "impulse": fluid.impulse.field, "motion": self._motion}
+            self._slip.restrain(motion, fluid.grid, **at_brush)
+
+    def _draw(
+        self, fluid: Scheme, motion: Motion, faces: Field, gain: float, attenuation: dict[str, Any] | None = None
+    ) -> None:
+        paint = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {}))
+        inputs = motion.tip.inputs(fluid.grid) | motion.inputs() | {"motion": self._motion, "gain": gain}
+        if isinstance(motion, Push):
+            inputs |= {"slip": self._slip.factor, "part": self._slip.part}
+        paint(faces, add=True, region=motion.tip.region(fluid.grid), **inputs, **(attenuation or {}))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from solver.brush.brush import Tip
-from solver.fluid import Fluid
+from solver.brush.tip import Tip
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
 from solver.grid import Grid
+from solver.scheme import LARGEST_VISCOSITY, Scheme, State, check_finite
 
 # Decades that painting may thin or thicken the fluid by, and the viscosity it starts from where there is none.
 THINNEST, THICKEST = -3.0, 5.0
@@ -42,14 +41,17 @@ class Masks:
 
     def thicken(self, tip: Tip, decades: float) -> None:
         """Thicken by `decades` at the tip's centre; negative thins."""
+        check_finite("a thickening", decades)
         self._paint(self.thickness, tip, more=decades, limits=(THINNEST, THICKEST))
 
     def freeze(self, tip: Tip, amount: float) -> None:
         """Freeze by `amount` (0-1); negative thaws."""
+        check_finite("a freezing", amount)
         self._paint(self.frozen, tip, mix=min(abs(amount), 1.0), towards=1.0 if amount > 0 else -1.0)
 
     def smooth(self, tip: Tip, strength: float) -> None:
         """Smooth both masks under the tip."""
+        check_finite("a smoothing", strength)
         for mask in (self.thickness, self.frozen):
             inputs = tip.inputs(self.grid)
             self.device.pass_("brush/smooth.frag")(mask.write, mask=mask.read, strength=strength, **inputs)
@@ -60,7 +62,7 @@ class Masks:
         self.thickness.read.clear()
         self.frozen.read.clear()
 
-    def apply(self, fluid: Fluid) -> None:
+    def apply(self, fluid: Scheme) -> None:
         """Give the fluid its viscosity and solid cells; the next step takes them up.
 
         Solid are the frozen cells and those within two of them, so that with `WarpMap.hold` no bit of a picture changes
@@ -73,17 +75,20 @@ class Masks:
             thickness=self.thickness.read,
             frozen=self.frozen.read,
             least=LEAST_VISCOSITY,
+            most=LARGEST_VISCOSITY,
         )
         fluid.masks_changed()
 
-    def state(self) -> Sequence[Field]:
-        """The painted fields, for checkpoints."""
-        return self.thickness.read, self.frozen.read
+    def save(self) -> State:
+        """A copy of the painted fields, on the GPU, which the caller releases."""
+        return State.of(self.device, self._live())
 
-    def load(self, state: Sequence[Field]) -> None:
-        """Go back to copies of `state()` taken earlier; call `apply` after it."""
-        for field, saved in zip(self.state(), state, strict=True):
-            field.copy_from(saved)
+    def restore(self, state: State) -> None:
+        """Go back to a saved state; call `apply` after it."""
+        state.write_to(self._live())
+
+    def _live(self) -> dict[str, Field]:
+        return {"thickness": self.thickness.read, "frozen": self.frozen.read}
 
     def release(self) -> None:
         for item in (self.base_viscosity, self.base_frozen, self.thickness, self.frozen):

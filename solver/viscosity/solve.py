@@ -219,7 +219,7 @@ class Viscosity:
         return self.levels[min(self.plan.grids, self._exact_level.depth)]
 
     @property
-    def given(self) -> PackedFaces:
+    def v_star(self) -> PackedFaces:
         """v*, packed, which is to be drawn here before `solve`: see `packing`."""
         return self.levels[0].right
 
@@ -231,11 +231,11 @@ class Viscosity:
 
     def diffuse(self, velocity: DoubleField) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution; see `solve`."""
-        self._pack(velocity.read, self.given)
+        self._pack(velocity.read, self.v_star)
         self.unpack(self.solve(), velocity.read)
 
     def solve(self) -> PackedFaces:
-        """The solution for what is `given`, packed, in lengths / s; valid until the next solve.
+        """The solution for what is `v_star`, packed, in lengths / s; valid until the next solve.
 
         By conjugate gradients from rest, first along v* and what the last step made of its v*, or by one correction to
         a part of v*: where little changes the rest of the work goes into the change, so that a steady state stays one,
@@ -243,11 +243,11 @@ class Viscosity:
         """
         right = self._right_hand_side()
         if self.plan.steps:
-            return self._conjugate_gradients(self.given, right)
+            return self._conjugate_gradients(self.v_star, right)
         if self.plan.grids:
-            return self._corrected(self.given, right)
+            return self._corrected(self.v_star, right)
         finest = self.levels[0]
-        self._smooth(finest, right, self._weights(finest), start=self.given)
+        self._smooth(finest, right, self._weights(finest), start=self.v_star)
         return finest.faces.read
 
     def unpack(self, faces: PackedFaces, velocity: Field) -> None:
@@ -262,10 +262,10 @@ class Viscosity:
     def _right_hand_side(self) -> PackedFaces:
         """v*, and what walls that move drag along."""
         if not any(self._wall_speed):
-            return self.given
+            return self.v_star
         finest, right = self.levels[0], self._residuals[-1]
         drag = self.device.pass_("viscosity/drag.frag", **finest.defines)
-        drag(right.fields, region=finest.region, wall_speed=self._wall_speed, cells=self.size, **self.given.inputs(),
+        drag(right.fields, region=finest.region, wall_speed=self._wall_speed, cells=self.size, **self.v_star.inputs(),
              **finest.matrix)  # fmt: skip
         return right
 
@@ -610,7 +610,7 @@ class Viscosity:
     # -- statistics -------------------------------------------------------------------------------------------------
 
     def residual_norm(self, after: Field) -> float:
-        """|v* - A v| / |v*|, v* what is `given`, v a velocity on MAC faces; waits for the GPU."""
+        """|v* - A v| / |v*|, v* what is `v_star`, v a velocity on MAC faces; waits for the GPU."""
         finest, right = self.levels[0], self._right_hand_side()
         self._pack(after, finest.faces.read)
         self._residual_of(finest, finest.faces.read, right, self._residuals[0])

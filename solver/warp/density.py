@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
+from solver.scheme import State
 
 DIFFUSION_SWEEPS = 20
 
@@ -37,8 +36,9 @@ class Density:
     def advance(self, faces: Field, grid: Grid, dt: float) -> None:
         """Move by the velocity on `faces` of the fluid's `grid` for `dt` seconds, diffuse, and add the source."""
         with self.device.stage("density"):
+            hx, hy = grid.spacing
             advect = self.device.pass_("warp/density/advect.frag")
-            advect(self._values.write, density=self._values.read, velocity=faces, dt_over_h=dt / grid.h)
+            advect(self._values.write, density=self._values.read, velocity=faces, cells_a_speed=(dt / hx, dt / hy))
             self._values.swap()
             if self.kappa > 0:
                 self._diffuse(dt)
@@ -46,6 +46,11 @@ class Density:
                 self.device.pass_("warp/density/add_source.frag")(
                     self._values.read, add=True, source=self._source, dt=dt
                 )
+
+    @property
+    def values(self) -> Field:
+        """The densities now, as a field of four components."""
+        return self._values.read
 
     def set(self, values: np.ndarray) -> None:
         """Start again from (h, w) or (h, w, c)."""
@@ -56,13 +61,13 @@ class Density:
         values = self._values.read.get()[..., : self._components]
         return values[..., 0] if self._components == 1 else values
 
-    def state(self) -> Sequence[Field]:
-        """The fields that a later step depends on, for checkpoints."""
-        return (self._values.read,)
+    def save(self) -> State:
+        """A copy of this moment, on the GPU, which the caller releases."""
+        return State.of(self.device, {"density": self.values})
 
-    def load(self, state: Sequence[Field]) -> None:
-        """Go back to copies of `state()` taken earlier."""
-        self._values.read.copy_from(state[0])
+    def restore(self, state: State) -> None:
+        """Go back to a saved state."""
+        state.write_to({"density": self.values})
 
     def release(self) -> None:
         for item in (self._values, self._before, self._source):

@@ -14,6 +14,7 @@ from solver.gl.field import Field, FieldError
 from solver.gl.points import draw_at
 from solver.gl.reduction import Reduction
 from solver.grid import Grid
+from solver.scheme import State, check_field, check_step, on_faces
 from solver.warp.inverse import ForwardMap
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
-CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last fold
+CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last remap
 STEEPEST = 1.0  # largest |grad D| that the cubic carries well
 
 
@@ -44,47 +45,29 @@ class MapStatistics:
     displacement_mean: float
 
 
-@dataclass(frozen=True)
-class MapState:
-    """A copy of a map on the GPU, for `WarpMap.load`."""
-
-    fields: tuple[Field, Field]
-    steps: int
-    held: np.ndarray | None = None
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(field.nbytes for field in self.fields)
-
-    def release(self) -> None:
-        """Free the textures."""
-        for field in self.fields:
-            field.release()
-
-
 class WarpMap:
     """The map x -> x + D(x) from the result to the original, carried along by a fluid without blurring.
 
-    Two levels (the characteristic mapping method): what has moved lately, `near`, on the simulation's grid, and `base`,
-    on a finer one, which `near` is folded into before it is bent so far that interpolating it every step would show.
-    The map is near first, then base: D(x) = near(x) + base(x + near(x)); longer sides, RG32F at cell centres.
+    Two levels (the characteristic mapping method): a submap of what has moved lately, on the simulation's grid, and the
+    accumulated map A, on a finer one, which takes the submap S in (a remap) before that is bent so far that
+    interpolating it every step would show. D(x) = S(x) + A(x + S(x)); longer sides, RG32F at cell centres.
+    Every place x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set` had looked.
 
     Args:
         device: the device.
         grid: the simulation's grid.
-        base_scale: texels of the base map along a cell.
-        fold_every: most steps between two folds.
+        scale: texels of the accumulated map along a cell.
+        remap_every: most steps between two remaps.
     """
 
-    def __init__(self, device: Device, grid: Grid, base_scale: int = 2, fold_every: int = 64) -> None:
+    def __init__(self, device: Device, grid: Grid, scale: int = 2, remap_every: int = 64) -> None:
         self.device = device
         self.grid = grid
-        self.base_scale = base_scale
-        self.fold_every = fold_every
-        fine = grid.nx * base_scale, grid.ny * base_scale
-        self._near = device.double_field(grid.size, 2, "warp map, near")
-        self._base = device.double_field(fine, 2, "warp map, base")
+        self.scale = scale
+        self.remap_every = remap_every
+        fine = grid.nx * scale, grid.ny * scale
+        self._submap = device.double_field(grid.size, 2, "submap")
+        self._accumulated = device.double_field(fine, 2, "accumulated map")
         self._trace = device.field(grid.size, 2, "warp map, trace")
         self._largest = device.field(grid.size, 4, "warp map, largest distortion")
         self._total = device.field(grid.size, 4, "warp map, total distortion")
@@ -99,35 +82,39 @@ class WarpMap:
         self._held_cells: np.ndarray | None = None  # what it holds; None if no cell
         self._composed: dict[tuple[int, bool], Field] = {}
         self._fresh: set[tuple[int, bool]] = set()  # of these, what holds the present map
-        self._steps = 0  # since the last fold
+        self._steps = 0  # since the last remap
+        self._limits = self._picture = (0.0, 0.0, *grid.extent)  # of the places looked up: left, top, right, bottom
         self.version = 0  # counts the changes, for those who keep what they made of the map
 
     # -- moving it --------------------------------------------------------------------------------------------------
 
     def follow(self, fluid: Fluid, dt: float) -> None:
-        """Carry the map one step by a fluid, which traces its own next step the same way: second-order backtrace."""
-        fluid.carry(self._near, dt)
-        self._advanced()
+        """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
+        self.advance_traced(fluid.trace(check_step(dt)))
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
-        self.device.pass_("step/trace.frag")(self._trace, velocity=velocity, dt_over_h=dt / self.grid.h)
+        check_field("a velocity", velocity, self.grid)
+        hx, hy = self.grid.spacing
+        dt = check_step(dt)
+        self.device.pass_("step/trace.frag")(self._trace, velocity=velocity, cells_a_speed=(dt / hx, dt / hy))
         self.advance_traced(self._trace)
 
     def advance_traced(self, trace: Field) -> None:
         """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
+        check_field("a trace", trace, self.grid)
         advance = self.device.pass_("warp/advance.frag")
-        advance(self._near.write, displacement=self._near.read, trace=trace, h=self.grid.h)
-        self._near.swap()
+        advance(self._submap.write, displacement=self._submap.read, trace=trace, spacing=self.grid.spacing)
+        self._submap.swap()
         self._advanced()
 
     def _advanced(self) -> None:
-        """Count a step, and fold if it is time to."""
+        """Count a step, and remap if it is time to."""
         self._steps += 1
         self._changed()
-        # The look waits for the GPU, so not at every step; at fixed steps, so that a replay folds at the same ones.
-        if self._steps >= self.fold_every or (self._steps % CHECK_EVERY == 0 and self._is_steep()):
-            self.fold()
+        # The look waits for the GPU, so not at every step; at fixed steps, so that a replay remaps at the same ones.
+        if self._steps >= self.remap_every or (self._steps % CHECK_EVERY == 0 and self._is_steep()):
+            self.remap()
 
     def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
         """Carry the map from `time` to `time + dt` by a velocity that is given.
@@ -135,25 +122,32 @@ class WarpMap:
         Args:
             velocity: a function (x, y, t) -> (u, v) on float64 arrays, lengths per second, followed back by a
                 fourth-order Runge-Kutta step of its own exact values; or an array (ny, nx, 2) on the MAC grid.
+                What would come from beyond the picture's edge comes from the edge.
             dt: the step.
             time: where it begins, for the function.
+
+        Raises:
+            ValueError: on an array of another shape, a value that is not finite, or a step that is none.
         """
+        dt = check_step(dt)
         if isinstance(velocity, np.ndarray):
-            field = self.device.upload(velocity, "prescribed velocity")
+            field = self.device.upload(on_faces("a velocity", velocity, self.grid), "prescribed velocity")
             self.advance(field, dt)
             field.release()
             return
         x, y = self.grid.centres()
         back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
-        self._trace.set(np.stack([back_x - x, back_y - y], axis=-1) / self.grid.h)
+        width, height = self.grid.extent
+        back = np.stack([np.clip(back_x, 0, width) - x, np.clip(back_y, 0, height) - y], axis=-1)
+        self._trace.set(back / self.grid.spacing)
         self.advance_traced(self._trace)
 
-    def fold(self) -> None:
-        """Fold what has moved lately into the base map; the whole map stays what it was."""
+    def remap(self) -> None:
+        """Let the accumulated map take in what has moved lately; the whole map stays what it was."""
         if self._steps:
-            self._compose(self._base.write)
-            self._base.swap()
-            self._near.read.clear()
+            self._compose(self._accumulated.write)
+            self._accumulated.swap()
+            self._submap.read.clear()
             self._steps = 0
 
     def hold(self, solid: Field) -> None:
@@ -165,11 +159,13 @@ class WarpMap:
         cells = _inside(solid.get() > 0)
         given = cells if cells.any() else None
         if not _same(given, self._held_cells):
-            self.fold()
+            self.remap()
             self._set_held(given)
             self._changed()
 
-    def restore(self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0) -> None:
+    def restore_under(
+        self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0
+    ) -> None:
         """Let the map go back to the identity under a round brush, but in held cells.
 
         Args:
@@ -177,7 +173,7 @@ class WarpMap:
             hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
             amount: 0-1, the part of the displacement that is taken away at the centre.
         """
-        for pair in (self._near, self._base):
+        for pair in (self._submap, self._accumulated):
             self.device.pass_("warp/restore.frag", **self._held_defines())(
                 pair.write,
                 displacement=pair.read,
@@ -195,41 +191,60 @@ class WarpMap:
 
     def reset(self) -> None:
         """Back to the identity."""
-        self._near.read.clear()
-        self._base.read.clear()
+        self._submap.read.clear()
+        self._accumulated.read.clear()
         self._steps = 0
+        self._limits = self._picture
         self._changed()
 
     def set(self, displacement: np.ndarray) -> None:
         """Take over a displacement (h, w, 2) in longer sides, of any size from 6 x 6, laid over the whole domain.
 
         Raises:
-            FieldError: on another shape, or a value that is not finite.
+            FieldError: on another shape, also one that is upright for a picture that is not, or a value that is not
+                finite.
         """
+        displacement = np.asarray(displacement)
         if displacement.ndim != 3 or displacement.shape[2] != 2 or min(displacement.shape[:2]) < 6:
             raise FieldError(f"a map of shape {displacement.shape} was given, (h, w, 2) from 6 x 6 is wanted")
         given = self.device.upload(displacement.astype(np.float32), "given map")
+        (rows, columns), (width, height) = displacement.shape[:2], self.extent
+        if (columns - rows) * (width - height) < 0:
+            given.release()
+            raise FieldError(
+                f"a map of {columns} x {rows} was given for a picture of {width:.4g} x {height:.4g}: is it transposed?"
+            )
         self.reset()
-        self._resample(given, self._base.read, (0.0, 0.0), self._base.read.texel)
+        self._resample(given, self._accumulated.read, (0.0, 0.0), self._accumulated.read.texel)
         given.release()
+        x, y = (np.arange(columns) + 0.5) / columns * width, (np.arange(rows) + 0.5) / rows * height
+        across, down = x + displacement[..., 0], y[:, None] + displacement[..., 1]
+        # Each of them in float32, as the shaders take them.
+        lowest, highest = np.minimum(0, [across.min(), down.min()]), [across.max(), down.max()]
+        self._limits = (*lowest.tolist(), *np.maximum(self.extent, highest).tolist())
 
-    def save(self) -> MapState:
-        """A copy of the state on the GPU, which the caller releases."""
-        copies = []
-        for field in (self._near.read, self._base.read):
-            copy = self.device.field(field.size, 2, f"{field.label}, saved")
-            copy.copy_from(field)
-            copies.append(copy)
-        return MapState((copies[0], copies[1]), self._steps, self._held_cells)
+    def save(self) -> State:
+        """A copy of this moment, on the GPU, which the caller releases."""
+        values = {"steps": self._steps, "limits": self._limits, "held": self._held_cells}
+        return State.of(self.device, self._live(), **values)
 
-    def load(self, state: MapState) -> None:
-        """Go back to a saved state, exactly."""
-        self._near.read.copy_from(state.fields[0])
-        self._base.read.copy_from(state.fields[1])
-        self._steps = state.steps
-        if not _same(state.held, self._held_cells):
-            self._set_held(state.held)
+    def restore(self, state: State) -> None:
+        """Go back to a saved state, exactly.
+
+        Raises:
+            ValueError: if it is of another grid.
+        """
+        state.write_to(self._live())
+        self._steps = int(state.values["steps"])
+        left, top, right, bottom = state.values["limits"].tolist()
+        self._limits = left, top, right, bottom
+        held = state.values.get("held")
+        if not _same(held, self._held_cells):
+            self._set_held(held)
         self._changed()
+
+    def _live(self) -> dict[str, Field]:
+        return {"submap": self._submap.read, "accumulated map": self._accumulated.read}
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -239,13 +254,19 @@ class WarpMap:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory, as long as nothing is read at other sizes."""
-        own = [self._near.read, self._near.write, self._base.read, self._base.write, *self._composed.values()]
+        own = [
+            self._submap.read,
+            self._submap.write,
+            self._accumulated.read,
+            self._accumulated.write,
+            *self._composed.values(),
+        ]
         return sum(thing.nbytes for thing in (*own, *self._scratch, *self._reductions))
 
     def release(self) -> None:
         """Free the textures."""
         self._set_held(None)
-        for thing in (self._near, self._base, *self._composed.values(), *self._scratch, *self._reductions):
+        for thing in (self._submap, self._accumulated, *self._composed.values(), *self._scratch, *self._reductions):
             thing.release()
         if "forward" in self.__dict__:
             self.forward.release()
@@ -253,13 +274,14 @@ class WarpMap:
     # -- reading it -------------------------------------------------------------------------------------------------
 
     def composed(self, scale: int | None = None, exact: bool = False) -> Field:
-        """The whole map's displacement on `scale` texels a cell, by default the base map's; valid until it changes.
+        """The whole map's displacement on `scale` texels a cell, by default the accumulated map's.
 
-        To be looked up between its texels by the cubic; unless `exact`, the base is looked up by the cubic for it too.
+        Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, the accumulated
+        map is looked up by the cubic for it too.
         """
-        scale = scale or self.base_scale
-        if scale == self.base_scale and self._steps == 0:
-            return self._base.read
+        scale = scale or self.scale
+        if scale == self.scale and self._steps == 0:
+            return self._accumulated.read
         key = scale, exact
         if key not in self._composed:
             size = self.grid.nx * scale, self.grid.ny * scale
@@ -301,7 +323,7 @@ class WarpMap:
     def statistics(self) -> MapStatistics:
         """How the whole map distorts; waits for the GPU."""
         targets = self._largest, self._total
-        self.device.pass_("warp/distortion.frag")(targets, displacement=self.composed(1), h=self.grid.h)
+        self.device.pass_("warp/distortion.frag")(targets, displacement=self.composed(1), spacing=self.grid.spacing)
         largest, total = self._find_largest(self._largest).tolist(), self._find_total(self._total).tolist()
         cells = self.grid.nx * self.grid.ny
         return MapStatistics(
@@ -321,7 +343,8 @@ class WarpMap:
 
     def _parts(self) -> dict[str, Any]:
         """What `compose.frag` puts together."""
-        return {"near": self._near.read, "base": self._base.read, "extent": self.grid.extent, **self._held_inputs()}
+        maps = {"submap": self._submap.read, "accumulated": self._accumulated.read}
+        return {**maps, "extent": self.grid.extent, "limits": self._limits, **self._held_inputs()}
 
     def _held_defines(self) -> dict[str, object]:
         return {"HELD": 1} if self._held else {}
@@ -336,8 +359,10 @@ class WarpMap:
         self._held_cells = cells
 
     def _is_steep(self) -> bool:
-        """True if the map is bent too far since the last fold; waits for the GPU."""
-        self.device.pass_("warp/steepness.frag")(self._steepness, displacement=self._near.read, h=self.grid.h)
+        """True if the map is bent too far since the last remap; waits for the GPU."""
+        self.device.pass_("warp/steepness.frag")(
+            self._steepness, displacement=self._submap.read, spacing=self.grid.spacing
+        )
         return self._find_steepest(self._steepness)[0] > STEEPEST**2
 
     def _resample(self, source: Field, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:

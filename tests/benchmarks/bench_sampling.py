@@ -60,7 +60,7 @@ def main() -> None:
     fast = Sampling("bilinear", samples=1, linear_light=False)
 
     def moved() -> WarpMap:
-        warp.restore((0.5, 0.5), 0.01, amount=0.0)
+        warp.restore_under((0.5, 0.5), 0.01, amount=0.0)
         return warp
 
     def remap(kind: int) -> Callable[[], object]:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -20,7 +21,8 @@ from rich.console import Console
 from rich.table import Table
 from scipy import ndimage
 
-from solver import Device, Fluid, Grid, PaperFluid, WarpMap
+from solver import Device, Fluid, Grid, PaperFluid, PaperWarpMap, WarpMap
+from solver.gl.field import Field
 from solver.gl.program import FULL_SCREEN_VERTEX, assemble
 
 JACOBI = """#version 330 core
@@ -155,19 +157,19 @@ def step_rows(device: Device, cells: int, rounds: int, table: Table) -> None:
     force = device.upload(brushes(grid, 5))
     start = brushes(grid)
     cases = {
-        "uniform viscosity": (Fluid, 1e-3),
-        "painted mask, contrast 1e5": (Fluid, painted(grid, 1e-4, 1e5)),
-        "the paper's scheme, 40 + 40 Jacobi": (PaperFluid, 1e-3),
+        "uniform viscosity": (Fluid, WarpMap, 1e-3),
+        "painted mask, contrast 1e5": (Fluid, WarpMap, painted(grid, 1e-4, 1e5)),
+        "the paper's scheme, 40 + 40 Jacobi": (PaperFluid, PaperWarpMap, 1e-3),
     }
     jobs: dict[str, tuple[Callable[[], None], int]] = {}
-    fluids: dict[str, Fluid] = {}
-    for name, (kind, viscosity) in cases.items():
-        fluid = kind(device, grid)
+    fluids: dict[str, Fluid | PaperFluid] = {}
+    for name, (kind, map_kind, viscosity) in cases.items():
+        fluid: Any = kind(device, grid)
         fluid.set_viscosity(viscosity)
         fluid.set_velocity(start)
-        warp = WarpMap(device, grid)
+        warp = map_kind(device, grid)
 
-        def step(fluid: Fluid = fluid, warp: WarpMap = warp) -> None:
+        def step(fluid: Any = fluid, warp: WarpMap = warp) -> None:
             fluid.step(dt, [(force, 1e-3)])
             with device.stage("warp map"):
                 warp.follow(fluid, dt)
@@ -215,9 +217,9 @@ def step_rows(device: Device, cells: int, rounds: int, table: Table) -> None:
             )
 
 
-def divergence_of_a_step(fluid: Fluid, force: object) -> tuple[float, float]:
+def divergence_of_a_step(fluid: Fluid | PaperFluid, force: Field) -> tuple[float, float]:
     """L2 norm of the divergence before and after the projection of a step."""
-    fluid.add_force([(force, 1e-3)])  # pyright: ignore[reportArgumentType]
+    fluid.add_force([(force, 1e-3)], 1 / 60)
     fluid.advect(1 / 60)
     fluid.diffuse(1 / 60)
     before = float(np.linalg.norm(fluid.divergence().astype(np.float64)))

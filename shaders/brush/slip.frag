@@ -1,4 +1,4 @@
-// Grip: the part of its own speed that a push gives to the fluid, into a single texel: 1 for what lies as it lay in the
+// Slip: the part of its own speed that a push gives to the fluid, into a single texel: 1 for what lies as it lay in the
 // picture, less the more radii it has come with the brush already and the more the push would stretch what is stretched
 // several times over. Drawn out without end, it would become thinner than a cell, and the map fold there.
 //   dC/dt = -(grad v)^T C - C grad v,  C = J^T J,  J = I + grad D:  growth = -2 (C : grad v) / tr C for the brush's own
@@ -7,20 +7,17 @@
 // What is pushed back to where it came from becomes shorter again, and is held as firmly as at first.
 // u_around: the warp map's displacement on a lattice around the brush, longer sides, its texels 1 / FINE of the radius
 // apart, the middle one at u_place (longer sides); u_extent: width and height of the domain, longer sides.
-// u_brush_velocity: lengths / s; u_patience: the part of that strain at which it slips, 0-1.
+// u_brush_velocity: lengths / s; u_carried: radii that something is carried before the push slips, and the least that it
+// gives for that reason; u_strain: where it begins to slip, and gives nothing; FINE: see solver/brush/push.py.
 // reads: 1157
+#include "lib/brush.glsl"
 uniform sampler2D u_around;
 uniform vec2 u_brush_velocity;
-uniform float u_radius;
-uniform float u_patience;
+uniform vec2 u_carried;
+uniform vec2 u_strain;
 uniform vec2 u_place;
 uniform vec2 u_extent;
-layout(location = 0) out float out_grip;
-
-const int FINE = 8;
-const float FIRM = 0.5;  // radii that something is carried before the grip loosens
-const float LEAST = 0.5; // of it, by the way alone
-const vec2 STRAIN = vec2(4.0, 5.25); // where a push of all patience begins to slip, and gives nothing
+layout(location = 0) out float out_slip;
 
 vec2 displacement(ivec2 node) { return texelFetch(u_around, node + FINE + 1, 0).rg / u_radius; }
 
@@ -28,14 +25,8 @@ float by_way(vec2 back, vec2 ahead) {
     float far = length(back);
     if (far == 0.0) return 1.0;
     float along = 1.0 - smoothstep(0.0, 1.0, dot(back, ahead) / far);
-    float beyond = max(far * along - FIRM, 0.0);
-    return mix(LEAST, 1.0, 1.0 / (1.0 + 2.0 * beyond * beyond));
-}
-
-// The flow of a soft brush at r, in radii: curl of its falloff times ahead x r.
-vec2 flow(vec2 r, vec2 ahead) {
-    float w = max(1.0 - dot(r, r), 0.0);
-    return w * w * (w * ahead + 6.0 * (ahead.x * r.y - ahead.y * r.x) * vec2(-r.y, r.x));
+    float beyond = max(far * along - u_carried.x, 0.0);
+    return mix(u_carried.y, 1.0, 1.0 / (1.0 + 2.0 * beyond * beyond));
 }
 
 float strain(ivec2 node, vec2 ahead) {
@@ -44,8 +35,8 @@ float strain(ivec2 node, vec2 ahead) {
     vec2 r = vec2(node) * e.x;
     vec2 jx = vec2(1.0, 0.0) + scale * (displacement(node + ivec2(1, 0)) - displacement(node - ivec2(1, 0)));
     vec2 jy = vec2(0.0, 1.0) + scale * (displacement(node + ivec2(0, 1)) - displacement(node - ivec2(0, 1)));
-    vec2 vx = scale * (flow(r + e.xy, ahead) - flow(r - e.xy, ahead));
-    vec2 vy = scale * (flow(r + e.yx, ahead) - flow(r - e.yx, ahead));
+    vec2 vx = scale * (brush_flow(r + e.xy, ahead) - brush_flow(r - e.xy, ahead));
+    vec2 vy = scale * (brush_flow(r + e.yx, ahead) - brush_flow(r - e.yx, ahead));
     float xx = dot(jx, jx), xy = dot(jx, jy), yy = dot(jy, jy);
     float growth = -2.0 * (xx * vx.x + xy * (vx.y + vy.x) + yy * vy.y) / max(xx + yy, 1e-6);
     return sqrt(0.5 * (xx + yy)) * max(growth, 0.0);
@@ -62,11 +53,11 @@ float by_strain(vec2 ahead) {
             sum += here * here * here * here;
             count += 1.0;
         }
-    return 1.0 - smoothstep(u_patience * STRAIN.x, u_patience * STRAIN.y, sqrt(sqrt(sum / max(count, 1.0))));
+    return 1.0 - smoothstep(u_strain.x, u_strain.y, sqrt(sqrt(sum / max(count, 1.0))));
 }
 
 void main() {
     float speed = length(u_brush_velocity);
     vec2 ahead = u_brush_velocity / max(speed, 1e-9);
-    out_grip = speed == 0.0 ? 1.0 : by_way(displacement(ivec2(0)), ahead) * by_strain(ahead);
+    out_slip = speed == 0.0 ? 1.0 : by_way(displacement(ivec2(0)), ahead) * by_strain(ahead);
 }

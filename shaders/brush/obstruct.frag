@@ -1,4 +1,4 @@
-// Leeway: how much a brush may do, into a single texel: less the more of it lies on cells that are frozen or thicker than
+// Obstruct: the part that a brush may do, into a single texel: less the more of it lies on cells that are frozen or thicker than
 // the fluid at its tip, for all of it alike. Were it less beside them only, what the brush moves would flow back there
 // through a single cell, many times faster than the brush, and tear the map.
 // u_motion: from probe; u_viscosity: cells, lengths^2 / s; u_solid: cells.
@@ -7,7 +7,8 @@
 uniform sampler2D u_motion;
 uniform sampler2D u_viscosity;
 uniform sampler2D u_solid;
-layout(location = 0) out float out_leeway;
+uniform vec2 u_spacing;
+layout(location = 0) out float out_part;
 
 const int RAYS = 8, ALONG = 3;
 const float CROWDED = 0.25; // part of the brush on such cells from which on nothing is led
@@ -19,10 +20,10 @@ void main() {
         float angle = 6.2831853 * float(k) / float(RAYS);
         vec2 way = vec2(cos(angle), sin(angle)) * u_radius / float(ALONG);
         for (int j = 1; j <= ALONG; ++j) {
-            vec2 place = (u_segment.zw + way * float(j)) * max(size.x, size.y) / size;
+            vec2 place = (u_segment.zw + way * float(j)) / (size * u_spacing);
             float thicker = max(texture(u_viscosity, place).r / thin, 1.0);
             sum += max(step(0.5, texture(u_solid, place).r), 1.0 - 1.0 / thicker);
         }
     }
-    out_leeway = 1.0 - smoothstep(0.0, CROWDED, sum / float(RAYS * ALONG));
+    out_part = 1.0 - smoothstep(0.0, CROWDED, sum / float(RAYS * ALONG));
 }

@@ -1,0 +1,163 @@
+"""The push: carry what is under the brush along, and the laws by which it slips."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from solver.brush.tip import Point, Tip
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.grid import Grid
+from solver.scheme import check_finite, check_step
+from solver.warp.map import WarpMap
+
+# A push slips so that what it draws out does not become thinner than the map can tell: there the map would fold.
+#
+# 1. By the brush's own way: it holds fast for FIRM radii, and in the end gives LOOSEST of its speed; one over a square
+#    in between. Else a long stroke would draw out what lay at its start into a thread.
+FIRM, LOOSEST = 0.7, 0.3
+# 2. By the way that the picture under it has come with it, in this stroke or before: the same law. What is pushed back
+#    to where it came from becomes shorter again and is held as firmly as at first.
+FIRM_CARRIED, LOOSEST_CARRIED = 0.5, 0.5
+# 3. By strain, in e-folds a radius of the way times how far the picture is stretched already: where a push with all of
+#    the strain limit begins to slip, and where it gives nothing.
+SLIPPING, HELD_OFF = 4.0, 5.25
+# The strain limit: its part at the beginning of a stroke; the radii of the way in which as much is added; and how much
+# less for every radius that the fluid will go on without the brush, after the first. Found, as all of these, by making
+# the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
+BEGINNING, GAINING, COASTING = 0.68, 6.0, 3.0
+
+# 4. By energy: it gives nothing to a fluid that has, under the brush, so many times the energy of the brush's own flow.
+#    One stroke does not come there by itself, with any feel; stirred for a minute without drag, a fluid then moves at
+#    1.7 times the brush's speed at most (2.2 times with 2, 7 times without).
+MOST_ENERGY = 1.5
+
+# A brush's own flow is damped by viscosity as a mode of k^2 = 12 / radius^2 (measured), and no more is put in for it
+# than so many times what is wanted.
+SQUARED_WAVENUMBER = 12.0
+MOST_GAIN = 20.0
+
+# All that the core of the stream function moves has to flow back beside it, and with little room left there it would
+# do so many times faster than the brush moves. With .3 a stroke of Putty folds there.
+HARDEST = 0.15
+
+# The lattice on which strain is looked at: texels along the brush's radius, and one beyond the brush on either side.
+FINE = 8
+AROUND = 2 * (FINE + 1) + 1
+
+
+def slip_factor(travelled: float) -> float:
+    """The part of its speed that a push gives, `travelled` radii after its stroke began: the first law."""
+    return LOOSEST + (1 - LOOSEST) / (1 + 2 * max(travelled - FIRM, 0.0) ** 2)
+
+
+def strain_limit(tip: Tip, dt: float, travelled: float, drag: float, viscosity: float) -> float:
+    """The part of the most strain at which a push slips, `travelled` radii after its stroke began: the third law.
+
+    All that a stroke strains by itself it may; one that begins where the picture is strained already slips soon. So
+    does one in a fluid that will go on by itself for about the brush's radius, because then there is no brush to slip.
+    Nothing depends on the grid: a recipe gives the same warp on any.
+    """
+    speed = math.hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1]) / dt
+    slowing = max(drag + SQUARED_WAVENUMBER * viscosity / tip.radius**2, 1e-6)
+    coasting = speed / slowing / tip.radius
+    begin = BEGINNING / (1 + coasting / 2)
+    return min(begin + travelled / GAINING, 1.0) / (1 + coasting / 4 + COASTING * max(coasting - 1, 0.0))
+
+
+def gain_compensation(radius: float, dt: float, drag: float, viscosity: float) -> float:
+    """How many times a brush's motion is put in, so that about all of it is left after a tick of viscosity and drag."""
+    held = math.exp(min(drag * dt, 10.0)) * (1 + SQUARED_WAVENUMBER * dt * viscosity / radius**2)
+    return min(held, MOST_GAIN)
+
+
+@dataclass(frozen=True)
+class Push:
+    """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it.
+
+    Attributes:
+        slip: the part of its own speed that the tip gives to the fluid; see `slip_factor`.
+        strain_limit: the part of the most strain at which it slips; see `strain_limit`.
+
+    Raises:
+        ValueError: if a number is not finite, or the tip is faster than the solvers can follow.
+    """
+
+    tip: Tip
+    dt: float
+    strength: float = 1.0
+    slip: float = 1.0
+    strain_limit: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not check_step(self.dt) > 0:
+            raise ValueError("a push takes some time")
+        for name in ("strength", "slip", "strain_limit"):
+            check_finite(f"a push's {name}", getattr(self, name))
+        for speed in self.velocity:
+            check_finite("a push's speed", speed)
+
+    @property
+    def shader(self) -> str:
+        return "brush/push.frag"
+
+    @property
+    def velocity(self) -> Point:
+        """What it gives to the fluid: against the drag at the whole speed, and no stronger than along it."""
+        (x0, y0), (x1, y1) = self.tip.start, self.tip.end
+        speed = (self.slip if self.strength > 0 else -self.slip) / self.dt
+        return (x1 - x0) * speed, (y1 - y0) * speed
+
+    def inputs(self) -> dict[str, Any]:
+        return {
+            "brush_velocity": self.velocity,
+            "strength": abs(self.strength),
+            "hardness": HARDEST * min(max(self.tip.hardness, 0.0), 1.0),
+        }
+
+
+class Slip:
+    """How firmly a push holds: the laws that look at the map and at the fluid, on the GPU.
+
+    Attributes:
+        factor: the part of its speed that it gives, by what it has carried and stretched: the second and third law.
+        part: the part of what the fluid lacks that it gives, by energy: the fourth.
+    """
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.factor = device.field((1, 1), 1, "slip factor")
+        self.part = device.field((1, 1), 1, "part of the push")
+        self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
+
+    def find(self, push: Push, warp: WarpMap | None) -> None:
+        """Set `factor` for a push on the picture of a map; without one it holds as firmly as it can."""
+        if warp is None:
+            self.factor.clear(1.0)
+            return
+        width, height = warp.extent
+        x, y = (min(max(at, 0.0), far) for at, far in zip(push.tip.start, warp.extent, strict=True))
+        step = push.tip.radius / FINE
+        warp.probe(self._around, (x / width, y / height), (step / width, step / height))
+        self.device.pass_("brush/slip.frag", FINE=FINE)(
+            self.factor,
+            around=self._around,
+            brush_velocity=push.velocity,
+            radius=push.tip.radius,
+            carried=(FIRM_CARRIED, LOOSEST_CARRIED),
+            strain=(push.strain_limit * SLIPPING, push.strain_limit * HELD_OFF),
+            place=(x, y),
+            extent=warp.extent,
+        )
+
+    def restrain(self, push: Push, grid: Grid, **at_brush: Field) -> None:
+        """Set `part`, after `factor`, for a push on a fluid: its velocity, impulse and motion at the brush."""
+        inputs = push.tip.inputs(grid) | push.inputs() | {"slip": self.factor, "most": MOST_ENERGY}
+        self.device.pass_("brush/restrain.frag")(self.part, **at_brush, **inputs)
+
+    def release(self) -> None:
+        self.factor.release()
+        self.part.release()
+        self._around.release()

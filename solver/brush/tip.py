@@ -1,0 +1,61 @@
+"""A brush tip on its way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from solver.gl.passes import Region
+from solver.grid import Grid
+
+Point = tuple[float, float]
+
+# Longer sides: how far off the picture a tip may be, and how large.
+FARTHEST = 100.0
+
+
+@dataclass(frozen=True)
+class Tip:
+    """A brush tip on its way from `start` to `end` within one tick.
+
+    Attributes:
+        start, end: places, in lengths (the longer side of the picture is 1), y down.
+        radius: in lengths.
+        hardness: 0 is a soft falloff, 1 a core of nine tenths of the radius.
+
+    Raises:
+        ValueError: if a number is not finite, or beyond all measure, or the radius is not positive.
+    """
+
+    start: Point
+    end: Point
+    radius: float
+    hardness: float = 0.0
+
+    def __post_init__(self) -> None:
+        places = (*self.start, *self.end)
+        if not all(abs(place) <= FARTHEST for place in places):
+            raise ValueError(
+                f"a brush from {self.start} to {self.end} is off the picture by more than {FARTHEST:g} sides"
+            )
+        if not 1e-6 <= self.radius <= FARTHEST:
+            raise ValueError(f"a brush of radius {self.radius} was given; it must be from 1e-06 to {FARTHEST:g}")
+        if math.isnan(self.hardness):
+            raise ValueError("a brush's hardness must be a number from 0 to 1")
+
+    def inputs(self, grid: Grid) -> dict[str, Any]:
+        """The uniforms of `lib/brush.glsl`."""
+        return {
+            "segment": (*self.start, *self.end),
+            "radius": self.radius,
+            "hardness": min(max(self.hardness, 0.0), 1.0),
+            "spacing": grid.spacing,
+        }
+
+    def region(self, grid: Grid) -> Region:
+        """The cells it touches, with one to spare."""
+        ends = [(min(a, b), max(a, b), h) for a, b, h in zip(self.start, self.end, grid.spacing, strict=True)]
+        low = [math.floor((least - self.radius) / h) - 1 for least, _, h in ends]
+        high = [math.ceil((most + self.radius) / h) + 2 for _, most, h in ends]
+        return low[0], low[1], high[0] - low[0], high[1] - low[1]

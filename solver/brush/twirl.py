@@ -1,0 +1,31 @@
+"""The twirl: turn what is under the brush."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from solver.brush.tip import Tip
+from solver.scheme import check_finite
+
+
+@dataclass(frozen=True)
+class Twirl:
+    """Turn the fluid under the tip at `rate` rad/s, positive clockwise.
+
+    Raises:
+        ValueError: if the rate is not finite, or beyond all measure.
+    """
+
+    tip: Tip
+    rate: float
+
+    def __post_init__(self) -> None:
+        check_finite("a twirl's rate", self.rate)
+
+    @property
+    def shader(self) -> str:
+        return "brush/twirl.frag"
+
+    def inputs(self) -> dict[str, Any]:
+        return {"rate": self.rate}

@@ -1,0 +1,407 @@
+"""What a fluid scheme is: the stages of a step, what is put in, what is read out, and its state."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.grid import Grid
+from solver.params import FluidParams
+
+# Longer sides per second, and as much for what is put in: the solvers multiply sums of squares over the grid, which
+# then stay below float32's 3e38. Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below it too.
+LARGEST_SPEED = 1e6
+LONGEST_STEP = 1e4
+LARGEST_VISCOSITY = 1e6
+
+# A vector on MAC faces: (ny, nx, 2), or a function (x, y, t) of arrays that gives both components.
+Vector = np.ndarray | Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+
+# A force, lengths / s^2: a vector, or a field on faces with its time law integrated over the step, seconds.
+Force = Vector | tuple[Field, float]
+Forces = Vector | Iterable[Force]
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What the two solves of the last step left; see `Scheme.measuring`.
+
+    Attributes:
+        divergence_before, divergence_after: root mean square over the cells, 1 / s, less what brushes ask for.
+        viscous_residual: of the implicit viscous step, relative; None where the scheme does not tell.
+    """
+
+    divergence_before: float = 0.0
+    divergence_after: float = 0.0
+    viscous_residual: float | None = None
+
+    @property
+    def divergence_left(self) -> float:
+        """The part of the divergence that the projection has left."""
+        return self.divergence_after / self.divergence_before if self.divergence_before else 0.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How fast the fluid moves: what stop conditions and statistics look at."""
+
+    kinetic_energy: float
+    largest_speed: float
+
+
+@dataclass(frozen=True)
+class State:
+    """A copy of everything that later steps depend on, on the GPU; whoever has it releases it.
+
+    Attributes:
+        fields: the textures by name.
+        values: what is no texture, by name.
+    """
+
+    fields: dict[str, Field]
+    values: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, device: Device, fields: Mapping[str, Field], **values: object) -> State:
+        """Copy `fields` and `values`; a value that is None is left out."""
+        copies = {}
+        for name, live in fields.items():
+            copies[name] = device.field(live.size, live.components, f"{live.label}, saved", live.dtype)
+            copies[name].copy_from(live)
+        return cls(copies, {name: np.array(value) for name, value in values.items() if value is not None})
+
+    def write_to(self, fields: Mapping[str, Field]) -> None:
+        """Copy the saved textures back into the live ones of the same names.
+
+        Raises:
+            ValueError: if they are those of something else.
+        """
+        kinds = [
+            {name: (item.size, item.components, item.dtype) for name, item in some.items()}
+            for some in (self.fields, fields)
+        ]
+        if kinds[0] != kinds[1]:
+            raise ValueError("the state is of another grid or of another scheme")
+        for name, saved in self.fields.items():
+            fields[name].copy_from(saved)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Everything in it by name, off the GPU."""
+        return {name: saved.get() for name, saved in self.fields.items()} | self.values
+
+    def with_arrays(self, arrays: Mapping[str, np.ndarray]) -> State:
+        """This state with its textures filled from what `arrays()` gave.
+
+        Raises:
+            ValueError: if those were of something else.
+        """
+        for name, saved in self.fields.items():
+            given = arrays.get(name)
+            now = saved.get()
+            if given is None or (given.shape, given.dtype) != (now.shape, now.dtype):
+                raise ValueError(f"its {name} is missing or of another size")
+            saved.set(given)
+        return State(self.fields, {name: array for name, array in arrays.items() if name not in self.fields})
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return sum(saved.nbytes for saved in self.fields.values())
+
+    def release(self) -> None:
+        """Free the textures."""
+        for saved in self.fields.values():
+            saved.release()
+
+
+class Gathered:
+    """A field that is drawn into between two steps, by addition, and used up by the next."""
+
+    def __init__(self, device: Device, size: tuple[int, int], components: int, label: str) -> None:
+        self.field = device.field(size, components, label)
+        self.is_empty = True
+
+    def add(self, draw: Callable[[Field], None]) -> None:
+        """Let `draw` add to the field."""
+        draw(self.field)
+        self.is_empty = False
+
+    def clear(self) -> None:
+        """Empty it."""
+        if not self.is_empty:
+            self.field.clear()
+            self.is_empty = True
+
+    def release(self) -> None:
+        self.field.release()
+
+
+class Scheme(ABC):
+    """A fluid on a grid: what `Fluid` and `PaperFluid` both are, for brushes, maps and the program.
+
+    Everything is in the units of CONTRIBUTING.md: the longer side of the picture is 1, y points down, velocities are
+    lengths per second.
+
+    Args:
+        device: where it lives.
+        grid: its cells; see `Grid.for_picture`.
+        params: walls, drag, cycles; may be replaced between steps.
+
+    Attributes:
+        time: seconds that its steps have made up to now.
+        viscosity, solid: at cells, lengths^2 / s, and 1 for solid; call `masks_changed` after drawing into them.
+        impulse: what brushes have drawn on MAC faces for the next step, lengths / s.
+        source: the divergence that the next projection shall leave, at cells, 1 / s: bloat, or pinch.
+        measuring: let every step leave its `residuals`; it changes no result, and is slow.
+    """
+
+    def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
+        self.device = device
+        self.grid = grid
+        self.params = params or FluidParams()
+        self.time = 0.0
+        self.viscosity = device.field(grid.size, 1, "viscosity")
+        self.solid = device.field(grid.size, 1, "solid", "f1")
+        self.impulse = Gathered(device, grid.size, 2, "impulse")
+        self.source = Gathered(device, grid.size, 1, "divergence source")
+        self.measuring = False
+        self.residuals = Residuals()
+
+    # -- the paper's step -------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def step(self, dt: float, forces: Forces = (), steer: Callable[[Field], None] | None = None) -> None:
+        """Advance by `dt` seconds: add force, advect, diffuse, project.
+
+        Args:
+            dt: seconds, of any size.
+            forces: one or several: arrays (ny, nx, 2) on MAC faces, lengths / s^2; functions (x, y, t) that give both
+                components; or fields, each with its time law integrated over the step.
+            steer: draws into the velocity on MAC faces it is handed, by addition, between diffusion and projection:
+                there brushes that lead the picture by hand make up for what viscosity took.
+
+        Raises:
+            ValueError: for a step or a force that is not finite, negative, of another shape, or beyond all measure.
+        """
+
+    # -- what is put in ---------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def set_velocity(self, velocity: Vector) -> None:
+        """Set the velocity, and forget the steps before."""
+
+    @abstractmethod
+    def clear_velocity(self) -> None:
+        """Stop all motion."""
+
+    def set_viscosity(self, viscosity: np.ndarray | float) -> None:
+        """Set the viscosity of the cells, lengths^2 / s, from (ny, nx) or one number.
+
+        Raises:
+            ValueError: on another shape, or if a value is negative, not finite or beyond all measure.
+        """
+        array = np.asarray(viscosity, np.float32)
+        if array.ndim:
+            check_shape("a viscosity", array, (self.grid.ny, self.grid.nx))
+        if not ((array >= 0).all() and (array <= LARGEST_VISCOSITY).all()):
+            raise ValueError(f"viscosity must be from 0 to {LARGEST_VISCOSITY:g} everywhere")
+        self.viscosity.set(np.broadcast_to(array, (self.grid.ny, self.grid.nx)))
+        self.masks_changed()
+
+    def set_solid(self, solid: np.ndarray) -> None:
+        """Freeze the cells where the (ny, nx) array is true or non-zero: their faces do not move.
+
+        Raises:
+            ValueError: on another shape or a NaN.
+        """
+        array = np.asarray(solid)
+        check_shape("solid cells", array, (self.grid.ny, self.grid.nx))
+        if np.isnan(array).any():
+            raise ValueError("solid cells must be true or false, not NaN")
+        self.solid.set(np.where(array, 255, 0).astype(np.uint8))
+        self.masks_changed()
+
+    @abstractmethod
+    def masks_changed(self) -> None:
+        """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
+
+    def add_source(self, source: Field, amount: float = 1.0) -> None:
+        """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
+        check_finite("an amount of a source", amount)
+        add = self.device.pass_("step/add_source.frag")
+        self.source.add(lambda field: add(field, add=True, source=source, amount=amount))
+
+    # -- what is read out -------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def faces(self) -> Field:
+        """The velocity on MAC faces, as the warp map, the overlays and the density take it."""
+
+    @abstractmethod
+    def velocity_at_centres(self) -> np.ndarray:
+        """Velocity at cell centres, (ny, nx, 2) float32."""
+
+    @abstractmethod
+    def divergence(self) -> np.ndarray:
+        """Divergence of the velocity, (ny, nx) float32, 1 / s."""
+
+    @abstractmethod
+    def pressure(self) -> np.ndarray:
+        """The last projection's q, (ny, nx) float32, lengths^2 / s: pressure times dt."""
+
+    @property
+    def u(self) -> np.ndarray:
+        """Velocity to the right through the faces between columns, walls included, (ny, nx + 1) float32."""
+        return np.pad(self.faces().get()[..., 0], ((0, 0), (0, 1)))
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocity downwards through the faces between rows, walls included, (ny + 1, nx) float32."""
+        return np.pad(self.faces().get()[..., 1], ((0, 1), (0, 0)))
+
+    def vorticity(self) -> np.ndarray:
+        """dv/dx - du/dy at the cells' corners, (ny + 1, nx + 1) float32, 1 / s, positive clockwise on the screen."""
+        hx, hy = self.grid.spacing
+        u, v = np.pad(self.u, ((1, 1), (0, 0)), mode="edge"), np.pad(self.v, ((0, 0), (1, 1)), mode="edge")
+        if self.params.walls.slip == "none":
+            left, right, top, bottom = self.params.walls.speed
+            u[0], u[-1] = 2 * top - u[0], 2 * bottom - u[-1]
+            v[:, 0], v[:, -1] = 2 * left - v[:, 0], 2 * right - v[:, -1]
+        return np.diff(v, axis=1) / np.float32(hx) - np.diff(u, axis=0) / np.float32(hy)
+
+    def stream_function(self) -> np.ndarray:
+        """psi at the cells' corners with u = dpsi/dy and v = -dpsi/dx, (ny + 1, nx + 1) float32, lengths^2 / s.
+
+        Zero at the walls. It is all of the flow unless a brush's source has acted in the last step.
+        """
+        return np.pad(np.cumsum(self.u * np.float32(self.grid.spacing[1]), axis=0), ((1, 0), (0, 0)))
+
+    def motion(self) -> Motion:
+        """Kinetic energy (integral of |v|^2 / 2, summed over the faces) and largest speed at cell centres."""
+        faces, (hx, hy) = self.faces().get().astype(np.float64), self.grid.spacing
+        speed = np.linalg.norm(self.velocity_at_centres().astype(np.float64), axis=-1)
+        return Motion(float(0.5 * (faces**2).sum() * hx * hy), float(speed.max()))
+
+    def _divergence_norm(self, wanted: np.ndarray | None) -> float:
+        """Root mean square of the divergence less what is wanted, 1 / s; 0 if nobody is `measuring`."""
+        if wanted is None:
+            return 0.0
+        return float(np.sqrt(np.mean((self.divergence().astype(np.float64) - wanted) ** 2)))
+
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def save(self) -> State:
+        """A copy of this moment, on the GPU, which the caller releases."""
+        return State.of(self.device, self._live(), time=self.time)
+
+    def restore(self, state: State) -> None:
+        """Go back to a moment, exactly; what was put in for the next step is forgotten.
+
+        Raises:
+            ValueError: if the state is of another grid or of another scheme.
+        """
+        state.write_to(self._live())
+        self.time = float(state.values["time"])
+        self.impulse.clear()
+        self.source.clear()
+        self.masks_changed()
+
+    @abstractmethod
+    def _live(self) -> dict[str, Field]:
+        """The textures that a later step depends on."""
+
+    def release(self) -> None:
+        """Free the textures."""
+        for item in (self.viscosity, self.solid, self.impulse, self.source):
+            item.release()
+
+    def __repr__(self) -> str:
+        motion = self.motion()
+        return (
+            f"{type(self).__name__}({self.grid.nx} x {self.grid.ny} cells, t = {self.time:.6g} s, "
+            f"{self.params.walls.slip}-slip walls, energy {motion.kinetic_energy:.4g}, "
+            f"fastest {motion.largest_speed:.4g} sides / s)".replace("none-slip", "no-slip")
+        )
+
+    # -- for the schemes --------------------------------------------------------------------------------------------
+
+    def _acting(self, forces: Forces, dt: float) -> tuple[list[tuple[Field, float]], np.ndarray | None]:
+        """Forces as fields with their impulses, and the velocity, (ny, nx, 2), that all others make in `dt`."""
+        fields, total = list[tuple[Field, float]](), None
+        for force in [forces] if isinstance(forces, np.ndarray) or callable(forces) else forces:
+            if isinstance(force, tuple):
+                field, impulse = force
+                check_field("a force", field, self.grid)
+                check_finite("a force's impulse", impulse)
+                if impulse != 0.0:
+                    fields.append((field, float(impulse)))
+            else:
+                faces = dt * on_faces("a force", force, self.grid, self.time + dt / 2)
+                check_size("what a force adds to the velocity", faces)
+                total = faces if total is None else total + faces
+        return fields, total
+
+    def _wall_defines(self) -> dict[str, Any]:
+        return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
+
+    def _wall_inputs(self) -> dict[str, Any]:
+        return {"wall_speed": self.params.walls.speed} if self.params.walls.slip == "none" else {}
+
+
+def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.ndarray:
+    """A vector on MAC faces as (ny, nx, 2) float32: u on left faces, v on upper ones.
+
+    Raises:
+        ValueError: on another shape or a value that is not finite.
+    """
+    if callable(vector):
+        parts = [vector(*points, time)[axis] for axis, points in enumerate((grid.u_faces(), grid.v_faces()))]
+        shape = grid.ny, grid.nx
+        array = np.stack([np.broadcast_to(np.asarray(part, np.float64), shape) for part in parts], axis=-1)
+    else:
+        array = np.asarray(vector)
+    check_shape(what, array, (grid.ny, grid.nx, 2))
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} holds a value that is not finite")
+    return array.astype(np.float32)
+
+
+def check_step(dt: float) -> float:
+    """A time step, if it is one.
+
+    Raises:
+        ValueError: if it is not from 0 to `LONGEST_STEP` seconds.
+    """
+    if not 0 <= dt <= LONGEST_STEP:
+        raise ValueError(f"a step of {dt} s was asked for; it must be from 0 to {LONGEST_STEP:g} s")
+    return float(dt)
+
+
+def check_finite(what: str, value: float) -> None:
+    """Make sure that a number is finite, and no larger than `LARGEST_SPEED`."""
+    if not abs(value) <= LARGEST_SPEED:
+        raise ValueError(f"{what} of {value} was given; it must be finite and no larger than {LARGEST_SPEED:g}")
+
+
+def check_size(what: str, array: np.ndarray) -> None:
+    """Make sure that nothing in an array is faster than `LARGEST_SPEED`."""
+    if not (np.abs(array) <= LARGEST_SPEED).all():
+        raise ValueError(f"{what} is beyond {LARGEST_SPEED:g} longer sides per second somewhere, or not finite")
+
+
+def check_shape(what: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+    """Make sure that an array has a shape."""
+    if array.shape != shape:
+        raise ValueError(f"{what} of shape {array.shape} was given, {shape} is wanted")
+
+
+def check_field(what: str, field: Field, grid: Grid) -> None:
+    """Make sure that a field is a vector on the faces of a grid."""
+    if field.size != grid.size or field.components != 2:
+        raise ValueError(f"{what} is {field}, {grid.nx} x {grid.ny} x 2 is wanted")
