@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.gl.field import Field
 
-# A graph of no more unknowns than this is solved by a dense matrix: its inversion takes some 10 ms.
-DIRECT = 256
+# A graph of no more unknowns than this is solved by a dense matrix: its inversion takes a few ms.
+DIRECT = 128
 
 
 class Cycle:

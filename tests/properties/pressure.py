@@ -198,8 +198,8 @@ def check_source(device: Device, seed: int) -> dict[str, float]:
     if rng.random() < 0.5:
         asked = ndimage.gaussian_filter(asked, 3.0)
     region = np.zeros(solid.shape, int)
-    count = int(np.asarray(ndimage.label(~solid, output=region)))
-    mean = ndimage.mean(asked.astype(float), region, range(count + 1))
+    ndimage.label(~solid, output=region)
+    mean = np.bincount(region.ravel(), asked.ravel()) / np.maximum(np.bincount(region.ravel()), 1)
     wanted = np.where(solid, 0.0, asked - mean[region]) / max(size)
     projection, field = Projection(device, size), device.double_field(size, 2)
     source, frozen = device.upload(asked), device.upload(solid.astype(np.uint8) * 255)
