@@ -3,14 +3,16 @@
 // and on coarser ones what the faces it stands for count together; a link down counts u_aspect^2 times that.
 //   u_left  the four cells' left faces,   u_up  their upper faces,
 //   u_far   the block's right faces (x upper, y lower) and its lower faces (z left, w right).
+//   u_inverse   of each cell one over the sum of its links, 0 without any.
 // With OPEN there are no solids, and the weights follow from u_span, the grid's size in cells of the level: the cells of
-// the last row and column may be less than whole.
+// the last row and column may be less than whole. One over the sum of an inner cell's links serves all.
 #ifdef OPEN
 uniform vec2 u_span;
 #else
 uniform sampler2D u_left;
 uniform sampler2D u_up;
 uniform sampler2D u_far;
+uniform sampler2D u_inverse;
 #endif
 uniform float u_aspect;  // side of a cell along x over that along y
 
@@ -32,6 +34,14 @@ Links links_of(vec2 block, vec2 uv) {
 #else
     vec4 left = texture(u_left, uv), up = down * texture(u_up, uv), far = texture(u_far, uv) * vec2(1.0, down).xxyy;
     return Links(left, vec4(left.y, far.x, left.w, far.y), up, vec4(up.zw, far.zw));
+#endif
+}
+
+vec4 inverse_diagonal(vec2 uv) {
+#ifdef OPEN
+    return vec4(0.5 / (1.0 + u_aspect * u_aspect));
+#else
+    return texture(u_inverse, uv);
 #endif
 }
 

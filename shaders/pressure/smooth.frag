@@ -1,7 +1,6 @@
 // Red-black Gauss-Seidel: the cells of one colour solved for, with their neighbours as they are.
 //   p += (A p - r) / (sum of links)
 // in:  u_pressure   p at blocks;  u_residual   r at blocks;  links of lib/block.glsl
-//      u_inverse    of each cell one over the sum of its links, 0 without any; with OPEN that of an inner cell serves all
 // With RED: the cells x and w of a block, else y and z. With FROM_ZERO p is 0, and the red ones come first, then the black.
 // out: p at blocks
 // reads: 13
@@ -9,24 +8,15 @@
 
 uniform sampler2D u_pressure;
 uniform sampler2D u_residual;
-uniform sampler2D u_inverse;
 
 in vec2 v_uv;
 out vec4 out_pressure;
 
-vec4 inverse_at(vec2 uv) {
-#ifdef OPEN
-    return vec4(0.5 / (1.0 + u_aspect * u_aspect));
-#else
-    return texture(u_inverse, uv);
-#endif
-}
-
-vec4 from_zero(vec2 uv) { return -inverse_at(uv) * texture(u_residual, uv); }
+vec4 from_zero(vec2 uv) { return -inverse_diagonal(uv) * texture(u_residual, uv); }
 
 void main() {
     Links f = links_of(floor(gl_FragCoord.xy), v_uv);
-    vec4 inverse = inverse_at(v_uv), residual = texture(u_residual, v_uv);
+    vec4 inverse = inverse_diagonal(v_uv), residual = texture(u_residual, v_uv);
 #ifdef FROM_ZERO
     const vec4 red = vec4(1.0, 0.0, 0.0, 1.0);
     vec2 texel = 1.0 / vec2(textureSize(u_residual, 0)), across = vec2(texel.x, 0.0), down = vec2(0.0, texel.y);

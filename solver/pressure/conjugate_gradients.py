@@ -44,7 +44,12 @@ class ConjugateGradients:
         return self._pressure.read
 
     def solve(
-        self, cycle: Cycle, residual: DoubleField, squares: float, wanted: float, sweeps: int,
+        self,
+        cycle: Cycle,
+        residual: DoubleField,
+        squares: float,
+        wanted: float,
+        sweeps: int,
         iterations: int | None = None,
     ) -> int:
         """Solve for `pressure`; waits for the GPU. The residual is used up.

@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.gl.field import Field
 
-# A graph of no more unknowns than this is solved by a dense matrix: its inversion takes some 10 ms.
-DIRECT = 256
+# A graph of no more unknowns than this is solved by a dense matrix: its inversion takes a few ms.
+DIRECT = 128
 
 
 class Cycle:
     """Levels from the finest to one that is solved directly.
 
-    An unknown of a level stands for a block of 2 x 2 cells of the finer one, or among solids for each connected piece of
-    it, so that no wall is leaked through. Interpolation is constant, restriction its transpose, and the smoothing after
-    the correction is that before it backwards: with that the cycle is symmetric, as conjugate gradients ask.
+    An unknown of a level stands for a block of 2 x 2 cells of the finer one, or among solids for each connected piece
+    of it, so that no wall is leaked through. Interpolation is constant, restriction its transpose, and the smoothing
+    after the correction is that before it backwards: so the cycle is symmetric, as conjugate gradients ask.
 
     Args:
         device: the device.
@@ -34,10 +34,10 @@ class Cycle:
 
     def __init__(self, device: Device, size: tuple[int, int], aspect: float, solid: np.ndarray | None) -> None:
         self.levels: list[GridLevel | GraphLevel] = []
+        # About the part of a warm start's residual that a cycle of one sweep leaves, and conjugate gradients after it.
+        self.light_leaves = 0.1 if solid is None else 0.2
         self._direct = (
-            self._coarsen_box(device, size, aspect)
-            if solid is None
-            else self._coarsen_around(device, solid, aspect)
+            self._coarsen_box(device, size, aspect) if solid is None else self._coarsen_around(device, solid, aspect)
         )
 
     @property
@@ -64,23 +64,25 @@ class Cycle:
         coarse = self.levels[number + 1]
         for sweep in range(sweeps):
             level.smooth(residual, from_zero=from_zero and sweep == 0)
-        level.restrict(residual, coarse)  # pyright: ignore[reportArgumentType]
+        level.restrict(residual, coarse)
         self._visit(number + 1, coarse.residual, sweeps, from_zero=True)
-        # Among thin walls one visit leaves too much to smooth. A second one of the last level would find nothing, and of the
-        # first coarse one it would cost as much as another cycle.
+        # Among thin walls one visit leaves too much to smooth. A second one of the last level would find nothing, and
+        # of the first coarse one it would cost as much as another cycle.
         if isinstance(coarse, GraphLevel) and 0 < number < len(self.levels) - 2:
             self._visit(number + 1, coarse.residual, sweeps, from_zero=False)
-        level.prolong(coarse)  # pyright: ignore[reportArgumentType]
+        level.prolong(coarse)
         for _ in range(sweeps):
             level.smooth(residual, backwards=True)
 
     def _coarsen_box(self, device: Device, size: tuple[int, int], aspect: float) -> FastDiagonalization:
         span = float(size[0]), float(size[1])
-        self.levels.append(GridLevel(device, span, aspect, 0))
-        while not FastDiagonalization.is_worth(self.levels[-1].size):
+        level = GridLevel(device, span, aspect, 0)
+        self.levels.append(level)
+        while not FastDiagonalization.is_worth(level.size):
             span = span[0] / 2, span[1] / 2
-            self.levels.append(GridLevel(device, span, aspect, len(self.levels)))
-        return FastDiagonalization(device, span, self.levels[-1].size, aspect)
+            level = GridLevel(device, span, aspect, len(self.levels))
+            self.levels.append(level)
+        return FastDiagonalization(device, span, level.size, aspect)
 
     def _coarsen_around(self, device: Device, solid: np.ndarray, aspect: float) -> DirectSolve:
         left, up = links_of(solid)

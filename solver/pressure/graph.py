@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# The links of a coarser level are those of the finer one, added up, over this. A constant interpolation makes smooth
-# errors cost twice their energy: 2 is right where they are linear, and above it a second visit of a level could diverge.
+# The links of a coarser graph are those of the finer one, added up, over this. A linear pressure, interpolated as
+# constant on blocks, has twice its energy, so 2 would be exact; but pressures that really are constant on blocks would
+# then be corrected twice, and a second visit would leave all of them. Four cycles leave 6e-4 of impulses between thin
+# walls with 1.6, 1.5e-4 with 1.8 and 6e-5 with 2.
 OVERCORRECTION = 1.8
 
 

@@ -23,7 +23,7 @@ class GridLevel:
 
     Args:
         device: the device.
-        span: the finest grid's size in cells of this level, which halves exactly: the last cells may be less than whole.
+        span: the finest grid's size in cells of this level; it halves exactly, the last cells may be less than whole.
         aspect: side of a cell along x over that along y.
         number: of the level, in labels.
         links: weights of the left and of the upper faces, (ny, nx); None without solids.
@@ -58,8 +58,7 @@ class GridLevel:
             for name, texels in textures.items():
                 texels = texels[: self.size[1], : self.size[0]]
                 self._textures[name] = device.upload(texels, f"{label} {name}", "f2")
-            self.inputs |= {name: self._textures[name] for name in ("left", "up", "far")}
-        self._smoothing = {name: field for name, field in self._textures.items() if name == "inverse"}
+            self.inputs |= self._textures
 
     def draw(self, shader: str, target: Target, defines: dict[str, Any] | None = None, **inputs: Any) -> None:
         """Draw a pass that needs the links of the level."""
@@ -68,13 +67,12 @@ class GridLevel:
     def smooth(self, residual: Field, backwards: bool = False, from_zero: bool = False) -> None:
         """A sweep over the red cells and the black ones; backwards the black ones first."""
         if from_zero:
-            self.draw("smooth", self.pressure.write, {"FROM_ZERO": 1}, residual=residual, **self._smoothing)
+            self.draw("smooth", self.pressure.write, {"FROM_ZERO": 1}, residual=residual)
             self.pressure.swap()
             return
         colours: tuple[dict[str, Any], ...] = ({"RED": 1}, {})
         for colour in reversed(colours) if backwards else colours:
-            self.draw("smooth", self.pressure.write, colour,
-                      pressure=self.pressure.read, residual=residual, **self._smoothing)  # fmt: skip
+            self.draw("smooth", self.pressure.write, colour, pressure=self.pressure.read, residual=residual)
             self.pressure.swap()
 
     def restrict(self, residual: Field, coarse: GridLevel | GraphLevel) -> None:
@@ -130,8 +128,8 @@ class GraphLevel:
         self.pressure = device.double_field(self._rows.size, 1, f"{label} pressure")
         self.parents: Field | None = None
         if grid is None:
-            number_of = np.bincount(finer[finer >= 0], minlength=count)
-            self.children = _upload(device, np.stack([np.cumsum(number_of) - number_of, number_of], 1), f"{label} children")
+            children = np.bincount(finer[finer >= 0], minlength=count)
+            self.children = _upload(device, np.c_[np.cumsum(children) - children, children], f"{label} children")
         else:
             cells = finer.reshape(grid[1], grid[0])
             y, x = np.nonzero(cells >= 0)
@@ -142,19 +140,20 @@ class GraphLevel:
     def smooth(self, residual: Field, backwards: bool = False, from_zero: bool = False) -> None:
         """A sweep, the same in both directions."""
         zero = {"FROM_ZERO": 1} if from_zero else {}
-        read = {} if from_zero else {"pressure": self.pressure.read, "links": self._links}
+        read: dict[str, Any] = {} if from_zero else {"pressure": self.pressure.read, "links": self._links}
         smooth = self.device.pass_("pressure/smooth_graph.frag", **zero)
         smooth(self.pressure.write, rows=self._rows, residual=residual, **read)
         self.pressure.swap()
 
-    def restrict(self, residual: Field, coarse: GraphLevel) -> None:
+    def restrict(self, residual: Field, coarse: GridLevel | GraphLevel) -> None:
         """What is left of the residual becomes the coarser level's."""
+        assert isinstance(coarse, GraphLevel)
         self.device.pass_("pressure/restrict_graph.frag")(
             coarse.residual, pressure=self.pressure.read, residual=residual, rows=self._rows, links=self._links,
             children=coarse.children,
         )  # fmt: skip
 
-    def prolong(self, coarse: GraphLevel) -> None:
+    def prolong(self, coarse: GridLevel | GraphLevel) -> None:
         """Add the coarser level's correction."""
         prolong = self.device.pass_("pressure/prolong_graph.frag")
         prolong(self.pressure.write, pressure=self.pressure.read, rows=self._rows, coarse=coarse.pressure.read)

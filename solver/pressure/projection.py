@@ -99,8 +99,8 @@ class Projection:
             self._expected.read.clear()
             squares, left = self._take_divergence(given, **wanted)
         least = WANTED_LEFT**2 * squares
-        # A cycle of one sweep leaves a tenth to a fifth, one of two a thirtieth, for half as much time again.
-        sweeps = 1 if left <= 25.0 * least else 2
+        # Two sweeps leave about a thirtieth, and take half as long again as one.
+        sweeps = 1 if self._cycle.light_leaves**2 * left <= least else 2
         taken = self._solver.solve(self._cycle, self._residual, left, least, sweeps, cycles)
         if not warm and cycles is None:
             # What float32 has rounded off a pressure much larger than its gradient is corrected.

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from solver.gl.device import Device
+from solver.packing import packed
 from solver.pressure.cycle import Cycle
 from solver.pressure.projection import Projection
 
@@ -15,7 +16,7 @@ Size = tuple[int, int]
 SIZES: list[Size] = [(8, 8), (9, 17), (100, 512), (333, 217), (512, 512), (1023, 8)]
 
 
-# -- random masks, (ny, nx), true where solid ---------------------------------------------------------------------------
+# -- random masks, (ny, nx), true where solid --------------------------------------------------------------------------
 
 
 def open_box(size: Size, rng: np.random.Generator) -> np.ndarray:
@@ -108,7 +109,7 @@ MASKS: dict[Callable[[Size, np.random.Generator], np.ndarray], int] = {
 }  # fmt: skip
 
 
-# -- velocities and what is measured ------------------------------------------------------------------------------------
+# -- velocities and what is measured -----------------------------------------------------------------------------------
 
 
 def random_velocity(size: Size, rng: np.random.Generator) -> np.ndarray:
@@ -171,7 +172,7 @@ def leave(device: Device, size: Size, kind: Callable[..., np.ndarray], rng: np.r
     return {"left": worst, f"cycles of {kind.__name__}": most}
 
 
-# -- the properties -----------------------------------------------------------------------------------------------------
+# -- the properties ----------------------------------------------------------------------------------------------------
 
 
 def check_divergence(device: Device, seed: int) -> dict[str, float]:
@@ -196,8 +197,9 @@ def check_source(device: Device, seed: int) -> dict[str, float]:
     asked = rng.standard_normal(size[::-1]).astype(np.float32)
     if rng.random() < 0.5:
         asked = ndimage.gaussian_filter(asked, 3.0)
-    region, count = ndimage.label(~solid)
-    mean = ndimage.mean(asked.astype(float), region, range(count + 1))
+    region = np.zeros(solid.shape, int)
+    ndimage.label(~solid, output=region)
+    mean = np.bincount(region.ravel(), asked.ravel()) / np.maximum(np.bincount(region.ravel()), 1)
     wanted = np.where(solid, 0.0, asked - mean[region]) / max(size)
     projection, field = Projection(device, size), device.double_field(size, 2)
     source, frozen = device.upload(asked), device.upload(solid.astype(np.uint8) * 255)
@@ -258,8 +260,7 @@ def check_cycle(device: Device, seed: int) -> dict[str, float]:
     faces, worst = open_faces(solid), 0.0
 
     def residual(velocity: np.ndarray) -> np.ndarray:
-        cells = divergence(velocity * faces, 1.0)
-        return cells.reshape(size[1] // 2, 2, size[0] // 2, 2).transpose(0, 2, 1, 3).reshape(size[1] // 2, size[0] // 2, 4)
+        return packed(divergence(velocity * faces, 1.0))
 
     for sweeps in (1, 2):
         residuals = [residual(random_velocity(size, rng)) for _ in range(2)]
