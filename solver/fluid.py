@@ -323,8 +323,13 @@ class Fluid(Scheme):
         self._trace = None
 
     def _check_source(self) -> None:
-        if not self.source.is_empty:
+        if self.source.is_empty:
+            return
+        try:
             check_size("the divergence that brushes ask for", self.source.field.get())
+        except ValueError:
+            self.source.clear()
+            raise
 
     def _viscous_residual(self, diffused: PackedFaces) -> float:
         self._viscosity_solver.unpack(diffused, self.velocity.write)

@@ -5,10 +5,10 @@
 //   flow v = curl (g (F x r)), F a unit, so in e-folds of C a radius of the way; strain = sqrt(tr C / 2) growth where
 //   that is positive, in the mean over the brush of its fourth power.
 // What is pushed back to where it came from becomes shorter again, and is held as firmly as at first.
-// u_around: the warp map's displacement on a lattice around the brush, longer sides, its texels 1 / FINE of the radius
+// u_around: the warp map's displacement on a lattice around the brush, longer sides, its texels 1 / fine of the radius
 // apart, the middle one at u_place (longer sides); u_extent: width and height of the domain, longer sides.
 // u_brush_velocity: lengths / s; u_carried: radii that something is carried before the push slips, and the least that it
-// gives for that reason; u_strain: where it begins to slip, and gives nothing; FINE: see solver/brush/push.py.
+// gives for that reason; u_strain: where it begins to slip, and gives nothing.
 // reads: 1157
 #include "lib/brush.glsl"
 uniform sampler2D u_around;
@@ -19,7 +19,10 @@ uniform vec2 u_place;
 uniform vec2 u_extent;
 layout(location = 0) out float out_slip;
 
-vec2 displacement(ivec2 node) { return texelFetch(u_around, node + FINE + 1, 0).rg / u_radius; }
+// Texels of the lattice along the radius: it reaches one beyond the brush on either side.
+int fine() { return textureSize(u_around, 0).x / 2 - 1; }
+
+vec2 displacement(ivec2 node) { return texelFetch(u_around, node + fine() + 1, 0).rg / u_radius; }
 
 float by_way(vec2 back, vec2 ahead) {
     float far = length(back);
@@ -30,8 +33,8 @@ float by_way(vec2 back, vec2 ahead) {
 }
 
 float strain(ivec2 node, vec2 ahead) {
-    const vec2 e = vec2(1.0 / float(FINE), 0.0);
-    const float scale = 0.5 * float(FINE);
+    vec2 e = vec2(1.0 / float(fine()), 0.0);
+    float scale = 0.5 * float(fine());
     vec2 r = vec2(node) * e.x;
     vec2 jx = vec2(1.0, 0.0) + scale * (displacement(node + ivec2(1, 0)) - displacement(node - ivec2(1, 0)));
     vec2 jy = vec2(0.0, 1.0) + scale * (displacement(node + ivec2(0, 1)) - displacement(node - ivec2(0, 1)));
@@ -43,10 +46,11 @@ float strain(ivec2 node, vec2 ahead) {
 }
 
 float by_strain(vec2 ahead) {
+    int fine = fine();
     float sum = 0.0, count = 0.0;
-    for (int j = -FINE; j <= FINE; ++j)
-        for (int i = -FINE; i <= FINE; ++i) {
-            vec2 r = vec2(i, j) / float(FINE), place = u_place + r * u_radius;
+    for (int j = -fine; j <= fine; ++j)
+        for (int i = -fine; i <= fine; ++i) {
+            vec2 r = vec2(i, j) / float(fine), place = u_place + r * u_radius;
             bool inside = all(greaterThan(place, vec2(0.0))) && all(lessThan(place, u_extent));
             if (dot(r, r) >= 1.0 || !inside) continue;
             float here = strain(ivec2(i, j), ahead);

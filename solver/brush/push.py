@@ -141,7 +141,7 @@ class Slip:
         x, y = (min(max(at, 0.0), far) for at, far in zip(push.tip.start, warp.extent, strict=True))
         step = push.tip.radius / FINE
         warp.probe(self._around, (x / width, y / height), (step / width, step / height))
-        self.device.pass_("brush/slip.frag", FINE=FINE)(
+        self.device.pass_("brush/slip.frag")(
             self.factor,
             around=self._around,
             brush_velocity=push.velocity,

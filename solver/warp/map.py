@@ -276,8 +276,8 @@ class WarpMap:
     def composed(self, scale: int | None = None, exact: bool = False) -> Field:
         """The whole map's displacement on `scale` texels a cell, by default the accumulated map's.
 
-        Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, the accumulated
-        map is looked up by the cubic for it too.
+        Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, so is the
+        accumulated map for it.
         """
         scale = scale or self.scale
         if scale == self.scale and self._steps == 0:

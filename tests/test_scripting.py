@@ -1,0 +1,183 @@
+"""The solver as a script uses it: the README's own code, what is refused at the call, and what is read out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import reference
+from solver import Brush, Device, Fluid, FluidParams, Grid, PaperFluid, Tip, Walls, WarpMap
+
+SECTION = (Path(__file__).parent.parent / "README.md").read_text("utf-8").split("## Scripting")[1].split("\n## ")[0]
+BLOCKS = re.findall(r"```python\n(.*?)```", SECTION, re.DOTALL)
+
+
+def test_the_readmes_code_runs() -> None:
+    names: dict[str, Any] = {}
+    exec(BLOCKS[0].replace("Grid(320, 200)", "Grid(64, 40)"), names)
+    fluid, displacement = names["fluid"], names["displacement"]
+    assert names["vorticity"].shape == names["stream"].shape == (41, 65)
+    assert np.abs(displacement).max() > 0.01
+    assert fluid.motion().kinetic_energy > 0
+    names["device"].release()
+    # The plot needs what is no dependency; it uses what the first block made.
+    drawn = compile(BLOCKS[1], "README.md", "exec")
+    assert {"vorticity", "stream"} <= set(drawn.co_names)
+
+
+@pytest.fixture
+def fluid(device: Device) -> Any:
+    fluid = Fluid(device, Grid(20, 12))
+    fluid.set_velocity(reference.smooth_velocity(20, 12, seed=1))
+    fluid.project()
+    yield fluid
+    fluid.release()
+
+
+WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
+    "a step of NaN": (lambda fluid: fluid.step(float("nan")), "step"),
+    "a negative step": (lambda fluid: fluid.step(-0.1), "step"),
+    "an endless step": (lambda fluid: fluid.step(np.inf), "step"),
+    "a negative diffusion": (lambda fluid: fluid.diffuse(-0.1), "step"),
+    "a transposed force": (lambda fluid: fluid.step(0.1, np.zeros((20, 12, 2))), "shape"),
+    "a force of one component": (lambda fluid: fluid.step(0.1, np.zeros((12, 20))), "shape"),
+    "a force of NaN": (lambda fluid: fluid.step(0.1, lambda x, y, t: (x * np.nan, y)), "finite"),
+    "a force beyond all measure": (lambda fluid: fluid.step(0.1, np.full((12, 20, 2), 1e30)), "beyond"),
+    "a field beyond all measure": (
+        lambda fluid: fluid.step(0.1, [(fluid.device.upload(np.full((12, 20, 2), 1e30)), 1.0)]),
+        "beyond",
+    ),
+    "an impulse of NaN": (
+        lambda fluid: fluid.step(0.1, [(fluid.device.upload(np.ones((12, 20, 2))), np.nan)]),
+        "impulse",
+    ),
+    "a source beyond all measure": (
+        lambda fluid: (fluid.add_source(fluid.device.upload(np.full((12, 20), 1e30))), fluid.step(0.1)),
+        "beyond",
+    ),
+    "a transposed velocity": (lambda fluid: fluid.set_velocity(np.zeros((20, 12, 2))), "shape"),
+    "a row as viscosity": (lambda fluid: fluid.set_viscosity(np.ones((1, 20))), "shape"),
+    "a negative viscosity": (lambda fluid: fluid.set_viscosity(-1.0), "viscosity"),
+    "transposed solids": (lambda fluid: fluid.set_solid(np.zeros((20, 12), bool)), "shape"),
+    "a push of NaN": (
+        lambda fluid: Brush(fluid.device).push(fluid, Tip((0.1, np.nan), (0.2, 0.1), 0.1), 0.1),
+        "brush",
+    ),
+    "a push in no time": (lambda fluid: Brush(fluid.device).push(fluid, Tip((0.1, 0.1), (0.2, 0.1), 0.1), 0.0), "time"),
+    "an endless growth": (lambda fluid: Brush(fluid.device).expand(fluid, Tip((0, 0), (0, 0), 0.1), np.inf), "rate"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_simulated_is_refused_and_nothing_has_happened(fluid: Fluid, name: str) -> None:
+    act, told = WRONG[name]
+    before = fluid.u
+    with pytest.raises(ValueError, match=told):
+        act(fluid)
+    np.testing.assert_array_equal(fluid.u, before)
+    fluid.step(0.01)
+    assert np.isfinite(fluid.u).all()
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda warp: warp.set(np.zeros((40, 24, 2))),
+        lambda warp: warp.set(np.zeros((24, 40))),
+        lambda warp: warp.advance_prescribed(np.zeros((20, 12, 2)), 0.1),
+        lambda warp: warp.advance_prescribed(np.zeros((12, 20)), 0.1),
+        lambda warp: warp.advance_prescribed(np.zeros((12, 20, 2)), -0.1),
+        lambda warp: warp.advance_prescribed(lambda x, y, t: (x, y), np.nan),
+        lambda warp: warp.advance(warp.device.upload(np.zeros((12, 20))), 0.1),
+    ],
+    ids=["transposed", "one component", "transposed velocity", "velocity", "negative step", "NaN step", "field"],
+)
+def test_a_map_refuses_what_does_not_fit(device: Device, act: Callable[[WarpMap], object]) -> None:
+    warp = WarpMap(device, Grid(20, 12))
+    with pytest.raises(ValueError, match=r"shape|transposed|step|wanted"):
+        act(warp)
+    assert not warp.read().any()
+    warp.release()
+
+
+def test_each_stage_alone_does_what_it_says(fluid: Fluid) -> None:
+    energies = [fluid.motion().kinetic_energy]
+    fluid.set_viscosity(1e-3)
+    for stage in (lambda: fluid.diffuse(0.1), lambda: fluid.advect(0.1), fluid.project):
+        stage()
+        energies.append(fluid.motion().kinetic_energy)
+    assert energies[-1] > 0.1 * energies[0]  # `diffuse` alone once left nothing
+    assert energies[1] < energies[0]
+    assert np.abs(fluid.divergence()).max() < 1e-3 * np.abs(fluid.vorticity()).max()
+    before = fluid.u
+    fluid.add_force(np.ones((12, 20, 2)), 0.1)
+    np.testing.assert_allclose(fluid.u[:, 1:-1] - before[:, 1:-1], 0.1, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [Fluid, PaperFluid])
+def test_a_saved_moment_is_a_copy_and_comes_back(device: Device, kind: type[Fluid | PaperFluid]) -> None:
+    fluid = kind(device, Grid(24, 16))
+    fluid.set_viscosity(1e-3)
+    fluid.step(0.1, lambda x, y, t: (np.sin(5 * y), np.cos(4 * x)))
+    state = fluid.save()
+    for _ in range(4):
+        fluid.step(0.1)
+    wanted, time = fluid.u, fluid.time
+    for _ in range(2):  # a state that is live would be other a second time
+        fluid.restore(state)
+        assert fluid.time == pytest.approx(0.1)
+        for _ in range(4):
+            fluid.step(0.1)
+        np.testing.assert_array_equal(fluid.u, wanted)
+    assert fluid.time == time
+    other = kind(device, Grid(16, 24))
+    with pytest.raises(ValueError, match="another grid"):
+        other.restore(state)
+    state.release()
+    other.release()
+    fluid.release()
+
+
+@pytest.mark.parametrize("walls", [Walls(), Walls("none", (0.0, 0.0, 1.0, 0.0))], ids=["free", "none"])
+def test_vorticity_and_stream_function_are_those_of_a_known_flow(device: Device, walls: Walls) -> None:
+    """psi = sin pi x sin pi y: u = psi_y, v = -psi_x, vorticity 2 pi^2 psi but at walls that hold on to the fluid."""
+    grid = Grid(64, 64)
+    fluid = Fluid(device, grid, FluidParams(walls))
+    sin, cos, pi = np.sin, np.cos, np.pi
+    fluid.set_velocity(lambda x, y, t: (pi * sin(pi * x) * cos(pi * y), -pi * cos(pi * x) * sin(pi * y)))
+    x, y = np.meshgrid(np.linspace(0, 1, 65), np.linspace(0, 1, 65))
+    psi = sin(pi * x) * sin(pi * y)
+    inner = np.s_[1:-1, 1:-1]
+    np.testing.assert_allclose(fluid.stream_function(), psi, atol=1e-3)
+    np.testing.assert_allclose(fluid.vorticity()[inner], 2 * pi**2 * psi[inner], atol=2e-2)
+    assert fluid.u.shape == (64, 65)
+    assert fluid.v.shape == (65, 64)
+    top = fluid.vorticity()[0, 32]  # -du/dy between the wall's speed and the first row's
+    first = fluid.u[0, 32]
+    assert top == pytest.approx(0.0 if walls.slip == "free" else (1.0 - first) * 2 * 64, abs=1e-2)
+    assert "64 x 64" in repr(fluid)
+    fluid.release()
+
+
+def test_forces_as_fields_arrays_and_functions_do_the_same(device: Device) -> None:
+    grid, found = Grid(24, 16), []
+
+    def push(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        return np.sin(3 * y) + t, np.cos(2 * x)
+
+    (ux, uy), (vx, vy) = grid.u_faces(), grid.v_faces()
+    array = np.stack([push(ux, uy, 0.05)[0], push(vx, vy, 0.05)[1]], axis=-1)
+    field = device.upload(array.astype(np.float32))
+    for forces in (push, array, [array], [(field, 0.1)], [0.5 * array, (field, 0.05)]):
+        fluid = Fluid(device, grid)
+        fluid.step(0.1, forces)
+        found.append(fluid.u)
+        fluid.release()
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], atol=1e-5)
+    assert np.abs(found[0]).max() > 1e-3
