@@ -164,7 +164,7 @@ class Fluid:
         trace = self.trace(dt)
         self._take_up_masks(dt)
         with self.device.stage("advect"):
-            self._packed = self._viscosity_solver.given
+            self._packed = self._viscosity_solver.v_star
             packing = self._viscosity_solver.packing
             advect = self.device.pass_("step/advect.frag", **packing.defines)
             decay = math.exp(-self.params.drag * dt)

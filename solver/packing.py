@@ -60,3 +60,9 @@ def unpacked(texels: np.ndarray) -> np.ndarray:
     """Cells in their places, from the texels of 2 x 2 of them."""
     height, width = texels.shape[:2]
     return texels.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)
+
+
+def packed(cells: np.ndarray) -> np.ndarray:
+    """Texels of 2 x 2 cells, (height / 2, width / 2, 4), from cells in their places."""
+    height, width = cells.shape
+    return cells.reshape(height // 2, 2, width // 2, 2).transpose(0, 2, 1, 3).reshape(height // 2, width // 2, 4)

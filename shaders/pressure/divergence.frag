@@ -1,6 +1,6 @@
 // Right-hand side of the pressure equation: what flows out of each cell, per face length; h times the divergence.
 //   r = u_right - u_left + v_down - v_up  [- (s - mean)]          sum over open faces of (p' - p) = r
-// in:  u_velocity   MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/block.glsl packs it
+// in:  u_velocity   MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/operator.glsl packs it
 //      u_left, u_up, u_far, u_span   faces
 // With WITH_SOURCE: u_source, h s at blocks, lengths / s; u_mean, its mean over the fluid.
 // With EXPECTED: u_expected, a pressure / h at blocks, lengths / s, that is subtracted: r - A p; and a second output.

@@ -1,5 +1,5 @@
 // Advect: w2(x) = decay * w1(x_d), what departs carried along the trace, each component at its own faces, interpolated by
-// the cubic of lib/displacement.glsl; packed 2 x 2 cells a texel as viscosity/block.glsl has it, 0 on pinned faces.
+// the cubic of lib/displacement.glsl; packed 2 x 2 cells a texel as viscosity/operator.glsl has it, 0 on pinned faces.
 // u_departing: see depart.frag; u_trace: backtrace of the cell centres, cells; u_decay: exp(-drag dt).
 // reads: 57
 //

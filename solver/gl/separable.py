@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.gl.field import Field
-    from solver.gl.passes import Pass
-
-    Faces = tuple[Field, Field]  # of u and of v
 
 # Products of blocks that one solve is worth; a finer grid is left to multigrid.
 LARGEST = 65536
@@ -63,78 +60,8 @@ class Separable:
         self._waves.release()
 
 
-class ViscousWaves:
-    """Solves the viscous step for one viscosity in a box with free-slip walls.
-
-    There sines along the normal and cosines across it carry u and v, and the step couples u and v of one wave only:
-    four products with small matrices, and 2 x 2 equations between them.
-
-    Args:
-        device: the device.
-        box: (nx, ny) cells between the walls.
-        texels: of the packed faces, without their ring (see shaders/viscosity/block.glsl).
-    """
-
-    def __init__(self, device: Device, box: tuple[int, int], texels: tuple[int, int]) -> None:
-        self.device = device
-        self._region = (1, 1, *texels)
-        self._box = box
-        across, down = (_sines_and_cosines(*lengths) for lengths in zip(box, texels, strict=True))
-        # Of u and of v: across, down, and back again.
-        products = (across[0], across[1]), (down[1], down[0]), (down[1].T, down[0]), (across[0], across[1].T)
-        self._matrices = [
-            (device.upload(_blocks(u), "waves of u"), device.upload(_blocks(v), "waves of v")) for u, v in products
-        ]
-        ringed = texels[0] + 2, texels[1] + 2
-        self._half, self._waves = (
-            (device.field(ringed, 4, f"viscous {name} u"), device.field(ringed, 4, f"viscous {name} v"))
-            for name in ("halfway", "waves")
-        )
-
-    @staticmethod
-    def is_worth(texels: tuple[int, int]) -> bool:
-        """True if a grid of so many texels is small enough."""
-        return _products(texels) <= LARGEST
-
-    def solve(self, right: Faces, faces: Faces, stiffness: float) -> None:
-        """The `faces` that the step of `stiffness` dt mu / h^2 makes of `right`, packed faces (u, v) both."""
-        across = self.device.pass_("viscosity/waves.frag")
-        down = self.device.pass_("viscosity/waves.frag", DOWN=1)
-        solved = self.device.pass_("viscosity/waves.frag", DOWN=1, SOLVE=1)
-        there, there_down, back_down, back = self._matrices
-        self._draw(across, self._half, right, there)
-        self._draw(solved, self._waves, self._half, there_down, stiffness=stiffness, box=self._box)
-        self._draw(down, self._half, self._waves, back_down)
-        self._draw(across, faces, self._half, back)
-
-    def _draw(self, pass_: Pass, target: Faces, source: Faces, matrices: Faces, **inputs: Any) -> None:
-        u, v = source
-        pass_(target, region=self._region, u=u, v=v, matrix_u=matrices[0], matrix_v=matrices[1], **inputs)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(field.nbytes for pair in (*self._matrices, self._half, self._waves) for field in pair)
-
-    def release(self) -> None:
-        """Free the textures."""
-        for pair in (*self._matrices, self._half, self._waves):
-            for field in pair:
-                field.release()
-
-
 def _products(size: tuple[int, int]) -> int:
     return size[0] * size[1] * (size[0] + size[1])
-
-
-def _sines_and_cosines(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
-    """Orthonormal waves between walls: rows of sines at `count` left faces and of cosines at centres, zero-padded."""
-    wave, place = np.arange(count)[:, None], np.arange(count)
-    sines = np.sqrt(2.0 / count) * np.sin(np.pi * wave * place / count)
-    cosines = np.sqrt(2.0 / count) * np.cos(np.pi * wave * (place + 0.5) / count)
-    cosines[0] = np.sqrt(1.0 / count)
-    padding = (0, 2 * texels - count)
-    return np.pad(sines, padding), np.pad(cosines, padding)
 
 
 def _waves(span: float, blocks: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
