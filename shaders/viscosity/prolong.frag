@@ -73,7 +73,7 @@ void main() {
 #ifdef DRAGGED
     vec4 rhs_u = texture(u_rhs_u, v_uv), rhs_v = texture(u_rhs_v, v_uv);
 #else
-    vec4 rhs_u = u, right_v = v;
+    vec4 rhs_u = u, rhs_v = v;
 #endif
     float part = texelFetch(u_part, ivec2(0), 0).x;
     u = part * u + u_weight * inverse.u * mix(rhs_u, texture(u_r_u, v_uv), part);

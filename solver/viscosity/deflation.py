@@ -81,17 +81,20 @@ def _opened(stiff: np.ndarray) -> np.ndarray:
 
 
 def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
-    """The 4-connected pieces of a mask within tiles, numbered from 1 on, 0 outside."""
+    """The pieces of a mask within tiles, numbered from 1 on, 0 outside.
+
+    Two cells side by side belong together if a node that both touch has all its four cells inside; else they are a hinge.
+    """
     number = np.arange(1, inside.size + 1).reshape(inside.shape) * inside
+    around = np.pad(inside, 1)
+    whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
     links = []
-    for axis, length in ((0, inside.shape[0]), (1, inside.shape[1])):
-        here, ahead = (number.take(range(s, length - 1 + s), axis) for s in (0, 1))
-        at = np.arange(1, length) % side != 0
-        together = (here > 0) & (ahead > 0) & (at[:, None] if axis == 0 else at)
-        links.append((here[together], ahead[together]))
+    for turned, nodes in ((number, whole), (number.T, whole.T)):
+        together = (nodes[:-1, 1:-1] | nodes[1:, 1:-1]) & (np.arange(1, turned.shape[1]) % side != 0)
+        links.append((turned[:, :-1][together], turned[:, 1:][together]))
     one, other = (np.concatenate(ends) for ends in zip(*links, strict=True))
     used = np.zeros(inside.size + 1, int)
-    used[number.ravel()] = 1
+    used[number.ravel()] = used[0] = 1
     short = np.cumsum(used) - 1
     root = connected(int(short[-1]) + 1, short[one], short[other])
     first = np.cumsum(root == np.arange(len(root))) - 1
@@ -259,8 +262,8 @@ class Deflation:
         about = np.concatenate([1 + parts.tile * (parts.side // 2), self.space.centres], axis=1)
         self._tables[0].set(self._rows_of(about))
 
-    def correct(self, residual: PackedFaces, target: PackedFaces) -> None:
-        """Draw Z E^-1 Z' times the residual; waits for the GPU."""
+    def correct(self, residual: PackedFaces, target: PackedFaces, add: bool = False) -> None:
+        """Draw Z E^-1 Z' times the residual, or add it; waits for the GPU."""
         assert self.space is not None
         tiles, loads, motions = self._tables
         part_of = {"part_u": self._part_of[0], "part_v": self._part_of[1], "shear": self._shear}
@@ -269,7 +272,8 @@ class Deflation:
         gather(loads, region=(0, 0, WIDE, -(-count // WIDE)), tiles=tiles, **residual.inputs(), **part_of)
         found = self.space.solve(loads.get().reshape(-1, 4)[:count, :3].astype(np.float64))
         motions.set(self._rows_of(found))
-        self.device.pass_("viscosity/spread_motions.frag")(target.fields, region=self.region, motions=motions, **part_of)
+        spread = self.device.pass_("viscosity/spread_motions.frag")
+        spread(target.fields, add=add, region=self.region, motions=motions, **part_of)
 
     def _rows_of(self, values: np.ndarray) -> np.ndarray:
         table = self._tables[0]

@@ -22,6 +22,9 @@ LARGEST_EIGENVALUE = 2.8, 4.0
 # The smoothed part of the spectrum, up from the largest eigenvalue over this; by the number of sweeps.
 SMOOTHED = {1: 3.8, 2: 5.0}
 
+# Texels of a grid whose transform is less than the corrections around one.
+SMALL_GRID = 64
+
 
 def chebyshev_weights(least: float, largest: float, count: int) -> list[float]:
     """Weights of damped Jacobi sweeps that together damp eigenvalues of D^-1 A between the two most."""
@@ -51,9 +54,9 @@ class Multigrid:
             self.levels.append(Level(device, size, len(self.levels), finest))
             size = -(-size[0] // 2), -(-size[1] // 2)
         # Between free-slip walls one viscosity is solved directly on a much finer level than any other.
-        self._transform_level = next(
-            (level for level in self.levels[1:] if SineCosineTransform.is_worth(level.texels)), self.levels[-1]
-        )
+        is_worth = SineCosineTransform.is_worth
+        first = 0 if math.prod(self.levels[0].texels) <= SMALL_GRID else 1
+        self._transform_level = next((level for level in self.levels[first:] if is_worth(level.texels)), self.levels[-1])
         self._transform = SineCosineTransform(device, self._transform_level.box, self._transform_level.texels)
         self.has_transform = False
         unknowns = 8 * math.prod(self.levels[-1].texels)

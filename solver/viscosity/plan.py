@@ -21,10 +21,11 @@ STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
 # Softest kappa up to which one sweep before and after the coarser levels does as well as two, at three fifths of the cost.
 ONE_SWEEP = 4.0
-# Conjugate gradients end after an iteration that has brought less than this part of the energy, squared. Where things are
-# stiff one brings less than a third of what the last one did.
-TOLERANCE = 0.03
-TOLERANCE_STIFF = 0.05
+# Conjugate gradients end after an iteration that has brought less than this part of the energy, squared; what is left
+# then is less than half of that: below 1 % where the viscosity varies so much at most, and below 5 % beyond.
+MODERATE = 300.0
+TOLERANCE = 0.02
+TOLERANCE_STIFF = 0.06
 # Iterations at most: only rounding errors, at contrasts beyond 1e8, can ask for more.
 MOST_ITERATIONS = 30
 
@@ -34,23 +35,26 @@ class Plan:
     """How a viscous step is solved; see `plan_for`.
 
     Attributes:
-        method: "smooth": v* is smoothed; "fmg": v* is corrected once, by full multigrid, and smoothed; "cg": by
-            conjugate gradients, each iteration with one multigrid cycle.
+        method: "smooth": v* is smoothed; "direct": the grid is so small that its inverse is at hand; "fmg": v* is
+            corrected once, by full multigrid, and smoothed; "cg": by conjugate gradients, each iteration with one
+            multigrid cycle.
         sweeps: smoothing sweeps before and after the coarser levels: (on the finest, on the others).
         tolerance: of the conjugate gradients.
         iterations: of the conjugate gradients, at most.
         stiff: dt mu / h^2 above which cores and runs are deflated; 0: none are.
+        deflate_twice: once more after the cycle: what stiff parts have to do with each other through viscous fluid.
         levels: coarser levels that are visited, at most.
         nested: of these, the finest so many get a cycle while full multigrid carries a correction up through them.
         two_grid: such a cycle goes one level down only.
         last: smoothing sweeps on the last level, where it is not solved directly; with 0 as on the others.
     """
 
-    method: Literal["smooth", "fmg", "cg"] = "cg"
+    method: Literal["smooth", "direct", "fmg", "cg"] = "cg"
     sweeps: tuple[int, int] = (1, 1)
     tolerance: float = TOLERANCE
     iterations: int = MOST_ITERATIONS
     stiff: float = 0.0
+    deflate_twice: bool = False
     levels: int = 99
     nested: int = 99
     two_grid: bool = False
@@ -69,8 +73,10 @@ def plan_for(least: float, largest: float) -> Plan:
         nested = 0 if largest <= 5.0 else 1 if largest <= 50.0 else 2
         last = 4 if levels == 1 else 5
         return Plan("fmg", (sweeps, 2), levels=levels, nested=nested, two_grid=largest <= 150.0, last=last)
-    count = 1 if least <= ONE_SWEEP else 2
+    is_soft = least <= ONE_SWEEP
+    count = 1 if is_soft else 2
     stiff = max(STIFF, STIFF_OF_SOFTEST * least)
+    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF
     if largest <= stiff:
-        return Plan("cg", (count, count))
-    return Plan("cg", (count, count), TOLERANCE_STIFF, stiff=stiff)
+        return Plan("cg", (count, count), tolerance)
+    return Plan("cg", (count, count), tolerance, stiff=stiff, deflate_twice=not is_soft)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -58,15 +57,15 @@ class Viscosity:
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         kappa = dt / (hx * hy)
         self.plan = plan_for(kappa * least, kappa * largest)
-        if len(self.multigrid.levels) == 1 and self.plan.method != "smooth":
-            # The only level is solved directly: one iteration.
-            self.plan = replace(self.plan, method="cg", sweeps=(1, 1), levels=99, stiff=0.0, iterations=1)
         self.deflation.clear()
         if least == largest and not frozen.any():
             self.multigrid.set_uniform(least, dt, walls)
-            return
-        coefficients = self.multigrid.set_coefficients(amount, frozen, dt, walls)
-        if self.plan.stiff:
+            coefficients = None
+        else:
+            coefficients = self.multigrid.set_coefficients(amount, frozen, dt, walls)
+        if self.plan.method != "smooth" and self.multigrid.direct_level is self.multigrid.finest:
+            self.plan = Plan("direct")
+        elif coefficients and self.plan.stiff:
             stiffness = 0.5 * coefficients.xx[0] * hx / hy
             self.deflation.find(stiffness, coefficients, self.plan.stiff)
 
@@ -99,7 +98,10 @@ class Viscosity:
             return solution
         if self.plan.method == "fmg":
             return self.multigrid.correct(v_star, rhs)
-        self.multigrid.smooth(finest, rhs, self.multigrid.weights(finest), start=v_star)
+        if self.plan.method == "direct":
+            self.multigrid.direct_solve(rhs)
+        else:
+            self.multigrid.smooth(finest, rhs, self.multigrid.weights(finest), start=v_star)
         return finest.faces.read
 
     def _precondition(self, residual: PackedFaces) -> PackedFaces:
@@ -108,7 +110,11 @@ class Viscosity:
             return self.multigrid.precondition(residual, start=False)
         self.deflation.correct(residual, finest.faces.write)
         finest.faces.swap()
-        return self.multigrid.precondition(residual, start=True)
+        self.multigrid.precondition(residual, start=True)
+        if self.plan.deflate_twice:
+            self.multigrid.residual(finest, finest.faces.read, residual, finest.faces.write)
+            self.deflation.correct(finest.faces.write, finest.faces.read, add=True)
+        return finest.faces.read
 
     def unpack(self, faces: PackedFaces, velocity: Field) -> None:
         """Packed faces as a velocity on MAC faces."""
@@ -125,7 +131,7 @@ class Viscosity:
             return self.v_star
         finest, rhs = self.multigrid.finest, self._dragged
         drag = self.device.pass_("viscosity/drag.frag", **finest.defines)
-        drag(rhs.fields, region=finest.region, wall_speed=self._wall_speed, cells=self.size, **self.v_star.inputs(),
+        drag(rhs.fields, region=finest.region, wall_speed=self._wall_speed, size=self.size, **self.v_star.inputs(),
              **finest.operator)  # fmt: skip
         return rhs
 
