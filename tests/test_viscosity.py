@@ -27,16 +27,17 @@ class Step:
         dt: float | None = None,
         solid: np.ndarray | None = None,
         walls: Walls | None = None,
+        aspect: float = 1.0,
     ) -> None:
         ny, nx = viscosity.shape
-        self.h = 1 / max(nx, ny)
-        self.dt = self.h**2 if dt is None else dt
+        self.h = 1 / max(nx, ny), aspect / max(nx, ny)
+        self.dt = self.h[0] * self.h[1] if dt is None else dt
         self.walls = walls or Walls()
         self.solid = np.zeros((ny, nx), bool) if solid is None else solid
         # What the GPU is given, and so what the reference must be given too.
         self.viscosity = viscosity.astype(np.float32)
         self.device = device
-        self.solver = Viscosity(device, (nx, ny))
+        self.solver = Viscosity(device, (nx, ny), self.h)
         solid_field = device.upload(self.solid.astype(np.uint8) * np.uint8(255))
         self.solver.set_coefficients(device.upload(self.viscosity), solid_field, self.dt, self.walls)
         self.velocity = device.double_field((nx, ny), 2, "velocity")
@@ -182,6 +183,20 @@ def test_uniform_viscosity_on_the_smallest_grids(device: Device, size: tuple[int
     step = Step(device, np.full(size, k / max(size) ** -2), dt=max(size) ** -4.0)
     faces = push(*size)
     assert error(step(faces), uniform_exactly(faces.astype(np.float64), k)) < (1e-3 if k < 0.05 else 1e-4)
+
+
+@pytest.mark.parametrize("aspect", [0.7, 0.94, 1.06, 1.5])
+@pytest.mark.parametrize("kind", ["uniform", "varying", "no-slip", "stiff"])
+def test_cells_that_are_not_square(device: Device, kind: str, aspect: float) -> None:
+    size = 96, 128
+    viscosity = 30.0 ** np.random.default_rng(4).random(size) if kind != "uniform" else np.full(size, 5.0)
+    if kind == "stiff":
+        viscosity = 1e5 ** mask("disc", *size)
+    walls = Walls("none", (0.3, -0.2, 1.0, 0.5)) if kind == "no-slip" else Walls()
+    step = Step(device, viscosity, walls=walls, aspect=aspect)
+    if kind != "uniform":
+        step.with_plan(iterations=30, tolerance=0.0)
+    assert error(step(push(*size)), step.exact(push(*size))) < (0.01 if kind == "uniform" else 1e-4)
 
 
 def test_no_viscosity_changes_nothing(device: Device) -> None:

@@ -2,6 +2,9 @@
 // u_tiles: (first texel x, y, centre x, centre y) by part, cells; u_u, u_v: the residual; u_part_u, u_part_v: the part
 // that each face belongs to, 0 for none; u_shear: (s_y, s_x), see operator.glsl. SIDE: texels along a tile and one more.
 // reads: 101
+#ifndef SIDE
+#define SIDE 5
+#endif
 uniform sampler2D u_tiles;
 uniform sampler2D u_u;
 uniform sampler2D u_v;

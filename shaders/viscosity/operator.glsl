@@ -3,8 +3,8 @@
 // for the edge: what lies beyond a wall is at rest. Fixed faces (walls, solid cells) hold exactly zero and are no unknowns.
 // B: the strains e_xx and e_yy in cells (K = 2 dt mu / h^2), the shear s_y du + s_x dv at nodes (K = dt mu_node / h^2).
 // UNIFORM: of one viscosity in a box without solids; nothing is read, all follows from the place.
-// FINEST: K of each cell and node in textures.
 // COARSE: K couples neighbouring strains; stress.frag has multiplied, and its stresses K B v are read here.
+// Else, on the finest level, K of each cell and node is in textures.
 uniform vec2 u_shear;           // (s_y, s_x): (1, 1) where cells are square
 #ifdef UNIFORM
 #include "viscosity/box.glsl"
@@ -62,7 +62,7 @@ Faces inverse_diagonal(vec2 at) {
 Faces inverse_diagonal(vec2 at) { return Faces(texture(u_inverse_u, at), texture(u_inverse_v, at)); }
 #endif
 
-#ifdef FINEST
+#if !defined(UNIFORM) && !defined(COARSE)
 Stiffness read_stiffness(vec2 at) {
     vec2 right = vec2(1.0 / float(textureSize(u_nodes, 0).x), 0.0), below = vec2(0.0, 1.0 / float(textureSize(u_nodes, 0).y));
     vec4 x = texture(u_cells, at), n = texture(u_nodes, at);
@@ -97,7 +97,7 @@ Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, out Faces here, out Fa
                  here.v + vec4(above.zw, yy.xy) - yy + u_shear.y * (xy - vec4(xy.y, right.x, xy.w, right.z)));
 }
 #else
-// The same, the stresses made on the way. 12 reads, and FINEST 6 more.
+// The same, the stresses made on the way. 12 reads, and 6 of textures of K.
 Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {
     vec2 x = vec2(1.0 / float(textureSize(fu, 0).x), 0.0), y = vec2(0.0, 1.0 / float(textureSize(fu, 0).y));
     vec4 u = texture(fu, at), v = texture(fv, at);

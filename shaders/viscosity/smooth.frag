@@ -13,7 +13,7 @@ layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
 
 void main() {
-#ifdef FINEST
+#if !defined(UNIFORM) && !defined(COARSE)
     Stiffness k = read_stiffness(v_uv);
     vec2 s = u_shear * u_shear;
     Faces f, af = apply_operator(u_u, u_v, v_uv, k, f);

@@ -49,36 +49,41 @@ class ClusterMatrix:
         self._strip = np.where(self._is_small, -1, strip)
         self._first = int(strip[large].min()) if len(large) else 0
         self._place[large] = _places(strip[large])
-        strips = np.bincount(strip[large] - self._first) if len(large) else np.zeros(0, int)
+        strips = np.bincount(strip[large] - self._first)
         self._sizes = strips
         self._rows = [large[strip[large] == self._first + number] for number in range(len(strips))]
         self._diagonal_at = np.concatenate([[0], np.cumsum(strips**2)])
-        self._beside_at = np.concatenate([[0], np.cumsum(strips[:-1] * strips[1:])]) if len(strips) else np.zeros(1, int)
+        self._beside_at = np.concatenate([[0], np.cumsum(strips[:-1] * strips[1:])])
         self._small_inverse = np.zeros((0, SMALL, SMALL))
         self._pivots: list[np.ndarray] = []
         self._beside: list[np.ndarray] = []
 
     def factor(self, rows: np.ndarray, columns: np.ndarray, values: np.ndarray) -> None:
-        """Take up the matrix, a sum of entries, all of them on or above the diagonal of strips, and invert it."""
+        """Take up the sum of a matrix of such entries and its transpose, and invert it."""
         same = self._cluster[rows] == self._cluster[columns]
         rows, columns, values = rows[same], columns[same], values[same]
-        small = self._is_small[rows]
-        at = (self._block[rows] * SMALL + self._place[rows]) * SMALL + self._place[columns]
-        blocks = np.bincount(at[small], values[small], self._count * SMALL**2).reshape(-1, SMALL, SMALL)
-        self._small_inverse = np.linalg.inv(_regular(blocks))
-        rows, columns, values = rows[~small], columns[~small], values[~small]
+        is_small = self._is_small[rows]
+        small = rows[is_small]
+        at = (self._block[small] * SMALL + self._place[small]) * SMALL + self._place[columns[is_small]]
+        blocks = np.bincount(at, values[is_small], self._count * SMALL**2).reshape(-1, SMALL, SMALL)
+        self._small_inverse = np.linalg.inv(_regular(blocks + blocks.swapaxes(1, 2)))
         if not len(self._sizes):
             return
+        rows, columns, values = rows[~is_small], columns[~is_small], values[~is_small]
         strip, other = self._strip[rows] - self._first, self._strip[columns] - self._first
-        within, ahead = strip == other, strip + 1 == other
-        at = self._diagonal_at[strip] + self._place[rows] * self._sizes[strip] + self._place[columns]
-        diagonal = np.bincount(at[within], values[within], self._diagonal_at[-1])
-        at = self._beside_at[strip] + self._place[rows] * self._sizes[np.minimum(other, len(self._sizes) - 1)]
-        at += self._place[columns]
-        beside = np.bincount(at[ahead], values[ahead], self._beside_at[-1])
+        row, column = self._place[rows], self._place[columns]
+        within = strip == other
+        at = (self._diagonal_at[strip] + row * self._sizes[strip] + column)[within]
+        diagonal = np.bincount(at, values[within], self._diagonal_at[-1])
+        # From each strip to the next one.
+        row, column = (np.where(other > strip, a, b)[~within] for a, b in ((row, column), (column, row)))
+        strip = np.minimum(strip, other)[~within]
+        at = self._beside_at[strip] + row * self._sizes[1:][strip] + column
+        beside = np.bincount(at, values[~within], self._beside_at[-1])
         self._pivots, self._beside = [], []
         for number, size in enumerate(self._sizes):
-            block = _regular(diagonal[self._diagonal_at[number] : self._diagonal_at[number + 1]].reshape(size, size))
+            block = diagonal[self._diagonal_at[number] : self._diagonal_at[number + 1]].reshape(size, size)
+            block = _regular(block + block.T)
             if number:
                 upper = self._beside[-1]
                 block -= upper.T @ (self._pivots[-1] @ upper)

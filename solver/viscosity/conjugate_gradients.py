@@ -27,9 +27,8 @@ class ConjugateGradients:
         self.device = device
         self.level = level
         ringed = level.rhs.u.size
-        self._x, self._r, self._p, self._ap = (
-            DoublePackedFaces(device, ringed, f"viscous {name}") for name in ("solution", "residual", "direction", "A p")
-        )
+        names = "solution", "residual", "direction", "A p"
+        self._x, self._r, self._p, self._ap = (DoublePackedFaces(device, ringed, f"viscous {name}") for name in names)
         self._az = PackedFaces(device, ringed, "viscous A z")
         self._rest = PackedFaces(device, ringed, "viscous rest")
         self._products = device.field(ringed, 4, "viscous products")
@@ -66,7 +65,9 @@ class ConjugateGradients:
                 break
         return self._x.read
 
-    def _galerkin_initial_guess(self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces) -> tuple[float, float]:
+    def _galerkin_initial_guess(
+        self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces
+    ) -> tuple[float, float]:
         """Leave in x the a v* + b d of least energy, d being the `change`; that energy, and p . A p for p = x / a."""
         draw = self.device.pass_("viscosity/galerkin_guess.frag", **self.level.defines)
         draw(

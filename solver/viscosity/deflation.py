@@ -1,22 +1,23 @@
 """Deflation: what moves at little energy in very viscous fluid, solved for directly as a coarse space.
 
-With harmonic means at the nodes a stiff cell forces no more than u to be constant along its row and v along its column,
-and a node is stiff only where all its four cells are. So the motions without strain are spanned by *runs* (u along stiff
-cells of a row, v along those of a column) and, where it is at least five cells broad, by the rigid motions of *cores*.
-Both end at the tiles' edges, so that long things bend. Coarse correction: f += Z E^-1 Z' r with E = Z' A Z, of which only
-couplings within a cluster are kept, that is of parts which something stiff connects.
+With harmonic means at the nodes a stiff cell forces no more than u to be constant along its row and v along its
+column, and a node is stiff only where all its four cells are. So the motions without strain are spanned by *runs* (u
+along stiff cells of a row, v along those of a column) and, where it is at least five cells broad, by the rigid motions
+of *cores*. Both end at the tiles' edges, so that long things bend. Coarse correction: f += Z E^-1 Z' r with E = Z' A Z,
+of which only couplings within a cluster are kept, that is of parts which something stiff connects.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.packing import PackedFaces, packed
+from solver.packing import PackedFaces, framed, packed
 from solver.viscosity.clusters import ClusterMatrix, connected
 from solver.viscosity.operator import Coefficients
 
@@ -54,8 +55,8 @@ def find_parts(stiff: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: 
     """The cores and runs of the `stiff` cells, (rows, columns), in tiles of `side` cells."""
     rows, columns = stiff.shape
     core = _numbered(_opened(stiff), side)
-    of_u = np.maximum(core, np.pad(core, ((0, 0), (1, 0)))[:, :-1]) * open_u
-    of_v = np.maximum(core, np.pad(core, ((1, 0), (0, 0)))[:-1]) * open_v
+    of_u = np.maximum(core, framed(core, (0, 0), (1, 0))[:, :-1]) * open_u
+    of_v = np.maximum(core, framed(core, (1, 0), (0, 0))[:-1]) * open_v
     cores = int(core.max(initial=0))
     free = stiff & (core == 0)
     runs_u = _runs(free, open_u & (of_u == 0), side)
@@ -83,10 +84,10 @@ def _opened(stiff: np.ndarray) -> np.ndarray:
 def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
     """The pieces of a mask within tiles, numbered from 1 on, 0 outside.
 
-    Two cells side by side belong together if a node that both touch has all its four cells inside; else they are a hinge.
+    Two cells side by side belong together if a node that both touch has all four cells inside; else they are a hinge.
     """
     number = np.arange(1, inside.size + 1).reshape(inside.shape) * inside
-    around = np.pad(inside, 1)
+    around = framed(inside, (1, 1), (1, 1))
     whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
     links = []
     for turned, nodes in ((number, whole), (number.T, whole.T)):
@@ -103,7 +104,7 @@ def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
 
 def _runs(free: np.ndarray, faces: np.ndarray, side: int) -> np.ndarray:
     """Faces along the rows of `free` cells, numbered run by run from 1 on; a tile's edge ends a run."""
-    touching = faces & (free | np.pad(free, ((0, 0), (1, 0)))[:, :-1])
+    touching = faces & (free | framed(free, (0, 0), (1, 0))[:, :-1])
     on = np.zeros_like(touching)
     on[:, 1:] = touching[:, 1:] & touching[:, :-1] & free[:, :-1] & (np.arange(1, free.shape[1]) % side != 0)
     return np.cumsum((touching & ~on).ravel()).reshape(free.shape) * touching
@@ -139,8 +140,7 @@ class CoarseSpace:
     def _strains(self, level: Coefficients, arm_u: np.ndarray, arm_v: np.ndarray) -> list[Any]:
         """Of each kind of strain that some part feels: K, and of its faces (part, sign, arm, whether it is of v)."""
         s_y, s_x = level.shear
-        u, v = (np.pad(part, 1) for part in (self.parts.of_u, self.parts.of_v))
-        arm_u, arm_v = np.pad(arm_u, 1), np.pad(arm_v, 1)
+        u, v, arm_u, arm_v = (framed(at, (1, 1), (1, 1)) for at in (self.parts.of_u, self.parts.of_v, arm_u, arm_v))
         inner = slice(1, -1)
         kinds = (
             (level.xx[0], ((u[inner, 2:], 1.0, arm_u[inner, 2:], 0), (u[inner, inner], -1.0, arm_u[inner, inner], 0))),
@@ -169,7 +169,7 @@ class CoarseSpace:
         for stiffness, faces in strains:
             stiff = stiffness > threshold
             parts = [part[stiff] for part, *_ in faces]
-            for a, b in zip(parts, parts[1:], strict=False):
+            for a, b in pairwise(parts):
                 both = (a > 0) & (b > 0) & (a != b)
                 one.append(a[both])
                 other.append(b[both])
@@ -182,30 +182,48 @@ class CoarseSpace:
     def _entries(
         self, strains: list[Any], cluster: np.ndarray, arm_u: np.ndarray, arm_v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Entries (row, column, value) of Z' A Z within the clusters."""
+        """Entries (row, column, value) within the clusters, of which Z' A Z is the sum and its transpose."""
+        count, cores = self.parts.count + 1, self.parts.cores
+        # Of each part by itself, its mass and what it strains around it: the upper triangle over its three motions.
+        own = {pair: np.zeros(count) for pair in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))}
+        for part, arm, of_v in ((self.parts.of_u, arm_u, 0), (self.parts.of_v, arm_v, 1)):
+            faces = np.bincount(part.ravel(), minlength=count)
+            own[of_v, of_v][: cores + 1] += faces[: cores + 1]
+            own[0, 0][cores + 1 :] += faces[cores + 1 :]
+            own[2, 2] += np.bincount(part.ravel(), (arm**2).ravel(), count)
         rows, columns, values = [], [], []
         for stiffness, faces in strains:
+            part = np.maximum.reduce([face[0] for face in faces])
+            alone = np.logical_and.reduce([(face[0] == part) | (face[0] == 0) for face in faces])
+            one, k = part[alone], stiffness[alone]
+            motion = np.zeros((3, len(one)))
+            for face, sign, arm, of_v in faces:
+                felt = sign * (face[alone] == one)
+                motion[0] += felt * (of_v == 0 or one > cores)
+                motion[1] += felt * (of_v == 1)
+                motion[2] += felt * arm[alone]
+            for first, second in own:
+                own[first, second] += np.bincount(one, k * motion[first] * motion[second], count)
             # The unknowns that move a face, and by how much: across or down, and where it belongs to a core its turn.
             moves = []
-            for part, sign, arm, of_v in faces:
-                is_core = (part > 0) & (part <= self.parts.cores)
+            k = stiffness[~alone]
+            for face, sign, arm, of_v in faces:
+                part, arm = face[~alone], arm[~alone]
+                is_core = (part > 0) & (part <= cores)
                 moves.append((part, self._first[part] + of_v * is_core, np.full(part.shape, sign), part > 0))
                 moves.append((part, self._first[part] + 2, sign * arm, is_core))
-            for part, row, amount, is_there in moves:
-                for other, column, other_amount, is_other in moves:
+            for number, (part, row, amount, is_there) in enumerate(moves):
+                energy = k * amount
+                for other, column, other_amount, is_other in moves[number:]:
                     at = np.nonzero(is_there & is_other & (cluster[part] == cluster[other]))[0]
                     rows.append(row[at])
                     columns.append(column[at])
-                    values.append(stiffness[at] * amount[at] * other_amount[at])
-        for part, arm, of_v in ((self.parts.of_u, arm_u, 0), (self.parts.of_v, arm_v, 1)):
-            faces = np.bincount(part.ravel(), minlength=self.parts.count + 1)
-            turning = np.bincount(part.ravel(), (arm**2).ravel(), self.parts.count + 1)
-            number = np.nonzero(faces)[0]
-            number = number[number > 0]
-            is_core = number <= self.parts.cores
-            rows += [self._first[number] + of_v * is_core, self._first[number[is_core]] + 2]
-            values += [faces[number].astype(float), turning[number[is_core]]]
-            columns += rows[-2:]
+                    values.append((0.5 if column is row else 1.0) * energy[at] * other_amount[at])
+        for (first, second), sums in own.items():
+            number = np.arange(1, count if second == 0 else cores + 1)
+            rows.append(self._first[number] + first)
+            columns.append(self._first[number] + second)
+            values.append((0.5 if first == second else 1.0) * sums[number])
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
@@ -253,12 +271,13 @@ class Deflation:
         self.space = CoarseSpace(parts, level, threshold)
         self._shear = level.shear
         for field, part in zip(self._part_of, (parts.of_u, parts.of_v), strict=True):
-            field.set(np.pad(packed(part), ((1, 1), (1, 1), (0, 0))))
+            field.set(packed(framed(part, (2, 2), (2, 2))))
         height = -(-(parts.count + 1) // WIDE)
         if not self._tables or self._tables[0].height < height:
             for table in self._tables:
                 table.release()
-            self._tables = [self.device.field((WIDE, height), 4, f"deflated {name}") for name in ("tiles", "loads", "motions")]
+            names = "tiles", "loads", "motions"
+            self._tables = [self.device.field((WIDE, height), 4, f"deflated {name}") for name in names]
         about = np.concatenate([1 + parts.tile * (parts.side // 2), self.space.centres], axis=1)
         self._tables[0].set(self._rows_of(about))
 

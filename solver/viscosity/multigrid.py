@@ -1,4 +1,4 @@
-"""Multigrid cycles for the viscous operator: Chebyshev-Jacobi smoothing, transposed transfers, a direct solve at the end."""
+"""Multigrid cycles for the viscous operator: Chebyshev-Jacobi smoothing, transposed transfers, a direct solve."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ class Multigrid:
             self.levels.append(Level(device, size, len(self.levels), finest))
             size = -(-size[0] // 2), -(-size[1] // 2)
         # Between free-slip walls one viscosity is solved directly on a much finer level than any other.
-        is_worth = SineCosineTransform.is_worth
         first = 0 if math.prod(self.levels[0].texels) <= SMALL_GRID else 1
-        self._transform_level = next((level for level in self.levels[first:] if is_worth(level.texels)), self.levels[-1])
+        worth = [level for level in self.levels[first:] if SineCosineTransform.is_worth(level.texels)]
+        self._transform_level = worth[0] if worth else self.levels[-1]
         self._transform = SineCosineTransform(device, self._transform_level.box, self._transform_level.texels)
         self.has_transform = False
         unknowns = 8 * math.prod(self.levels[-1].texels)
@@ -83,8 +83,8 @@ class Multigrid:
             columns, rows = (2 * count for count in self.last.texels)
             (across, down), scale = self.last.box, 2.0**self.last.depth
             outside = (np.arange(columns) >= across) | (np.arange(rows)[:, None] >= down)
-            coarse = coefficients(np.full((rows, columns), viscosity), outside, dt, (hx * scale, hy * scale), bool(slip))
-            self._inverse.set(inverse_matrix(coarse))
+            everywhere, spacing = np.full((rows, columns), viscosity), (hx * scale, hy * scale)
+            self._inverse.set(inverse_matrix(coefficients(everywhere, outside, dt, spacing, bool(slip))))
 
     def set_coefficients(self, viscosity: np.ndarray, solid: np.ndarray, dt: float, walls: Walls) -> Coefficients:
         """Take up the viscosity of the cells, lengths^2 / s, and the solid ones, (ny, nx) both; those of the finest."""
@@ -308,7 +308,7 @@ class Multigrid:
         return 0.0 if level is self.direct_level else self.weights(level)[0]
 
     def _restrict(self, residual: PackedFaces, coarser: Level, weight: float) -> int:
-        """The residual as right-hand side of the coarser level; with a `weight` the first sweep on it too, from rest."""
+        """The residual as rhs of the coarser level; with a `weight` the first sweep on it too, from rest."""
         if not weight:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
             restrict(coarser.rhs.fields, region=coarser.region, **residual.inputs(), **coarser.open)

@@ -1,9 +1,9 @@
 """The viscous operator A = I + B' K B and its Galerkin coarse operators, as coefficients of strains.
 
-B takes differences: e_xx and e_yy in the cells, the shear s_y du + s_x dv at the nodes. K holds 2 dt mu / h^2 in the cells
-and dt mu / h^2 at the nodes. A coarse velocity that is interpolated has strains that are half an interpolation S of the
-coarse strains, so that P' A P keeps the form: K_coarse = S' K S / 16 (with the restriction P' / 4), a small stencil of
-couplings between strains of one kind. The identity is lumped. See README.md, "The viscous step".
+B takes differences: e_xx and e_yy in the cells, the shear s_y du + s_x dv at the nodes. K holds 2 dt mu / h^2 in the
+cells and dt mu / h^2 at the nodes. A coarse velocity that is interpolated has strains that are half an interpolation S
+of the coarse strains, so that P' A P keeps the form: K_coarse = S' K S / 16 (with the restriction P' / 4), a small
+stencil of couplings between strains of one kind. The identity is lumped. See README.md, "The viscous step".
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.passes import Region
-from solver.packing import DoublePackedFaces, PackedFaces, packed
+from solver.packing import DoublePackedFaces, PackedFaces, framed, packed
 
-# Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 128 unknowns, a millisecond to invert.
-COARSEST = 16
+# Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 64 unknowns. BLAS inverts 128 in
+# threads, which wait longer than they work.
+COARSEST = 8
 # Couplings of a strain with the next ones, (rows, columns) further; those backwards follow by symmetry.
 CELL_STENCIL = (0, 1, 2)
 NODE_STENCIL = ((0, 0), (0, 1), (1, 0), (1, 1), (1, -1))
@@ -85,11 +86,12 @@ def coefficients(
     at no-slip ones a face beyond it stands still at the node, half a cell away, which doubles K; at a convex corner the
     resting face is a whole cell away, and K stays.
     """
-    even = [(0, length % 2) for length in viscosity.shape]
-    fluid = np.pad(~solid, even)
-    amount = np.maximum(np.pad(viscosity.astype(np.float64) * dt, even), LEAST) * fluid
-    wet = np.pad(fluid, 1)
-    resistance = np.pad(np.divide(1.0, amount, out=np.zeros_like(amount), where=fluid), 1)
+    (rows, columns), ring = viscosity.shape, ((1, 1), (1, 1))
+    even = (0, rows % 2), (0, columns % 2)
+    fluid = framed(~solid, *even)
+    amount = np.maximum(framed(viscosity.astype(np.float64) * dt, *even), LEAST) * fluid
+    wet = framed(fluid, *ring)
+    resistance = framed(np.divide(1.0, amount, out=np.zeros_like(amount), where=fluid), *ring)
     meeting = _corners(wet.astype(np.float64))
     node = np.divide(meeting, _corners(resistance), out=np.zeros_like(meeting), where=meeting > 0)
     open_u, open_v = wet[:, 1:] & wet[:, :-1], wet[1:] & wet[:-1]
@@ -122,30 +124,34 @@ def coarsened(fine: Coefficients, no_slip: bool) -> Coefficients:
     yy = [k.T for k in _coarsened_cells([k[::2].T + k[1::2].T for k in fine.yy], moves_y.T)]
     nodes = _coarsened_nodes(fine.nodes)
     if not no_slip:
-        full_u, full_v = np.pad(open_u, 1), np.pad(open_v, 1)
+        full_u, full_v = (framed(faces, (1, 1), (1, 1)) for faces in (open_u, open_v))
         moving = (full_u[1:, 1:] & full_u[:-1, 1:] & full_v[1:, 1:] & full_v[1:, :-1]).astype(np.float64)
-        around = np.pad(moving, 1)
+        around = framed(moving, (1, 1), (1, 1))
         for (down, right), k in nodes.items():
             k *= moving * around[1 + down :, 1 + right :][: rows + 1, : columns + 1]
     return Coefficients(
-        tuple(np.pad(k, even) for k in xx),
-        tuple(np.pad(k, even) for k in yy),
-        {offset: np.pad(k, even) for offset, k in nodes.items()},
-        np.pad(open_u, even),
-        np.pad(open_v, even),
+        tuple(framed(k, *even) for k in xx),
+        tuple(framed(k, *even) for k in yy),
+        {offset: framed(k, *even) for offset, k in nodes.items()},
+        framed(open_u, *even),
+        framed(open_v, *even),
         fine.shear,
     )
 
 
 def _behind(values: np.ndarray, axis: int) -> np.ndarray:
     """The values one place back along an axis, zero at the first."""
-    padding = [(1, 0) if axis == other else (0, 0) for other in (0, 1)]
-    return np.pad(values, padding)[tuple(slice(0, length) for length in values.shape)]
+    shifted = np.zeros_like(values)
+    if axis == 0:
+        shifted[1:] = values[:-1]
+    else:
+        shifted[:, 1:] = values[:, :-1]
+    return shifted
 
 
 def _ahead(values: np.ndarray, axis: int) -> np.ndarray:
     """The values one place further along an axis, zero at the last."""
-    return np.flip(_behind(np.flip(values, axis), axis), axis)
+    return _behind(values[::-1, ::-1], axis)[::-1, ::-1]
 
 
 def _corners(cells: np.ndarray) -> np.ndarray:
@@ -173,8 +179,8 @@ def _coarsened_cells(fine: list[np.ndarray], live: np.ndarray) -> list[np.ndarra
     above, below = _behind(live, 0), _ahead(live, 0)
     # Weights of the four rows around a coarse row, by their places from its first one on; none beyond the last.
     places = ((-1, above, 0.25), (0, above, 0.75), (1, below, 0.75), (2, below, 0.25))
-    weights = {place: np.pad(np.where(other, part, 1.0), ((0, 2), (0, 0))) for place, other, part in places}
-    around = [np.pad(k, ((4, 6), (0, 0))) for k in fine]
+    weights = {place: framed(np.where(other, part, 1.0), (0, 2), (0, 0)) for place, other, part in places}
+    around = [framed(k, (4, 6), (0, 0)) for k in fine]
     found = []
     for apart in CELL_STENCIL:
         total = np.zeros(live.shape)
@@ -192,7 +198,7 @@ def _coarsened_nodes(fine: dict[tuple[int, int], np.ndarray]) -> dict[tuple[int,
     """S' K S / 16 at the nodes, S linear both ways: first along the rows, then down the columns."""
     weights = {-1: 0.5, 0: 1.0, 1: 0.5}
     rows, columns = (length // 2 + 1 for length in fine[0, 0].shape)
-    whole = {offset: np.pad(k, 2) for offset, k in fine.items()}
+    whole = {offset: framed(k, (2, 2), (2, 2)) for offset, k in fine.items()}
     for (down, right), k in list(whole.items()):
         whole[-down, -right] = np.roll(k, (down, right), (0, 1))
     across: dict[tuple[int, int], Any] = {}
@@ -232,8 +238,11 @@ class Level:
         ringed = self.texels[0] + 2, self.texels[1] + 2
         label = f"viscous level {depth}"
         names = ["inverse_u", "inverse_v"]
-        names += ["cells", "nodes"] if depth == 0 else [f"xx{d}" for d in CELL_STENCIL] + [f"yy{d}" for d in CELL_STENCIL]
-        names += [] if depth == 0 else [f"node{number}" for number in range(len(NODE_STENCIL))]
+        if depth == 0:
+            names += ["cells", "nodes"]
+        else:
+            names += [f"{kind}{apart}" for kind in ("xx", "yy") for apart in CELL_STENCIL]
+            names += [f"node{number}" for number in range(len(NODE_STENCIL))]
         self.packed = {name: device.field(ringed, 4, f"{label} {name}") for name in names}
         self.packed["open"] = device.field(ringed, 4, f"{label} open", "f1")
         self.stress = [device.field(ringed, 4, f"{label} stress {name}") for name in ("xx", "yy", "xy") if depth]
@@ -249,8 +258,8 @@ class Level:
 
     def set_coefficients(self, level: Coefficients, slip: dict[str, Any]) -> None:
         """Take the operator from coefficients of each cell."""
-        inverses = [np.where(o, 1.0 / d, 0.0) for o, d in zip((level.open_u, level.open_v), level.diagonal(), strict=True)]
-        values = dict(zip(("inverse_u", "inverse_v"), inverses, strict=True))
+        of_u, of_v = level.diagonal()
+        values = {"inverse_u": level.open_u / of_u, "inverse_v": level.open_v / of_v}
         node = level.nodes[0, 0]
         if self.depth == 0:
             # Signs tell which faces are open where these are read anyway; a node that resists nothing has one too.
@@ -261,12 +270,13 @@ class Level:
             values |= {f"{kind}{d}": k for kind in ("xx", "yy") for d, k in enumerate(getattr(level, kind))}
             values |= {f"node{number}": level.nodes[offset] for number, offset in enumerate(NODE_STENCIL)}
         for name, cells in values.items():
-            self.packed[name].set(self._ringed(cells))
+            # Without the check of `set`: K is finite where the viscosity is.
+            self.packed[name].texture.write(self._ringed(cells.astype(np.float32)))
         self.packed["open"].set(self._ringed((level.open_u + 2 * level.open_v).astype(np.uint8)))
         self.open = {"open": self.packed["open"]}
         names = ("inverse_u", "inverse_v", "open") + (() if self.depth else ("cells", "nodes"))
         self.operator = {**{name: self.packed[name] for name in names}, "shear": level.shear}
-        self.defines = {("COARSE" if self.depth else "FINEST"): 1, **slip}
+        self.defines = {"COARSE": 1, **slip} if self.depth else slip
         if self.depth:
             self.stencil = {name: field for name, field in self.packed.items() if name not in names}
             self.stencil["shear"] = level.shear
@@ -285,7 +295,7 @@ class Level:
         """Packed inside the ring; nodes on the far walls lie in the ring itself."""
         rows, columns = cells.shape
         width, height = self.texels
-        return packed(np.pad(cells, ((2, 2 * height + 2 - rows), (2, 2 * width + 2 - columns))))
+        return packed(framed(cells, (2, 2 * height + 2 - rows), (2, 2 * width + 2 - columns)))
 
     @property
     def is_coarsest(self) -> bool:
@@ -294,8 +304,8 @@ class Level:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        pairs = self.rhs, self.faces.read, self.faces.write
-        return sum(field.nbytes for field in (*self.packed.values(), *self.stress, *(f for p in pairs for f in p.fields)))
+        pairs = [*self.rhs.fields, *self.faces.read.fields, *self.faces.write.fields]
+        return sum(field.nbytes for field in (*self.packed.values(), *self.stress, *pairs))
 
     def release(self) -> None:
         for item in (*self.packed.values(), *self.stress, self.rhs, self.faces):

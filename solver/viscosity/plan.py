@@ -15,17 +15,17 @@ BARELY_VISCOUS = 0.05
 NEARLY_UNIFORM = 3.0
 # kappa on the coarsest level that is worth a visit.
 LEAST_VISITED = 0.3
-# Deflated is what is stiffer than this: below, multigrid alone takes no more iterations. A node that touches the softest
-# cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
+# Deflated is what is stiffer than this: below, multigrid alone takes no more iterations. A node that touches the
+# softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
-# Softest kappa up to which one sweep before and after the coarser levels does as well as two, at three fifths of the cost.
+# Softest kappa up to which one sweep before and after the coarser levels does as well as two, and costs three fifths.
 ONE_SWEEP = 4.0
 # Conjugate gradients end after an iteration that has brought less than this part of the energy, squared; what is left
 # then is less than half of that: below 1 % where the viscosity varies so much at most, and below 5 % beyond.
 MODERATE = 300.0
-TOLERANCE = 0.02
-TOLERANCE_STIFF = 0.06
+TOLERANCE = 0.017
+TOLERANCE_STIFF = 0.07, 0.03  # for the softest kappa below and above ONE_SWEEP
 # Iterations at most: only rounding errors, at contrasts beyond 1e8, can ask for more.
 MOST_ITERATIONS = 30
 
@@ -76,7 +76,7 @@ def plan_for(least: float, largest: float) -> Plan:
     is_soft = least <= ONE_SWEEP
     count = 1 if is_soft else 2
     stiff = max(STIFF, STIFF_OF_SOFTEST * least)
-    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF
+    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF[count - 1]
     if largest <= stiff:
         return Plan("cg", (count, count), tolerance)
     return Plan("cg", (count, count), tolerance, stiff=stiff, deflate_twice=not is_soft)

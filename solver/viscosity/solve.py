@@ -28,7 +28,7 @@ class Viscosity:
     def __init__(self, device: Device, size: tuple[int, int], spacing: tuple[float, float] | None = None) -> None:
         self.device = device
         self.size = size
-        self.spacing = spacing or (1.0 / max(size),) * 2
+        self.spacing = spacing or (1.0 / max(size), 1.0 / max(size))
         self._wall_speed: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
         self.multigrid = Multigrid(device, size, self.spacing)
         finest = self.multigrid.finest

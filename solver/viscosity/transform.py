@@ -38,7 +38,8 @@ class SineCosineTransform:
         # Of u and of v: across, down, and back again.
         products = (across[0], across[1]), (down[1], down[0]), (down[1].T, down[0]), (across[0], across[1].T)
         self._matrices = [
-            (device.upload(packed(u), "transform of u"), device.upload(packed(v), "transform of v")) for u, v in products
+            (device.upload(packed(u), "transform of u"), device.upload(packed(v), "transform of v"))
+            for u, v in products
         ]
         ringed = texels[0] + 2, texels[1] + 2
         self._half, self._spectrum = (
