@@ -73,7 +73,7 @@ class Fluid(Scheme):
         self._squares = device.field(blocks, 2, "energies")
         self._sum_of_squares = Reduction(device, blocks, 2, "sum")
         self._limited = PackedFaces(device, (blocks[0] + 2, blocks[1] + 2), "limited velocity")
-        self._viscosity_solver = Viscosity(device, grid.size)
+        self._viscosity_solver = Viscosity(device, grid.size, grid.spacing)
         self._pressure_solver = Projection(device, grid.size, grid.spacing)
         # What the solvers hold of the masks; None if they have to look.
         self._coefficients_of: object = None

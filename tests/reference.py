@@ -248,14 +248,16 @@ def follow(
 def viscous_system(
     viscosity: np.ndarray,
     dt: float,
-    h: float,
+    h: float | tuple[float, float],
     solid: np.ndarray | None = None,
     no_slip: bool = False,
     speed: tuple[float, ...] = (0, 0, 0, 0),
 ) -> tuple[sparse.csc_matrix, np.ndarray, np.ndarray]:
     """(I - dt div mu (grad + grad^T)) on MAC faces as a sparse matrix over (u, v) of (ny, nx) each; what moving walls
-    (left, right, top, bottom) add to the right-hand side; and which faces are free, the others being zero."""
+    (left, right, top, bottom) add to the right-hand side; and which faces are free, the others being zero.
+    `h` is the side of a cell, or (hx, hy)."""
     ny, nx = viscosity.shape
+    hx, hy = h if isinstance(h, tuple) else (h, h)
     fluid = np.pad(~(np.zeros((ny, nx), bool) if solid is None else np.asarray(solid, bool)), 1)
     mu = np.pad(np.asarray(viscosity, np.float64), 1)
     count = nx * ny
@@ -268,7 +270,7 @@ def viscous_system(
         for i in range(1, nx + 1):
             if fluid[j, i]:
                 stiffness += [2 * mu[j, i]] * 2
-                strains += [{u[j, i + 1]: 1, u[j, i]: -1}, {v[j + 1, i]: 1, v[j, i]: -1}]
+                strains += [{u[j, i + 1]: 1 / hx, u[j, i]: -1 / hx}, {v[j + 1, i]: 1 / hy, v[j, i]: -1 / hy}]
                 wall_strain += [0, 0]
     for j in range(1, ny + 2):
         for i in range(1, nx + 2):
@@ -277,13 +279,13 @@ def viscous_system(
             if not wet or (len(wet) < 4 and not no_slip):
                 continue
             node = len(wet) / sum(1 / mu[cell] for cell in wet)
-            strain, moving = {u[j, i]: 1, u[j - 1, i]: -1, v[j, i]: 1, v[j, i - 1]: -1}, 0.0
+            strain, moving = {u[j, i]: 1 / hy, u[j - 1, i]: -1 / hy, v[j, i]: 1 / hx, v[j, i - 1]: -1 / hx}, 0.0
             if len(wet) == 2:
                 # A flat wall: the velocity beyond it is 2 U minus the one inside, so the strain is twice what it is
                 # with a resting face there, and half the energy belongs to the fluid's side.
                 node *= 2
-                moving += speed[2] * (j == 1) * -1 + speed[3] * (j == ny + 1)
-                moving += speed[0] * (i == 1) * -1 + speed[1] * (i == nx + 1)
+                moving += (speed[2] * (j == 1) * -1 + speed[3] * (j == ny + 1)) / hy
+                moving += (speed[0] * (i == 1) * -1 + speed[1] * (i == nx + 1)) / hx
             stiffness.append(node)
             strains.append(strain)
             wall_strain.append(moving)
@@ -291,13 +293,15 @@ def viscous_system(
     columns = [face for strain in strains for face in strain if face >= 0]
     signs = [sign for strain in strains for face, sign in strain.items() if face >= 0]
     strain_of = sparse.csr_matrix((signs, (rows, columns)), (len(strains), 2 * count))
-    weighted = strain_of.T @ sparse.diags(np.asarray(stiffness) * dt / h**2)
+    weighted = strain_of.T @ sparse.diags(np.asarray(stiffness) * dt)
     matrix = sparse.identity(2 * count) + weighted @ strain_of
     free = np.isin(np.arange(2 * count), np.concatenate([u, v]))
     return sparse.csc_matrix(matrix), -(weighted @ np.asarray(wall_strain)), free
 
 
-def viscous_step(faces: Faces, viscosity: np.ndarray, dt: float, h: float, **walls: object) -> Faces:
+def viscous_step(
+    faces: Faces, viscosity: np.ndarray, dt: float, h: float | tuple[float, float], **walls: object
+) -> Faces:
     """The exact implicit viscous step of (ny, nx, 2) velocities on MAC faces."""
     matrix, added, free = viscous_system(viscosity, dt, h, **walls)  # pyright: ignore[reportArgumentType]
     right = np.where(free, np.moveaxis(np.asarray(faces, np.float64), -1, 0).ravel() + added, 0.0)

@@ -1,6 +1,6 @@
 // Right-hand side of the pressure equation: the side of a cell times the divergence, less what is wanted and expected.
 //   r = u_right - u_left + aspect (v_down - v_up) [- s] [- A p]          A p = r is to be solved
-// in:  u_velocity   MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/block.glsl packs it
+// in:  u_velocity   MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/operator.glsl packs it
 //      links of lib/block.glsl
 // With SOURCE: u_source, the side times the wanted divergence, at cells, lengths / s, 0 in the mean over closed regions.
 // With EXPECTED: u_expected, p at blocks, lengths / s.

@@ -1,5 +1,5 @@
 // The velocity made free of divergence:  u - (p - p_left),  v - aspect (p - p_up),  and 0 on closed faces.
-// in:  u_velocity         MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/block.glsl packs it
+// in:  u_velocity         MAC velocity, lengths / s; with PACKED u_u, u_v, the same as viscosity/operator.glsl packs it
 //      u_across, u_down   p - p_left and p - p_up at blocks, lengths / s
 //      u_left, u_up       faces of lib/block.glsl, not needed with OPEN (no solids);  u_aspect   see there
 // With CARRY: u_carried, gradients at MAC faces, lengths / s, and a second output.

@@ -1,5 +1,5 @@
 // Energy: what a step has left of the energy that departed, summed over a block of 2 x 2 cells (equation S5).
-// u_u, u_v: w3, packed as viscosity/block.glsl has it; u_departing: w1, MAC faces, all lengths / s.
+// u_u, u_v: w3, packed as viscosity/operator.glsl has it; u_departing: w1, MAC faces, all lengths / s.
 // squares: |w3|^2, |w1|^2.
 // reads: 6
 uniform sampler2D u_u;

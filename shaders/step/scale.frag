@@ -1,5 +1,5 @@
 // Scale packed faces.
-// u_u, u_v: packed as viscosity/block.glsl has it; u_factor.
+// u_u, u_v: packed as viscosity/operator.glsl has it; u_factor.
 // reads: 2
 uniform sampler2D u_u;
 uniform sampler2D u_v;

@@ -1,4 +1,4 @@
-// Which faces are open in a box without solids, texel by texel as in block.glsl.
+// Which faces are open in a box without solids, texel by texel as in operator.glsl.
 uniform vec2 u_box; // its cells
 
 vec2 own_texel() { return floor(gl_FragCoord.xy) - 1.0; }

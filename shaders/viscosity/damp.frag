@@ -11,7 +11,7 @@ layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
 
 void main() {
-    float part = min(texelFetch(u_part, ivec2(0), 0).x, 1.0);
+    float part = texelFetch(u_part, ivec2(0), 0).x;
     out_u = mix(texture(u_u, v_uv), texture(u_r_u, v_uv), part);
     out_v = mix(texture(u_v, v_uv), texture(u_r_v, v_uv), part);
 }

@@ -1,4 +1,4 @@
-// Which faces are open, texel by texel as in block.glsl: 1 for u, plus 2 for v.
+// Which faces are open, texel by texel as in operator.glsl: 1 for u, plus 2 for v.
 uniform sampler2D u_open; // 8 bits
 
 vec2 own_texel() { return floor(gl_FragCoord.xy) - 1.0; }

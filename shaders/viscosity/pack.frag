@@ -1,4 +1,4 @@
-// Pack: a velocity on the MAC grid, 2 x 2 cells a texel as in block.glsl, 0 on pinned faces.
+// Pack: a velocity on the MAC grid, 2 x 2 cells a texel as in operator.glsl, 0 on fixed faces.
 // u_velocity: lengths / s.
 // reads: 5
 #ifdef UNIFORM

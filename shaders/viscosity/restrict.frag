@@ -1,15 +1,15 @@
 // Restrict: the residual on the next coarser grid, a quarter of the transpose of prolong.frag.
-// u_u, u_v: the fine residual, zero on pinned faces; which coarse faces are open: see openness.glsl,
+// u_u, u_v: the fine residual, zero on fixed faces; which coarse faces are open: see openness.glsl,
 // with UNIFORM box.glsl.
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
-// that it would share with a pinned neighbour.
+// that it would share with a fixed neighbour.
 // With START a second pair of outputs, the first damped Jacobi sweep on it from rest: u_weight D^-1 times it.
-// With WEIGHED that of v* and, as a second pair, of the right-hand side b it was of, u_right_u, u_right_v; and texel by
-// texel the scalar products b . b and b . A v*, by which gradients.frag tells which part of v* to keep.
+// With WEIGHED that of v* and, as a second pair, of the right-hand side b it was of, u_rhs_u, u_rhs_v; and texel by
+// texel the scalar products b . b and b . A v*, by which scaling.frag tells which part of v* to keep.
 // reads: 29, and 53 when WEIGHED
 uniform sampler2D u_u;
 uniform sampler2D u_v;
-#include "viscosity/block.glsl"
+#include "viscosity/operator.glsl"
 #ifdef START
 uniform float u_weight;
 in vec2 v_uv;
@@ -17,10 +17,10 @@ layout(location = 2) out vec4 out_start_u;
 layout(location = 3) out vec4 out_start_v;
 #endif
 #ifdef WEIGHED
-uniform sampler2D u_right_u;
-uniform sampler2D u_right_v;
-layout(location = 2) out vec4 out_right_u;
-layout(location = 3) out vec4 out_right_v;
+uniform sampler2D u_rhs_u;
+uniform sampler2D u_rhs_v;
+layout(location = 2) out vec4 out_rhs_u;
+layout(location = 3) out vec4 out_rhs_v;
 layout(location = 4) out vec4 out_products;
 #endif
 layout(location = 0) out vec4 out_u;
@@ -59,10 +59,10 @@ void main() {
     out_u = gather(u_u, p, fx, fy, false, above, open_here_u, below);
     out_v = gather(u_v, p, fy, fx, true, left, open_here_v, right).xzyw;
 #ifdef WEIGHED
-    out_right_u = gather(u_right_u, p, fx, fy, false, above, open_here_u, below);
-    out_right_v = gather(u_right_v, p, fy, fx, true, left, open_here_v, right).xzyw;
-    float wanted = dot(out_right_u, out_right_u) + dot(out_right_v, out_right_v);
-    out_products = vec4(wanted, wanted - dot(out_right_u, out_u) - dot(out_right_v, out_v), 0.0, 0.0);
+    out_rhs_u = gather(u_rhs_u, p, fx, fy, false, above, open_here_u, below);
+    out_rhs_v = gather(u_rhs_v, p, fy, fx, true, left, open_here_v, right).xzyw;
+    float wanted = dot(out_rhs_u, out_rhs_u) + dot(out_rhs_v, out_rhs_v);
+    out_products = vec4(wanted, wanted - dot(out_rhs_u, out_u) - dot(out_rhs_v, out_v), 0.0, 0.0);
 #endif
 #ifdef START
     Faces inverse = inverse_diagonal(v_uv);

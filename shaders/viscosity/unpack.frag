@@ -1,4 +1,4 @@
-// Unpack: the velocity on the MAC grid from faces packed as in block.glsl.
+// Unpack: the velocity on the MAC grid from faces packed as in operator.glsl.
 // u_u, u_v: packed faces, lengths / s.
 // reads: 2
 uniform sampler2D u_u;

@@ -1,23 +1,24 @@
-"""Grids without solids, solved exactly: along x and y the equations fall apart into waves."""
+"""One viscosity between free-slip walls, solved by sine and cosine transforms (fast diagonalization)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from solver.gl.device import Device
-    from solver.gl.field import Field
-    from solver.gl.passes import Pass
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Pass
+from solver.packing import packed
 
-    Faces = tuple[Field, Field]  # of u and of v
+Faces = tuple[Field, Field]  # of u and of v
 
-# Products of blocks that one solve is worth; a finer grid is left to multigrid.
+# Products of 2 x 2 blocks that one solve is worth (64 x 32 texels or 40 x 40): about a multigrid cycle; a finer grid is
+# left to multigrid.
 LARGEST = 65536
 
 
-class ViscousWaves:
+class SineCosineTransform:
     """Solves the viscous step for one viscosity in a box with free-slip walls.
 
     There sines along the normal and cosines across it carry u and v, and the step couples u and v of one wave only:
@@ -26,7 +27,7 @@ class ViscousWaves:
     Args:
         device: the device.
         box: (nx, ny) cells between the walls.
-        texels: of the packed faces, without their ring (see shaders/viscosity/block.glsl).
+        texels: of the packed faces, without their ring (see shaders/viscosity/operator.glsl).
     """
 
     def __init__(self, device: Device, box: tuple[int, int], texels: tuple[int, int]) -> None:
@@ -37,28 +38,32 @@ class ViscousWaves:
         # Of u and of v: across, down, and back again.
         products = (across[0], across[1]), (down[1], down[0]), (down[1].T, down[0]), (across[0], across[1].T)
         self._matrices = [
-            (device.upload(_blocks(u), "waves of u"), device.upload(_blocks(v), "waves of v")) for u, v in products
+            (device.upload(packed(u), "transform of u"), device.upload(packed(v), "transform of v"))
+            for u, v in products
         ]
         ringed = texels[0] + 2, texels[1] + 2
-        self._half, self._waves = (
+        self._half, self._spectrum = (
             (device.field(ringed, 4, f"viscous {name} u"), device.field(ringed, 4, f"viscous {name} v"))
-            for name in ("halfway", "waves")
+            for name in ("halfway", "spectrum")
         )
 
     @staticmethod
     def is_worth(texels: tuple[int, int]) -> bool:
         """True if a grid of so many texels is small enough."""
-        return _products(texels) <= LARGEST
+        return texels[0] * texels[1] * (texels[0] + texels[1]) <= LARGEST
 
-    def solve(self, right: Faces, faces: Faces, stiffness: float) -> None:
-        """The `faces` that the step of `stiffness` dt mu / h^2 makes of `right`, packed faces (u, v) both."""
-        across = self.device.pass_("viscosity/waves.frag")
-        down = self.device.pass_("viscosity/waves.frag", DOWN=1)
-        solved = self.device.pass_("viscosity/waves.frag", DOWN=1, SOLVE=1)
+    def solve(self, rhs: Faces, faces: Faces, stiffness: tuple[float, float]) -> None:
+        """The `faces` that the step makes of `rhs`, packed faces (u, v) both.
+
+        `stiffness`: square roots of dt mu / hx^2 and of dt mu / hy^2.
+        """
+        across = self.device.pass_("viscosity/transform.frag")
+        down = self.device.pass_("viscosity/transform.frag", DOWN=1)
+        solved = self.device.pass_("viscosity/transform.frag", DOWN=1, SOLVE=1)
         there, there_down, back_down, back = self._matrices
-        self._draw(across, self._half, right, there)
-        self._draw(solved, self._waves, self._half, there_down, stiffness=stiffness, box=self._box)
-        self._draw(down, self._half, self._waves, back_down)
+        self._draw(across, self._half, rhs, there)
+        self._draw(solved, self._spectrum, self._half, there_down, stiffness=stiffness, box=self._box)
+        self._draw(down, self._half, self._spectrum, back_down)
         self._draw(across, faces, self._half, back)
 
     def _draw(self, pass_: Pass, target: Faces, source: Faces, matrices: Faces, **inputs: Any) -> None:
@@ -68,17 +73,13 @@ class ViscousWaves:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(field.nbytes for pair in (*self._matrices, self._half, self._waves) for field in pair)
+        return sum(field.nbytes for pair in (*self._matrices, self._half, self._spectrum) for field in pair)
 
     def release(self) -> None:
         """Free the textures."""
-        for pair in (*self._matrices, self._half, self._waves):
+        for pair in (*self._matrices, self._half, self._spectrum):
             for field in pair:
                 field.release()
-
-
-def _products(size: tuple[int, int]) -> int:
-    return size[0] * size[1] * (size[0] + size[1])
 
 
 def _sines_and_cosines(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
@@ -89,9 +90,3 @@ def _sines_and_cosines(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]
     cosines[0] = np.sqrt(1.0 / count)
     padding = (0, 2 * texels - count)
     return np.pad(sines, padding), np.pad(cosines, padding)
-
-
-def _blocks(cells: np.ndarray) -> np.ndarray:
-    """(2 h, 2 w) -> (h, w, 4), a texel for each block of 2 x 2."""
-    height, width = cells.shape
-    return cells.reshape(height // 2, 2, width // 2, 2).transpose(0, 2, 1, 3).reshape(height // 2, width // 2, 4)

@@ -1,17 +1,18 @@
-// Waves: matrices times the rows of the faces of a grid, or with DOWN their columns; one direction of ViscousWaves in
-// solver/gl/separable.py. With SOLVE the viscous step is made on the waves that come out, (1 + k A) w = b, where for the
-// wave numbers p, q in a box of n x m cells, a = 2 sin(pi p / 2 n), b = 2 sin(pi q / 2 m):
+// Transform: matrices times the rows of the faces of a grid, or with DOWN their columns; one direction of the sine and
+// cosine transforms of solver/viscosity/transform.py. With SOLVE the viscous step is made on the waves that come out,
+// (1 + A) w = b, where for the wave numbers p, q in a box of n x m cells, with (k_x, k_y) = u_stiffness,
+// a = 2 k_x sin(pi p / 2 n), b = 2 k_y sin(pi q / 2 m):
 //   A = (2 a^2 + b^2   a b        )
 //       (a b           2 b^2 + a^2)
-// u_u, u_v: packed as in block.glsl; u_matrix_u, u_matrix_v: a texel at (j, k) holds the 2 x 2 entries from texel j to
-// texel k, row after row; u_stiffness: k, dt mu / h^2; u_box: (n, m).
+// u_u, u_v: packed as in operator.glsl; u_matrix_u, u_matrix_v: a texel at (j, k) holds the 2 x 2 entries from texel j to
+// texel k, row after row; u_stiffness: square roots of dt mu / hx^2 and dt mu / hy^2; u_box: (n, m).
 // reads: 128
 uniform sampler2D u_u;
 uniform sampler2D u_v;
 uniform sampler2D u_matrix_u;
 uniform sampler2D u_matrix_v;
 #ifdef SOLVE
-uniform float u_stiffness;
+uniform vec2 u_stiffness;
 uniform vec2 u_box;
 #endif
 
@@ -41,10 +42,10 @@ void main() {
     }
 #ifdef SOLVE
     const float PI = 3.14159265358979;
-    vec4 a = 2.0 * sin(0.5 * PI * (2.0 * own.x + vec4(0.0, 1.0, 0.0, 1.0)) / u_box.x);
-    vec4 b = 2.0 * sin(0.5 * PI * (2.0 * own.y + vec4(0.0, 0.0, 1.0, 1.0)) / u_box.y);
-    vec4 uu = 1.0 + u_stiffness * (2.0 * a * a + b * b), vv = 1.0 + u_stiffness * (2.0 * b * b + a * a);
-    vec4 uv = u_stiffness * a * b, u = out_u, over = 1.0 / (uu * vv - uv * uv);
+    vec4 a = 2.0 * u_stiffness.x * sin(0.5 * PI * (2.0 * own.x + vec4(0.0, 1.0, 0.0, 1.0)) / u_box.x);
+    vec4 b = 2.0 * u_stiffness.y * sin(0.5 * PI * (2.0 * own.y + vec4(0.0, 0.0, 1.0, 1.0)) / u_box.y);
+    vec4 uu = 1.0 + 2.0 * a * a + b * b, vv = 1.0 + 2.0 * b * b + a * a;
+    vec4 uv = a * b, u = out_u, over = 1.0 / (uu * vv - uv * uv);
     out_u = over * (vv * u - uv * out_v);
     out_v = over * (uu * out_v - uv * u);
 #endif

@@ -1,0 +1,23 @@
+// Apply operator: A z and, texel by texel, the scalar products (r . z, z . A z, z . A p) of the conjugate gradients.
+// u_u, u_v: z; u_r_u, u_r_v: the residual r; u_ap_u, u_ap_v: A p of the last search direction p.
+// reads: 22
+#include "viscosity/operator.glsl"
+uniform sampler2D u_u;
+uniform sampler2D u_v;
+uniform sampler2D u_r_u;
+uniform sampler2D u_r_v;
+uniform sampler2D u_ap_u;
+uniform sampler2D u_ap_v;
+in vec2 v_uv;
+layout(location = 0) out vec4 out_u;
+layout(location = 1) out vec4 out_v;
+layout(location = 2) out vec4 out_products;
+
+void main() {
+    Faces z, is_open, az = apply_operator(u_u, u_v, v_uv, z, is_open);
+    out_u = is_open.u * az.u;
+    out_v = is_open.v * az.v;
+    out_products = vec4(dot(texture(u_r_u, v_uv), z.u) + dot(texture(u_r_v, v_uv), z.v),
+                        dot(out_u, z.u) + dot(out_v, z.v),
+                        dot(texture(u_ap_u, v_uv), z.u) + dot(texture(u_ap_v, v_uv), z.v), 0.0);
+}

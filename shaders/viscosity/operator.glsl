@@ -1,0 +1,123 @@
+// The operator A v = v + B' K B v on packed faces: 2 x 2 of them a texel, (x, y, z, w) = upper left, upper right, lower
+// left, lower right, u in one texture, v in another. Around the texels in use runs a ring of zeros, so that no stage asks
+// for the edge: what lies beyond a wall is at rest. Fixed faces (walls, solid cells) hold exactly zero and are no unknowns.
+// B: the strains e_xx and e_yy in cells (K = 2 dt mu / h^2), the shear s_y du + s_x dv at nodes (K = dt mu_node / h^2).
+// UNIFORM: of one viscosity in a box without solids; nothing is read, all follows from the place.
+// COARSE: K couples neighbouring strains; stress.frag has multiplied, and its stresses K B v are read here.
+// Else, on the finest level, K of each cell and node is in textures.
+uniform vec2 u_shear;           // (s_y, s_x): (1, 1) where cells are square
+#ifdef UNIFORM
+#include "viscosity/box.glsl"
+uniform float u_stiffness;      // dt mu / (hx hy)
+#else
+#include "viscosity/openness.glsl"
+uniform sampler2D u_inverse_u;  // 1 / diagonal of A for u and for v; 0 for fixed faces
+uniform sampler2D u_inverse_v;
+uniform sampler2D u_cells;      // K of e_xx in the cells, negative where the cell's left face is fixed
+uniform sampler2D u_nodes;      // K of the cells' upper left nodes, negative where the cell's upper face is fixed
+uniform float u_aspect;         // K of e_yy over K of e_xx
+uniform sampler2D u_stress_xx;  // of the cells
+uniform sampler2D u_stress_yy;
+uniform sampler2D u_stress_xy;  // of the cells' upper left nodes
+#endif
+
+struct Faces { vec4 u, v; };
+
+#ifndef COARSE
+struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_below, open_u, open_v; };
+#endif
+
+#ifdef UNIFORM
+// K of the nodes in a column (or row) over that of the inner ones: see `coefficients` in operator.py.
+vec4 at_walls(vec4 place, float far) {
+#ifdef NO_SLIP
+    const float wall = 2.0;
+#else
+    const float wall = 0.0;
+#endif
+    return mix(vec4(1.0), vec4(wall), vec4(equal(place, vec4(0.0))) + vec4(equal(place, vec4(far))));
+}
+
+Stiffness read_stiffness(vec2 at) {
+    vec4 i = columns(own_texel()), j = rows(own_texel());
+    vec4 x = at_walls(i, u_box.x), y = at_walls(j, u_box.y);
+    Stiffness k;
+    k.open_u = open_u(own_texel());
+    k.open_v = open_v(own_texel());
+    k.left = k.here_x = vec4(2.0 * u_stiffness * u_shear.y * u_shear.y);
+    k.above = k.here_y = vec4(2.0 * u_stiffness * u_shear.x * u_shear.x);
+    k.node = u_stiffness * x * y;
+    k.node_right = u_stiffness * at_walls(i + 1.0, u_box.x) * y;
+    k.node_below = u_stiffness * x * at_walls(j + 1.0, u_box.y);
+    return k;
+}
+
+Faces inverse_diagonal(vec2 at) {
+    vec4 i = columns(own_texel()), j = rows(own_texel());
+    vec4 x = at_walls(i, u_box.x) + at_walls(i + 1.0, u_box.x), y = at_walls(j, u_box.y) + at_walls(j + 1.0, u_box.y);
+    vec2 s = u_stiffness * u_shear * u_shear;
+    return Faces(open_u(own_texel()) / (1.0 + 4.0 * s.y + s.x * y), open_v(own_texel()) / (1.0 + 4.0 * s.x + s.y * x));
+}
+#else
+Faces inverse_diagonal(vec2 at) { return Faces(texture(u_inverse_u, at), texture(u_inverse_v, at)); }
+#endif
+
+#if !defined(UNIFORM) && !defined(COARSE)
+Stiffness read_stiffness(vec2 at) {
+    vec2 right = vec2(1.0 / float(textureSize(u_nodes, 0).x), 0.0), below = vec2(0.0, 1.0 / float(textureSize(u_nodes, 0).y));
+    vec4 x = texture(u_cells, at), n = texture(u_nodes, at);
+    vec4 x_left = abs(texture(u_cells, at - right)), x_above = abs(texture(u_cells, at - below));
+    vec4 n_right = abs(texture(u_nodes, at + right)), n_below = abs(texture(u_nodes, at + below));
+    Stiffness k;
+    k.open_u = vec4(greaterThan(x, vec4(0.0)));
+    k.open_v = vec4(greaterThan(n, vec4(0.0)));
+    x = abs(x);
+    n = abs(n);
+    k.here_x = x;
+    k.left = vec4(x_left.y, x.x, x_left.w, x.z);
+    k.here_y = u_aspect * x;
+    k.above = u_aspect * vec4(x_above.zw, x.xy);
+    k.node = n;
+    k.node_right = vec4(n.y, n_right.x, n.w, n_right.z);
+    k.node_below = vec4(n.zw, n_below.xy);
+    return k;
+}
+#endif
+
+#ifdef COARSE
+// A f for the texel at `at`; `here` becomes the faces' own values, `is_open` 1 for those that move. 10 reads.
+Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, out Faces here, out Faces is_open) {
+    vec2 x = vec2(1.0 / float(textureSize(fu, 0).x), 0.0), y = vec2(0.0, 1.0 / float(textureSize(fu, 0).y));
+    here = Faces(texture(fu, at), texture(fv, at));
+    is_open = Faces(open_u(own_texel()), open_v(own_texel()));
+    vec4 xx = texture(u_stress_xx, at), left = texture(u_stress_xx, at - x);
+    vec4 yy = texture(u_stress_yy, at), above = texture(u_stress_yy, at - y);
+    vec4 xy = texture(u_stress_xy, at), right = texture(u_stress_xy, at + x), below = texture(u_stress_xy, at + y);
+    return Faces(here.u + vec4(left.y, xx.x, left.w, xx.z) - xx + u_shear.x * (xy - vec4(xy.zw, below.xy)),
+                 here.v + vec4(above.zw, yy.xy) - yy + u_shear.y * (xy - vec4(xy.y, right.x, xy.w, right.z)));
+}
+#else
+// The same, the stresses made on the way. 12 reads, and 6 of textures of K.
+Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {
+    vec2 x = vec2(1.0 / float(textureSize(fu, 0).x), 0.0), y = vec2(0.0, 1.0 / float(textureSize(fu, 0).y));
+    vec4 u = texture(fu, at), v = texture(fv, at);
+    vec4 u_left = texture(fu, at - x), u_right = texture(fu, at + x), u_up = texture(fu, at - y), u_down = texture(fu, at + y);
+    vec4 v_left = texture(fv, at - x), v_right = texture(fv, at + x), v_up = texture(fv, at - y), v_down = texture(fv, at + y);
+    float u_corner = texture(fu, at + x - y).z, v_corner = texture(fv, at - x + y).y;
+    here = Faces(u, v);
+    // Tensions in the cells either side of a face, and shear at the nodes.
+    vec4 along_u = k.here_x * (vec4(u.y, u_right.x, u.w, u_right.z) - u) - k.left * (u - vec4(u_left.y, u.x, u_left.w, u.z));
+    vec4 along_v = k.here_y * (vec4(v.zw, v_down.xy) - v) - k.above * (v - vec4(v_up.zw, v.xy));
+    vec4 shear = k.node * (u_shear.x * (u - vec4(u_up.zw, u.xy)) + u_shear.y * (v - vec4(v_left.y, v.x, v_left.w, v.z)));
+    vec2 shear_below = k.node_below.zw * (u_shear.x * (u_down.xy - u.zw) + u_shear.y * (v_down.xy - vec2(v_corner, v_down.x)));
+    vec2 shear_right = k.node_right.yw * (u_shear.x * (u_right.xz - vec2(u_corner, u_right.x)) + u_shear.y * (v_right.xz - v.yw));
+    return Faces(u - along_u + u_shear.x * (shear - vec4(shear.zw, shear_below)),
+                 v - along_v + u_shear.y * (shear - vec4(shear.y, shear_right.x, shear.w, shear_right.y)));
+}
+
+Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, out Faces here, out Faces is_open) {
+    Stiffness k = read_stiffness(at);
+    is_open = Faces(k.open_u, k.open_v);
+    return apply_operator(fu, fv, at, k, here);
+}
+#endif

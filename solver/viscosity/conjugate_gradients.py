@@ -1,0 +1,160 @@
+"""Flexible preconditioned conjugate gradients on packed faces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.reduction import Reduction
+from solver.packing import DoublePackedFaces, PackedFaces
+from solver.viscosity.operator import Level
+
+
+class ConjugateGradients:
+    """Solves A x = b; the scalar products are summed up in float64, and wait for the GPU.
+
+    The preconditioner need not be the same from one iteration to the next: beta makes the search direction conjugate to
+    the last one by A itself (Notay, SIAM J. Sci. Comput. 22, 2000).
+
+    Args:
+        device: where it lives.
+        level: whose operator A is.
+    """
+
+    def __init__(self, device: Device, level: Level) -> None:
+        self.device = device
+        self.level = level
+        ringed = level.rhs.u.size
+        names = "solution", "residual", "direction", "A p"
+        self._x, self._r, self._p, self._ap = (DoublePackedFaces(device, ringed, f"viscous {name}") for name in names)
+        self._az = PackedFaces(device, ringed, "viscous A z")
+        self._rest = PackedFaces(device, ringed, "viscous rest")
+        self._products = device.field(ringed, 4, "viscous products")
+        self._sum = Reduction(device, ringed, 4, "sum")
+        self._change_product = device.field(ringed, 1, "viscous product of the change")
+        self._change_sum = Reduction(device, ringed, 1, "sum")
+        self.iterations = 0
+
+    def solve(
+        self,
+        v_star: PackedFaces,
+        change: PackedFaces,
+        rhs: PackedFaces,
+        precondition: Callable[[PackedFaces], PackedFaces],
+        tolerance: float,
+        most: int,
+    ) -> PackedFaces:
+        """The solution, from the best first guess in the plane of `v_star` and the last step's `change`.
+
+        Ends after an iteration that has brought less than the part `tolerance`^2 of the energy, or after so many at
+        most. `precondition(r)` returns about A^-1 r.
+        """
+        found, curvature = self._galerkin_initial_guess(v_star, change, rhs)
+        for self.iterations in range(1, most + 1):
+            z = precondition(self._r.read)
+            rz, z_az, z_ap = self._apply_operator(z)
+            alpha, beta, curvature = cg_coefficients(rz, z_az, z_ap, curvature)
+            if not alpha:
+                break
+            self._update(z, self._az, alpha, beta)
+            gained = alpha**2 * curvature
+            found += gained
+            if gained <= tolerance**2 * found:
+                break
+        return self._x.read
+
+    def _galerkin_initial_guess(
+        self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces
+    ) -> tuple[float, float]:
+        """Leave in x the a v* + b d of least energy, d being the `change`; that energy, and p . A p for p = x / a."""
+        draw = self.device.pass_("viscosity/galerkin_guess.frag", **self.level.defines)
+        draw(
+            (*self._az.fields, *self._ap.read.fields, self._products, self._change_product),
+            region=self.level.region,
+            **v_star.inputs(),
+            **change.inputs("change_"),
+            **rhs.inputs("rhs_"),
+            **self.level.operator,
+        )
+        bv, bd, vav, vad = (float(value) for value in self._sum(self._products))
+        dad = float(self._change_sum(self._change_product)[0])
+        # Along v*; then along what of d is conjugate to v*, unless rounding has spoiled it or nothing is left.
+        a = bv / vav if vav > 0.0 else 0.0
+        conjugate = vad / vav if vav > 0.0 else 0.0
+        left = dad - conjugate * vad
+        b = (bd - conjugate * bv) / left if left > 1e-5 * dad else 0.0
+        a -= conjugate * b
+        if not (isfinite(a) and isfinite(b)) or a == 0.0:
+            a, b = 0.0, 0.0
+        self._update(v_star, self._az, a, b / a if a else 0.0, x=self._rest, r=rhs, p=change)
+        energy = a * bv + b * bd
+        return energy, energy / a**2 if a else 0.0
+
+    def _apply_operator(self, z: PackedFaces) -> tuple[float, float, float]:
+        """A z, and r . z, z . A z, z . A p."""
+        draw = self.device.pass_("viscosity/apply_operator.frag", **self.level.defines)
+        draw(
+            (*self._az.fields, self._products),
+            region=self.level.region,
+            **z.inputs(),
+            **self._r.read.inputs("r_"),
+            **self._ap.read.inputs("ap_"),
+            **self.level.operator,
+        )
+        rz, z_az, z_ap, _ = (float(value) for value in self._sum(self._products))
+        return rz, z_az, z_ap
+
+    def _update(
+        self,
+        z: PackedFaces,
+        az: PackedFaces,
+        alpha: float,
+        beta: float,
+        x: PackedFaces | None = None,
+        r: PackedFaces | None = None,
+        p: PackedFaces | None = None,
+    ) -> None:
+        """p = z + beta p, A p likewise, x + alpha p, r - alpha A p; in place of x, r and p others may be given."""
+        pairs = self._x, self._r, self._p, self._ap
+        self.device.pass_("viscosity/update.frag")(
+            [field for pair in pairs for field in pair.write.fields],
+            region=self.level.region,
+            alpha=alpha,
+            beta=beta,
+            **(x or self._x.read).inputs("x_"),
+            **(r or self._r.read).inputs("r_"),
+            **(p or self._p.read).inputs("p_"),
+            **self._ap.read.inputs("ap_"),
+            **z.inputs("z_"),
+            **az.inputs("az_"),
+        )
+        for pair in pairs:
+            pair.swap()
+
+    @property
+    def _pairs(self) -> list[PackedFaces]:
+        doubles = self._x, self._r, self._p, self._ap
+        return [side for pair in doubles for side in (pair.read, pair.write)] + [self._az, self._rest]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        fields: list[Field] = [field for pair in self._pairs for field in pair.fields]
+        items = *fields, self._products, self._change_product, self._sum, self._change_sum
+        return sum(item.nbytes for item in items)
+
+    def release(self) -> None:
+        """Free the textures."""
+        for item in (*self._pairs, self._products, self._change_product, self._sum, self._change_sum):
+            item.release()
+
+
+def cg_coefficients(rz: float, z_az: float, z_ap: float, p_ap: float) -> tuple[float, float, float]:
+    """(alpha, beta, p . A p) of the next direction p = z + beta p_before; alpha 0 where rounding has spoiled it."""
+    beta = -z_ap / p_ap if p_ap > 0.0 else 0.0
+    curvature = z_az + beta * z_ap
+    if not (isfinite(curvature) and isfinite(rz)) or curvature <= 1e-6 * z_az:
+        return 0.0, 0.0, 0.0
+    return rz / curvature, beta, curvature

@@ -1,0 +1,323 @@
+"""The viscous operator A = I + B' K B and its Galerkin coarse operators, as coefficients of strains.
+
+B takes differences: e_xx and e_yy in the cells, the shear s_y du + s_x dv at the nodes. K holds 2 dt mu / h^2 in the
+cells and dt mu / h^2 at the nodes. A coarse velocity that is interpolated has strains that are half an interpolation S
+of the coarse strains, so that P' A P keeps the form: K_coarse = S' K S / 16 (with the restriction P' / 4), a small
+stencil of couplings between strains of one kind. The identity is lumped. See README.md, "The viscous step".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.gl.passes import Region
+from solver.packing import DoublePackedFaces, PackedFaces, framed, packed
+
+# Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 64 unknowns. BLAS inverts 128 in
+# threads, which wait longer than they work.
+COARSEST = 8
+# Couplings of a strain with the next ones, (rows, columns) further; those backwards follow by symmetry.
+CELL_STENCIL = (0, 1, 2)
+NODE_STENCIL = ((0, 0), (0, 1), (1, 0), (1, 1), (1, -1))
+# So that a cell of no viscosity is still told from no fluid.
+LEAST = 1e-20
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """One level's K, cell by cell; `rows x columns` are even, cells beyond the grid hold no fluid.
+
+    Attributes:
+        xx: couplings of e_xx with e_xx 0, 1, 2 rows further, each (rows, columns).
+        yy: couplings of e_yy with e_yy 0, 1, 2 columns further.
+        nodes: couplings of shears by `NODE_STENCIL`, each (rows + 1, columns + 1).
+        open_u, open_v: which faces move, (rows, columns).
+        shear: (s_y, s_x), weights of du and dv in the shear: (1, 1) where cells are square.
+    """
+
+    xx: tuple[np.ndarray, ...]
+    yy: tuple[np.ndarray, ...]
+    nodes: dict[tuple[int, int], np.ndarray]
+    open_u: np.ndarray
+    open_v: np.ndarray
+    shear: tuple[float, float]
+
+    def diagonal(self) -> tuple[np.ndarray, np.ndarray]:
+        """The diagonal of A for u and for v."""
+        (s_y, s_x), n = self.shear, self.nodes
+        u = 1.0 + self.xx[0] + _behind(self.xx[0], 1) + s_y**2 * (n[0, 0][:-1, :-1] + n[0, 0][1:, :-1])
+        v = 1.0 + self.yy[0] + _behind(self.yy[0], 0) + s_x**2 * (n[0, 0][:-1, :-1] + n[0, 0][:-1, 1:])
+        if (1, 0) in n:
+            u -= 2.0 * s_y**2 * n[1, 0][:-1, :-1]
+            v -= 2.0 * s_x**2 * n[0, 1][:-1, :-1]
+        return u, v
+
+    def matrix(self) -> np.ndarray:
+        """A as a dense matrix over all u, row after row, and then all v; the identity for fixed faces."""
+        rows, columns = self.open_u.shape
+        count = rows * columns
+        moving = np.concatenate([self.open_u.ravel(), self.open_v.ravel()])
+        faces = np.diag(moving.astype(float)).reshape(-1, 2, rows, columns)
+        u, v = (np.pad(faces[:, axis], ((0, 0), (1, 1), (1, 1))) for axis in (0, 1))
+        s_y, s_x = self.shear
+        strains = (
+            (_dense(dict(zip(((0, 0), (1, 0), (2, 0)), self.xx, strict=False))), np.diff(u, axis=2)[:, 1:-1, 1:]),
+            (_dense(dict(zip(((0, 0), (0, 1), (0, 2)), self.yy, strict=False))), np.diff(v, axis=1)[:, 1:, 1:-1]),
+            (_dense(self.nodes), s_y * np.diff(u, axis=1)[:, :, 1:] + s_x * np.diff(v, axis=2)[:, 1:, :]),
+        )
+        matrix = np.eye(2 * count)
+        for stiffness, strain in strains:
+            flat = strain.reshape(2 * count, -1)
+            matrix += flat @ stiffness @ flat.T
+        return matrix
+
+
+def coefficients(
+    viscosity: np.ndarray, solid: np.ndarray, dt: float, spacing: tuple[float, float], no_slip: bool
+) -> Coefficients:
+    """K on the finest level from the viscosity of the cells, lengths^2 / s, (ny, nx), and the solid ones.
+
+    mu at a node is the harmonic mean of the fluid cells that meet there. A wall node's shear is nil at free-slip walls;
+    at no-slip ones a face beyond it stands still at the node, half a cell away, which doubles K; at a convex corner the
+    resting face is a whole cell away, and K stays.
+    """
+    (rows, columns), ring = viscosity.shape, ((1, 1), (1, 1))
+    even = (0, rows % 2), (0, columns % 2)
+    fluid = framed(~solid, *even)
+    amount = np.maximum(framed(viscosity.astype(np.float64) * dt, *even), LEAST) * fluid
+    wet = framed(fluid, *ring)
+    resistance = framed(np.divide(1.0, amount, out=np.zeros_like(amount), where=fluid), *ring)
+    meeting = _corners(wet.astype(np.float64))
+    node = np.divide(meeting, _corners(resistance), out=np.zeros_like(meeting), where=meeting > 0)
+    open_u, open_v = wet[:, 1:] & wet[:, :-1], wet[1:] & wet[:-1]
+    moving = open_u[1:].astype(int) + open_u[:-1] + open_v[:, 1:] + open_v[:, :-1]
+    node *= np.where(moving < 2, 2.0, 1.0) if no_slip else moving == 4
+    hx, hy = spacing
+    return Coefficients(
+        (2.0 / hx**2 * amount,),
+        (2.0 / hy**2 * amount,),
+        {(0, 0): node / (hx * hy)},
+        open_u[1:-1, :-1],
+        open_v[:-1, 1:-1],
+        (float(np.sqrt(hx / hy)), float(np.sqrt(hy / hx))),
+    )
+
+
+def coarsened(fine: Coefficients, no_slip: bool) -> Coefficients:
+    """K of the next coarser level: S' K S / 16.
+
+    A coarse face is open if all the fine faces beside it are, so a correction never pushes through a wall.
+    """
+    rows, columns = (length // 2 for length in fine.open_u.shape)
+    even = (0, rows % 2), (0, columns % 2)
+    u = fine.open_u[::2] & fine.open_u[1::2]
+    v = fine.open_v[:, ::2] & fine.open_v[:, 1::2]
+    open_u = u[:, ::2] & u[:, 1::2] & _behind(u, 1)[:, ::2]
+    open_v = v[::2] & v[1::2] & _behind(v, 0)[::2]
+    moves_x, moves_y = (open_u | _ahead(open_u, 1)) | no_slip, (open_v | _ahead(open_v, 0)) | no_slip
+    xx = _coarsened_cells([k[:, ::2] + k[:, 1::2] for k in fine.xx], moves_x)
+    yy = [k.T for k in _coarsened_cells([k[::2].T + k[1::2].T for k in fine.yy], moves_y.T)]
+    nodes = _coarsened_nodes(fine.nodes)
+    if not no_slip:
+        full_u, full_v = (framed(faces, (1, 1), (1, 1)) for faces in (open_u, open_v))
+        moving = (full_u[1:, 1:] & full_u[:-1, 1:] & full_v[1:, 1:] & full_v[1:, :-1]).astype(np.float64)
+        around = framed(moving, (1, 1), (1, 1))
+        for (down, right), k in nodes.items():
+            k *= moving * around[1 + down :, 1 + right :][: rows + 1, : columns + 1]
+    return Coefficients(
+        tuple(framed(k, *even) for k in xx),
+        tuple(framed(k, *even) for k in yy),
+        {offset: framed(k, *even) for offset, k in nodes.items()},
+        framed(open_u, *even),
+        framed(open_v, *even),
+        fine.shear,
+    )
+
+
+def _behind(values: np.ndarray, axis: int) -> np.ndarray:
+    """The values one place back along an axis, zero at the first."""
+    shifted = np.zeros_like(values)
+    if axis == 0:
+        shifted[1:] = values[:-1]
+    else:
+        shifted[:, 1:] = values[:, :-1]
+    return shifted
+
+
+def _ahead(values: np.ndarray, axis: int) -> np.ndarray:
+    """The values one place further along an axis, zero at the last."""
+    return _behind(values[::-1, ::-1], axis)[::-1, ::-1]
+
+
+def _corners(cells: np.ndarray) -> np.ndarray:
+    """Sums over the four cells that meet at the nodes of cells with a frame around them."""
+    return cells[1:, 1:] + cells[:-1, 1:] + cells[1:, :-1] + cells[:-1, :-1]
+
+
+def _dense(stencil: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
+    """The symmetric matrix of couplings with the places (rows, columns) further."""
+    shape = stencil[0, 0].shape
+    matrix = np.zeros((*shape, *shape))
+    for (down, right), k in stencil.items():
+        for j, i in product(range(shape[0]), range(shape[1])):
+            if j + down < shape[0] and 0 <= i + right < shape[1]:
+                matrix[j, i, j + down, i + right] = matrix[j + down, i + right, j, i] = k[j, i]
+    return matrix.reshape(k.size, k.size)
+
+
+def _coarsened_cells(fine: list[np.ndarray], live: np.ndarray) -> list[np.ndarray]:
+    """S' K S / 16 down the rows: a row counts 3/4 to the coarse row it lies in and 1/4 to the nearest other one.
+
+    Where one of the two does not move (not `live`) the other counts whole.
+    """
+    rows = len(live)
+    above, below = _behind(live, 0), _ahead(live, 0)
+    # Weights of the four rows around a coarse row, by their places from its first one on; none beyond the last.
+    places = ((-1, above, 0.25), (0, above, 0.75), (1, below, 0.75), (2, below, 0.25))
+    weights = {place: framed(np.where(other, part, 1.0), (0, 2), (0, 0)) for place, other, part in places}
+    around = [framed(k, (4, 6), (0, 0)) for k in fine]
+    found = []
+    for apart in CELL_STENCIL:
+        total = np.zeros(live.shape)
+        for place, step in product(weights, range(1 - len(fine), len(fine))):
+            partner = place + step - 2 * apart
+            if partner in weights:
+                first = 4 + place + min(step, 0)
+                stiffness = around[abs(step)][first : first + 2 * rows : 2]
+                total += weights[place][:rows] * weights[partner][apart : apart + rows] * stiffness
+        found.append(total / 16.0)
+    return found
+
+
+def _coarsened_nodes(fine: dict[tuple[int, int], np.ndarray]) -> dict[tuple[int, int], np.ndarray]:
+    """S' K S / 16 at the nodes, S linear both ways: first along the rows, then down the columns."""
+    weights = {-1: 0.5, 0: 1.0, 1: 0.5}
+    rows, columns = (length // 2 + 1 for length in fine[0, 0].shape)
+    whole = {offset: framed(k, (2, 2), (2, 2)) for offset, k in fine.items()}
+    for (down, right), k in list(whole.items()):
+        whole[-down, -right] = np.roll(k, (down, right), (0, 1))
+    across: dict[tuple[int, int], Any] = {}
+    for (down, right), k in whole.items():
+        for place, apart in product(weights, (-1, 0, 1)):
+            partner = place + right - 2 * apart
+            if partner in weights:
+                term = weights[place] * weights[partner] * k[:, 2 + place :: 2][:, :columns]
+                across[down, apart] = across.get((down, apart), 0.0) + term
+    found: dict[tuple[int, int], np.ndarray] = {}
+    for apart_down, apart_right in NODE_STENCIL:
+        total = np.zeros((rows, columns))
+        for (down, right), k in across.items():
+            for place in weights if right == apart_right else ():
+                partner = place + down - 2 * apart_down
+                if partner in weights:
+                    total += weights[place] * weights[partner] * k[2 + place :: 2][:rows]
+        found[apart_down, apart_right] = total / 16.0
+    return found
+
+
+class Level:
+    """One level: its operator, its right-hand side and its iterate, as packed faces.
+
+    Args:
+        device: where it lives.
+        size: (nx, ny) in cells of the level.
+        depth: 0 is the finest.
+        finest: (nx, ny) of the finest.
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], depth: int, finest: tuple[int, int]) -> None:
+        self.size = size
+        self.depth = depth
+        self.texels = -(-size[0] // 2), -(-size[1] // 2)
+        self.region: Region = (1, 1, *self.texels)
+        ringed = self.texels[0] + 2, self.texels[1] + 2
+        label = f"viscous level {depth}"
+        names = ["inverse_u", "inverse_v"]
+        if depth == 0:
+            names += ["cells", "nodes"]
+        else:
+            names += [f"{kind}{apart}" for kind in ("xx", "yy") for apart in CELL_STENCIL]
+            names += [f"node{number}" for number in range(len(NODE_STENCIL))]
+        self.packed = {name: device.field(ringed, 4, f"{label} {name}") for name in names}
+        self.packed["open"] = device.field(ringed, 4, f"{label} open", "f1")
+        self.stress = [device.field(ringed, 4, f"{label} stress {name}") for name in ("xx", "yy", "xy") if depth]
+        self.rhs = PackedFaces(device, ringed, f"{label} right-hand side")
+        self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
+        # Without solids, what walls leave of a grid whose last column or row is only half in it.
+        self.box = finest[0] >> depth, finest[1] >> depth
+        # What passes read of it: the operator, which faces are open, and what stress.frag multiplies with.
+        self.operator: dict[str, Any] = {}
+        self.stencil: dict[str, Any] = {}
+        self.open: dict[str, Any] = {}
+        self.defines: dict[str, Any] = {}
+
+    def set_coefficients(self, level: Coefficients, slip: dict[str, Any]) -> None:
+        """Take the operator from coefficients of each cell."""
+        of_u, of_v = level.diagonal()
+        values = {"inverse_u": level.open_u / of_u, "inverse_v": level.open_v / of_v}
+        node = level.nodes[0, 0]
+        if self.depth == 0:
+            # Signs tell which faces are open where these are read anyway; a node that resists nothing has one too.
+            values["cells"] = np.where(level.open_u, level.xx[0], -level.xx[0])
+            sign = np.pad(np.where(level.open_v, 1.0, -1.0), ((0, 1), (0, 1)), constant_values=1.0)
+            values["nodes"] = sign * np.maximum(node, 1e-30)
+        else:
+            values |= {f"{kind}{d}": k for kind in ("xx", "yy") for d, k in enumerate(getattr(level, kind))}
+            values |= {f"node{number}": level.nodes[offset] for number, offset in enumerate(NODE_STENCIL)}
+        for name, cells in values.items():
+            # Without the check of `set`: K is finite where the viscosity is.
+            self.packed[name].texture.write(self._ringed(cells.astype(np.float32)))
+        self.packed["open"].set(self._ringed((level.open_u + 2 * level.open_v).astype(np.uint8)))
+        self.open = {"open": self.packed["open"]}
+        names = ("inverse_u", "inverse_v", "open") + (() if self.depth else ("cells", "nodes"))
+        self.operator = {**{name: self.packed[name] for name in names}, "shear": level.shear}
+        self.defines = {"COARSE": 1, **slip} if self.depth else slip
+        if self.depth:
+            self.stencil = {name: field for name, field in self.packed.items() if name not in names}
+            self.stencil["shear"] = level.shear
+            self.operator |= dict(zip(("stress_xx", "stress_yy", "stress_xy"), self.stress, strict=True))
+        else:
+            # K of e_yy over that of e_xx, (hx / hy)^2.
+            self.operator["aspect"] = level.shear[0] ** 4
+
+    def set_uniform(self, stiffness: float, shear: tuple[float, float], slip: dict[str, Any]) -> None:
+        """Take the operator of one viscosity in a box without solids, dt mu / (hx hy) of this level."""
+        self.open, self.stencil = {"box": self.box}, {}
+        self.operator = {"stiffness": stiffness, "shear": shear, **self.open}
+        self.defines = {"UNIFORM": 1, **slip}
+
+    def _ringed(self, cells: np.ndarray) -> np.ndarray:
+        """Packed inside the ring; nodes on the far walls lie in the ring itself."""
+        rows, columns = cells.shape
+        width, height = self.texels
+        return packed(framed(cells, (2, 2 * height + 2 - rows), (2, 2 * width + 2 - columns)))
+
+    @property
+    def is_coarsest(self) -> bool:
+        return self.texels[0] * self.texels[1] <= COARSEST
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        pairs = [*self.rhs.fields, *self.faces.read.fields, *self.faces.write.fields]
+        return sum(field.nbytes for field in (*self.packed.values(), *self.stress, *pairs))
+
+    def release(self) -> None:
+        for item in (*self.packed.values(), *self.stress, self.rhs, self.faces):
+            item.release()
+
+
+def inverse_matrix(level: Coefficients) -> np.ndarray:
+    """A^-1 for `shaders/viscosity/direct_solve.frag`, (unknowns, unknowns / 4, 4), zero for fixed faces."""
+    count = 2 * level.open_u.size
+    moving = np.concatenate([level.open_u.ravel(), level.open_v.ravel()])
+    inverse = np.linalg.inv(level.matrix()) * moving * moving[:, None]
+    # In the order of the texture: texel after texel, all u before all v.
+    numbers = np.arange(count).reshape(2, *level.open_u.shape)
+    order = np.concatenate([packed(part).ravel() for part in numbers])
+    return inverse[order[:, None], order].reshape(count, count // 4, 4)

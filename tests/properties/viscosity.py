@@ -1,0 +1,180 @@
+"""The viscous step among random masks, against a direct solution of the same equation in float64."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+import reference
+from solver.gl.device import Device
+from solver.params import Walls
+from solver.viscosity.solve import Viscosity
+
+SIZES = (96, 96), (200, 133), (256, 256)
+CONTRASTS = 1e2, 1e5, 1e8
+SOFTEST = 1.0, 30.0  # kappa = dt mu / h^2
+# Error left at most, by contrast; beyond, no more than v* itself has.
+ERROR = {1e2: 0.01, 1e5: 0.05}
+ITERATIONS = {1.0: 5, 30.0: 10}
+
+Rng = np.random.Generator
+
+
+def blobs(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    return ndimage.gaussian_filter(rng.standard_normal((ny, nx)), max(nx, ny) / rng.uniform(12, 24))
+
+
+def hard_blobs(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    field = blobs(rng, nx, ny)
+    return (field > 0.5 * field.std()) * 1.0
+
+
+def soft_blobs(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    field = blobs(rng, nx, ny)
+    return np.clip(0.8 * field / field.std(), 0, 1)
+
+
+def small_blobs(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    """Hundreds of discs of one to five cells."""
+    y, x = np.mgrid[:ny, :nx] + 0.5
+    mask = np.zeros((ny, nx), bool)
+    for _ in range(30 + nx * ny // 220):
+        mask |= np.hypot(x - rng.uniform(0, nx), y - rng.uniform(0, ny)) < rng.uniform(1, 5)
+    return mask * 1.0
+
+
+def snakes(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    """Winding lines of one to three cells."""
+    mask = np.zeros((ny, nx), bool)
+    for _ in range(12):
+        place, angle, turn = rng.uniform(0, 1, 2) * (nx, ny), rng.uniform(0, 2 * np.pi), 0.0
+        width = int(rng.integers(1, 4))
+        for _ in range(int(2 * max(nx, ny) * rng.uniform(0.3, 1))):
+            turn = 0.9 * turn + 0.05 * rng.standard_normal()
+            angle += 0.5 * turn
+            place = place + 0.5 * np.array([np.cos(angle), np.sin(angle)])
+            i, j = int(place[0]), int(place[1])
+            mask[max(j, 0) : max(j + width, 0), max(i, 0) : max(i + width, 0)] = True
+    return mask * 1.0
+
+
+def spiral(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    """Arms of one to three cells."""
+    y, x = np.mgrid[:ny, :nx] + 0.5
+    width, pitch = rng.uniform(1, 3), rng.uniform(6, 14)
+    radius = np.hypot(x - nx / 2, y - ny / 2)
+    angle = np.arctan2(y - ny / 2, x - nx / 2) + rng.uniform(0, 2 * np.pi)
+    return (((radius - pitch * angle / (2 * np.pi)) % pitch < width) & (radius < 0.45 * min(nx, ny))) * 1.0
+
+
+def checkerboard(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    side = int(rng.choice([1, 2, 3, 5, 8, 13]))
+    y, x = np.mgrid[:ny, :nx] // side
+    return (x + y) % 2 * 1.0
+
+
+CLASSES: dict[str, Callable[[Rng, int, int], np.ndarray]] = {
+    "hard blobs": hard_blobs,
+    "soft blobs": soft_blobs,
+    "small blobs": small_blobs,
+    "snakes": snakes,
+    "spiral": spiral,
+    "checkerboard": checkerboard,
+}
+
+
+def eddies(rng: Rng, nx: int, ny: int) -> np.ndarray:
+    """A velocity without divergence on MAC faces, (ny, nx, 2), smooth on a twentieth of the longer side."""
+    stream = ndimage.gaussian_filter(rng.standard_normal((ny + 1, nx + 1)), max(nx, ny) / 20)
+    stream *= np.sin(np.pi * np.linspace(0, 1, nx + 1)) * np.sin(np.pi * np.linspace(0, 1, ny + 1))[:, None]
+    faces = np.stack([stream[1:, :-1] - stream[:-1, :-1], stream[:-1, :-1] - stream[:-1, 1:]], axis=-1)
+    return (faces / np.abs(faces).max()).astype(np.float32)
+
+
+@dataclass
+class Case:
+    """A step of random input; dt / h^2 is one, and so mu is kappa."""
+
+    viscosity: np.ndarray
+    faces: np.ndarray
+    walls: Walls
+    solid: np.ndarray
+
+    @classmethod
+    def random(
+        cls, kind: str, size: tuple[int, int], contrast: float, softest: float, rng: Rng, plain: bool = True
+    ) -> Case:
+        """A mask of the kind; unless `plain`, between no-slip walls and with a solid disc half of the times each."""
+        nx, ny = size
+        viscosity = (softest * contrast ** CLASSES[kind](rng, nx, ny)).astype(np.float32)
+        faces = eddies(rng, nx, ny)
+        solid, walls = np.zeros((ny, nx), bool), Walls()
+        if not plain and rng.random() < 0.5:
+            walls = Walls("none")
+        if not plain and rng.random() < 0.5:
+            y, x = np.mgrid[:ny, :nx]
+            solid = np.hypot(x - rng.uniform(0, nx), y - rng.uniform(0, ny)) < rng.uniform(0.03, 0.2) * max(nx, ny)
+            faces[solid] = 0.0
+            faces[:, 1:, 0][solid[:, :-1]] = 0.0
+            faces[1:, :, 1][solid[:-1]] = 0.0
+        return cls(viscosity, faces, walls, solid)
+
+    def solved(self, device: Device) -> tuple[np.ndarray, int]:
+        """The solution and how many iterations it took."""
+        ny, nx = self.viscosity.shape
+        solver = Viscosity(device, (nx, ny))
+        fields = device.upload(self.viscosity), device.upload(self.solid.astype(np.uint8) * np.uint8(255))
+        solver.set_coefficients(*fields, 1 / max(nx, ny) ** 2, self.walls)
+        velocity = device.double_field((nx, ny), 2, "velocity")
+        velocity.read.set(self.faces)
+        solver.diffuse(velocity)
+        found = velocity.read.get().astype(np.float64)
+        for item in (solver, velocity, *fields):
+            item.release()
+        return found, solver.conjugate_gradients.iterations
+
+    def exact(self) -> np.ndarray:
+        no_slip = self.walls.slip == "none"
+        return reference.viscous_step(
+            self.faces, self.viscosity.astype(np.float64), 1.0, 1.0, solid=self.solid, no_slip=no_slip
+        )
+
+
+def error(found: np.ndarray, wanted: np.ndarray) -> float:
+    return float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+
+
+def check_viscous_step(device: Device, seed: int) -> dict[str, float]:
+    """Whatever the mask: near the direct solution, in few iterations, and never worse than doing nothing."""
+    rng = np.random.default_rng(seed)
+    kind, size = str(rng.choice(list(CLASSES))), SIZES[rng.integers(2)]
+    contrast, softest = float(rng.choice(CONTRASTS)), float(rng.choice(SOFTEST))
+    case = Case.random(kind, size, contrast, softest, rng, plain=False)
+    found, iterations = case.solved(device)
+    wanted = case.exact()
+    left, nothing = error(found, wanted), error(case.faces, wanted)
+    told = f"seed {seed}: {kind}, {size}, contrast {contrast:g}, kappa {softest:g}: {left:.4f} in {iterations}"
+    assert np.isfinite(found).all(), told
+    assert left < min(ERROR.get(contrast, np.inf), nothing), told
+    assert iterations <= ITERATIONS[softest], told
+    return {"error": left, "doing nothing": nothing, "iterations": iterations}
+
+
+def check_viscous_step_is_stable(device: Device, seed: int) -> dict[str, float]:
+    """Any viscosity, cell by cell, any grid, any walls and solids, any velocity: energy never grows."""
+    rng = np.random.default_rng(seed)
+    nx, ny = (int(length) for length in rng.integers(8, 90, 2))
+    viscosity = 10 ** (rng.uniform(-4, 8, (ny, nx)) if rng.random() < 0.5 else np.full((ny, nx), rng.uniform(-4, 8)))
+    solid = rng.random((ny, nx)) < rng.choice([0.0, 0.05, 0.5])
+    faces = rng.standard_normal((ny, nx, 2)).astype(np.float32)
+    faces[solid] = faces[:, 0, 0] = faces[0, :, 1] = 0.0
+    faces[:, 1:, 0][solid[:, :-1]] = 0.0
+    faces[1:, :, 1][solid[:-1]] = 0.0
+    case = Case(viscosity.astype(np.float32), faces, Walls("none" if rng.random() < 0.5 else "free"), solid)
+    found, iterations = case.solved(device)
+    growth = float(np.linalg.norm(found) / max(np.linalg.norm(faces), 1e-30))
+    assert growth <= 1.001, f"seed {seed}: {nx} x {ny}, growth {growth:.4f}"
+    return {"growth": growth, "iterations": iterations}
