@@ -231,11 +231,10 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     values = cropped(given).values
     width, height = given.width, given.height
     grid = Grid.for_picture(width, height, min(max(width, height), MOST_CELLS))
-    fit = np.divide(grid.extent, np.divide((width, height), max(width, height)))
     warp = WarpMap(device, grid)
     try:
-        warp.set(values * fit)
-        found = warp.forward.read((width, height)) / fit
+        warp.set(values)
+        found = warp.forward.read((width, height))
     except FieldError as error:
         raise UserError(f"the map cannot be turned round: {error}") from None
     finally:

@@ -543,7 +543,7 @@ def displacement(
     Nothing flows beyond the picture's edge: the displacement there is that of the nearest point on it.
     forward: where the points of the original go. check: called now and then; may raise, as `Progress.check` does.
     """
-    # The grid's cells are square, and its sides whole cells: the picture is fitted to it by less than half a cell.
+    # A size in whole pixels has nearly the picture's aspect.
     fit = np.divide(size, max(size)) / replay.grid.extent
     warp = replay.warp.forward if forward else replay.warp
     if not overscan and max(size) <= replay.device.limits.max_texture_size:

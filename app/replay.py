@@ -386,11 +386,8 @@ class Replay:
         self._set_parameters()
 
     def _begin_with(self, name: str) -> None:
-        source = self.pictures.source
-        # The picture is fitted to whole cells, and its lengths with it.
-        fit = np.divide(self.grid.extent, np.divide((source.width, source.height), max(source.width, source.height)))
         try:
-            self.warp.set(self.pictures.load_map(name) * fit)
+            self.warp.set(self.pictures.load_map(name))
         except FieldError as error:
             raise UserError(f"{name} cannot be the map to begin with: {error}") from None
 

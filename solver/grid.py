@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
 SMALLEST_GRID = 8
+MOST_ALONG = 4096  # cells that a narrow picture gets along it: twice as many texels of the map a GL must have
 
 
 @dataclass(frozen=True)
@@ -34,16 +36,15 @@ class Grid:
 
     @classmethod
     def for_picture(cls, width: int, height: int, cells: int) -> Grid:
-        """The grid with `cells` along the longer side of a picture of `width x height` pixels.
+        """The grid with `cells` along the longer side of a picture of `width x height` pixels, laid over exactly that.
 
-        The shorter side is rounded to whole cells, and to at least 8 of them, and the picture is fitted to the grid:
-        its aspect is off by at most half a cell.
+        The shorter side is rounded to whole cells, which are then a little wider or narrower than high. A picture so
+        narrow that it would have fewer than 8 of them there gets more along it instead, up to `MOST_ALONG`.
         """
-        longer = max(width, height)
-        return cls(
-            max(SMALLEST_GRID, round(cells * width / longer)),
-            max(SMALLEST_GRID, round(cells * height / longer)),
-        )
+        longer, shorter = max(width, height), min(width, height)
+        along = max(cells, min(ceil(SMALLEST_GRID * longer / shorter), MOST_ALONG))
+        nx, ny = (max(SMALLEST_GRID, round(along * side / longer)) for side in (width, height))
+        return cls(nx, ny, (width / longer, height / longer))
 
     @property
     def size(self) -> tuple[int, int]:
