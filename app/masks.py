@@ -104,7 +104,7 @@ class _PictureLayer(_Layer):
             return self._shades(grid, pictures)
         # The steps are cut on a fine grid and then averaged, or their edges would lie elsewhere on every grid.
         finer = math.ceil(FINE / max(grid.nx, grid.ny))
-        steps = quantised(self._shades(Grid(grid.nx * finer, grid.ny * finer), pictures), self.levels)
+        steps = quantised(self._shades(grid.refined(finer), pictures), self.levels)
         return steps.reshape(grid.ny, finer, grid.nx, finer).mean(axis=(1, 3))
 
     def _shades(self, grid: Grid, pictures: Pictures) -> np.ndarray:

@@ -229,15 +229,16 @@ class Replay:
 
         The place that is looked up nearest to it, and from there one step of Newton's method: exact to second order.
         """
-        fine = Grid(self.grid.nx * FINER, self.grid.ny * FINER)
-        h, (x, y) = fine.h, fine.centres()
+        fine = self.grid.refined(FINER)
+        (hx, hy), (x, y) = fine.spacing, fine.centres()
         looked_up = self.warp.read(fine.size).astype(np.float64) + np.stack([x, y], axis=-1)
         wanted = np.multiply(point, self.grid.extent)
         j, i = np.unravel_index(((looked_up - wanted) ** 2).sum(axis=-1).argmin(), x.shape)
         around = looked_up[max(j - 1, 0) : j + 2, max(i - 1, 0) : i + 2]
-        jacobian = np.stack([np.gradient(around, h, axis=axis).mean(axis=(0, 1)) for axis in (1, 0)], axis=-1)
+        slopes = np.gradient(around, hx, axis=1), np.gradient(around, hy, axis=0)
+        jacobian = np.stack([slope.mean(axis=(0, 1)) for slope in slopes], axis=-1)
         step = np.linalg.lstsq(jacobian, wanted - looked_up[j, i], rcond=None)[0]
-        at_x, at_y = np.array([x[j, i], y[j, i]]) + np.clip(step, -h, h)
+        at_x, at_y = np.array([x[j, i], y[j, i]]) + np.clip(step, (-hx, -hy), (hx, hy))
         return float(at_x), float(at_y)
 
     # -- one step ---------------------------------------------------------------------------------------------------

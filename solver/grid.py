@@ -46,6 +46,10 @@ class Grid:
         nx, ny = (max(SMALLEST_GRID, round(along * side / longer)) for side in (width, height))
         return cls(nx, ny, (width / longer, height / longer))
 
+    def refined(self, times: int) -> Grid:
+        """The grid with so many cells for each of these, both ways."""
+        return Grid(self.nx * times, self.ny * times, self.extent)
+
     @property
     def size(self) -> tuple[int, int]:
         """(nx, ny), as a field's size."""
