@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -109,9 +110,12 @@ class Fluid(Scheme):
         self._check_source()
         fields = self._fields_of(forces, dt)
         with self.device.stage("add force"):
-            departing, add_force = self._departing.faces, self.device.pass_("step/add_force.frag")
-            add_force(departing, velocity=self.velocity.read, carried=self._carried.read)
-            self._add_fields(departing, fields)
+            departing = self._departing.faces
+            inputs: dict[str, Any] = {"velocity": self.velocity.read, "carried": self._carried.read}
+            for force, impulse in fields[:1]:
+                inputs |= {"force": force, "impulse": impulse}
+            self.device.pass_("step/add_force.frag", **({"FORCE": 1} if fields else {}))(departing, **inputs)
+            self._add_fields(departing, fields[1:])
         return self._lay_rows(departing)
 
     def _advect(self, departing: Departing, dt: float) -> PackedFaces:
