@@ -371,12 +371,13 @@ def test_the_grid_is_chosen_for_a_picture_with_another_feel_too(device: Device, 
 
     write_picture(tmp_path / "other.png", pattern(100, 60))
     robot = Robot(device, small_project(tmp_path), preferences=Preferences(auto_quality=True))
-    robot.editor.quality._speed = Speed(1.0, 1000.0, 1.0)
+    quality, speed = robot.editor.quality, Speed(1.0, 1000.0, 1.0)
+    quality._speed, quality._grid = speed, speed.best_grid  # as if it had been measured
     robot.editor.session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     robot.drop(tmp_path / "other.png")
     assert PUTTY.fits(robot.editor.session.recipe.fluid)
-    assert robot.editor.session.recipe.fluid.grid == robot.editor.quality._speed.best_grid
+    assert robot.editor.session.recipe.fluid.grid == speed.best_grid
     robot.close()
 
 
