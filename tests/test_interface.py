@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import project as projects
+from app.maps import Displacement, write_map
 from app.pictures import Picture, write_picture
 from app.presets import PUTTY, WATER
 from app.tools import TOOLS
@@ -383,13 +383,13 @@ def test_the_grid_is_chosen_for_a_picture_with_another_feel_too(device: Device, 
 
 def test_messages_of_the_window_name_no_options_of_the_command_line(robot: Robot, tmp_path: Path) -> None:
     write_picture(tmp_path / "strip.png", Picture(np.zeros((8, 400, 3), np.uint8)))
-    forward = np.zeros((18, 24, 2), np.float32)
-    np.save(tmp_path / "offsets.npy", forward)
-    projects.save(robot.editor.session.project, tmp_path / "work.fluidwarp", True)
+    write_map(tmp_path / "forward.exr", Displacement(np.zeros((180, 240, 2), np.float32), forward=True))
     robot.drop(tmp_path / "strip.png")
-    text = robot.editor.messages.shown[-1].text
-    assert "narrow" in text
-    assert "--" not in text
+    robot.drop(tmp_path / "forward.exr")
+    narrow, forward = (message.text for message in robot.editor.messages.shown)
+    assert "too narrow for a grid of 256" in narrow
+    assert "tells where each point goes" in forward
+    assert "--" not in narrow + forward
 
 
 # Small windows ------------------------------------------------------------------------------------------------------
