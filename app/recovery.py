@@ -98,6 +98,7 @@ class Journal:
         self._written: tuple[Project, Work] | None = None
         self._leaving = False
         self._changed, self._urgent, self._handed = threading.Event(), threading.Event(), threading.Event()
+        self._asking = threading.Lock()  # `_handed` is of what is wanted now, and not of what was before
         self._thread: threading.Thread | None = None
         self._file: int | None = None
         self._size = self._most = 0
@@ -119,8 +120,9 @@ class Journal:
         )
         if work is None and self._wanted is None and self._held is None:
             return
-        self._handed.clear()
-        self._wanted = work and (project, work)
+        with self._asking:
+            self._handed.clear()
+            self._wanted = work and (project, work)
         self._wake(urgent=not is_amended)
         if work is not None and not is_amended:
             self._handed.wait(HANDING)
@@ -171,8 +173,9 @@ class Journal:
                     self._forget()
                 elif wanted is not self._written:
                     self._write(*wanted)
-                if wanted is self._wanted:
-                    self._handed.set()
+                with self._asking:
+                    if wanted is self._wanted:
+                        self._handed.set()
                 if self._file is not None and urgent:
                     os.fsync(self._file)
             except Exception as error:
