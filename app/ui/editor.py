@@ -326,6 +326,7 @@ class Editor:
                 self.do(name)
         except UserError as error:
             self.messages.warn(error.in_window)
+        self.ui.end_frame()
         io = imgui.get_io()
         self._held_by_imgui = io.want_capture_mouse
         self._is_typing_now = io.want_text_input
