@@ -255,6 +255,19 @@ def test_closing_a_message_does_not_paint(robot: Robot) -> None:
     assert robot.editor.shows_ring
 
 
+def test_the_ring_is_not_drawn_around_a_pointer_on_a_message(robot: Robot) -> None:
+    robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
+    robot.frame(count=6)
+    plain, rect = robot.pixels(), robot.editor.ui.covers[-1]
+    above = slice(int(rect.y) - 40, int(rect.y) - 2), slice(int(rect.x), int(rect.right))
+    robot.move(rect.x + 60, rect.y + 6)
+    robot.frame(count=6)
+    assert np.array_equal(robot.pixels()[above], plain[above])
+    robot.move(rect.x + 60, rect.y - 20)
+    robot.frame(count=6)
+    assert not np.array_equal(robot.pixels()[above], plain[above])
+
+
 def test_cancelling_an_export_does_not_paint(robot: Robot, tmp_path: Path) -> None:
     dialog = ExportDialog(robot.editor.session, str(tmp_path))
     robot.editor.exports.start(dialog.job())
