@@ -16,7 +16,7 @@ import numpy as np
 from app import ffmpeg
 from app.errors import Cancelled, UserError
 from app.files import NUMBER, cannot_write, is_sequence, replacing, replacing_many, temporary_beside, temporary_file
-from app.pictures import FORMATS, Picture, check_picture_output, to_bits, write_picture
+from app.pictures import FORMATS, WEBP, Picture, check_picture_output, to_bits, write_picture
 from app.progress import never
 from app.video import sound_codec
 
@@ -115,7 +115,7 @@ class Container:
 # The widest and highest picture that an encoder, or what holds it, takes.
 LARGEST = {
     "h264": (16384, 16384), "vp9": (65536, 65536), "av1": (16384, 8704), "prores-4444": (65534, 65534),
-    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (16383, 16383),
+    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (WEBP.longest, WEBP.longest),
 }  # fmt: skip
 
 ANIMATIONS = {

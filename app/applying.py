@@ -217,7 +217,7 @@ class Applier:
             return []
         if is_sequence(path):
             return [
-                f"{len(self._folds)} of the maps {path.name} fold over themselves, in up to {max(self._folds)} pixels"
+                f"folds in {len(self._folds)} of the maps {path.name}, the worst in {max(self._folds)} of its pixels"
             ]
         return [f"{path.name} folds over itself in {self._folds[0]} of its pixels"]
 

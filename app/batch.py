@@ -290,8 +290,12 @@ def perform(task: Task, cancel: Callable[[], bool] = never) -> Outcome:
     except MemoryError:
         return Outcome(task.label, "there is not enough memory for it; use fewer --jobs or a smaller --size")
     except Exception as error:
-        return Outcome(task.label, f"{type(error).__name__}: {str(error).strip() or 'no reason given'}")
+        return Outcome(task.label, f"{type(error).__name__}: {_in_a_line(error) or 'no reason given'}")
     return Outcome(task.label, notices=(*told.notices, *([told.verdict] if told.verdict else [])))
+
+
+def _in_a_line(error: BaseException) -> str:
+    return " ".join(str(error).split())
 
 
 @lru_cache(maxsize=4)
@@ -523,7 +527,7 @@ def _outcome(future: Any, task: Task) -> Outcome:
     error = future.exception()
     if type(error).__name__ == "KilledWorker":
         return Outcome(task.label, "every worker that tried it died, perhaps for want of memory")
-    return Outcome(task.label, f"it failed on the cluster ({error})")
+    return Outcome(task.label, f"it failed on the cluster ({_in_a_line(error)})")
 
 
 Stamps = tuple[tuple[int, int] | None, ...]

@@ -163,11 +163,14 @@ class Job:
     def _check_map_size(self, maps: MapOutput) -> None:
         size = result_size(self.recipe, self.picture)
         width, height = size if maps.size is None else longer_side(size, maps.size)
+        why = "the size of the result" if maps.size is None else f"--map-size {maps.size}"
+        mend = "ask for fewer by --map-size" if maps.size is None else "ask for fewer"
+        if width * height <= MAX_PIXELS:
+            width, height = width + 2 * maps.overscan, height + 2 * maps.overscan
+            why, mend = f"--overscan {maps.overscan}", "ask for fewer"
         if width * height > MAX_PIXELS:
-            raise UserError(f"--map-size {maps.size} makes a map of {width} x {height} pixels; ask for fewer")
-        width, height = width + 2 * maps.overscan, height + 2 * maps.overscan
-        if width * height > MAX_PIXELS:
-            raise UserError(f"--overscan {maps.overscan} makes a map of {width} x {height} pixels; ask for fewer")
+            large = f"a map of {width} x {height} pixels"
+            raise UserError(f"{why} makes {large}; {mend}", in_window=f"{large} is too large; choose a smaller size")
 
 
 @dataclass(frozen=True)
@@ -271,8 +274,9 @@ class _Export:
                 found = self._map(job.maps)
             except MemoryError:
                 width, height = (side + 2 * job.maps.overscan for side in self._map_size(job.maps))
+                little = f"there is not enough memory for a map of {width} x {height} pixels"
                 raise UserError(
-                    f"there is not enough memory for a map of {width} x {height} pixels; lower --map-size or --overscan"
+                    f"{little}; lower --map-size or --overscan", in_window=f"{little}; choose a smaller size"
                 ) from None
             self.progress.advance(steps_for((found.width, found.height)))
             self.progress.enter("writing the map")

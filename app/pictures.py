@@ -288,6 +288,11 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(shown) + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
 
 
+def _not_kept(kind: str, names: Sequence[str]) -> str:
+    """That parts of a file are lost, as "its channels A, B are not kept"."""
+    return f"its {kind}{'s' * (len(names) > 1)} {_few(names)} {'are' if len(names) > 1 else 'is'} not kept"
+
+
 def _unusual_colours(primaries: int, transfer: int) -> str:
     """What colours are, by the codes of H.273, if they are neither sRGB's nor BT.709's; else ""."""
     named = [PRIMARIES.get(primaries, f"primaries {primaries}")] if primaries not in USUAL_PRIMARIES else []
@@ -528,8 +533,9 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
     if pixels.shape[2] > 4:  # further samples are masks and spot colours
-        losses.append(f"of its {pixels.shape[2]} samples a pixel the first are taken")
-        pixels = pixels[..., : 4 if page.extrasamples else 3]
+        taken = 4 if page.extrasamples else 3
+        losses.append(f"of its {pixels.shape[2]} samples a pixel the first {taken} are taken")
+        pixels = pixels[..., :taken]
 
     premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
 
@@ -644,7 +650,7 @@ def _read_exr(file: Path, name: str, max_pixels: int) -> Picture:
     place_window(data, (left - first_x, top - first_y), pixels)
     chromaticities = header.get("chromaticities")
     others = [key for key in channels if key not in wanted]
-    losses = [f"its channels {_few(others)} are not kept"] if others else []
+    losses = [_not_kept("channel", others)] if others else []
     losses += _exr_losses(file, header)
     return Picture(
         pixels,
@@ -662,12 +668,12 @@ def _exr_losses(file: Path, header: Mapping[str, Any]) -> list[str]:
 
     with _quiet():
         parts = [part.header.get("name", "") for part in OpenEXR.File(str(file), header_only=True).parts[1:]]
-    losses = [f"its further parts {_few(parts)} are not kept"] if parts else []
+    losses = [_not_kept("further part", parts)] if parts else []
     (left, top), (right, bottom) = header["dataWindow"]
     (first_x, first_y), (last_x, last_y) = header["displayWindow"]
     beyond = max(first_x - left, first_y - top, right - last_x, bottom - last_y)
     if beyond > 0:
-        losses.append(f"its {int(beyond)} pixels of overscan, beyond the display window, are not kept")
+        losses.append(f"its overscan ({int(beyond)} px beyond the display window) is not kept")
     if first_x or first_y:
         losses.append(f"its display window begins at {int(first_x)}, {int(first_y)} and is moved to 0, 0")
     return losses

@@ -28,6 +28,7 @@ SLACK = 4 * 2**20  # bytes that a journal may grow before it is begun anew; and 
 HANDING = 0.1  # seconds that a frame in which a stroke ends may wait for the journal: mostly it is less than one tick
 PAUSE = 0.25  # seconds in which the records of a fluid that comes to rest are put together; a stroke waits for nothing
 LEAVING = 5.0  # seconds that the disk may take when the program ends
+BINARY = getattr(os, "O_BINARY", 0)  # Windows writes other line ends without it
 
 
 def default_folder() -> Path:
@@ -54,8 +55,13 @@ class Held:
         root.mkdir(parents=True, exist_ok=True, mode=0o700)
         while True:
             folder = Path(tempfile.mkdtemp(prefix="", dir=root))
+            try:
+                lock = Lock.take(folder / LOCK)
+            except OSError:  # of a disk without locks; with every edit it is tried again
+                shutil.rmtree(folder, ignore_errors=True)
+                raise
             # None: one who looks for journals has it in hand, and will remove it.
-            if (lock := Lock.take(folder / LOCK)) is not None:
+            if lock is not None:
                 return cls(folder, lock)
 
     def discard(self) -> None:
@@ -92,6 +98,7 @@ class Journal:
         self._written: tuple[Project, Work] | None = None
         self._leaving = False
         self._changed, self._urgent, self._handed = threading.Event(), threading.Event(), threading.Event()
+        self._asking = threading.Lock()  # `_handed` is of what is wanted now, and not of what was before
         self._thread: threading.Thread | None = None
         self._file: int | None = None
         self._size = self._most = 0
@@ -113,8 +120,9 @@ class Journal:
         )
         if work is None and self._wanted is None and self._held is None:
             return
-        self._handed.clear()
-        self._wanted = work and (project, work)
+        with self._asking:
+            self._handed.clear()
+            self._wanted = work and (project, work)
         self._wake(urgent=not is_amended)
         if work is not None and not is_amended:
             self._handed.wait(HANDING)
@@ -126,7 +134,11 @@ class Journal:
 
     def end(self, discard: bool) -> None:
         """Write what has still to be written, and leave the journal where it is; or, `discard`, remove it."""
-        if self._thread is None and self._held is None:
+        self._seen = ()  # of work that is closed, nothing stays in memory
+        if self._thread is None and not (discard and self._held):
+            # Nothing has been heard of the work; if it was restored, it is still in the journal.
+            if self._held is not None:
+                self._held.lock.release()
             return
         if discard:
             self._wanted = None
@@ -161,8 +173,9 @@ class Journal:
                     self._forget()
                 elif wanted is not self._written:
                     self._write(*wanted)
-                if wanted is self._wanted:
-                    self._handed.set()
+                with self._asking:
+                    if wanted is self._wanted:
+                        self._handed.set()
                 if self._file is not None and urgent:
                     os.fsync(self._file)
             except Exception as error:
@@ -192,7 +205,7 @@ class Journal:
             self._held = Held.new(self._root)
         folder = self._held.folder
         path, temporary = folder / JOURNAL, folder / f"{JOURNAL}.new"
-        file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o600)
         try:
             for line in beginning(Origin.of(project), work):
                 _write_all(file, line)
@@ -202,7 +215,7 @@ class Journal:
         finally:
             os.close(file)
         os.replace(temporary, path)
-        self._file = os.open(path, os.O_WRONLY | os.O_APPEND)
+        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | BINARY)
         self._most = 2 * self._size + SLACK
         for changed in (folder, self._root):
             sync(changed)
@@ -265,9 +278,9 @@ class Found:
         try:
             return project_of(self.origin, self.work.recipe)
         except (UserError, OSError) as error:
-            why = str(error) if file.exists() else f"There is no {file} any more."
+            why = str(error).removesuffix(".") if file.exists() else f"There is no {file} any more"
             kept = f"The work on “{self.origin.name}” is kept; put the file back, and the next start offers it again."
-            raise UserError(f"{why} {kept}") from None
+            raise UserError(f"{why}. {kept}") from None
 
     def is_as_it_was(self, project: Project) -> bool:
         """True if the picture is the one that was worked on, to the byte."""

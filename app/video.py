@@ -84,7 +84,7 @@ class Clip:
             if complaint := process.complaint():
                 notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
             elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
-                notice(f"{self.path} has {count} frames, and by the length it tells about {self.frames}")
+                notice(f"{self.path} should have about {self.frames} frames by its length, and has {count}")
 
     def _check_unchanged(self) -> None:
         """Raise `UserError` if the file is not as it was: the frames would be fewer, or some of another clip.

@@ -665,7 +665,7 @@ def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
     assert len(list(read_clip(path).read_frames(notice=said.append))) == 40
     assert len(said) == 2
     assert "a.mkv is damaged, and what could be read of it was used" in said[0]
-    assert said[1] == f"{path} has 40 frames, and by the length it tells about 80"
+    assert said[1] == f"{path} should have about 80 frames by its length, and has 40"
 
 
 def test_a_clip_that_is_replaced_or_deleted_while_it_is_read_is_read_to_its_end(tmp_path: Path):

@@ -425,7 +425,7 @@ def test_a_fold_is_told(folder: Path):
     write_map(folder / "m.0007.npy", Displacement(values * 0))
     write_map(folder / "m.0008.npy", Displacement(values))
     ran = fluidwarp(folder, "apply", "m.%04d.npy", "cat.png", "-o", "z.%04d.png")
-    assert ran.stderr == "fluidwarp: 1 of the maps m.%04d.npy fold over themselves, in up to 96 pixels\n"
+    assert ran.stderr == "fluidwarp: folds in 1 of the maps m.%04d.npy, the worst in 96 of its pixels\n"
 
 
 def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(folder: Path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +25,7 @@ from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
 from app.ui.canvas import shown_pixels
 from app.ui.dialogs import PictureOrMap, Preferring, Shortcuts, Unsaved
-from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Key, Mods, Move
+from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.preferences import Preferences
@@ -571,6 +572,56 @@ def test_unsaved_work_is_asked_about(robot: Robot, tmp_path: Path) -> None:
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     robot.key("ctrl+q")
     assert robot.editor.closed
+
+
+def test_a_question_is_not_asked_twice(robot: Robot, tmp_path: Path) -> None:
+    for number in range(2):
+        write_picture(tmp_path / f"{number}.png", pattern(100 - 10 * number, 60))
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot.frame(CloseWish(), CloseWish())
+    robot.frame(CloseWish())
+    robot.frame(count=2)
+    robot.key("escape")
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+    for number in range(2):
+        robot.frame(Drop((str(tmp_path / f"{number}.png"),)))
+        robot.frame(count=2)
+    asked = robot.editor.dialogs[-1]
+    robot.click(asked.rect.x + 60, asked.rect.bottom - 36)
+    robot.until(lambda: not robot.editor.files.is_loading)
+    assert robot.editor.canvas.size == (100, 60)
+    assert not robot.editor.dialogs
+
+
+def test_a_file_that_has_been_read_waits_for_the_answer_to_a_dialog(robot: Robot, tmp_path: Path) -> None:
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    robot.frame(Key("e", True, Mods(ctrl=True)))
+    robot.editor.files.open(tmp_path / "other.png")
+    for _ in range(20):
+        robot.frame()
+        time.sleep(0.02)
+    assert isinstance(robot.editor.dialogs[-1], ExportDialog)
+    assert robot.editor.canvas.size == (240, 180)
+    robot.key("escape")
+    robot.until(lambda: not robot.editor.files.is_loading)
+    assert robot.editor.canvas.size == (100, 60)
+
+
+def test_a_message_that_comes_or_goes_by_itself_is_drawn_until_it_fits(robot: Robot) -> None:
+    messages = robot.editor.messages
+    messages.warn("A long one that takes two lines or even three of them in the panel that it stands in, and stays.")
+    robot.frame(count=10)
+    assert not robot.editor.wants_frame()
+    messages.done("Short")
+    assert robot.editor.wants_frame()
+    robot.frame(count=10)
+    rested = robot.pixels()
+    robot.frame(count=10)
+    assert np.array_equal(robot.pixels(), rested)
+    robot.frame(dt=6.0)
+    assert robot.editor.wants_frame()
 
 
 def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_path: Path) -> None:

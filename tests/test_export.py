@@ -282,6 +282,17 @@ def test_opencv_warps_by_the_map_as_we_do(device: Device, picture: Path, tmp_pat
     assert np.abs(ours - theirs)[4:-4, 4:-4].max() <= 2
 
 
+def test_a_map_as_large_as_too_large_a_picture_is_refused_before_the_work(tmp_path: Path):
+    """And the window, which has no options, names none."""
+    pixels = np.broadcast_to(np.uint8(0), (24_000, 24_000, 1))
+    job = Job(Recipe.parse(WHIRL), Picture(pixels), tmp_path, None, maps=MapOutput(tmp_path / "m.exr"))
+    with pytest.raises(UserError) as refused:
+        job.check()
+    large = "a map of 24000 x 24000 pixels"
+    assert str(refused.value) == f"the size of the result makes {large}; ask for fewer by --map-size"
+    assert refused.value.in_window == f"{large} is too large; choose a smaller size"
+
+
 def test_the_size_of_the_gpu_does_not_bound_a_map(device: Device, picture: Path):
     """Found in pieces, it is the same."""
     replay = replayed(device, WHIRL, picture, 12)

@@ -11,6 +11,7 @@ import struct
 import subprocess
 import sys
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -234,6 +235,19 @@ def packed(members: dict[str, bytes], how: int = zipfile.ZIP_DEFLATED) -> bytes:
     return data.getvalue()
 
 
+def lying_project(members: dict[str, bytes], size: int) -> bytes:
+    """A project whose recipe unpacks to `size` bytes, a whole number of MB, and to 99 by its index."""
+    packer = zlib.compressobj(1, zlib.DEFLATED, -zlib.MAX_WBITS)
+    block = packer.compress(b"#" * 2**20) + packer.flush(zlib.Z_FULL_FLUSH)
+    recipe = block * (size >> 20) + packer.flush()
+    others = {name: content for name, content in members.items() if name != "recipe.toml"}
+    data = bytearray(packed({**others, "recipe.toml": recipe}, zipfile.ZIP_STORED))
+    index = data.rfind(b"PK\1\2")
+    struct.pack_into("<H", data, index + 10, zipfile.ZIP_DEFLATED)
+    struct.pack_into("<I", data, index + 24, 99)
+    return bytes(data)
+
+
 def hostile_project(dice: random.Random, picture: bytes) -> bytes:
     """A project whose members are not what they seem."""
     members = {"format.txt": b"fluidwarp project 1\n", "recipe.toml": PLAIN.encode(), "a.png": picture}
@@ -290,22 +304,27 @@ def test_hostile_projects_are_taken_or_refused_in_a_sentence(tmp_path: Path, pic
 def test_a_project_unpacks_to_no_more_than_a_few_times_its_size(tmp_path: Path, picture: bytes):
     """By its index, and whatever its index says."""
     members = {"format.txt": b"fluidwarp project 1 ", "recipe.toml": PLAIN.encode(), "a.png": picture}
-    honest = []
-    for name, size in (("", 0), ("recipe.toml", 2**26), ("a.png", 2**28)):
-        honest.append(tmp_path / f"honest {name}.fluidwarp")
-        with zipfile.ZipFile(honest[-1], "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-            for other, content in members.items():
-                archive.writestr(other, content + b"#" * (size if other == name else 0))
-    said = opened(honest)
-    assert [bool(sentence) for sentence in said.values()] == [False, True, True]
-    assert all(path.stat().st_size < 2**22 for path in honest)
-    lying = []
-    for how, size in ((zipfile.ZIP_DEFLATED, 2**29), (zipfile.ZIP_BZIP2, 2**26), (zipfile.ZIP_LZMA, 2**26)):
-        data = packed({"format.txt": b"fluidwarp project 1", "a.png": picture, "recipe.toml": b"#" * size}, how)
-        index = data.rfind(b"PK\1\2")
-        lying.append(tmp_path / f"lying {how}.fluidwarp")
-        lying[-1].write_bytes(data[: index + 24] + struct.pack("<I", 99) + data[index + 28 :])
-    assert all(opened(lying).values())
+    made = {
+        "plain": packed(members),
+        "recipe": packed(members | {"recipe.toml": members["recipe.toml"] + b"#" * 2**24}),
+        "picture": packed(members | {"a.png": picture + b"#" * 2**24}),
+        "lying": lying_project(members, 2**29),
+    }
+    paths = [tmp_path / f"{name}.fluidwarp" for name in made]
+    for path, data in zip(paths, made.values(), strict=True):
+        assert len(data) < 2**22
+        path.write_bytes(data)
+    assert [bool(sentence) for sentence in opened(paths).values()] == [False, True, True, True]
+
+
+def test_a_project_is_packed_as_projects_are(tmp_path: Path, picture: bytes):
+    """In other ways a step of unpacking may give any number of bytes."""
+    members = {"format.txt": b"fluidwarp project 1 ", "recipe.toml": PLAIN.encode(), "a.png": picture}
+    ways = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+    paths = [tmp_path / f"{how}.fluidwarp" for how in ways]
+    for path, how in zip(paths, ways, strict=True):
+        path.write_bytes(packed(members, how))
+    assert [bool(sentence) for sentence in opened(paths).values()] == [False, False, True, True]
 
 
 # Files --------------------------------------------------------------------------------------------------------------

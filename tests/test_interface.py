@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import project as projects
+from app.maps import Displacement, write_map
 from app.pictures import Picture, write_picture
 from app.presets import PUTTY, WATER
 from app.tools import TOOLS
@@ -255,6 +255,19 @@ def test_closing_a_message_does_not_paint(robot: Robot) -> None:
     assert robot.editor.shows_ring
 
 
+def test_the_ring_is_not_drawn_around_a_pointer_on_a_message(robot: Robot) -> None:
+    robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
+    robot.frame(count=6)
+    plain, rect = robot.pixels(), robot.editor.ui.covers[-1]
+    above = slice(int(rect.y) - 40, int(rect.y) - 2), slice(int(rect.x), int(rect.right))
+    robot.move(rect.x + 60, rect.y + 6)
+    robot.frame(count=6)
+    assert np.array_equal(robot.pixels()[above], plain[above])
+    robot.move(rect.x + 60, rect.y - 20)
+    robot.frame(count=6)
+    assert not np.array_equal(robot.pixels()[above], plain[above])
+
+
 def test_cancelling_an_export_does_not_paint(robot: Robot, tmp_path: Path) -> None:
     dialog = ExportDialog(robot.editor.session, str(tmp_path))
     robot.editor.exports.start(dialog.job())
@@ -371,24 +384,25 @@ def test_the_grid_is_chosen_for_a_picture_with_another_feel_too(device: Device, 
 
     write_picture(tmp_path / "other.png", pattern(100, 60))
     robot = Robot(device, small_project(tmp_path), preferences=Preferences(auto_quality=True))
-    robot.editor.quality._speed = Speed(1.0, 1000.0, 1.0)
+    quality, speed = robot.editor.quality, Speed(1.0, 1000.0, 1.0)
+    quality._speed, quality._grid = speed, speed.best_grid  # as if it had been measured
     robot.editor.session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     robot.drop(tmp_path / "other.png")
     assert PUTTY.fits(robot.editor.session.recipe.fluid)
-    assert robot.editor.session.recipe.fluid.grid == robot.editor.quality._speed.best_grid
+    assert robot.editor.session.recipe.fluid.grid == speed.best_grid
     robot.close()
 
 
 def test_messages_of_the_window_name_no_options_of_the_command_line(robot: Robot, tmp_path: Path) -> None:
     write_picture(tmp_path / "strip.png", Picture(np.zeros((8, 400, 3), np.uint8)))
-    forward = np.zeros((18, 24, 2), np.float32)
-    np.save(tmp_path / "offsets.npy", forward)
-    projects.save(robot.editor.session.project, tmp_path / "work.fluidwarp", True)
+    write_map(tmp_path / "forward.exr", Displacement(np.zeros((180, 240, 2), np.float32), forward=True))
     robot.drop(tmp_path / "strip.png")
-    text = robot.editor.messages.shown[-1].text
-    assert "narrow" in text
-    assert "--" not in text
+    robot.drop(tmp_path / "forward.exr")
+    narrow, forward = (message.text for message in robot.editor.messages.shown)
+    assert "too narrow for a grid of 256" in narrow
+    assert "tells where each point goes" in forward
+    assert "--" not in narrow + forward
 
 
 # Small windows ------------------------------------------------------------------------------------------------------

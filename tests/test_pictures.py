@@ -347,13 +347,13 @@ def test_what_of_an_exr_is_lost_is_told(tmp_path: Path):
     assert note(OpenEXR.Part({}, rgb)) == ""
     layers = {f"layer{number}.R": plane for number in range(9)}
     said = note(OpenEXR.Part({}, {**rgb, "Z": plane}))
-    assert said == "shot.exr: its channels Z are not kept"
+    assert said == "shot.exr: its channel Z is not kept"
     said = note(OpenEXR.Part({}, {**rgb, **layers}))
     assert said == "shot.exr: its channels layer0.R, layer1.R, layer2.R, layer3.R and 5 more are not kept"
     said = note(OpenEXR.Part({"name": "left"}, rgb), OpenEXR.Part({"name": "right\x1b[31m"}, {"Z": plane}))
-    assert said == "shot.exr: its further parts right?[31m are not kept"
+    assert said == "shot.exr: its further part right?[31m is not kept"
     said = note(OpenEXR.Part({"dataWindow": window(-1, 0, 2, 4), "displayWindow": window(0, 0, 2, 4)}, rgb))
-    assert said == "shot.exr: its 1 pixels of overscan, beyond the display window, are not kept"
+    assert said == "shot.exr: its overscan (1 px beyond the display window) is not kept"
     said = note(OpenEXR.Part({"dataWindow": window(7, 9, 10, 13), "displayWindow": window(7, 9, 10, 13)}, rgb))
     assert said == "shot.exr: its display window begins at 7, 9 and is moved to 0, 0"
 
@@ -434,7 +434,7 @@ def test_what_of_a_tiff_is_lost_is_told(tmp_path: Path):
     tifffile.imwrite(
         path, np.dstack([noise(4, np.uint8), noise(2, np.uint8)]), photometric="rgb", planarconfig="contig"
     )
-    assert read_picture(path).note == "a.tif: of its 6 samples a pixel the first are taken"
+    assert read_picture(path).note == "a.tif: of its 6 samples a pixel the first 4 are taken"
     Image.frombytes("CMYK", (32, 32), bytes(32 * 32 * 4)).save(path)
     assert read_picture(path).note == "a.tif: its inks (CMYK) become RGB"
     with tifffile.TiffWriter(path) as writer:  # a smaller version of the same picture is no page of its own

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import gc
 import os
 import random
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app import locks, recovery
 from app import project as projects
-from app import recovery
 from app.document import Document
 from app.errors import UserError
 from app.history import History
@@ -226,6 +229,26 @@ def test_a_journal_torn_anywhere_gives_what_was_whole(desk: Desk) -> None:
             file.parent.mkdir()
 
 
+def test_work_that_was_restored_outlasts_a_failure_before_its_first_frame(desk: Desk) -> None:
+    desk.push()
+    desk.die()
+    journal = Journal(desk.root, found_in(desk.root).held)
+    journal.end(discard=False)
+    journal.join()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_of_work_that_was_closed_nothing_stays_in_memory(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "journals", small_project(tmp_path))
+    desk.push()
+    journal, project = desk.journal, weakref.ref(desk.project)
+    journal.end(discard=True)
+    journal.join()
+    del desk
+    gc.collect()
+    assert project() is None
+
+
 def test_a_journal_goes_on_after_it_was_restored(desk: Desk) -> None:
     """And at every moment of it there is one journal, with everything."""
     desk.push(2)
@@ -362,6 +385,17 @@ def test_a_picture_that_is_only_in_a_project_is_found_there(tmp_path: Path) -> N
         found.load()
 
 
+def test_what_is_told_of_a_damaged_project_is_in_whole_sentences(tmp_path: Path) -> None:
+    path = tmp_path / "work.fluidwarp"
+    projects.save(small_project(tmp_path), path)
+    desk = Desk(tmp_path / "journals", projects.load(path))
+    desk.push()
+    desk.die()
+    path.write_bytes(b"no project")
+    with pytest.raises(UserError, match=r"get it again\. The work on “work” is kept; put the file back"):
+        found_in(desk.root).load()
+
+
 def test_another_picture_of_the_same_name_is_noticed(desk: Desk, tmp_path: Path) -> None:
     desk.push()
     desk.die()
@@ -382,6 +416,17 @@ def test_a_folder_that_cannot_be_written_is_told_and_tried_again(desk: Desk) -> 
     desk.write()
     desk.die()
     assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_on_a_disk_without_locks_nothing_is_left(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(handle: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(locks, "_try_lock", refuse)
+    desk.push(2)
+    desk.write()
+    assert desk.journal.trouble is not None
+    assert files_in(desk.root) == []
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")

@@ -75,11 +75,11 @@ class Editor:
         )
         self.host = Host(device)
         self.ui = Ui(theme.PALETTES[self.preferences.theme], self.host.fonts, self.preferences.scale)
-        self.messages = Messages()
+        self.clock = Clock()
+        self.messages = Messages(self.clock.stir)
         self.hand = Hand(self)
         self.files = Files(self)
         self.exports = Exports(self.messages)
-        self.clock = Clock()
         self.quality = Quality(self)
         self.numbers = Numbers()
         self.recovery = Recovery(self, journals)
@@ -274,7 +274,8 @@ class Editor:
             case Focus(False):
                 self.hand.let_go()
                 self.state.before = False
-            case Drop(paths) if paths:
+            # A dialog is about the work that is open, and is answered before there is another one.
+            case Drop(paths) if paths and not self.dialogs:
                 self.files.open(Path(paths[0]))
             case CloseWish():
                 self.do("quit")
@@ -325,6 +326,7 @@ class Editor:
                 self.do(name)
         except UserError as error:
             self.messages.warn(error.in_window)
+        self.ui.end_frame()
         io = imgui.get_io()
         self._held_by_imgui = io.want_capture_mouse
         self._is_typing_now = io.want_text_input
@@ -436,7 +438,7 @@ class Editor:
 
     def _quit_unless_exporting(self) -> None:
         if self.exports.is_running:
-            self.dialogs.append(StillExporting(self.exports, self._quit))
+            self._ask(StillExporting(self.exports, self._quit))
         else:
             self._quit()
 
@@ -444,9 +446,13 @@ class Editor:
         """Do something that would lose unsaved work, once the person has said what shall become of it."""
         self.session.release()
         if self.is_dirty:
-            self.dialogs.append(Unsaved(what, then))
+            self._ask(Unsaved(what, then))
         else:
             then()
+
+    def _ask(self, question: Dialog) -> None:
+        """Ask; of the same kind the last one counts, as where a person closes the window once more."""
+        self.dialogs = [*[other for other in self.dialogs if type(other) is not type(question)], question]
 
     def copy_recipe(self) -> None:
         self.clipboard(self.session.recipe.text())

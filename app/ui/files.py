@@ -140,8 +140,10 @@ class Files:
 
     def _look_at_loading(self) -> None:
         editor, loading = self.editor, self._loading
-        # Nobody's stroke is broken off by a file that has come at last.
-        if loading is None or not loading.is_done() or editor.session.is_painting:
+        if loading is None or not loading.is_done():
+            return
+        # Nobody's stroke is broken off by a file that has come at last, nor does a dialog about the work lose it.
+        if editor.session.is_painting or (editor.dialogs and editor.session is not editor.placeholder):
             return
         self._loading = None
         if loading.error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from imgui_bundle import imgui
@@ -26,10 +27,16 @@ class Message:
 
 
 class Messages:
-    """The messages that are shown."""
+    """The messages that are shown.
 
-    def __init__(self) -> None:
+    Args:
+        changed: called when one comes or goes, as they do without anybody's hand; their windows fit themselves to
+            what is in them in the frames after that.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
         self.shown: list[Message] = []
+        self._changed = changed
 
     def say(self, text: str) -> None:
         """Something to know."""
@@ -56,6 +63,7 @@ class Messages:
                 message.left -= dt
                 if message.left <= 0:
                     self.shown.remove(message)
+                    self._changed()
 
     def draw(self, ui: Ui, canvas: Rect) -> None:
         """Draw them on the canvas, the newest lowest."""
@@ -92,3 +100,4 @@ class Messages:
 
     def _add(self, message: Message) -> None:
         self.shown = [*[other for other in self.shown if other.text != message.text][-(MOST - 1) :], message]
+        self._changed()

@@ -51,6 +51,7 @@ class Ui:
     scale: float
     density: float = 1.0
     covers: list[Rect] = field(default_factory=list)
+    _covering: list[Rect] = field(default_factory=list)  # the same of the frame that is being drawn
     _slid: tuple[str, float] = ("", -1.0)  # the slider that was let go of last, and when
     _untyped: dict[str, float] = field(default_factory=dict)  # values of sliders before one is typed
 
@@ -97,7 +98,11 @@ class Ui:
     def cover(self) -> None:
         """Take note that the window being drawn lies on the canvas."""
         place, size = imgui.get_window_pos(), imgui.get_window_size()
-        self.covers.append(Rect(place.x, place.y, size.x, size.y))
+        self._covering.append(Rect(place.x, place.y, size.x, size.y))
+
+    def end_frame(self) -> None:
+        """Everything has been drawn: what covers the canvas is known."""
+        self.covers, self._covering = self._covering, []
 
     @contextmanager
     def enabled(self, condition: bool) -> Iterator[None]:

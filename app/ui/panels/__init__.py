@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
 def draw(ui: Ui, editor: Editor) -> None:
     """Draw all panels."""
-    ui.covers.clear()
     hud.draw(ui, editor)
     strip.draw(ui, editor)
     inspector.draw(ui, editor)
