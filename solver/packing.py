@@ -13,7 +13,7 @@ from solver.gl.passes import Region
 
 
 class PackedFaces:
-    """Packed faces: u and v, 2 x 2 a texel, inside a ring of zeros (see shaders/viscosity/block.glsl)."""
+    """Packed faces: u and v, 2 x 2 a texel, inside a ring of zeros (see shaders/viscosity/operator.glsl)."""
 
     def __init__(self, device: Device, size: tuple[int, int], label: str) -> None:
         self.u = device.field(size, 4, f"{label} u")
