@@ -10,7 +10,7 @@ of which only couplings within a cluster are kept, that is of parts which someth
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -197,7 +197,7 @@ class CoarseSpace:
             felt = [self._felt(*face) for face in faces]
             parts = [face[0] for face in faces]
             is_first = [part > 0 for part in parts]
-            for later, earlier in ((later, earlier) for later in range(len(parts)) for earlier in range(later)):
+            for earlier, later in combinations(range(len(parts)), 2):
                 same = is_first[later] & is_first[earlier] & (parts[later] == parts[earlier])
                 felt[earlier] += same * felt[later]
                 is_first[later] = is_first[later] & ~same
