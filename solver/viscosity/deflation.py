@@ -10,7 +10,7 @@ of which only couplings within a cluster are kept, that is of parts which someth
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -193,38 +193,41 @@ class CoarseSpace:
             own[2, 2] += np.bincount(part.ravel(), (arm**2).ravel(), count)
         rows, columns, values = [], [], []
         for stiffness, faces in strains:
-            part = np.maximum.reduce([face[0] for face in faces])
-            alone = np.logical_and.reduce([(face[0] == part) | (face[0] == 0) for face in faces])
-            one, k = part[alone], stiffness[alone]
-            motion = np.zeros((3, len(one)))
-            for face, sign, arm, of_v in faces:
-                felt = sign * (face[alone] == one)
-                motion[0] += felt * (of_v == 0 or one > cores)
-                motion[1] += felt * (of_v == 1)
-                motion[2] += felt * arm[alone]
-            for first, second in own:
-                own[first, second] += np.bincount(one, k * motion[first] * motion[second], count)
-            # The unknowns that move a face, and by how much: across or down, and where it belongs to a core its turn.
-            moves = []
-            k = stiffness[~alone]
-            for face, sign, arm, of_v in faces:
-                part, arm = face[~alone], arm[~alone]
-                is_core = (part > 0) & (part <= cores)
-                moves.append((part, self._first[part] + of_v * is_core, np.full(part.shape, sign), part > 0))
-                moves.append((part, self._first[part] + 2, sign * arm, is_core))
-            for number, (part, row, amount, is_there) in enumerate(moves):
-                energy = k * amount
-                for other, column, other_amount, is_other in moves[number:]:
-                    at = np.nonzero(is_there & is_other & (cluster[part] == cluster[other]))[0]
-                    rows.append(row[at])
-                    columns.append(column[at])
-                    values.append((0.5 if column is row else 1.0) * energy[at] * other_amount[at])
+            # How a strain feels the three motions of each part it touches, at the first of the faces that belong to it.
+            felt = [self._felt(*face) for face in faces]
+            parts = [face[0] for face in faces]
+            is_first = [part > 0 for part in parts]
+            for earlier, later in combinations(range(len(parts)), 2):
+                same = is_first[later] & is_first[earlier] & (parts[later] == parts[earlier])
+                felt[earlier] += same * felt[later]
+                is_first[later] = is_first[later] & ~same
+            for number, part in enumerate(parts):
+                at = np.nonzero(is_first[number])[0]
+                one, motion, k = part[at], felt[number][:, at], stiffness[at]
+                for first, second in own:
+                    own[first, second] += np.bincount(one, k * motion[first] * motion[second], count)
+                for later in range(number + 1, len(parts)):
+                    both = is_first[number] & is_first[later] & (cluster[part] == cluster[parts[later]])
+                    at = np.nonzero(both)[0]
+                    one, other, k = part[at], parts[later][at], stiffness[at]
+                    for first, second in product(range(3), range(3)):
+                        there = ((one <= cores) | (first == 0)) & ((other <= cores) | (second == 0))
+                        rows.append(self._first[one[there]] + first)
+                        columns.append(self._first[other[there]] + second)
+                        energy = k * felt[number][first, at] * felt[later][second, at]
+                        values.append(energy[there])
         for (first, second), sums in own.items():
             number = np.arange(1, count if second == 0 else cores + 1)
             rows.append(self._first[number] + first)
             columns.append(self._first[number] + second)
             values.append((0.5 if first == second else 1.0) * sums[number])
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+
+    def _felt(self, part: np.ndarray, sign: float, arm: np.ndarray, of_v: int) -> np.ndarray:
+        """A face's share in a strain as its part moves across, down and turns; a run's one motion is the first."""
+        is_core = part <= self.parts.cores
+        across = np.where(is_core, 1.0 - of_v, 1.0)
+        return sign * np.stack([across, is_core * float(of_v), is_core * arm])
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """What the loads (across, down, torque) of all parts move: (a, b, turn), u = a - turn y, v = b + turn x."""

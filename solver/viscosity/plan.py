@@ -25,7 +25,7 @@ ONE_SWEEP = 4.0
 # then is less than half of that: below 1 % where the viscosity varies so much at most, and below 5 % beyond.
 MODERATE = 300.0
 TOLERANCE = 0.017
-TOLERANCE_STIFF = 0.07, 0.03  # for the softest kappa below and above ONE_SWEEP
+TOLERANCE_STIFF = 0.07, 0.036  # for the softest kappa below and above ONE_SWEEP
 # Iterations at most: only rounding errors, at contrasts beyond 1e8, can ask for more.
 MOST_ITERATIONS = 30
 

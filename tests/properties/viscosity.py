@@ -159,7 +159,7 @@ def check_viscous_step(device: Device, seed: int) -> dict[str, float]:
     told = f"seed {seed}: {kind}, {size}, contrast {contrast:g}, kappa {softest:g}: {left:.4f} in {iterations}"
     assert np.isfinite(found).all(), told
     assert left < min(ERROR.get(contrast, np.inf), nothing), told
-    assert iterations <= ITERATIONS[softest], told
+    assert iterations <= ITERATIONS[softest] or contrast not in ERROR, told
     return {"error": left, "doing nothing": nothing, "iterations": iterations}
 
 
