@@ -18,6 +18,21 @@ MAY_IMPORT = {
     "app": {"app", "solver", "shaders", "assets"},
     "app/ui": {"app", "solver", "shaders", "assets"},
 }
+# Each room of the solver and the rooms that it may look into; `test_the_rooms_are_in_order` holds that there is no circle.
+SOLVER = {
+    "gl": set[str](),
+    "grid": set[str](),
+    "params": set[str](),
+    "packing": {"gl"},
+    "pressure": {"gl", "packing"},
+    "viscosity": {"gl", "packing", "params"},
+    "scheme": {"gl", "grid", "params"},
+    "fluid": {"gl", "grid", "params", "packing", "pressure", "viscosity", "scheme"},
+    "warp": {"gl", "grid", "scheme", "fluid"},
+    "paper": {"gl", "grid", "params", "scheme", "warp"},
+    "brush": {"gl", "grid", "scheme", "warp"},
+    "resample": {"gl", "warp"},
+}
 TOOLKITS = {"glfw", "imgui_bundle"}
 MODEL = ("recipe", "schema", "strokes", "forces", "masks", "timelaws", "timeline", "history", "document")
 
@@ -45,6 +60,25 @@ def test_imports_run_one_way(folder: str):
             assert top not in OURS or top in MAY_IMPORT[folder], f"{path} imports {name}"
             if folder != "app/ui":
                 assert top not in TOOLKITS, f"{path} imports {name}"
+
+
+def test_the_rooms_of_the_solver_look_one_way():
+    for path in (ROOT / "solver").rglob("*.py"):
+        room = path.relative_to(ROOT / "solver").parts[0].removesuffix(".py")
+        if room == "__init__":
+            continue
+        for name in imported(path):
+            if name.startswith("solver."):
+                assert name.split(".")[1] in {room, *SOLVER[room]}, f"{path} imports {name}"
+
+
+def test_the_rooms_are_in_order():
+    passed: set[str] = set()
+    for room, others in SOLVER.items():
+        assert others <= passed, f"{room} looks into what comes after it"
+        passed.add(room)
+    names = {path.name.removesuffix(".py") for path in (ROOT / "solver").iterdir()}
+    assert passed == {name for name in names if not name.startswith(("__", "README", "py.typed"))}
 
 
 def test_only_the_window_is_imported_by_name():
