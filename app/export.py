@@ -132,7 +132,7 @@ class Job:
         Raises:
             UserError: naming the file and the mend.
         """
-        check_picture(self.picture, self.recipe.fluid.grid)
+        check_picture(self.picture)
         if self.output is not None:
             check_output(
                 self.output,

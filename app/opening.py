@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from contextlib import closing
 from dataclasses import dataclass
@@ -12,9 +11,9 @@ from pathlib import Path
 from app.errors import UserError
 from app.pictures import FORMATS, MAX_PIXELS, OTHERS, Picture, read_picture
 from app.project import Project, is_project, load
-from app.recipe import FINEST_GRID, Recipe
+from app.recipe import Recipe
 from app.video import Clip, read_clip
-from solver.grid import SMALLEST_GRID
+from solver.grid import MOST_ALONG, SMALLEST_GRID
 
 SMALLEST_SIDE = 8  # pixels
 PICTURE_ENDINGS = (*FORMATS, ".gif", ".bmp", *OTHERS)
@@ -45,22 +44,18 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
     return Source(Picture(first, note=clip.note), clip)
 
 
-def check_picture(picture: Picture, cells: int) -> None:
-    """Make sure that a picture can be covered by square cells, `cells` of them along its longer side.
+def check_picture(picture: Picture) -> None:
+    """Make sure that a picture can be covered by cells that are about square.
 
     Raises:
-        UserError: if it is too small, or too narrow for that many.
+        UserError: if it is too small or too narrow for any grid.
     """
     shorter, longer = sorted((picture.width, picture.height))
     size = f"the picture is {picture.width} x {picture.height} pixels"
     if shorter < SMALLEST_SIDE:
         raise UserError(f"{size}; a side must have at least {SMALLEST_SIDE}, so enlarge or crop it")
-    if cells * shorter < (SMALLEST_GRID - 0.5) * longer:
-        needed = math.ceil(SMALLEST_GRID * longer / shorter)
-        if needed > FINEST_GRID:
-            raise UserError(f"{size}, too narrow for any grid; crop it")
-        narrow = f"{size}, too narrow for a grid of {cells}"
-        raise UserError(f"{narrow}; use --grid {needed} or more, or crop it", in_window=f"{narrow}; crop it")
+    if SMALLEST_GRID * longer > MOST_ALONG * shorter:
+        raise UserError(f"{size}, too narrow for any grid; crop it")
 
 
 @dataclass(frozen=True)

@@ -186,7 +186,6 @@ BAD = {
     "1 x 1": (["a.toml", "-i", "dot.png", "-o", "x.png"], "1 x 1 pixels"),
     "1 x 5000": (["a.toml", "-i", "line.png", "-o", "x.png"], "1 x 5000 pixels"),
     "too narrow for any": (["a.toml", "-i", "thread.png", "-o", "x.png"], "too narrow for any grid; crop it"),
-    "too narrow": (["a.toml", "-i", "strip.png", "-o", "x.png"], "--grid 160"),
     "unknown ending": (["a.toml", "-o", "x.xyz"], "x.xyz"),
     "no ending": (["a.toml", "-o", "x"], "Cannot write x"),
     "an unknown video": (["a.toml", "-o", "x.avi"], ".exr, an animation's in .mp4"),

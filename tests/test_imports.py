@@ -18,7 +18,7 @@ MAY_IMPORT = {
     "app": {"app", "solver", "shaders", "assets"},
     "app/ui": {"app", "solver", "shaders", "assets"},
 }
-# Each room of the solver and the rooms that it may look into; `test_the_rooms_are_in_order` holds that there is no circle.
+# Each room of the solver and the rooms that it may look into, in an order without circles.
 SOLVER = {
     "gl": set[str](),
     "grid": set[str](),

@@ -103,7 +103,7 @@ class Files:
 
         def load() -> Project:
             project = found.load()
-            check_picture(project.picture, project.recipe.fluid.grid)
+            check_picture(project.picture)
             return project
 
         self._open(found.file, load, found)
@@ -329,7 +329,7 @@ def load_any(path: Path, fluid: dict[str, Any] | None = None) -> Project:
         project = projects.load(path)
     else:
         project = projects.from_picture(path, fresh_recipe(fluid))
-    check_picture(project.picture, project.recipe.fluid.grid)
+    check_picture(project.picture)
     return project
 
 

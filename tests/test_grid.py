@@ -1,0 +1,83 @@
+"""The grid covers exactly the picture, whatever its aspect and however many cells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.export import displacement
+from app.pictures import Picture
+from app.recipe import Recipe
+from app.replay import Replay
+from app.sampling import Pictures
+from solver.gl.device import Device
+from solver.grid import MOST_ALONG, SMALLEST_GRID, Grid
+
+SIZES = [(1500, 1000), (451, 300), (300, 451), (601, 599), (97, 1000), (4000, 9), (8, 4000), (12, 12)]
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize("cells", [8, 57, 128, 1000])
+def test_a_grid_covers_the_picture(size: tuple[int, int], cells: int):
+    grid = Grid.for_picture(*size, cells)
+    longer = max(size)
+    assert grid.extent == (size[0] / longer, size[1] / longer)
+    assert min(grid.size) >= SMALLEST_GRID
+    assert max(grid.size) == cells or max(grid.size) <= MOST_ALONG
+    (hx, hy), (x, y) = grid.spacing, grid.centres()
+    assert hx * grid.nx == pytest.approx(grid.extent[0])
+    assert hy * grid.ny == pytest.approx(grid.extent[1])
+    # Cells are about square: rounding to 8 or more of them is off by a sixteenth at most.
+    assert 0.9 < hx / hy < 1.1
+    assert x[0, 0] == pytest.approx(hx / 2)
+    assert y[-1, -1] == pytest.approx(grid.extent[1] - hy / 2)
+
+
+def test_what_is_no_picture_is_refused():
+    with pytest.raises(ValueError, match="below 8 x 8"):
+        Grid(7, 20)
+    for extent in ((1.0, 0.0), (0.5, 0.5), (1.0, 2.0)):
+        with pytest.raises(ValueError, match="the longer must be 1"):
+            Grid(8, 8, extent)
+
+
+@pytest.mark.parametrize("size", [(331, 200), (200, 337)], ids=str)
+def test_the_warp_converges_where_no_grid_divides_the_picture(device: Device, size: tuple[int, int]):
+    """Grids whose shorter side is rounded differently see the same domain: order 1.5 or better."""
+    text = """
+duration = 0.5
+[fluid]
+grid = {}
+viscosity = 0.002
+[[force]]
+kind = "vortex"
+point = [0.4, 0.45]
+radius = 0.35
+strength = 4.0
+at = 0.0
+"""
+    maps = []
+    for cells in (48, 96, 288):
+        pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
+        replay = Replay(device, Recipe.parse(text.format(cells)), pictures)
+        replay.seek(replay.recipe.ticks)
+        maps.append(displacement(replay, size).values.astype(np.float64))
+        replay.release()
+    coarse, fine = (float(np.sqrt(((some - maps[2]) ** 2).mean())) for some in maps[:2])
+    assert np.log2(coarse / fine) > 1.5, (coarse, fine)
+
+
+def test_a_narrow_strip_is_warped(device: Device, tmp_path: Path):
+    """More cells along it than were asked for, so that there are enough across."""
+    pictures = Pictures(Picture(np.zeros((12, 600, 3), np.uint8)))
+    replay = Replay(
+        device, Recipe.parse('[fluid]\ngrid = 16\n[[force]]\nkind = "vortex"\npoint = [0.5, 0.5]\nat = 0.0'), pictures
+    )
+    replay.seek(10)
+    assert replay.grid.size == (400, 8)
+    found = displacement(replay, (600, 12)).values
+    assert np.isfinite(found).all()
+    assert np.abs(found).max() > 1e-4
+    replay.release()
