@@ -82,7 +82,7 @@ def _fail(message: str, status: int) -> NoReturn:
 def _tell(*lines: str) -> None:
     """Say what the user should hear of, a line each, on stderr."""
     for line in filter(None, lines):
-        print(f"fluidwarp: {shown(' '.join(line.split()))}", file=sys.stderr)
+        print(f"fluidwarp: {shown(line)}", file=sys.stderr)
 
 
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="What to write; its ending says how.")]
