@@ -19,7 +19,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.files import replacing
-from app.inputs import open_input
+from app.inputs import read_start
 
 EXR_LAYOUT = frozenset({"version", "chunkCount", "maxSamplesPerPixel", "dwaCompressionLevel"})
 
@@ -252,8 +252,7 @@ def read_picture(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> 
 
 def _head(file: Path) -> bytes:
     """The first bytes of a file that is there and not empty."""
-    with open_input(file, "picture") as stream:
-        head = stream.read(16)
+    head = read_start(file, "picture", 16)
     if not head:
         raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
     return head

@@ -183,6 +183,15 @@ SMALL_AND_HARMFUL = {
     "no such date": ("name = 2024-13-41", "is not valid TOML"),
     "unclosed quotes": ('name = "' + '\\"' * 50_000, "is not valid TOML"),
     "spaces in a list": ("nope = [\n[" + " " * 99_000 + "\n]]", "line 1: unknown key 'nope'"),
+    "texts without an end": ('a = """\\""\n' + '\\"""\\""\n' * 140_000, "is not valid TOML: Unterminated string"),
+    "faulty tables": ("force = [" + "{}," * 60_000 + "]", "line 1: force[1]: 'kind' must be one of"),
+    "faulty lists": ("force = [" + "[1]," * 1_000_000 + "]", "line 1: 'force[1]' must be a table"),
+    "faulty samples": (
+        "[[stroke]]\ntool = 'push'\nsamples = [" + "[1]," * 1_000_000 + "]",
+        "line 3: stroke[1]: 'samples[1][2]' is missing",
+    ),
+    "tables in plenty": ("nope = [" + "{}," * 1_000_000 + "]", "line 1: the 200001th of its keys, values and brackets"),
+    "keys in plenty": ("".join(f"a{key} = 1\n" for key in range(200_000)), "of its keys, values and brackets"),
     "formula": (
         "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\nformula = '" + "~" * 499 + "1'",
         "not allowed in a formula",
@@ -347,6 +356,17 @@ READERS: dict[str, Callable[[Path], object]] = {
 def test_only_ordinary_files_are_opened(endless: Callable[[str], Path], name: str):
     path = endless(name)
     with pytest.raises(UserError, match=rf"Cannot read {path}: it is a pipe or a device; save it as an ordinary file"):
+        READERS[name](path)
+    assert holds(path) in ("picture", "map")
+    assert is_project(path) == (path.suffix == ".fluidwarp")
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_file_that_cannot_be_read_to_its_end_is_told(tmp_path: Path, name: str):
+    """As on a bad disk: the first page of a process's memory is never there."""
+    path = tmp_path / name
+    path.symlink_to("/proc/self/mem")
+    with pytest.raises(UserError, match=f"{path}"):
         READERS[name](path)
     assert holds(path) in ("picture", "map")
     assert is_project(path) == (path.suffix == ".fluidwarp")
