@@ -342,6 +342,8 @@ def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
         try:
             headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
             shape, _, kind = headers[np.lib.format.read_magic(stream)](stream)
+            if any(isinstance(side, bool) for side in shape):  # Python's whole numbers, but not NumPy's
+                raise ValueError(f"its shape is {shape}")
         except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error

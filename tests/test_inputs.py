@@ -477,3 +477,24 @@ def test_names_reach_the_terminal_escaped_and_shortened(tmp_path: Path):
     ran = fluidwarp("x" * 100_000, "-o", "out.png")
     assert ran.returncode == 1
     assert len(ran.stderr) < MOST_SHOWN + 50
+
+
+TOO_LONG = [
+    ["-o", "o" * 300 + ".png"],
+    ["-o", "o.png", "--states", "s" * 300],
+    ["-o", "o.mp4", "--frames", "9" * 5000],
+    ["-o", "o.mp4", "--frames", "0-" + "9" * 5000],
+]
+
+
+@pytest.mark.parametrize("words", TOO_LONG)
+def test_what_is_too_long_is_told(tmp_path: Path, words: list[str]):
+    write_picture(tmp_path / "cat.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    (tmp_path / "a.toml").write_text("duration = 0.02\n[fluid]\ngrid = 16\n")
+    command = [sys.executable, "-m", "app", "render", "a.toml", "-i", "cat.png", *words]
+    ran = subprocess.run(
+        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert ran.returncode == 1
+    assert "a mistake in fluidwarp" not in ran.stderr
+    assert words[-1][:50] in ran.stderr
