@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import math
 import os
 import re
 import struct
@@ -511,6 +512,9 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
         samples = [axis for axis in page.axes if axis in "YXS"]
         if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
             raise UserError(f"Cannot read {file}: a TIFF with the axes {page.axes} is no picture; save one page of it.")
+        pieces = math.prod(page.chunked)
+        if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
+            raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
         losses = _tiff_losses(tiff)
         pixels = page.asarray()
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
