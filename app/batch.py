@@ -181,7 +181,7 @@ def spread(task: Task, pictures: Sequence[Path]) -> list[Task]:
     recipe = str(Path(task.recipe).absolute()) if os.path.exists(task.recipe) else task.recipe
     output = task.output
     folder = output if NAME not in str(output) else None
-    if folder is not None and folder.suffix and not folder.is_dir():
+    if folder is not None and folder.suffix and not os.path.isdir(folder):
         raise UserError(f"{len(pictures)} pictures cannot all become {output}; write a folder, or out/{NAME}.png")
     for path in (task.stats, task.maps and task.maps.path):
         if path is not None and NAME not in str(path) and len(pictures) > 1:

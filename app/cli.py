@@ -240,7 +240,7 @@ def render(
 
 
 def _is_folder(output: Path) -> bool:
-    return output.is_dir() or output.suffix == ""
+    return os.path.isdir(output) or output.suffix == ""
 
 
 def _part(frames: str | None) -> tuple[int, int | None]:
@@ -248,7 +248,9 @@ def _part(frames: str | None) -> tuple[int, int | None]:
     if frames is None:
         return 0, None
     first, dash, last = frames.partition("-")
-    if not first.isdecimal() or (last and not last.isdecimal()) or (last and int(last) < int(first)):
+    numbers = [number for number in (first, last) if number]
+    whole = first and all(number.isdecimal() and len(number) < 16 for number in numbers)
+    if not whole or (last and int(last) < int(first)):
         raise UserError(f"--frames must be like 0-99, 100- or 7, not {frames}")
     return int(first), (int(last) if last else None if dash else int(first))
 

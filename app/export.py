@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import gc
 import json
+import os
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -157,7 +158,7 @@ class Job:
         for path in (self.output, self.stats, self.maps and self.maps.path):
             if path is not None:
                 writable(path)
-        if self.states is not None and self.states.exists() and not self.states.is_dir():
+        if self.states is not None and os.path.exists(self.states) and not os.path.isdir(self.states):
             raise cannot_write(self.states, FileExistsError(errno.EEXIST, "it is a file"))
 
     def _check_map_size(self, maps: MapOutput) -> None:

@@ -29,7 +29,7 @@ from app.sampling import (
     places,
     to_grid,
 )
-from app.schema import Radius
+from app.schema import Radius, Several
 from app.timelaws import Law, Timed
 from solver.grid import Grid
 
@@ -115,7 +115,7 @@ class CurveForce(_Force):
     """
 
     kind: Literal["curve"]
-    points: tuple[Point, ...]
+    points: Several[Point]
     spline: bool = False
     direction: Literal["tangent", "normal"] | tuple[float, float] = "tangent"
     radius: Radius = 0.05

@@ -46,14 +46,19 @@ def _without_waiting(path: str, flags: int) -> int:
 
 def read_input(path: str | os.PathLike[str], kind: str, most: int) -> bytes:
     """All of an ordinary file of no more than `most` bytes. Raises `UserError`."""
-    with open_input(path, kind, most) as stream:
-        try:
-            data = stream.read(most + 1)
-        except OSError as error:
-            raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
+    data = read_start(path, kind, most + 1, most)
     if len(data) > most:  # it grew, or is one of the system's files whose size is told as 0
         raise _too_large(path, kind, most)
     return data
+
+
+def read_start(path: str | os.PathLike[str], kind: str, count: int, most: int | None = None) -> bytes:
+    """The first `count` bytes of an ordinary file of no more than `most`, or all that it has. Raises `UserError`."""
+    with open_input(path, kind, most) as stream:
+        try:
+            return stream.read(count)
+        except OSError as error:  # of the disk or the network, or of a file of the system's that cannot be read
+            raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
 
 
 def _check(path: str | os.PathLike[str], status: os.stat_result, kind: str, most: int | None) -> None:

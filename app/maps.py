@@ -16,7 +16,7 @@ import numpy as np
 from app.animation import sequence_writer
 from app.errors import UserError
 from app.files import replacing
-from app.inputs import open_input
+from app.inputs import open_input, read_start
 from app.pictures import MAX_PIXELS, check_size, exr_channels, read_exr, read_picture, write_exr
 from app.progress import never
 
@@ -323,8 +323,9 @@ def _check_finite(path: str | os.PathLike[str], values: np.ndarray) -> None:
 
 
 def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
+    head = read_start(file, "map", 12)
     with open_input(file, "map") as stream:
-        head = stream.read(12)
+        stream.seek(len(head))
         width, height = (int(side) for side in np.frombuffer(head[4:12].ljust(8, b"\0"), "<i4"))
         if len(head) < 12 or np.frombuffer(head[:4], "<f4")[0] != FLO_MAGIC or min(width, height) < 1:
             raise UserError(f"Cannot read {file}: it is no Middlebury .flo file.")
@@ -341,6 +342,8 @@ def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
         try:
             headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
             shape, _, kind = headers[np.lib.format.read_magic(stream)](stream)
+            if any(isinstance(side, bool) for side in shape):  # Python's whole numbers, but not NumPy's
+                raise ValueError(f"its shape is {shape}")
         except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error

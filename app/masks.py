@@ -36,7 +36,7 @@ from app.sampling import (
     quantised,
     to_grid,
 )
-from app.schema import Fraction01, Model, Radius
+from app.schema import Fraction01, Model, Radius, Several
 from solver.grid import Grid
 
 MOST_VISCOUS = 1e6
@@ -134,7 +134,7 @@ class _Path(_Layer):
     """
 
     kind: Literal["path"]
-    points: Annotated[tuple[Point, ...], Field(min_length=1)]
+    points: Annotated[Several[Point], Field(min_length=1)]
     radius: Radius = 0.08
     hardness: Fraction01 = 0.5
 

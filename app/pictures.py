@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import math
 import os
 import re
 import struct
@@ -19,7 +20,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.files import replacing
-from app.inputs import open_input
+from app.inputs import read_start
 
 EXR_LAYOUT = frozenset({"version", "chunkCount", "maxSamplesPerPixel", "dwaCompressionLevel"})
 
@@ -252,8 +253,7 @@ def read_picture(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> 
 
 def _head(file: Path) -> bytes:
     """The first bytes of a file that is there and not empty."""
-    with open_input(file, "picture") as stream:
-        head = stream.read(16)
+    head = read_start(file, "picture", 16)
     if not head:
         raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
     return head
@@ -517,6 +517,9 @@ def _read_tiff(file: Path, name: str, max_pixels: int) -> Picture:
         samples = [axis for axis in page.axes if axis in "YXS"]
         if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
             raise UserError(f"Cannot read {file}: a TIFF with the axes {page.axes} is no picture; save one page of it.")
+        pieces = math.prod(page.chunked)
+        if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
+            raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
         losses = _tiff_losses(tiff)
         pixels = page.asarray()
         photometric = tifffile.PHOTOMETRIC(page.photometric).name

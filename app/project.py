@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.errors import UserError
+from app.errors import UserError, shown
 from app.files import replacing
 from app.inputs import MOST_TEXT, Archive, open_input, read_input
 from app.leftovers import temporary_folder
@@ -168,7 +168,7 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     try:
         picture = read_picture(source, max_pixels)
     except UserError as error:  # the temporary folder is nobody's business
-        raise UserError(str(error).replace(str(source), f"{recipe.picture} in {path}")) from None
+        raise UserError(str(error).replace(shown(str(source)), f"{recipe.picture} in {path}")) from None
     return Project(recipe, picture, data, folder, path, keeper=keeper)
 
 
@@ -198,7 +198,7 @@ def _referring(project: Project, path: Path) -> Recipe:
     names = {}
     for name in picture_names(project.recipe):
         target = (project.folder / name).resolve()
-        if not target.exists():
+        if not os.path.exists(target):
             raise UserError(f"Cannot refer to {target}: it is gone; keep the picture in the project instead")
         try:
             names[name] = os.path.relpath(target, path.resolve().parent)

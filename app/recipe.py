@@ -14,7 +14,7 @@ from app.files import replacing
 from app.forces import Force
 from app.inputs import MOST_TEXT, read_input
 from app.masks import FreezeLayer, ViscosityLayer
-from app.schema import FileName, Model, Place, Radius, complaint, frozen, plain
+from app.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
 from app.strokes import Change, Stroke
 
 VERSION = 1
@@ -56,7 +56,7 @@ class Density(Model):
     """
 
     kappa: Annotated[float, Field(ge=0, le=1000)] = 0.0
-    source: tuple[Annotated[float, Field(ge=-1000, le=1000)], ...] = (0.0, 0.0, 0.0)
+    source: Several[Annotated[float, Field(ge=-1000, le=1000)]] = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")
     def _three(self) -> Self:
@@ -102,7 +102,7 @@ class Stop(Model):
     speed_below: Annotated[float, Field(gt=0)] | None = None
     displacement_above: Annotated[float, Field(gt=0)] | None = None
     det_below: Annotated[float, Field(lt=1)] | None = None
-    watch: tuple[Watch, ...] = ()
+    watch: Several[Watch] = ()
 
 
 class Playback(Model):
@@ -174,11 +174,11 @@ class Recipe(Model):
     stop: Stop = Stop()
     time: Playback = Playback()
     output: Output = Output()
-    viscosity: tuple[ViscosityLayer, ...] = ()
-    freeze: tuple[FreezeLayer, ...] = ()
-    force: tuple[Force, ...] = ()
-    change: tuple[Change, ...] = ()
-    stroke: tuple[Stroke, ...] = ()
+    viscosity: Several[ViscosityLayer] = ()
+    freeze: Several[FreezeLayer] = ()
+    force: Several[Force] = ()
+    change: Several[Change] = ()
+    stroke: Several[Stroke] = ()
 
     @model_validator(mode="after")
     def _affordable(self) -> Self:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from app.schema import Fraction01, Model, Place, Radius
+from app.schema import Fraction01, Model, Place, Radius, Several
 
 Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
 Tick = Annotated[int, Field(ge=0, le=10_000_000)]
@@ -46,7 +46,7 @@ class Stroke(Model):
     hardness: Fraction01 = 0.5
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0
     reverse: bool = False
-    samples: Annotated[tuple[Sample, ...], Field(min_length=1)]
+    samples: Annotated[Several[Sample], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

@@ -16,6 +16,7 @@ DEEPEST = 16  # brackets within each other
 MOST_PARTS = 16  # of a dotted key
 LONGEST_WORD = 200  # characters of a number, or of a key without quotes
 LONGEST_STRING = 10_000
+MOST_WORDS = 200_000  # keys, values and brackets, but for those of lists of numbers; a stroke has about 20
 
 _NUMBER = r"[+-]?[0-9][0-9_.eE+-]{0,40}+"
 # Every repetition keeps what it has taken (its second +), so that the time is proportional to the length of the text.
@@ -24,8 +25,9 @@ _TOKENS = re.compile(
     (?:\[\ *+(?:{_NUMBER}\ *+,\ *+){{0,15}}+{_NUMBER}\ *+\]\ *+,?\ *+)++  # lists of numbers: nearly all of a recipe
     | (?P<word> [\w+:-]++)
     | (?P<string> \"{{3}}(?:[^"\\]|\\.|"(?!""))*+"{{3,5}} | '{{3}}(?:[^']|'(?!''))*+'{{3,5}}
-        | "(?:[^"\\\n]|\\[^\n])*+" | '[^'\n]*+')
-    | (?P<unfinished> ["'])
+        # Three quotes without an end are no empty text and a quote, or what follows would be searched again and again.
+        | (?!\"{{3}}|'{{3}}) (?: "(?:[^"\\\n]|\\[^\n])*+" | '[^'\n]*+'))
+    | (?P<unfinished> \"{{3}} | '{{3}} | ["'])
     | \#[^\n]*+
     | (?P<mark> [][{{}}.,=\n])
     """,
@@ -53,9 +55,12 @@ def _check(text: str, source: str) -> None:
         line = text.count("\n", 0, at) + 1
         return UserError(f"{source}, line {line}: {what}, which is more than any recipe needs; get it again")
 
-    depth = dots = 0
+    depth = dots = words = 0
     for token in _TOKENS.finditer(text):
         kind, length = token.lastgroup, token.end() - token.start()
+        words += kind in ("word", "string") or token[0] in ("[", "{")
+        if words > MOST_WORDS:
+            raise refuse(token.start(), f"the {words}th of its keys, values and brackets")
         if kind == "word" and length > LONGEST_WORD:
             raise refuse(token.start(), f"a number or a key of {length} characters")
         elif kind == "string" and length > LONGEST_STRING:

@@ -14,7 +14,7 @@ import numpy as np
 
 from app import ffmpeg
 from app.errors import UserError
-from app.inputs import open_input
+from app.inputs import read_start
 from app.pictures import MAX_PIXELS, check_size, lost
 from app.progress import never
 
@@ -189,9 +189,8 @@ def _late(told: str, video: str) -> float:
 
 def _banner(file: Path) -> str:
     """What ffmpeg says of a file it opens; imageio-ffmpeg brings no ffprobe."""
-    with open_input(file, "video") as stream:
-        if not stream.read(1):
-            raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
+    if not read_start(file, "video", 1):
+        raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
     command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}"]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     return done.stderr.decode("utf-8", "replace")

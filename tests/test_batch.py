@@ -368,7 +368,7 @@ def test_a_scheduler_without_workers_and_one_that_dies_are_told(folder: Path):
     found = re.fullmatch(
         rf"fluidwarp: the Dask scheduler at {address} is gone; (\d) of 6 pictures are written, and its workers may "
         r"still finish what they have in hand; start it again, and then this for the others\n",
-        told,
+        told.splitlines(keepends=True)[-1],  # before it, what was written had folds to tell of
     )
     assert found, told
     assert 2 <= int(found[1]) <= len(finished(folder / "out")) < 6

@@ -184,6 +184,15 @@ SMALL_AND_HARMFUL = {
     "no such date": ("name = 2024-13-41", "is not valid TOML"),
     "unclosed quotes": ('name = "' + '\\"' * 50_000, "is not valid TOML"),
     "spaces in a list": ("nope = [\n[" + " " * 99_000 + "\n]]", "line 1: unknown key 'nope'"),
+    "texts without an end": ('a = """\\""\n' + '\\"""\\""\n' * 140_000, "is not valid TOML: Unterminated string"),
+    "faulty tables": ("force = [" + "{}," * 60_000 + "]", "line 1: force[1]: 'kind' must be one of"),
+    "faulty lists": ("force = [" + "[1]," * 1_000_000 + "]", "line 1: 'force[1]' must be a table"),
+    "faulty samples": (
+        "[[stroke]]\ntool = 'push'\nsamples = [" + "[1]," * 1_000_000 + "]",
+        "line 3: stroke[1]: 'samples[1][2]' is missing",
+    ),
+    "tables in plenty": ("nope = [" + "{}," * 1_000_000 + "]", "line 1: the 200001th of its keys, values and brackets"),
+    "keys in plenty": ("".join(f"a{key} = 1\n" for key in range(200_000)), "of its keys, values and brackets"),
     "formula": (
         "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\nformula = '" + "~" * 499 + "1'",
         "not allowed in a formula",
@@ -371,6 +380,17 @@ def test_only_ordinary_files_are_opened(endless: Callable[[str], Path], name: st
     assert is_project(path) == (path.suffix == ".fluidwarp")
 
 
+@pytest.mark.parametrize("name", READERS)
+def test_a_file_that_cannot_be_read_to_its_end_is_told(tmp_path: Path, name: str):
+    """As on a bad disk: the first page of a process's memory is never there."""
+    path = tmp_path / name
+    path.symlink_to("/proc/self/mem")
+    with pytest.raises(UserError, match=f"{path}"):
+        READERS[name](path)
+    assert holds(path) in ("picture", "map")
+    assert is_project(path) == (path.suffix == ".fluidwarp")
+
+
 def test_files_are_of_a_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = tmp_path / "a.toml"
     with path.open("wb") as stream:
@@ -476,3 +496,24 @@ def test_names_reach_the_terminal_escaped_and_shortened(tmp_path: Path):
     ran = fluidwarp("x" * 100_000, "-o", "out.png")
     assert ran.returncode == 1
     assert len(ran.stderr) < MOST_SHOWN + 50
+
+
+TOO_LONG = [
+    ["-o", "o" * 300 + ".png"],
+    ["-o", "o.png", "--states", "s" * 300],
+    ["-o", "o.mp4", "--frames", "9" * 5000],
+    ["-o", "o.mp4", "--frames", "0-" + "9" * 5000],
+]
+
+
+@pytest.mark.parametrize("words", TOO_LONG)
+def test_what_is_too_long_is_told(tmp_path: Path, words: list[str]):
+    write_picture(tmp_path / "cat.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    (tmp_path / "a.toml").write_text("duration = 0.02\n[fluid]\ngrid = 16\n")
+    command = [sys.executable, "-m", "app", "render", "a.toml", "-i", "cat.png", *words]
+    ran = subprocess.run(
+        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert ran.returncode == 1
+    assert "a mistake in fluidwarp" not in ran.stderr
+    assert words[-1][:50] in ran.stderr

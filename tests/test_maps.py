@@ -282,6 +282,10 @@ def test_what_is_no_map(tmp_path: Path):
     np.save(tmp_path / "a.npy", np.array([{}]), allow_pickle=True)
     with pytest.raises(UserError, match=r"this one is object \(1,\)"):
         read_map(tmp_path / "a.npy")
+    header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (True, 4, 2)}\n"
+    (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\1\0" + len(header).to_bytes(2, "little") + header + bytes(32))
+    with pytest.raises(UserError, match=r"it is no NumPy array, or truncated \(its shape is \(True, 4, 2\)\)"):
+        read_map(tmp_path / "a.npy")
     with pytest.raises(UserError, match=r"b\.npy: there is no such file; check the name\.$"):
         read_map(tmp_path / "b.npy")
     write_map(tmp_path / "b.tif", identity(8, 8))

@@ -709,3 +709,17 @@ def test_other_formats_in_their_depth(tmp_path: Path):
     (tmp_path / "deep.ppm").write_bytes(b"P6\n# by hand\n4 4\n65535\n" + bytes(96))
     with pytest.raises(UserError, match="16-bit colours"):
         read_picture(tmp_path / "deep.ppm")
+
+
+def test_a_tiff_that_lacks_strips_is_told_and_not_filled(tmp_path: Path):
+    """However many it claims: a few hundred bytes would become gigabytes of zeros."""
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, np.full((16, 16, 3), 7, np.uint8), photometric="rgb", compression="zlib", rowsperstrip=8)
+    read_picture(path)
+    data = bytearray(path.read_bytes())
+    with tifffile.TiffFile(path) as tiff:
+        place = tiff.pages.first.tags["ImageLength"].valueoffset
+    data[place : place + 2] = (8000).to_bytes(2, "little")
+    path.write_bytes(data)
+    with pytest.raises(UserError, match=r"a\.tif: the TIFF file is truncated .*it has 2 of its 1000 strips or tiles"):
+        read_picture(path)

@@ -81,6 +81,17 @@ def test_a_project_cut_short_says_so(made: Project, tmp_path: Path, part: float)
         projects.load(path)
 
 
+def test_the_temporary_folder_is_not_told_whatever_the_name_of_the_picture(made: Project, tmp_path: Path) -> None:
+    path = tmp_path / "work.fluidwarp"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("format.txt", "fluidwarp project 1\n")
+        archive.writestr("recipe.toml", 'picture = "\\u001b[31mx.png"')
+        archive.writestr("\x1b[31mx.png", b"none")
+    with pytest.raises(UserError) as caught:
+        projects.load(path)
+    assert str(caught.value).startswith(rf"Cannot read \x1b[31mx.png in {path}: it is no picture")
+
+
 def test_a_bomb_is_refused_before_it_is_unpacked(made: Project, tmp_path: Path) -> None:
     path = tmp_path / "work.fluidwarp"
     projects.save(made, path)

@@ -47,7 +47,7 @@ class Browser(Dialog):
         self._chosen = chosen
         self._selected: Path | None = None
         self._confirm = False
-        self.go(folder if folder.is_dir() else Path.home())
+        self.go(folder if os.path.isdir(folder) else Path.home())
 
     def go(self, folder: Path) -> None:
         """Show another folder."""
@@ -69,9 +69,9 @@ class Browser(Dialog):
         entered, self.typed = imgui.input_text("##folder", self.typed, imgui.InputTextFlags_.enter_returns_true)
         if entered:
             typed = Path(self.typed).expanduser()
-            if typed.is_dir():
+            if os.path.isdir(typed):  # unlike Path's own, no error where a name is too long
                 self.go(typed)
-            elif typed.exists() or self.writes:
+            elif os.path.exists(typed) or self.writes:
                 return not self._take(typed)
         foot = ui.px(88 if self.writes else 48)
         imgui.begin_child("files", ImVec2(0, -foot))
@@ -127,7 +127,7 @@ class Browser(Dialog):
 
     def _take(self, path: Path) -> bool:
         """Hand the file over; False where the person has to say first that it may be replaced."""
-        if self.writes and path.exists() and not self._confirm:
+        if self.writes and os.path.exists(path) and not self._confirm:
             self._confirm = True
             return False
         self._chosen(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -429,7 +430,7 @@ class Editor:
     def ask_export(self) -> None:
         self.session.release()
         likes = self.preferences
-        folder = next((name for name in (likes.export_folder, likes.folder) if name and Path(name).is_dir()), "")
+        folder = next((name for name in (likes.export_folder, likes.folder) if name and os.path.isdir(name)), "")
         self.dialogs.append(ExportDialog(self.session, folder))
 
     def ask_quit(self) -> None:

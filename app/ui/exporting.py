@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -62,7 +63,7 @@ class ExportDialog(Dialog):
         seconds = session.end * session.dt
         self.start, self.end = 0.0, seconds
         self.finer = 0
-        self.folder = Path(folder) if folder and Path(folder).is_dir() else Path.home()
+        self.folder = Path(folder) if folder and os.path.isdir(folder) else Path.home()
         self.name = f"{session.project.name} warped"
         self._named = self.name
         self._preview: ExportProcess | None = None
@@ -146,7 +147,7 @@ class ExportDialog(Dialog):
         if ui.button("Browse", width=96, height=27):
             editor.files.ask_where("Export to", self.output, (self.ending,), self._chosen)
         ui.dim(str(self.output))
-        if self.output.exists():
+        if os.path.exists(self.output):
             ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(6)))
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))

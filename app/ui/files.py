@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import time
@@ -273,7 +274,7 @@ class Files:
 
     def _folder(self) -> Path:
         folder = Path(self.editor.preferences.folder or Path.home())
-        return folder if folder.is_dir() else Path.home()
+        return folder if os.path.isdir(folder) else Path.home()
 
     def _ask_for(self, title: str, endings: tuple[str, ...], chosen: Chosen) -> None:
         def ours() -> Browser:

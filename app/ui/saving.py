@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -57,7 +58,7 @@ class SaveDialog(Dialog):
         if ui.button("Browse", width=96, height=27):
             editor.files.ask_where("Save", self.path, (SUFFIX,), self._chosen)
         ui.dim(str(self.path))
-        if self.path.exists() and self.path != self._own:
+        if os.path.exists(self.path) and self.path != self._own:
             ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(2)))
         with ui.enabled(not self.must_embed):

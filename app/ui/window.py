@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
@@ -216,7 +217,7 @@ def run(file: Path | None = None) -> None:
     Raises:
         UserError: if there is no window to be had (status 2), or no such file.
     """
-    if file is not None and not file.exists():
+    if file is not None and not os.path.exists(file):
         load_any(file)
     window = Window()
     try:
