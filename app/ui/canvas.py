@@ -136,7 +136,7 @@ class Canvas:
         for force, acts in zip(replay.forces, acting, strict=True):
             share = 1.0 if acts else RESTING
             if force.faces is not None and force.strongest:
-                add = self.device.pass_("step/add_force.frag")
+                add = self.device.pass_("step/add_impulse.frag")
                 add(fields[0], add=True, force=force.faces, impulse=share / force.strongest)
             if force.divergence is not None and force.widest:
                 add = self.device.pass_("step/add_source.frag")

@@ -236,7 +236,7 @@ class Multigrid:
     def weights(self, level: Level, count: int = 0, is_last: bool = False) -> list[float]:
         """Chebyshev weights of the smoothing sweeps; `is_last`: no coarser level follows."""
         is_last = is_last or level is self.last
-        count = count or (is_last and self.plan.last) or self.plan.sweeps[0 if level.depth == 0 else 1]
+        count = count or self.plan.sweeps[0 if level.depth == 0 else 1]
         if self.plan.method == "cg":
             largest = LARGEST_EIGENVALUE[min(level.depth, 1)]
             return chebyshev_weights(largest / SMOOTHED[count], largest, count)

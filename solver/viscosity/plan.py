@@ -5,7 +5,6 @@ The errors are those of `tests/benchmarks/bench_viscosity.py`, against a direct 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,8 +12,6 @@ from typing import Literal
 BARELY_VISCOUS = 0.05
 # A viscosity that varies less than so many times is solved as if it were one: the correction then still holds 1 %.
 NEARLY_UNIFORM = 3.0
-# kappa on the coarsest level that is worth a visit.
-LEAST_VISITED = 0.3
 # Deflated is what is stiffer than this: below, multigrid alone takes no more iterations. A node that touches the
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
@@ -46,7 +43,6 @@ class Plan:
         levels: coarser levels that are visited, at most.
         nested: of these, the finest so many get a cycle while full multigrid carries a correction up through them.
         two_grid: such a cycle goes one level down only.
-        last: smoothing sweeps on the last level, where it is not solved directly; with 0 as on the others.
     """
 
     method: Literal["smooth", "direct", "fmg", "cg"] = "cg"
@@ -58,7 +54,6 @@ class Plan:
     levels: int = 99
     nested: int = 99
     two_grid: bool = False
-    last: int = 0
 
 
 def plan_for(least: float, largest: float) -> Plan:
@@ -66,13 +61,9 @@ def plan_for(least: float, largest: float) -> Plan:
     if largest <= BARELY_VISCOUS:
         return Plan("smooth", (2, 0), levels=0)
     if largest <= NEARLY_UNIFORM * least:
-        levels = max(1, math.ceil(math.log(largest / LEAST_VISITED, 4.0)))
-        # A second sweep halves the error of the change where that is small; from 3 on it hardly tells.
-        sweeps = 2 if largest <= 3.0 else 1
-        # What a nested cycle meets is smooth only where the viscosity reaches far. Sweeps cost least on the last level.
+        # What a nested cycle meets is smooth only where the viscosity reaches far.
         nested = 0 if largest <= 5.0 else 1 if largest <= 50.0 else 2
-        last = 4 if levels == 1 else 5
-        return Plan("fmg", (sweeps, 2), levels=levels, nested=nested, two_grid=largest <= 150.0, last=last)
+        return Plan("fmg", (2, 2), nested=nested, two_grid=largest <= 150.0)
     is_soft = least <= ONE_SWEEP
     count = 1 if is_soft else 2
     stiff = max(STIFF, STIFF_OF_SOFTEST * least)
