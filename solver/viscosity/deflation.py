@@ -60,7 +60,7 @@ def find_parts(stiff: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: 
     # The first column of u and the first row of v are walls, so that a cell lies behind each open face.
     touch_u = open_u & (inside | framed(inside, (0, 0), (1, 0))[:, :-1])
     touch_v = open_v & (inside | framed(inside, (1, 0), (0, 0))[:-1])
-    of_u, of_v = np.zeros((2, *stiff.shape), np.int32)
+    of_u, of_v = np.zeros(stiff.shape, np.int32), np.zeros(stiff.shape, np.int32)
     for of_face, touch, back in ((of_u, touch_u, 1), (of_v, touch_v, stiff.shape[1])):
         at = np.flatnonzero(touch)
         of_face.ravel()[at] = np.maximum(core.ravel()[at], core.ravel()[at - back])
@@ -79,11 +79,10 @@ def find_parts(stiff: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: 
 
 def _opened(stiff: np.ndarray) -> np.ndarray:
     """The union of all squares of `BROAD` cells in the stiff ones; walls count as stiff."""
-    for axis in (0, 1):
-        padding = [(BROAD - 1, BROAD - 1) if axis == other else (0, 0) for other in (0, 1)]
-        full, count = np.pad(stiff, padding, constant_values=True), stiff.shape[axis] + BROAD - 1
-        whole = np.logical_and.reduce([full.take(range(s, s + count), axis) for s in range(BROAD)])
-        stiff = np.logical_or.reduce([whole.take(range(s, s + count - BROAD + 1), axis) for s in range(BROAD)])
+    for _ in ("down the rows", "then, turned over, across"):
+        full, count = np.pad(stiff, ((BROAD - 1, BROAD - 1), (0, 0)), constant_values=True), len(stiff) + BROAD - 1
+        whole = np.logical_and.reduce([full[start : start + count] for start in range(BROAD)])
+        stiff = np.logical_or.reduce([whole[start : start + len(stiff)] for start in range(BROAD)]).T
     return stiff
 
 
@@ -92,8 +91,8 @@ def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
 
     Two cells side by side belong together if a node that both touch has all four cells inside; else they are a hinge.
     """
-    count = np.count_nonzero(inside)
-    number = np.zeros(inside.shape, int)
+    count = int(np.count_nonzero(inside))
+    number: np.ndarray = np.zeros(inside.shape, int)
     number[inside] = np.arange(count)
     around = framed(inside, (1, 1), (1, 1))
     whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
@@ -218,13 +217,16 @@ class CoarseSpace:
                 for later in range(number + 1, len(parts)):
                     both = is_first[number] & is_first[later] & (cluster[part] == cluster[parts[later]])
                     at = np.nonzero(both)[0]
-                    one, other, k = part[at], parts[later][at], stiffness[at]
+                    one, other = part[at], parts[later][at]
+                    # All have a first motion, cores two more.
+                    anywhere = np.arange(len(at)), np.nonzero(other <= cores)[0]
+                    in_core = np.nonzero(one <= cores)[0], np.nonzero((one <= cores) & (other <= cores))[0]
                     for first, second in product(range(3), range(3)):
-                        there = ((one <= cores) | (first == 0)) & ((other <= cores) | (second == 0))
+                        there = (in_core if first else anywhere)[second > 0]
+                        strain = at[there]
                         rows.append(self._first[one[there]] + first)
                         columns.append(self._first[other[there]] + second)
-                        energy = k * felt[number][first, at] * felt[later][second, at]
-                        values.append(energy[there])
+                        values.append(stiffness[strain] * felt[number][first, strain] * felt[later][second, strain])
         for (first, second), sums in own.items():
             number = np.arange(1, count if second == 0 else cores + 1)
             rows.append(self._first[number] + first)
