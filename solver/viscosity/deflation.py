@@ -53,31 +53,36 @@ class Parts:
 
 def find_parts(stiff: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: int) -> Parts:
     """The cores and runs of the `stiff` cells, (rows, columns), in tiles of `side` cells."""
-    rows, columns = stiff.shape
-    core = _numbered(_opened(stiff), side)
-    of_u = np.maximum(core, framed(core, (0, 0), (1, 0))[:, :-1]) * open_u
-    of_v = np.maximum(core, framed(core, (1, 0), (0, 0))[:-1]) * open_v
+    inside = _opened(stiff)
+    core = _numbered(inside, side)
     cores = int(core.max(initial=0))
-    free = stiff & (core == 0)
-    runs_u = _runs(free, open_u & (of_u == 0), side)
-    runs_v = _runs(free.T, (open_v & (of_v == 0)).T, side).T
-    runs_of_u = int(runs_u.max(initial=0))
-    of_u += np.where(runs_u, cores + runs_u, 0)
-    of_v += np.where(runs_v, cores + runs_of_u + runs_v, 0)
-    tile = np.zeros((cores + runs_of_u + int(runs_v.max(initial=0)) + 1, 2), int)
-    across, down = np.broadcast_arrays(np.arange(columns) // side, np.arange(rows)[:, None] // side)
-    for parts in (np.where(runs_u, of_u, 0), np.where(runs_v, of_v, 0), core):
-        tile[parts, 0], tile[parts, 1] = across, down
+    # What is few, the parts' faces, is worked on in lists: a mask of bytes costs little, an array of numbers much.
+    # The first column of u and the first row of v are walls, so that a cell lies behind each open face.
+    touch_u = open_u & (inside | framed(inside, (0, 0), (1, 0))[:, :-1])
+    touch_v = open_v & (inside | framed(inside, (1, 0), (0, 0))[:-1])
+    of_u, of_v = np.zeros(stiff.shape, np.int32), np.zeros(stiff.shape, np.int32)
+    for of_face, touch, back in ((of_u, touch_u, 1), (of_v, touch_v, stiff.shape[1])):
+        at = np.flatnonzero(touch)
+        of_face.ravel()[at] = np.maximum(core.ravel()[at], core.ravel()[at - back])
+    free = stiff & ~inside
+    on_u, runs_u = _runs(free, open_u & ~touch_u, side)
+    on_v, runs_v = _runs(np.ascontiguousarray(free.T), np.ascontiguousarray((open_v & ~touch_v).T), side)
+    runs_of_u, runs_of_v = int(runs_u.max(initial=0)), int(runs_v.max(initial=0))
+    of_u[on_u] = cores + runs_u
+    of_v.T[on_v] = cores + runs_of_u + runs_v
+    tile = np.zeros((cores + runs_of_u + runs_of_v + 1, 2), int)
+    for parts, on in ((core, inside), (of_u, on_u), (of_v, on_v.T)):
+        row, column = np.nonzero(on)
+        tile[parts[row, column]] = np.stack([column, row], axis=1) // side
     return Parts(of_u, of_v, cores, runs_of_u, tile, side)
 
 
 def _opened(stiff: np.ndarray) -> np.ndarray:
     """The union of all squares of `BROAD` cells in the stiff ones; walls count as stiff."""
-    for axis in (0, 1):
-        padding = [(BROAD - 1, BROAD - 1) if axis == other else (0, 0) for other in (0, 1)]
-        full, count = np.pad(stiff, padding, constant_values=True), stiff.shape[axis] + BROAD - 1
-        whole = np.logical_and.reduce([full.take(range(s, s + count), axis) for s in range(BROAD)])
-        stiff = np.logical_or.reduce([whole.take(range(s, s + count - BROAD + 1), axis) for s in range(BROAD)])
+    for _ in ("down the rows", "then, turned over, across"):
+        full, count = np.pad(stiff, ((BROAD - 1, BROAD - 1), (0, 0)), constant_values=True), len(stiff) + BROAD - 1
+        whole = np.logical_and.reduce([full[start : start + count] for start in range(BROAD)])
+        stiff = np.logical_or.reduce([whole[start : start + len(stiff)] for start in range(BROAD)]).T
     return stiff
 
 
@@ -86,7 +91,9 @@ def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
 
     Two cells side by side belong together if a node that both touch has all four cells inside; else they are a hinge.
     """
-    number = np.arange(1, inside.size + 1).reshape(inside.shape) * inside
+    count = int(np.count_nonzero(inside))
+    number: np.ndarray = np.zeros(inside.shape, int)
+    number[inside] = np.arange(count)
     around = framed(inside, (1, 1), (1, 1))
     whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
     links = []
@@ -94,20 +101,17 @@ def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
         together = (nodes[:-1, 1:-1] | nodes[1:, 1:-1]) & (np.arange(1, turned.shape[1]) % side != 0)
         links.append((turned[:, :-1][together], turned[:, 1:][together]))
     one, other = (np.concatenate(ends) for ends in zip(*links, strict=True))
-    used = np.zeros(inside.size + 1, int)
-    used[number.ravel()] = used[0] = 1
-    short = np.cumsum(used) - 1
-    root = connected(int(short[-1]) + 1, short[one], short[other])
-    first = np.cumsum(root == np.arange(len(root))) - 1
-    return first[root][short[number]]
+    root = connected(count, one, other)
+    number[inside] = np.cumsum(root == np.arange(count))[root]
+    return number
 
 
-def _runs(free: np.ndarray, faces: np.ndarray, side: int) -> np.ndarray:
-    """Faces along the rows of `free` cells, numbered run by run from 1 on; a tile's edge ends a run."""
+def _runs(free: np.ndarray, faces: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which faces lie along the rows of `free` cells, and of these their run, from 1 on; a tile's edge ends a run."""
     touching = faces & (free | framed(free, (0, 0), (1, 0))[:, :-1])
     on = np.zeros_like(touching)
     on[:, 1:] = touching[:, 1:] & touching[:, :-1] & free[:, :-1] & (np.arange(1, free.shape[1]) % side != 0)
-    return np.cumsum((touching & ~on).ravel()).reshape(free.shape) * touching
+    return touching, np.cumsum(~on[touching])
 
 
 class CoarseSpace:
@@ -118,10 +122,11 @@ class CoarseSpace:
         s_y, s_x = level.shear
         rows, columns = parts.of_u.shape
         # Arms of a turn, u = -turn y, v = turn x, without strain where cells are not square too.
-        y = np.broadcast_to((np.arange(rows)[:, None] + 0.5) / s_y, (rows, columns))
-        x = np.broadcast_to((np.arange(columns) + 0.5) / s_x, (rows, columns))
-        centres = [_means(part, at, parts.count) for part, at in ((parts.of_v, x), (parts.of_u, y))]
-        self.centres = np.stack(centres, axis=1)
+        self._y, self._x = (np.arange(rows) + 0.5) / s_y, (np.arange(columns) + 0.5) / s_x
+        # Of the faces that belong to parts: the part, and the place across the way they move.
+        (row, column), (row_v, column_v) = np.nonzero(parts.of_u), np.nonzero(parts.of_v)
+        faces_u, faces_v = (parts.of_u[row, column], self._y[row]), (parts.of_v[row_v, column_v], self._x[column_v])
+        self.centres = np.stack([_means(*faces, parts.count) for faces in (faces_v, faces_u)], axis=1)
         number = np.arange(parts.count + 1)
         is_core = (number > 0) & (number <= parts.cores)
         self._first = np.where(is_core, 3 * (number - 1), number - 1 + 2 * parts.cores)
@@ -130,37 +135,37 @@ class CoarseSpace:
         self.part = np.repeat(number[1:], np.where(is_core, 3, 1)[1:])
         runs = np.where(np.arange(parts.count - parts.cores) < parts.runs_of_u, 0, 1)
         self.motion = np.concatenate([np.tile([0, 1, 2], parts.cores), runs])
-        arm_u, arm_v = centres[1][parts.of_u] - y, x - centres[0][parts.of_v]
-        strains = self._strains(level, arm_u, arm_v)
+        strains = self._strains(level)
         cluster = self._clusters(strains, threshold)
         along = 0 if columns >= rows else 1
         self._matrix = ClusterMatrix(cluster[self.part], parts.tile[self.part, along])
-        self._matrix.factor(*self._entries(strains, cluster, arm_u, arm_v))
+        self._matrix.factor(*self._entries(strains, cluster, faces_u, faces_v))
 
-    def _strains(self, level: Coefficients, arm_u: np.ndarray, arm_v: np.ndarray) -> list[Any]:
+    def _strains(self, level: Coefficients) -> list[Any]:
         """Of each kind of strain that some part feels: K, and of its faces (part, sign, arm, whether it is of v)."""
         s_y, s_x = level.shear
-        u, v, arm_u, arm_v = (framed(at, (1, 1), (1, 1)) for at in (self.parts.of_u, self.parts.of_v, arm_u, arm_v))
-        inner = slice(1, -1)
+        u, v = (framed(at, (1, 1), (1, 1)) for at in (self.parts.of_u, self.parts.of_v))
+        # Beyond the walls no face belongs to a part, and no arm counts.
+        x, y = np.pad(self._x, 1), np.pad(self._y, 1)
+        # K and, of each face, where the framed faces begin (row, column), its sign and whether it is of v.
         kinds = (
-            (level.xx[0], ((u[inner, 2:], 1.0, arm_u[inner, 2:], 0), (u[inner, inner], -1.0, arm_u[inner, inner], 0))),
-            (level.yy[0], ((v[2:, inner], 1.0, arm_v[2:, inner], 1), (v[inner, inner], -1.0, arm_v[inner, inner], 1))),
-            (
-                level.nodes[0, 0],
-                (
-                    (u[1:, 1:], s_y, arm_u[1:, 1:], 0),
-                    (u[:-1, 1:], -s_y, arm_u[:-1, 1:], 0),
-                    (v[1:, 1:], s_x, arm_v[1:, 1:], 1),
-                    (v[1:, :-1], -s_x, arm_v[1:, :-1], 1),
-                ),
-            ),
+            (level.xx[0], ((1, 2, 1.0, 0), (1, 1, -1.0, 0))),
+            (level.yy[0], ((2, 1, 1.0, 1), (1, 1, -1.0, 1))),
+            (level.nodes[0, 0], ((1, 1, s_y, 0), (0, 1, -s_y, 0), (1, 1, s_x, 1), (1, 0, -s_x, 1))),
         )
         found = []
         for stiffness, faces in kinds:
-            first = faces[0][0]
+            rows, columns = stiffness.shape
+            parts = [(v if of_v else u)[down : down + rows, right : right + columns] for down, right, _, of_v in faces]
             # A part that moves as a whole feels no strain within.
-            felt = np.logical_or.reduce([face[0] != first for face in faces[1:]]) & (stiffness > 0)
-            found.append((stiffness[felt], [(part[felt], sign, arm[felt], of_v) for part, sign, arm, of_v in faces]))
+            felt = np.logical_or.reduce([part != parts[0] for part in parts[1:]]) & (stiffness > 0)
+            row, column = np.nonzero(felt)
+            ends = []
+            for part, (down, right, sign, of_v) in zip(parts, faces, strict=True):
+                part = part[row, column].astype(int)
+                arm = x[column + right] - self.centres[part, 0] if of_v else self.centres[part, 1] - y[row + down]
+                ends.append((part, sign, arm, of_v))
+            found.append((stiffness[row, column], ends))
         return found
 
     def _clusters(self, strains: list[Any], threshold: float) -> np.ndarray:
@@ -180,17 +185,17 @@ class CoarseSpace:
         return connected(self.parts.count + 1, np.concatenate(one), np.concatenate(other))
 
     def _entries(
-        self, strains: list[Any], cluster: np.ndarray, arm_u: np.ndarray, arm_v: np.ndarray
+        self, strains: list[Any], cluster: np.ndarray, *faces_of: tuple[np.ndarray, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Entries (row, column, value) within the clusters, of which Z' A Z is the sum and its transpose."""
         count, cores = self.parts.count + 1, self.parts.cores
         # Of each part by itself, its mass and what it strains around it: the upper triangle over its three motions.
         own = {pair: np.zeros(count) for pair in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))}
-        for part, arm, of_v in ((self.parts.of_u, arm_u, 0), (self.parts.of_v, arm_v, 1)):
-            faces = np.bincount(part.ravel(), minlength=count)
+        for of_v, (part, at) in enumerate(faces_of):
+            faces = np.bincount(part, minlength=count)
             own[of_v, of_v][: cores + 1] += faces[: cores + 1]
             own[0, 0][cores + 1 :] += faces[cores + 1 :]
-            own[2, 2] += np.bincount(part.ravel(), (arm**2).ravel(), count)
+            own[2, 2] += np.bincount(part, (at - self.centres[part, 1 - of_v]) ** 2, count)
         rows, columns, values = [], [], []
         for stiffness, faces in strains:
             # How a strain feels the three motions of each part it touches, at the first of the faces that belong to it.
@@ -204,18 +209,24 @@ class CoarseSpace:
             for number, part in enumerate(parts):
                 at = np.nonzero(is_first[number])[0]
                 one, motion, k = part[at], felt[number][:, at], stiffness[at]
-                for first, second in own:
+                own[0, 0] += np.bincount(one, k * motion[0] * motion[0], count)
+                of_core = one <= cores
+                one, motion, k = one[of_core], motion[:, of_core], k[of_core]
+                for first, second in list(own)[1:]:
                     own[first, second] += np.bincount(one, k * motion[first] * motion[second], count)
                 for later in range(number + 1, len(parts)):
                     both = is_first[number] & is_first[later] & (cluster[part] == cluster[parts[later]])
                     at = np.nonzero(both)[0]
-                    one, other, k = part[at], parts[later][at], stiffness[at]
+                    one, other = part[at], parts[later][at]
+                    # All have a first motion, cores two more.
+                    anywhere = np.arange(len(at)), np.nonzero(other <= cores)[0]
+                    in_core = np.nonzero(one <= cores)[0], np.nonzero((one <= cores) & (other <= cores))[0]
                     for first, second in product(range(3), range(3)):
-                        there = ((one <= cores) | (first == 0)) & ((other <= cores) | (second == 0))
+                        there = (in_core if first else anywhere)[second > 0]
+                        strain = at[there]
                         rows.append(self._first[one[there]] + first)
                         columns.append(self._first[other[there]] + second)
-                        energy = k * felt[number][first, at] * felt[later][second, at]
-                        values.append(energy[there])
+                        values.append(stiffness[strain] * felt[number][first, strain] * felt[later][second, strain])
         for (first, second), sums in own.items():
             number = np.arange(1, count if second == 0 else cores + 1)
             rows.append(self._first[number] + first)
@@ -239,8 +250,7 @@ class CoarseSpace:
 
 
 def _means(part: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
-    faces = np.bincount(part.ravel(), minlength=count + 1)
-    return np.bincount(part.ravel(), at.ravel(), count + 1) / np.maximum(faces, 1)
+    return np.bincount(part, at, count + 1) / np.maximum(np.bincount(part, minlength=count + 1), 1)
 
 
 class Deflation:

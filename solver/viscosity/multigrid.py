@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,16 @@ from solver.gl.field import Field
 from solver.gl.reduction import Reduction
 from solver.packing import PackedFaces
 from solver.params import Walls
-from solver.viscosity.operator import Coefficients, Level, coarsened, coefficients, inverse_matrix
+from solver.viscosity.changed import Box, changed
+from solver.viscosity.operator import (
+    Coefficients,
+    Level,
+    change_coarse,
+    change_finest,
+    coarsened,
+    coefficients,
+    inverse_matrix,
+)
 from solver.viscosity.plan import Plan
 from solver.viscosity.transform import SineCosineTransform
 
@@ -30,6 +40,22 @@ def chebyshev_weights(least: float, largest: float, count: int) -> list[float]:
     """Weights of damped Jacobi sweeps that together damp eigenvalues of D^-1 A between the two most."""
     middle, half = 0.5 * (largest + least), 0.5 * (largest - least)
     return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
+
+
+@dataclass(frozen=True)
+class TakenUp:
+    """What the coefficients in the textures were made from, and these.
+
+    Attributes:
+        basis: (time step, whether walls hold the fluid, depth of the last level): with others nothing can be kept.
+        viscosity, solid: of the cells.
+        levels: the coefficients, the finest first.
+    """
+
+    basis: tuple[float, bool, int]
+    viscosity: np.ndarray
+    solid: np.ndarray
+    levels: list[Coefficients]
 
 
 class Multigrid:
@@ -59,6 +85,7 @@ class Multigrid:
         self._transform_level = worth[0] if worth else self.levels[-1]
         self._transform = SineCosineTransform(device, self._transform_level.box, self._transform_level.texels)
         self.has_transform = False
+        self._taken_up: TakenUp | None = None
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
         self._largest = 0.0
@@ -73,6 +100,7 @@ class Multigrid:
 
     def set_uniform(self, viscosity: float, dt: float, walls: Walls) -> None:
         """Take up one viscosity, lengths^2 / s, in a box without solids."""
+        self._taken_up = None
         hx, hy = self.spacing
         self._largest = dt * viscosity / (hx * hy)
         shear, slip = (math.sqrt(hx / hy), math.sqrt(hy / hx)), _slip(walls)
@@ -87,17 +115,40 @@ class Multigrid:
             self._inverse.set(inverse_matrix(coefficients(everywhere, outside, dt, spacing, bool(slip))))
 
     def set_coefficients(self, viscosity: np.ndarray, solid: np.ndarray, dt: float, walls: Walls) -> Coefficients:
-        """Take up the viscosity of the cells, lengths^2 / s, and the solid ones, (ny, nx) both; those of the finest."""
+        """Take up the viscosity of the cells, lengths^2 / s, and the solid ones, (ny, nx) both; those of the finest.
+
+        What is made again is what has changed: a dab of a brush changes few cells.
+        """
         slip, self.has_transform = _slip(walls), False
-        finest = level = coefficients(viscosity, solid, dt, self.spacing, bool(slip))
-        for grid in self.levels:
-            grid.set_coefficients(level, slip)
-            if grid is self.last:
-                break
-            level = coarsened(level, bool(slip))
+        taken_up, self._taken_up = self._taken_up, None
+        basis = dt, bool(slip), self.last.depth
+        if taken_up and taken_up.basis == basis and np.array_equal(taken_up.solid, solid):
+            levels = taken_up.levels
+            self._change(levels, changed(taken_up.viscosity, viscosity), viscosity, solid, dt, slip)
+        else:
+            levels = [coefficients(viscosity, solid, dt, self.spacing, bool(slip))]
+            while len(levels) <= self.last.depth:
+                levels.append(coarsened(levels[-1], bool(slip)))
+            for grid, level in zip(self.levels, levels, strict=False):
+                grid.set_coefficients(level, slip)
         if self.last is self.levels[-1]:
-            self._inverse.set(inverse_matrix(level))
-        return finest
+            self._inverse.set(inverse_matrix(levels[-1]))
+        self._taken_up = TakenUp(basis, viscosity, solid, levels)
+        return levels[0]
+
+    def _change(
+        self, levels: list[Coefficients], box: Box | None, viscosity: np.ndarray, solid: np.ndarray, dt: float,
+        slip: dict[str, Any],
+    ) -> None:  # fmt: skip
+        """Make the coefficients of all levels those of another viscosity, which differs in a box of cells."""
+        if box is None:
+            return
+        change_finest(levels[0], box, viscosity, solid, dt, self.spacing, bool(slip))
+        self.finest.set_coefficients(levels[0], slip, box)
+        for grid, level, fine in zip(self.levels[1:], levels[1:], levels, strict=False):
+            box = box.coarser(level.open_u.shape)
+            change_coarse(level, box, fine, bool(slip))
+            grid.set_coefficients(level, slip, box)
 
     @property
     def finest(self) -> Level:

@@ -17,6 +17,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.passes import Region
 from solver.packing import DoublePackedFaces, PackedFaces, framed, packed
+from solver.viscosity.changed import Box, whole
 
 # Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 64 unknowns. BLAS inverts 128 in
 # threads, which wait longer than they work.
@@ -26,6 +27,9 @@ CELL_STENCIL = (0, 1, 2)
 NODE_STENCIL = ((0, 0), (0, 1), (1, 0), (1, 1), (1, -1))
 # So that a cell of no viscosity is still told from no fluid.
 LEAST = 1e-20
+# Cells around a box that its K, in the cells and at their corners, is made from: on the finest level, and coarse ones.
+FINE_HALO = 2
+COARSE_HALO = 3
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,25 @@ class Coefficients:
     open_u: np.ndarray
     open_v: np.ndarray
     shear: tuple[float, float]
+
+    def part(self, box: Box) -> Coefficients:
+        """K in a box only."""
+        return Coefficients(
+            tuple(k[box.cells] for k in self.xx),
+            tuple(k[box.cells] for k in self.yy),
+            {offset: k[box.nodes] for offset, k in self.nodes.items()},
+            self.open_u[box.cells],
+            self.open_v[box.cells],
+            self.shear,
+        )
+
+    def put(self, box: Box, part: Coefficients, window: Box) -> None:
+        """Take over K in a box from a `part` that was made for a larger `window`; open faces stay."""
+        inner = box.within(window)
+        for mine, other in zip(self.xx + self.yy, part.xx + part.yy, strict=True):
+            mine[box.cells] = other[inner.cells]
+        for offset, k in self.nodes.items():
+            k[box.nodes] = part.nodes[offset][inner.nodes]
 
     def diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         """The diagonal of A for u and for v."""
@@ -137,6 +160,21 @@ def coarsened(fine: Coefficients, no_slip: bool) -> Coefficients:
         framed(open_v, *even),
         fine.shear,
     )
+
+
+def change_finest(
+    level: Coefficients, box: Box, viscosity: np.ndarray, solid: np.ndarray, dt: float, spacing: tuple[float, float],
+    no_slip: bool,
+) -> None:  # fmt: skip
+    """Make K of the finest `level` that of another viscosity, which differs in a box; bit for bit what all is."""
+    window = box.grown(FINE_HALO, level.open_u.shape)
+    level.put(box, coefficients(viscosity[window.cells], solid[window.cells], dt, spacing, no_slip), window)
+
+
+def change_coarse(level: Coefficients, box: Box, fine: Coefficients, no_slip: bool) -> None:
+    """Make K of a coarse `level` that of the `fine` one, which has changed it in a box; bit for bit what all is."""
+    window = box.grown(COARSE_HALO, level.open_u.shape)
+    level.put(box, coarsened(fine.part(window.finer), no_slip), window)
 
 
 def _behind(values: np.ndarray, axis: int) -> np.ndarray:
@@ -256,23 +294,12 @@ class Level:
         self.open: dict[str, Any] = {}
         self.defines: dict[str, Any] = {}
 
-    def set_coefficients(self, level: Coefficients, slip: dict[str, Any]) -> None:
-        """Take the operator from coefficients of each cell."""
-        of_u, of_v = level.diagonal()
-        values = {"inverse_u": level.open_u / of_u, "inverse_v": level.open_v / of_v}
-        node = level.nodes[0, 0]
-        if self.depth == 0:
-            # Signs tell which faces are open where these are read anyway; a node that resists nothing has one too.
-            values["cells"] = np.where(level.open_u, level.xx[0], -level.xx[0])
-            sign = np.pad(np.where(level.open_v, 1.0, -1.0), ((0, 1), (0, 1)), constant_values=1.0)
-            values["nodes"] = sign * np.maximum(node, 1e-30)
-        else:
-            values |= {f"{kind}{d}": k for kind in ("xx", "yy") for d, k in enumerate(getattr(level, kind))}
-            values |= {f"node{number}": level.nodes[offset] for number, offset in enumerate(NODE_STENCIL)}
-        for name, cells in values.items():
-            # Without the check of `set`: K is finite where the viscosity is.
-            self.packed[name].texture.write(self._ringed(cells.astype(np.float32)))
-        self.packed["open"].set(self._ringed((level.open_u + 2 * level.open_v).astype(np.uint8)))
+    def set_coefficients(self, level: Coefficients, slip: dict[str, Any], box: Box | None = None) -> None:
+        """Take the operator from coefficients of each cell, of which only those in a box are others, if it is given."""
+        box = box or whole(level.open_u.shape)
+        # Faces next to the box feel its strains; one texel more is there to be read only.
+        window = box.grown(1 + 2, level.open_u.shape)
+        self._upload(level.part(window), window)
         self.open = {"open": self.packed["open"]}
         names = ("inverse_u", "inverse_v", "open") + (() if self.depth else ("cells", "nodes"))
         self.operator = {**{name: self.packed[name] for name in names}, "shear": level.shear}
@@ -285,17 +312,40 @@ class Level:
             # K of e_yy over that of e_xx, (hx / hy)^2.
             self.operator["aspect"] = level.shear[0] ** 4
 
+    def _upload(self, part: Coefficients, window: Box) -> None:
+        """Write K of a window; its first cells are there to be read only, unless the level begins there."""
+        of_u, of_v = part.diagonal()
+        values = {"inverse_u": part.open_u / of_u, "inverse_v": part.open_v / of_v}
+        node = part.nodes[0, 0]
+        if self.depth == 0:
+            # Signs tell which faces are open where these are read anyway; a node that resists nothing has one too.
+            values["cells"] = np.where(part.open_u, part.xx[0], -part.xx[0])
+            sign = framed(np.where(part.open_v, 2.0, 0.0), (0, 1), (0, 1)) - 1.0
+            sign[-1] = sign[:, -1] = 1.0
+            values["nodes"] = sign * np.maximum(node, 1e-30)
+        else:
+            values |= {f"{kind}{d}": k for kind in ("xx", "yy") for d, k in enumerate(getattr(part, kind))}
+            values |= {f"node{number}": part.nodes[offset] for number, offset in enumerate(NODE_STENCIL)}
+        written: dict[str, np.ndarray] = {name: cells.astype(np.float32) for name, cells in values.items()}
+        written["open"] = (part.open_u + 2 * part.open_v).astype(np.uint8)
+        inside = window.texels
+        left, top = int(inside.left > 0), int(inside.top > 0)
+        # Nodes on the far walls lie in the ring itself.
+        columns = slice(left, inside.right - inside.left + (inside.right == self.texels[0]))
+        rows = slice(top, inside.bottom - inside.top + (inside.bottom == self.texels[1]))
+        at = 1 + inside.left + left, 1 + inside.top + top
+        for name, cells in written.items():
+            height, width = cells.shape
+            texels = packed(framed(cells, (0, 2 - height % 2), (0, 2 - width % 2)))[rows, columns]
+            # Without the check of `set`: K is finite where the viscosity is.
+            viewport = (*at, texels.shape[1], texels.shape[0])
+            self.packed[name].texture.write(np.ascontiguousarray(texels), viewport)
+
     def set_uniform(self, stiffness: float, shear: tuple[float, float], slip: dict[str, Any]) -> None:
         """Take the operator of one viscosity in a box without solids, dt mu / (hx hy) of this level."""
         self.open, self.stencil = {"box": self.box}, {}
         self.operator = {"stiffness": stiffness, "shear": shear, **self.open}
         self.defines = {"UNIFORM": 1, **slip}
-
-    def _ringed(self, cells: np.ndarray) -> np.ndarray:
-        """Packed inside the ring; nodes on the far walls lie in the ring itself."""
-        rows, columns = cells.shape
-        width, height = self.texels
-        return packed(framed(cells, (2, 2 * height + 2 - rows), (2, 2 * width + 2 - columns)))
 
     @property
     def is_coarsest(self) -> bool:
