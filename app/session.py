@@ -575,9 +575,11 @@ class Session:
         return float(np.abs(self.replay.fluid.divergence()).max())
 
     def saved(self, project: Project) -> None:
-        """Take note that the work has been saved as `project`."""
+        """Take note that the work has been saved as `project`: what is in the file is exported too, grid and all."""
         assert project.path is not None
         self.project = project
+        self.is_grid_automatic = False
+        self.forget_grid()
         self.document.saved(project.path)
 
     def release_gpu(self) -> None:

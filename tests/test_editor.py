@@ -1296,6 +1296,18 @@ def test_a_grid_that_was_chosen_stays(automatic: Robot) -> None:
     until_on(automatic, 96)
 
 
+def test_the_grid_of_saved_work_stays(automatic: Robot, tmp_path: Path) -> None:
+    """What is exported is what the command line makes of the file."""
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    session = automatic.editor.session
+    session.begin_with(grid=128)
+    automatic.drag((0.4, 0.3), (0.5, 0.3))
+    assert automatic.editor.files.save_as(tmp_path / "work.fluidwarp")
+    paint_at(automatic, 0.1)
+    automatic.frame(count=20)
+    assert session.recipe.fluid.grid == 128
+
+
 def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
     robot = Robot(device, small_project(tmp_path, 128), preferences=Preferences(auto_quality=True))
     robot.until(lambda: not robot.editor.quality.is_measuring)
