@@ -358,3 +358,26 @@ def test_one_viscosity_is_solved_exactly_on_a_coarser_grid(
     multigrid.residual(level, level.faces.read, level.rhs, level.faces.write)
     left = np.stack([field.get() for field in level.faces.write.fields])
     assert np.linalg.norm(left) <= 2e-5 * np.linalg.norm(wanted)
+
+
+def test_what_was_solved_before_does_not_matter(device: Device) -> None:
+    """A barely viscous mask after one viscosity, and at once: the same bytes."""
+    size, rng = (32, 24), np.random.default_rng(5)
+    velocity = rng.standard_normal((24, 32, 2)).astype(np.float32)
+    velocity[:, 0, 0] = velocity[0, :, 1] = 0.0
+    solid = device.field(size, 1, "solid", "f1")
+    mask = device.upload(np.where(rng.random((24, 32)) < 0.3, 1e-3, 2e-4).astype(np.float32))
+    found = []
+    for before in (None, 1.4e-3, 0.5):
+        solver = Viscosity(device, size)
+        if before is not None:
+            solver.set_coefficients(device.upload(np.full((24, 32), before, np.float32)), solid, 1 / 30, Walls())
+        solver.set_coefficients(mask, solid, 1 / 30, Walls())
+        assert solver.plan.method == "smooth"
+        faces = device.double_field(size, 2)
+        faces.read.set(velocity)
+        solver.diffuse(faces)
+        found.append(faces.read.get())
+        solver.release()
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])

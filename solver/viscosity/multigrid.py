@@ -88,7 +88,7 @@ class Multigrid:
         self._taken_up: TakenUp | None = None
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
-        self._largest = 0.0
+        self._largest = 0.0  # kappa
         ringed = self.levels[0].rhs.u.size
         self._residual = PackedFaces(device, ringed, "viscous residual of v*")
         coarser = self.levels[min(1, len(self.levels) - 1)].rhs.u.size
@@ -120,6 +120,7 @@ class Multigrid:
         What is made again is what has changed: a dab of a brush changes few cells.
         """
         slip, self.has_transform = _slip(walls), False
+        self._largest = dt * float(viscosity[~solid].max(initial=0.0)) / (self.spacing[0] * self.spacing[1])
         taken_up, self._taken_up = self._taken_up, None
         basis = dt, bool(slip), self.last.depth
         if taken_up and taken_up.basis == basis and np.array_equal(taken_up.solid, solid):
