@@ -12,6 +12,9 @@ from app.pictures import Picture
 from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
+from solver.brush.brush import Brush
+from solver.brush.tip import Tip
+from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import MOST_ALONG, SMALLEST_GRID, Grid
 
@@ -41,6 +44,32 @@ def test_what_is_no_picture_is_refused():
     for extent in ((1.0, 0.0), (0.5, 0.5), (1.0, 2.0)):
         with pytest.raises(ValueError, match="the longer must be 1"):
             Grid(8, 8, extent)
+
+
+def test_a_window_of_a_grid_is_its_part(device: Device):
+    """A brush in a window draws what it draws in the whole."""
+    whole = Grid(64, 48)
+    window = Grid(24, 20, (24 / 64, 20 / 64), (16 / 64, 8 / 64), whole.picture)
+    part = (slice(8, 28), slice(16, 40))
+    for one, other in zip(whole.u_faces(), window.u_faces(), strict=True):
+        np.testing.assert_allclose(other, one[part], atol=1e-12)
+    assert whole.is_whole
+    assert not window.is_whole
+    assert whole.at_edge == (True, True, True, True)
+    assert window.at_edge == (False, False, False, False)
+    assert Grid(24, 20, (24 / 64, 20 / 64), (40 / 64, 28 / 64), whole.picture).at_edge == (False, True, False, True)
+    with pytest.raises(ValueError, match="not within"):
+        Grid(24, 20, (24 / 64, 20 / 64), (41 / 64, 0.0), whole.picture)
+    tip, drawn = Tip((0.4, 0.3), (0.45, 0.33), 0.08, 0.2), []
+    for grid in (whole, window):
+        fluid, brush = Fluid(device, grid), Brush(device)
+        brush.push(fluid, tip, 0.1)
+        brush.twirl(fluid, tip, 2.0)
+        drawn.append(fluid.impulse.field.get())
+        brush.release()
+        fluid.release()
+    assert np.abs(drawn[1]).max() > 0.1
+    np.testing.assert_allclose(drawn[1], drawn[0][part], atol=2e-6 * np.abs(drawn[1]).max())
 
 
 @pytest.mark.parametrize("size", [(331, 200), (200, 337)], ids=str)

@@ -71,14 +71,14 @@ class Brush:
 
     def _look(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None) -> None:
         """Find how the fluid moves at the brush, and how firmly a push holds the picture."""
-        (hx, hy), tip = fluid.grid.spacing, motion.tip
+        (hx, hy), (left, top), tip = fluid.grid.spacing, fluid.grid.origin, motion.tip
         probe = self.device.pass_("brush/probe.frag")
         probe(
             self._motion,
             velocity=velocity,
             impulse=fluid.impulse.field,
             viscosity=fluid.viscosity,
-            at=(tip.end[0] / hx, tip.end[1] / hy),
+            at=((tip.end[0] - left) / hx, (tip.end[1] - top) / hy),
             reach=tuple(max(0.25 * tip.radius / h, 0.5) for h in (hx, hy)),
             spacing=(hx, hy),
         )
