@@ -8,6 +8,7 @@ import os
 import random
 import subprocess
 import sys
+import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
@@ -80,6 +81,41 @@ class Desk:
 @pytest.fixture
 def desk(tmp_path: Path) -> Desk:
     return Desk(tmp_path / "state" / "journals", small_project(tmp_path))
+
+
+class Late(threading.Event):
+    """An event after each waiting for which something happens before the waiter goes on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.then: list[Callable[[], None]] = []
+
+    def wait(self, timeout: float | None = None) -> bool:
+        heard = super().wait(timeout)
+        while self.then:
+            self.then.pop()()
+        return heard
+
+
+def test_a_stroke_just_after_the_pause_for_the_fluid_is_written_through(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[int] = []
+    desk.push()
+    desk.write()
+    until(desk.journal._handed.is_set)
+    sync = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda file: (sync(file), written.append(file)))
+    late = Late()
+    late.then.append(desk.push)
+    desk.journal._urgent = late
+    recipe = desk.document.recipe
+    desk.document.history.amend(recipe.edited(duration=recipe.duration + 1 / 30))
+    desk.keep()
+    until(lambda: not late.then and desk.journal._handed.is_set() and not desk.journal.is_behind)
+    time.sleep(3 * recovery.PAUSE)
+    assert written
+    desk.die()
 
 
 def found_in(root: Path) -> Found:
