@@ -103,13 +103,13 @@ class Journal:
         self._file: int | None = None
         self._size = self._most = 0
 
-    def keep(self, project: Project, document: Document) -> None:
+    def keep(self, project: Project, document: Document, is_grid_automatic: bool = False) -> None:
         """Take note of what the work is now; costs next to nothing where it is as it was."""
         history, saved = document.history, document.saved_recipe
-        before, self._seen = self._seen, (project, history.recipe, history.index, saved)
+        before, self._seen = self._seen, (project, history.recipe, history.index, saved, is_grid_automatic)
         if before and all(a is b for a, b in zip(before, self._seen, strict=True)):
             return
-        work = Work(history.entries, history.index, saved)
+        work = Work(history.entries, history.index, saved, is_grid_automatic)
         is_just_saved = bool(before) and before[0] is not project
         if is_just_saved or not work.is_unsaved:
             work = None

@@ -591,6 +591,18 @@ def test_restored_work_is_as_it_was_and_unsaved(
     assert found_in(starter.root).work.strokes == 3
 
 
+@pytest.mark.parametrize("is_automatic", [True, False])
+def test_restored_work_has_the_choice_of_its_grid(starter: Starter, tmp_path: Path, is_automatic: bool) -> None:
+    robot = starter.start(tmp_path)
+    robot.editor.session.is_grid_automatic = is_automatic
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    starter.kill()
+    robot = starter.start(tmp_path)
+    answer(robot, "Restore")
+    assert robot.editor.session.is_grid_automatic is is_automatic
+
+
 @pytest.mark.usefixtures("before")
 def test_work_that_is_put_off_is_offered_again_until_it_is_discarded(
     starter: Starter, tmp_path: Path, root: Path
