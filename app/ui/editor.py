@@ -71,7 +71,6 @@ class Editor:
         self.preferences = preferences or Preferences()
         self.state = State(
             inspector=self.preferences.inspector,
-            hint=self.preferences.hint,
             auto_quality=self.preferences.auto_quality,
         )
         self.host = Host(device)
@@ -143,7 +142,7 @@ class Editor:
         self._turn_to(len(self._sessions) - 1)
         if replaced is not None:
             self._close(*replaced)
-        self.quality.opened()
+        self.quality.opened(found)
 
     def undo(self) -> None:
         if self.session.document.history.can_undo:
@@ -404,6 +403,12 @@ class Editor:
         self.state.inspector = self.preferences.inspector = not self.state.inspector
         self.preferences.save()
 
+    def dismiss_hint(self) -> None:
+        """The first hint has been followed or closed, and does not come again."""
+        if self.preferences.hint:
+            self.preferences.hint = False
+            self.preferences.save()
+
     def toggle_statistics(self) -> None:
         self.state.statistics = not self.state.statistics
         self.device.timings.enabled = self.state.statistics
@@ -437,6 +442,11 @@ class Editor:
         """Leave, after having asked about what is not saved and what is being exported."""
         self.unless_unsaved("quit", self._quit_unless_exporting)
 
+    @property
+    def asks_before_quitting(self) -> bool:
+        """Who leaves now is asked something first."""
+        return bool(self.is_dirty or self.session.is_painting or self.exports.is_running)
+
     def _quit_unless_exporting(self) -> None:
         if self.exports.is_running:
             self._ask(StillExporting(self.exports, self._quit))
@@ -466,7 +476,6 @@ class Editor:
     def release(self) -> None:
         """Free everything."""
         self.exports.cancel()
-        self.preferences.hint = self.state.hint
         self.preferences.save()
         self.recovery.release(discard=self.closed)
         for work in self._sessions:

@@ -36,7 +36,7 @@ def draw(ui: Ui, editor: Editor) -> None:
     lines.pop_clip_rect()
     if canvas.width > ui.px(ZOOM):
         _zoom(ui, editor)
-    if editor.state.hint and canvas.width > ui.px(HINT):
+    if editor.preferences.hint and canvas.width > ui.px(HINT):
         _hint(ui, editor)
     if editor.state.statistics:
         _statistics(ui, editor)
@@ -189,7 +189,7 @@ def _hint(ui: Ui, editor: Editor) -> None:
         imgui.same_line(0, ui.px(6))
         imgui.set_cursor_pos_y(top)
         if ui.icon_button("no hint", "close", size=24, icon_size=12):
-            editor.state.hint = False
+            editor.dismiss_hint()
 
 
 def _statistics(ui: Ui, editor: Editor) -> None:
