@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,24 +30,19 @@ from solver.scheme import (
 )
 from solver.viscosity.solve import Viscosity
 
-# How far the rows of faces that are advected reach beyond the grid, columns and rows on either side.
+# Of u and of v, four faces of a row a texel (see `depart.frag`), and how far they reach beyond the grid: columns and rows
+# on either side.
+Rows = tuple[Field, Field]
 BEYOND = 1, 2
 
 
 @dataclass(frozen=True)
-class Departing:
-    """w1, as advection takes it: on MAC faces, and the same four faces of a row a texel (see `lay_rows.frag`)."""
+class Tracing:
+    """What drawing the trace takes: where to, and the defines and inputs of `trace.frag`."""
 
-    faces: Field
-    rows: tuple[Field, Field]
-
-
-@dataclass(frozen=True)
-class Trace:
-    """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells."""
-
-    field: Field
-    dt: float
+    target: Field
+    defines: dict[str, Any]
+    inputs: dict[str, Any]
 
 
 class Fluid(Scheme):
@@ -64,16 +60,14 @@ class Fluid(Scheme):
         # Half the last pressure gradient, which the next step takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         rows = grid.nx + 2 * BEYOND[0], grid.ny + 2 * BEYOND[1]
-        self._departing = Departing(
-            device.field(grid.size, 2, "departing velocity"),
-            (device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")),
-        )
-        self._trace_field = device.field(grid.size, 2, "trace")
-        self._trace: Trace | None = None  # of the velocity as it is
-        blocks = -(-grid.nx // 2), -(-grid.ny // 2)
-        self._squares = device.field(blocks, 2, "energies")
-        self._sum_of_squares = Reduction(device, blocks, 2, "sum")
-        self._limited = PackedFaces(device, (blocks[0] + 2, blocks[1] + 2), "limited velocity")
+        self._departing = device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")
+        self._trace = device.field(grid.size, 2, "trace")
+        self._traced: float | None = None  # the step that it is of; None if the velocity has changed since
+        packed = -(-grid.nx // 2) + 2, -(-grid.ny // 2) + 2
+        self._departed = device.field(packed, 1, "departed energy")
+        self._squares = device.field(packed, 2, "energies")
+        self._sum_of_squares = Reduction(device, packed, 2, "sum")
+        self._limited = PackedFaces(device, packed, "limited velocity")
         self._viscosity_solver = Viscosity(device, grid.size, grid.spacing)
         self._pressure_solver = Projection(device, grid.size, grid.spacing)
         # What the solvers hold of the masks; None if they have to look.
@@ -93,13 +87,13 @@ class Fluid(Scheme):
         w2 = self._advect(w1, dt)
         w3 = self._diffuse(w2, dt)
         viscous_residual = self._viscous_residual(w3) if self.measuring else None
-        w3 = self._bound_energy(w1, w3)
+        w3 = self._bound_energy(w3)
         self._project(w3 if steer is None else self._steered(w3, steer))
         if self.measuring:
             self.residuals = replace(self.residuals, viscous_residual=viscous_residual)
         self.time += dt
 
-    def _add_force(self, forces: Forces, dt: float) -> Departing:
+    def _add_force(self, forces: Forces, dt: float) -> Rows:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn.
 
         g is half the last pressure gradient: with the projection, where the fluid arrives, pressure then acts along the
@@ -108,17 +102,13 @@ class Fluid(Scheme):
         schemes.
         """
         self._check_source()
-        fields = self._fields_of(forces, dt)
+        force = self._force(forces, dt)
         with self.device.stage("add force"):
-            departing = self._departing.faces
-            inputs: dict[str, Any] = {"velocity": self.velocity.read, "carried": self._carried.read}
-            for force, impulse in fields[:1]:
-                inputs |= {"force": force, "impulse": impulse}
-            self.device.pass_("step/add_force.frag", **({"FORCE": 1} if fields else {}))(departing, **inputs)
-            self._add_fields(departing, fields[1:])
-        return self._lay_rows(departing)
+            departing = self._depart(carried=self._carried.read, **force)
+        self.impulse.clear()
+        return departing
 
-    def _advect(self, departing: Departing, dt: float) -> PackedFaces:
+    def _advect(self, departing: Rows, dt: float) -> PackedFaces:
         """w2(x) = w1(x_d): second-order backtrace, cubic interpolation, each component from where it departs; and drag.
 
         Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has
@@ -129,7 +119,7 @@ class Fluid(Scheme):
         with self.device.stage("advect"):
             advected, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
             advect = self.device.pass_("step/advect.frag", **packing.defines)
-            advect(advected.fields, region=packing.region, rows_u=departing.rows[0], rows_v=departing.rows[1],
+            advect((*advected.fields, self._departed), region=packing.region, rows_u=departing[0], rows_v=departing[1],
                    trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
         return advected
 
@@ -140,7 +130,7 @@ class Fluid(Scheme):
         with self.device.stage("diffuse"):
             return self._viscosity_solver.solve()
 
-    def _bound_energy(self, departing: Departing, diffused: PackedFaces) -> PackedFaces:
+    def _bound_energy(self, diffused: PackedFaces) -> PackedFaces:
         """w3, made smaller where it has more energy than departed: advection moves energy and viscosity takes it.
 
         A semi-Lagrangian step reads some places more often than others and so may make energy; see equation (S6). Walls
@@ -151,10 +141,10 @@ class Fluid(Scheme):
         """
         with self.device.stage("diffuse"):
             energy = self.device.pass_("step/energy.frag")
-            energy(self._squares, **diffused.inputs(), departing=departing.faces)
+            energy(self._squares, **diffused.inputs(), departed=self._departed)
             after, before = self._sum_of_squares(self._squares).tolist()
             cells = self.grid.nx * self.grid.ny
-            if not before <= cells * LARGEST_SPEED**2:
+            if not (before <= cells * LARGEST_SPEED**2 and math.isfinite(after)):
                 self._forget_last_step()
                 raise ValueError("the forces and brushes of this step are beyond all measure")
             moved = max(map(abs, self.params.walls.speed)) if self.params.walls.slip == "none" else 0.0
@@ -189,27 +179,29 @@ class Fluid(Scheme):
                 packed=diffused,
             )
             self.source.clear()
-            self._trace = None
+            self._traced = None
         self.residuals = Residuals(before, self._divergence_norm(wanted))
 
     # -- its stages, each alone -------------------------------------------------------------------------------------
 
     def add_force(self, forces: Forces, dt: float) -> None:
         """Add forces, and what brushes have drawn, to the velocity; see `step`."""
-        self._add_fields(self.velocity.read, self._fields_of(forces, check_step(dt)))
-        self._trace = None
+        if force := self._force(forces, check_step(dt)):
+            self.device.pass_("step/add_impulse.frag")(self.velocity.read, add=True, **force)
+        self.impulse.clear()
+        self._traced = None
 
     def advect(self, dt: float) -> None:
         """Let the velocity carry itself for `dt` seconds; the result is not free of divergence."""
         dt = check_step(dt)
-        self._unpack(self._advect(self._lay_rows(self.velocity.read), dt))
+        self._unpack(self._advect(self._depart(), dt))
 
     def diffuse(self, dt: float) -> None:
         """Let viscosity act on the velocity for `dt` seconds; the result is not free of divergence."""
         self._take_up_masks(check_step(dt))
         with self.device.stage("diffuse"):
             self._viscosity_solver.diffuse(self.velocity)
-            self._trace = None
+            self._traced = None
 
     def project(self) -> None:
         """Make the velocity free of divergence, but for what brushes ask for."""
@@ -221,13 +213,19 @@ class Fluid(Scheme):
 
         Valid until the velocity changes. The warp map and the next step both follow it.
         """
-        if self._trace is None or self._trace.dt != dt:
-            hx, hy = self.grid.spacing
+        if tracing := self.begin_trace(dt):
             with self.device.stage("trace"):
-                trace = self.device.pass_("step/trace.frag", **self._wall_defines())
-                trace(self._trace_field, velocity=self.faces(), cells_a_speed=(dt / hx, dt / hy), **self._wall_inputs())
-            self._trace = Trace(self._trace_field, dt)
-        return self._trace.field
+                self.device.pass_("step/trace.frag", **tracing.defines)(tracing.target, **tracing.inputs)
+        return self._trace
+
+    def begin_trace(self, dt: float) -> Tracing | None:
+        """For whoever draws the trace, which must then be done, beside something else; None if it is there already."""
+        if self._traced == dt:
+            return None
+        self._traced = dt
+        hx, hy = self.grid.spacing
+        inputs = {"velocity": self.faces(), "cells_a_speed": (dt / hx, dt / hy), **self._wall_inputs()}
+        return Tracing(self._trace, self._wall_defines(), inputs)
 
     # -- what is put in ---------------------------------------------------------------------------------------------
 
@@ -274,11 +272,11 @@ class Fluid(Scheme):
 
     def restore(self, state: State) -> None:
         super().restore(state)
-        self._trace = None
+        self._traced = None
 
     def release(self) -> None:
         super().release()
-        for item in (self.velocity, self._carried, self._departing.faces, *self._departing.rows, self._trace_field):
+        for item in (self.velocity, self._carried, *self._departing, self._trace, self._departed):
             item.release()
         for item in (self._squares, self._sum_of_squares, self._limited, self._viscosity_solver, self._pressure_solver):
             item.release()
@@ -291,40 +289,43 @@ class Fluid(Scheme):
 
     # -- parts of the stages ----------------------------------------------------------------------------------------
 
-    def _fields_of(self, forces: Forces, dt: float) -> list[tuple[Field, float]]:
-        """All that acts in a step as fields with their impulses; arrays and functions go where brushes draw."""
+    def _force(self, forces: Forces, dt: float) -> dict[str, Any]:
+        """All that acts in a step as one `force` and its `impulse`, empty if nothing does.
+
+        More than one are added up where brushes draw.
+        """
         fields, faces = self._acting(forces, dt)
-        if faces is not None:
-            upload = self.device.upload(faces, "force")
+        upload = None if faces is None else self.device.upload(faces, "force")
+        if upload:
+            fields.append((upload, 1.0))
+        if upload or len(fields) > 1 or not self.impulse.is_empty:
             add = self.device.pass_("step/add_impulse.frag")
-            self.impulse.add(lambda target: add(target, add=True, force=upload, impulse=1.0))
+            for force, impulse in fields:
+                self.impulse.add(partial(add, add=True, force=force, impulse=impulse))
+            fields = [(self.impulse.field, 1.0)]
+        if upload:
             upload.release()
-        return fields if self.impulse.is_empty else [*fields, (self.impulse.field, 1.0)]
+        return {"force": fields[0][0], "impulse": fields[0][1]} if fields else {}
 
-    def _add_fields(self, target: Field, fields: list[tuple[Field, float]]) -> None:
-        add = self.device.pass_("step/add_impulse.frag")
-        for force, impulse in fields:
-            add(target, add=True, force=force, impulse=impulse)
-        self.impulse.clear()
-
-    def _lay_rows(self, faces: Field) -> Departing:
-        with self.device.stage("advect"):
-            rows = self._departing.rows
-            width, height = rows[0].size
-            # A texel holds the faces from one before its own to two behind.
-            left, right, above = BEYOND[0] + 1, BEYOND[0] + 2, BEYOND[1]
-            inside = (left, above, width - left - right, height - 2 * above)
-            around = [(0, 0, width, above), (0, height - above, width, above)]
-            around += [(0, above, left, height - 2 * above), (width - right, above, right, height - 2 * above)]
-            self.device.pass_("step/lay_rows.frag")(rows, region=inside, velocity=faces)
-            edges = self.device.pass_("step/lay_rows.frag", EDGES=1, **self._wall_defines())
-            edges(rows, region=around, velocity=faces, **self._wall_inputs())
-            return Departing(faces, rows)
+    def _depart(self, **parts: Any) -> Rows:
+        """The velocity, less what is `carried` and with a `force`, if they are given, as advection reads it."""
+        rows = self._departing
+        width, height = rows[0].size
+        # A texel holds the faces from one before its own to two behind.
+        left, right, above = BEYOND[0] + 1, BEYOND[0] + 2, BEYOND[1]
+        inside = (left, above, width - left - right, height - 2 * above)
+        around = [(0, 0, width, above), (0, height - above, width, above)]
+        around += [(0, above, left, height - 2 * above), (width - right, above, right, height - 2 * above)]
+        given = {name.upper(): 1 for name in parts if name != "impulse"}
+        self.device.pass_("step/depart.frag", **given)(rows, region=inside, velocity=self.velocity.read, **parts)
+        edges = self.device.pass_("step/depart.frag", EDGES=1, **given, **self._wall_defines())
+        edges(rows, region=around, velocity=self.velocity.read, **parts, **self._wall_inputs())
+        return rows
 
     def _unpack(self, faces: PackedFaces) -> None:
         """Let packed faces be the velocity."""
         self._viscosity_solver.unpack(faces, self.velocity.read)
-        self._trace = None
+        self._traced = None
 
     def _check_source(self) -> None:
         if self.source.is_empty:
@@ -341,7 +342,7 @@ class Fluid(Scheme):
 
     def _forget_last_step(self) -> None:
         self.impulse.clear()
-        self._trace = None
+        self._traced = None
         self._carried.read.clear()
         self._viscosity_solver.forget()
         self._pressure_solver.forget()

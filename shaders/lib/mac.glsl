@@ -37,3 +37,8 @@ vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
     vec2 middle = clamp(p - 0.5 * cells_a_speed * here, vec2(0.0), edge);
     return clamp(p - cells_a_speed * mac_velocity(velocity, middle), vec2(0.0), edge);
 }
+
+// The same from the centre of the cell at p, as how far it is: x_d - x, in cells. 11 reads.
+vec2 mac_trace(sampler2D velocity, vec2 p, vec2 cells_a_speed) {
+    return mac_backtrace(velocity, p, mac_centre(velocity, p), cells_a_speed) - p;
+}

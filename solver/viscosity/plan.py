@@ -61,9 +61,11 @@ def plan_for(least: float, largest: float) -> Plan:
     if largest <= BARELY_VISCOUS:
         return Plan("smooth", (2, 0), levels=0)
     if largest <= NEARLY_UNIFORM * least:
+        # A second sweep on the finest level halves what is left of the change at .3, and takes a quarter of it at 1.
+        sweeps = 2 if largest <= 1.0 else 1
         # What a nested cycle meets is smooth only where the viscosity reaches far.
         nested = 0 if largest <= 5.0 else 1 if largest <= 50.0 else 2
-        return Plan("fmg", (2, 2), nested=nested, two_grid=largest <= 150.0)
+        return Plan("fmg", (sweeps, 2), nested=nested, two_grid=largest <= 150.0)
     is_soft = least <= ONE_SWEEP
     count = 1 if is_soft else 2
     stiff = max(STIFF, STIFF_OF_SOFTEST * least)

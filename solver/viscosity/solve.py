@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
-from solver.packing import DoublePackedFaces, PackedFaces, Packing
+from solver.packing import PackedFaces, Packing
 from solver.params import Walls
 from solver.viscosity.conjugate_gradients import ConjugateGradients
 from solver.viscosity.deflation import Deflation
@@ -36,7 +36,7 @@ class Viscosity:
         self.deflation = Deflation(device, finest.texels)
         ringed = finest.rhs.u.size
         # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
-        self._change = DoublePackedFaces(device, ringed, "viscous change")
+        self._change = PackedFaces(device, ringed, "viscous change")
         self._dragged = PackedFaces(device, ringed, "viscous right-hand side between moving walls")
 
     @property
@@ -89,13 +89,8 @@ class Viscosity:
         """The solution for `v_star`, packed, in lengths / s; valid until the next solve."""
         v_star, rhs, finest = self.v_star, self._right_hand_side(), self.multigrid.finest
         if self.plan.method == "cg":
-            change = self._change.read
             plan, solve = self.plan, self.conjugate_gradients.solve
-            solution = solve(v_star, change, rhs, self._precondition, plan.tolerance, plan.iterations)
-            draw = self.device.pass_("viscosity/change.frag")
-            draw(self._change.write.fields, region=finest.region, **solution.inputs("x_"), **v_star.inputs())
-            self._change.swap()
-            return solution
+            return solve(v_star, self._change, rhs, self._precondition, plan.tolerance, plan.iterations)
         if self.plan.method == "fmg":
             return self.multigrid.correct(v_star, rhs)
         if self.plan.method == "direct":
@@ -137,7 +132,7 @@ class Viscosity:
 
     def state(self) -> tuple[Field, Field]:
         """The fields that a later step depends on."""
-        return self._change.read.fields
+        return self._change.fields
 
     def forget(self) -> None:
         """Expect no change: the velocity is a new one."""
@@ -146,7 +141,8 @@ class Viscosity:
 
     def residual_norm(self, after: Field) -> float:
         """|v* - A v| / |v*| for a velocity v on MAC faces; waits for the GPU."""
-        finest, rhs, left = self.multigrid.finest, self._right_hand_side(), self._change.write
+        finest, rhs = self.multigrid.finest, self._right_hand_side()
+        left = finest.faces.write
         self._pack(after, finest.faces.read)
         self.multigrid.residual(finest, finest.faces.read, rhs, left)
         wanted, found = (
@@ -158,7 +154,7 @@ class Viscosity:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        pairs = self._change.read, self._change.write, self._dragged
+        pairs = self._change, self._dragged
         fields = [field for pair in pairs for field in pair.fields]
         return sum(item.nbytes for item in (*fields, self.multigrid, self.conjugate_gradients, self.deflation))
 

@@ -90,7 +90,15 @@ class WarpMap:
 
     def follow(self, fluid: Fluid, dt: float) -> None:
         """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
-        self.advance_traced(fluid.trace(check_step(dt)))
+        check_field("a velocity", fluid.faces(), self.grid)
+        if tracing := fluid.begin_trace(check_step(dt)):
+            advance = self.device.pass_("warp/advance.frag", TRACE=1, **tracing.defines)
+            targets = self._submap.write, tracing.target
+            advance(targets, displacement=self._submap.read, spacing=self.grid.spacing, **tracing.inputs)
+            self._submap.swap()
+            self._advanced()
+        else:
+            self.advance_traced(fluid.trace(dt))
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
