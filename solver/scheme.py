@@ -269,10 +269,10 @@ class Scheme(ABC):
         """dv/dx - du/dy at the cells' corners, (ny + 1, nx + 1) float32, 1 / s, positive clockwise on the screen."""
         hx, hy = self.grid.spacing
         u, v = np.pad(self.u, ((1, 1), (0, 0)), mode="edge"), np.pad(self.v, ((0, 0), (1, 1)), mode="edge")
-        if self.params.walls.slip == "none":
-            left, right, top, bottom = self.params.walls.speed
-            u[0], u[-1] = 2 * top - u[0], 2 * bottom - u[-1]
-            v[:, 0], v[:, -1] = 2 * left - v[:, 0], 2 * right - v[:, -1]
+        beyond = v[:, 0], v[:, -1], u[0], u[-1]
+        for image, sticks, speed in zip(beyond, self.params.walls.no_slip, self.params.walls.speed, strict=False):
+            if sticks:
+                image[:] = 2 * speed - image
         return np.diff(v, axis=1) / np.float32(hx) - np.diff(u, axis=0) / np.float32(hy)
 
     def stream_function(self) -> np.ndarray:
@@ -348,10 +348,13 @@ class Scheme(ABC):
         return fields, total
 
     def _wall_defines(self) -> dict[str, Any]:
-        return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
+        return {"NO_SLIP": 1} if any(self.params.walls.no_slip) else {}
 
     def _wall_inputs(self) -> dict[str, Any]:
-        return {"wall_speed": self.params.walls.speed} if self.params.walls.slip == "none" else {}
+        walls = self.params.walls
+        if not any(walls.no_slip):
+            return {}
+        return {"wall_speed": walls.speed, "wall_image": tuple(-1.0 if side else 1.0 for side in walls.no_slip[:4])}
 
 
 def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.ndarray:
