@@ -30,7 +30,7 @@ from solver.grid import Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
 from solver.warp.density import Density
-from solver.warp.map import WarpMap
+from solver.warp.map import WarpMap, map_size
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought
@@ -185,11 +185,13 @@ class Replay:
             ValueError: if it is not of this simulation.
         """
         self._leave_passing()
-        moment = self._save()
+        now = self._save()
         try:
-            self._restore(moment.with_arrays(snapshot))
+            then = now.with_arrays(self.device, snapshot)
         finally:
-            moment.release()
+            now.release()
+        self._restore(then)
+        then.release()
         self.tick = tick
 
     def release(self) -> None:
@@ -374,7 +376,8 @@ class Replay:
         self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.fluid = fluid(self.device, self.grid)
-        self.warp = warp(self.device, self.grid)
+        largest = self.device.limits.max_texture_size
+        self.warp = warp(self.device, self.grid, map_size(self.grid, (source.width, source.height), largest))
         if recipe.map is not None:
             self._begin_with(recipe.map)
         self.masks = Masks(self.device, self.grid)
