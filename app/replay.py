@@ -185,11 +185,13 @@ class Replay:
             ValueError: if it is not of this simulation.
         """
         self._leave_passing()
-        moment = self._save()
+        now = self._save()
         try:
-            self._restore(moment.with_arrays(snapshot))
+            then = now.with_arrays(self.device, snapshot)
         finally:
-            moment.release()
+            now.release()
+        self._restore(then)
+        then.release()
         self.tick = tick
 
     def release(self) -> None:

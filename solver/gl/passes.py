@@ -84,6 +84,8 @@ class Pass:
             framebuffer.use()
             self._vertices.render(moderngl.TRIANGLES, vertices=vertices)
             self.device.timings.count(width * height, self.reads)
+            for field in fields:
+                field.drawn((x, y, width, height))
         if add:
             ctx.enable_only(moderngl.NOTHING)
         if region is not None:
