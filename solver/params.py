@@ -36,7 +36,7 @@ class Walls:
 
     @classmethod
     def of(cls, slip: Literal["free", "none"], grid: Grid) -> Walls:
-        """Those of a grid in which the picture's own edges have this `slip`, and the fluid sticks to all other sides."""
+        """Those of a grid: this `slip` at the edges of the picture, and all other sides stick."""
         left, right, top, bottom = grid.at_edge
         return cls(slip, sticky=(not left, not right, not top, not bottom))
 

@@ -86,8 +86,8 @@ def test_the_flow_in_a_window_is_that_of_the_whole(device: Device, left: int, vi
         fluid = Fluid(device, grid, FluidParams(Walls.of("free", grid)))
         fluid.set_viscosity(viscosity)
         for tick in range(6):
-            points = [(x + 0.002 * n, y + 0.004 * n) for n in (tick, tick + 1)]
-            brush.push(fluid, Tip(*points, 0.04), 1 / 60)
+            start = x + 0.002 * tick, y + 0.004 * tick
+            brush.push(fluid, Tip(start, (start[0] + 0.002, start[1] + 0.004), 0.04), 1 / 60)
             fluid.step(1 / 60)
         flows.append(fluid.velocity.read.get())
         fluid.release()

@@ -316,7 +316,7 @@ class Level:
         self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
         # Without solids, what walls leave of a grid whose last column or row is only half in it.
         self.box = finest[0] >> depth, finest[1] >> depth
-        # What passes read of it: the operator, what stress.frag multiplies with, open faces, and where the fluid sticks.
+        # What passes read: the operator, what stress.frag multiplies with, open faces, and where the fluid sticks.
         self.operator: dict[str, Any] = {}
         self.stencil: dict[str, Any] = {}
         self.open: dict[str, Any] = {}
