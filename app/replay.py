@@ -19,7 +19,7 @@ from app.strokes import Change, Dab, Stroke
 from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
 from solver.brush.brush import Brush, Motion
-from solver.brush.masks import Masks
+from solver.brush.masks import Masks, canvas_of
 from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
 from solver.brush.tip import Tip
 from solver.brush.twirl import Twirl
@@ -29,8 +29,9 @@ from solver.gl.field import Field, FieldError
 from solver.grid import Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
+from solver.scheme import State
 from solver.warp.density import Density
-from solver.warp.map import WarpMap
+from solver.warp.map import WarpMap, map_size
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought
@@ -185,11 +186,13 @@ class Replay:
             ValueError: if it is not of this simulation.
         """
         self._leave_passing()
-        moment = self._save()
+        now = self._save()
         try:
-            self._restore(moment.with_arrays(snapshot))
+            then = now.with_arrays(self.device, snapshot)
         finally:
-            moment.release()
+            now.release()
+        self._restore(then)
+        then.release()
         self.tick = tick
 
     def release(self) -> None:
@@ -283,9 +286,13 @@ class Replay:
         if params != self.fluid.params:
             self.fluid.params = params
         if settings.viscosity != self._viscosity_in_force:
-            self.masks.set_base(self._viscosity(settings.viscosity), self._frozen)
+            self._use_viscosity(settings.viscosity)
             self._apply_masks()
-            self._viscosity_in_force = settings.viscosity
+
+    def _use_viscosity(self, base: float) -> None:
+        """Let the masks be painted over the recipe's layers on another base."""
+        self.masks.set_base(lambda grid: self._viscosity(base, grid))
+        self._viscosity_in_force = base
 
     def _apply_masks(self) -> None:
         self.masks.apply(self.fluid)
@@ -374,13 +381,16 @@ class Replay:
         self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.fluid = fluid(self.device, self.grid)
-        self.warp = warp(self.device, self.grid)
+        largest = self.device.limits.max_texture_size
+        self.warp = warp(self.device, self.grid, map_size(self.grid, (source.width, source.height), largest))
         if recipe.map is not None:
             self._begin_with(recipe.map)
-        self.masks = Masks(self.device, self.grid)
+        canvas = canvas_of((source.width, source.height), self.grid, self.device.limits.max_texture_size)
+        self.masks = Masks(self.device, canvas)
+        if recipe.freeze:
+            self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
-        self._frozen = solid(recipe.freeze, self.grid, self.pictures)
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
         self._viscosity = cache(self._viscosity_over)
@@ -403,8 +413,8 @@ class Replay:
         colours, alpha = channels(self.pictures.source)
         return np.concatenate([colours, alpha[..., None]], axis=2)
 
-    def _viscosity_over(self, base: float) -> np.ndarray:
-        return viscosity(self.recipe.viscosity, base, self.grid, self.pictures)
+    def _viscosity_over(self, base: float, grid: Grid) -> np.ndarray:
+        return viscosity(self.recipe.viscosity, base, grid, self.pictures)
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence)]
@@ -418,13 +428,15 @@ class Replay:
         return {name: part for name, part in parts.items() if part is not None}
 
     def _save(self) -> Moment:
-        return Moment({name: part.save() for name, part in self._parts().items()})
+        states = {name: part.save() for name, part in self._parts().items()}
+        return Moment(states | {"settings": State({}, {"viscosity": np.array(self._viscosity_in_force)})})
 
     def _restore(self, moment: Moment) -> None:
         for name, part in self._parts().items():
             part.restore(moment.states[name])
-        # Which base the masks were painted over then is worked out anew.
-        self._viscosity_in_force = None
+        viscosity = float(moment.states["settings"].values["viscosity"])
+        if viscosity != self._viscosity_in_force:
+            self._use_viscosity(viscosity)
 
     def _load(self, checkpoint: Checkpoint | None) -> None:
         if checkpoint is None:

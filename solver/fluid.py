@@ -147,7 +147,7 @@ class Fluid(Scheme):
             if not (before <= cells * LARGEST_SPEED**2 and math.isfinite(after)):
                 self._forget_last_step()
                 raise ValueError("the forces and brushes of this step are beyond all measure")
-            moved = max(map(abs, self.params.walls.speed)) if self.params.walls.slip == "none" else 0.0
+            moved = max(map(abs, self.params.walls.drag))
             most = math.sqrt(before) + moved * math.sqrt(cells)
             if math.sqrt(after) <= most:
                 return diffused

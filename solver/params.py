@@ -3,20 +3,54 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    from solver.grid import Grid
+
+
+class NoSlip(NamedTuple):
+    """Where fluid sticks: at the left, right, top and bottom sides of the grid, and at solid cells."""
+
+    left: bool
+    right: bool
+    top: bool
+    bottom: bool
+    solids: bool
 
 
 @dataclass(frozen=True)
 class Walls:
-    """What the fluid does at the edges of the picture and at frozen cells.
+    """What the fluid does at the sides of the grid and at frozen cells.
 
     Attributes:
         slip: "free" glides along walls, "none" sticks to them.
-        speed: tangential velocity of the left, right, top and bottom wall, for `slip="none"` (a moving lid).
+        speed: tangential velocity of the left, right, top and bottom wall, where it sticks (a moving lid).
+        sticky: sides (left, right, top, bottom) that it sticks to whatever `slip` is, as those of a window do which are
+            not the picture's edge.
     """
 
     slip: Literal["free", "none"] = "free"
     speed: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    sticky: tuple[bool, bool, bool, bool] = (False, False, False, False)
+
+    @classmethod
+    def of(cls, slip: Literal["free", "none"], grid: Grid) -> Walls:
+        """Those of a grid: this `slip` at the edges of the picture, and all other sides stick."""
+        left, right, top, bottom = grid.at_edge
+        return cls(slip, sticky=(not left, not right, not top, not bottom))
+
+    @property
+    def no_slip(self) -> NoSlip:
+        """Where it sticks."""
+        everywhere = self.slip == "none"
+        left, right, top, bottom = (everywhere or side for side in self.sticky)
+        return NoSlip(left, right, top, bottom, everywhere)
+
+    @property
+    def drag(self) -> tuple[float, ...]:
+        """The speeds of the walls that it sticks to, 0 for the others."""
+        return tuple(speed if sticks else 0.0 for speed, sticks in zip(self.speed, self.no_slip, strict=False))
 
 
 @dataclass(frozen=True)

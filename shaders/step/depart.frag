@@ -29,8 +29,8 @@ vec2 departing(vec2 place) {
 vec2 face(vec2 cell, vec2 size) {
     float sign_u, sign_u_across, added_u, sign_v, sign_v_across, added_v;
     vec2 image_u = vec2(image_normal(cell.x, size.x, sign_u),
-                        image_tangential(cell.y, size.y, u_wall_speed.zw, sign_u_across, added_u));
-    vec2 image_v = vec2(image_tangential(cell.x, size.x, u_wall_speed.xy, sign_v_across, added_v),
+                        image_tangential(cell.y, size.y, u_wall_image.zw, u_wall_speed.zw, sign_u_across, added_u));
+    vec2 image_v = vec2(image_tangential(cell.x, size.x, u_wall_image.xy, u_wall_speed.xy, sign_v_across, added_v),
                         image_normal(cell.y, size.y, sign_v));
     return vec2(sign_u * (sign_u_across * departing((image_u + 0.5) / size).x + added_u),
                 sign_v * (sign_v_across * departing((image_v + 0.5) / size).y + added_v));

@@ -33,17 +33,16 @@ layout(location = 1) out vec4 out_v;
 
 vec4 coarse(sampler2D f, vec2 p, bool is_v) { return is_v ? texture(f, p).xzyw : texture(f, p); }
 
-// Between the nearest coarse face and the next one.
-vec4 across(vec4 nearest, vec4 next) {
-    vec4 mixed = 0.75 * nearest + 0.25 * next;
-#ifndef NO_SLIP
-    mixed = mix(mixed, nearest + next, max(vec4(equal(nearest, vec4(0.0))), vec4(equal(next, vec4(0.0)))));
-#endif
-    return mixed;
+// Between the nearest coarse face and the next one; what each is glided along for, if it is fixed.
+vec4 across(vec4 nearest, vec4 next, vec4 glides_nearest, vec4 glides_next) {
+    vec4 alone = max(vec4(equal(nearest, vec4(0.0))) * glides_nearest, vec4(equal(next, vec4(0.0))) * glides_next);
+    return mix(0.75 * nearest + 0.25 * next, nearest + next, alone);
 }
 
-// The texel's four faces. `odd` says whether it is the second fine texel of the coarse one at p, along and across.
-vec4 spread(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, bool odd_along, bool odd_across) {
+// The texel's four faces. `odd` says whether it is the second fine texel of the coarse one at p, along and across; `row`
+// is the first coarse row of that one, `count` of them lie between the sides that are `no_slip` or not.
+vec4 spread(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, bool odd_along, bool odd_across,
+            float row, float count, vec2 no_slip) {
     vec2 q = p + (odd_across ? step_across : -step_across);
     vec4 a = coarse(f, p, is_v), b = coarse(f, p + step_along, is_v);
     vec4 c = coarse(f, q, is_v), d = coarse(f, q + step_along, is_v);
@@ -52,7 +51,9 @@ vec4 spread(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, b
     vec4 second = odd_along ? vec4(b.x, b.z, d.x, d.z) : vec4(a.y, a.w, c.y, c.w);
     // Rows before, here and after.
     vec3 near = odd_across ? first.xyz : first.wxy, far = odd_across ? second.xyz : second.wxy;
-    vec4 rows = across(vec4(near.yy, far.yy), vec4(near.xz, far.xz));
+    float before = row - (odd_across ? 0.0 : 1.0);
+    vec4 glides_next = glides(before + vec4(0.0, 2.0, 0.0, 2.0), count, no_slip);
+    vec4 rows = across(vec4(near.yy, far.yy), vec4(near.xz, far.xz), glides(vec4(before + 1.0), count, no_slip), glides_next);
     return vec4(rows.x, 0.5 * (rows.x + rows.z), rows.y, 0.5 * (rows.y + rows.w));
 }
 
@@ -60,14 +61,15 @@ void main() {
     ivec2 place = ivec2(gl_FragCoord.xy) - 1;
     bvec2 odd = equal(place & 1, ivec2(1));
     vec2 texel = 1.0 / vec2(textureSize(u_coarse_u, 0)), p = (vec2(place >> 1) + 1.5) * texel;
+    vec2 first = vec2(place >> 1) * 2.0, box = floor(0.5 * u_box);
     vec2 x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
 #if defined(START) || defined(CORRECT)
     Faces inverse = inverse_diagonal(v_uv);
 #endif
     vec4 u = texture(u_u, v_uv), v = texture(u_v, v_uv);
 #ifdef START
-    u = inverse.u * (u - spread(u_coarse_rhs_u, p, x, y, false, odd.x, odd.y));
-    v = inverse.v * (v - spread(u_coarse_rhs_v, p, y, x, true, odd.y, odd.x).xzyw);
+    u = inverse.u * (u - spread(u_coarse_rhs_u, p, x, y, false, odd.x, odd.y, first.y, box.y, u_no_slip.zw));
+    v = inverse.v * (v - spread(u_coarse_rhs_v, p, y, x, true, odd.y, odd.x, first.x, box.x, u_no_slip.xy).xzyw);
 #endif
 #ifdef CORRECT
 #ifdef DRAGGED
@@ -79,6 +81,6 @@ void main() {
     u = part * u + u_weight * inverse.u * mix(rhs_u, texture(u_r_u, v_uv), part);
     v = part * v + u_weight * inverse.v * mix(rhs_v, texture(u_r_v, v_uv), part);
 #endif
-    out_u = u + open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y);
-    out_v = v + open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x).xzyw;
+    out_u = u + open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y, first.y, box.y, u_no_slip.zw);
+    out_v = v + open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x, first.x, box.x, u_no_slip.xy).xzyw;
 }

@@ -12,7 +12,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.reduction import Reduction
 from solver.packing import PackedFaces
-from solver.params import Walls
+from solver.params import NoSlip
 from solver.viscosity.changed import Box, changed
 from solver.viscosity.operator import (
     Coefficients,
@@ -47,12 +47,12 @@ class TakenUp:
     """What the coefficients in the textures were made from, and these.
 
     Attributes:
-        basis: (time step, whether walls hold the fluid, depth of the last level): with others nothing can be kept.
+        basis: (time step, where the fluid sticks, depth of the last level): with others nothing can be kept.
         viscosity, solid: of the cells.
         levels: the coefficients, the finest first.
     """
 
-    basis: tuple[float, bool, int]
+    basis: tuple[float, NoSlip, int]
     viscosity: np.ndarray
     solid: np.ndarray
     levels: list[Coefficients]
@@ -98,40 +98,40 @@ class Multigrid:
 
     # -- what is solved ---------------------------------------------------------------------------------------------
 
-    def set_uniform(self, viscosity: float, dt: float, walls: Walls) -> None:
+    def set_uniform(self, viscosity: float, dt: float, no_slip: NoSlip) -> None:
         """Take up one viscosity, lengths^2 / s, in a box without solids."""
         self._taken_up = None
         hx, hy = self.spacing
         self._largest = dt * viscosity / (hx * hy)
-        shear, slip = (math.sqrt(hx / hy), math.sqrt(hy / hx)), _slip(walls)
+        shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
         for level in self.levels:
-            level.set_uniform(self._largest / 4.0**level.depth, shear, slip)
-        self.has_transform = not slip
+            level.set_uniform(self._largest / 4.0**level.depth, shear, no_slip)
+        self.has_transform = not any(no_slip)
         if not self.has_transform and self.last is self.levels[-1]:
             columns, rows = (2 * count for count in self.last.texels)
             (across, down), scale = self.last.box, 2.0**self.last.depth
             outside = (np.arange(columns) >= across) | (np.arange(rows)[:, None] >= down)
             everywhere, spacing = np.full((rows, columns), viscosity), (hx * scale, hy * scale)
-            self._inverse.set(inverse_matrix(coefficients(everywhere, outside, dt, spacing, bool(slip))))
+            self._inverse.set(inverse_matrix(coefficients(everywhere, outside, dt, spacing, no_slip, self.last.box)))
 
-    def set_coefficients(self, viscosity: np.ndarray, solid: np.ndarray, dt: float, walls: Walls) -> Coefficients:
+    def set_coefficients(self, viscosity: np.ndarray, solid: np.ndarray, dt: float, no_slip: NoSlip) -> Coefficients:
         """Take up the viscosity of the cells, lengths^2 / s, and the solid ones, (ny, nx) both; those of the finest.
 
         What is made again is what has changed: a dab of a brush changes few cells.
         """
-        slip, self.has_transform = _slip(walls), False
+        self.has_transform = False
         self._largest = dt * float(viscosity[~solid].max(initial=0.0)) / (self.spacing[0] * self.spacing[1])
         taken_up, self._taken_up = self._taken_up, None
-        basis = dt, bool(slip), self.last.depth
+        basis = dt, no_slip, self.last.depth
         if taken_up and taken_up.basis == basis and np.array_equal(taken_up.solid, solid):
             levels = taken_up.levels
-            self._change(levels, changed(taken_up.viscosity, viscosity), viscosity, solid, dt, slip)
+            self._change(levels, changed(taken_up.viscosity, viscosity), viscosity, solid, dt, no_slip)
         else:
-            levels = [coefficients(viscosity, solid, dt, self.spacing, bool(slip))]
+            levels = [coefficients(viscosity, solid, dt, self.spacing, no_slip)]
             while len(levels) <= self.last.depth:
-                levels.append(coarsened(levels[-1], bool(slip)))
+                levels.append(coarsened(levels[-1], no_slip, self.levels[len(levels)].box))
             for grid, level in zip(self.levels, levels, strict=False):
-                grid.set_coefficients(level, slip)
+                grid.set_coefficients(level, no_slip)
         if self.last is self.levels[-1]:
             self._inverse.set(inverse_matrix(levels[-1]))
         self._taken_up = TakenUp(basis, viscosity, solid, levels)
@@ -139,17 +139,17 @@ class Multigrid:
 
     def _change(
         self, levels: list[Coefficients], box: Box | None, viscosity: np.ndarray, solid: np.ndarray, dt: float,
-        slip: dict[str, Any],
+        no_slip: NoSlip,
     ) -> None:  # fmt: skip
         """Make the coefficients of all levels those of another viscosity, which differs in a box of cells."""
         if box is None:
             return
-        change_finest(levels[0], box, viscosity, solid, dt, self.spacing, bool(slip))
-        self.finest.set_coefficients(levels[0], slip, box)
+        change_finest(levels[0], box, viscosity, solid, dt, self.spacing, no_slip)
+        self.finest.set_coefficients(levels[0], no_slip, box)
         for grid, level, fine in zip(self.levels[1:], levels[1:], levels, strict=False):
             box = box.coarser(level.open_u.shape)
-            change_coarse(level, box, fine, bool(slip))
-            grid.set_coefficients(level, slip, box)
+            change_coarse(level, box, fine, no_slip, grid.box)
+            grid.set_coefficients(level, no_slip, box)
 
     @property
     def finest(self) -> Level:
@@ -247,7 +247,7 @@ class Multigrid:
         wanted, left = coarser.faces.write, coarser.faces.read
         restrict = self.device.pass_("viscosity/restrict.frag", WEIGHED=1, **coarser.defines)
         restrict((*left.fields, *wanted.fields, self._products), region=coarser.region, **residual.inputs(),
-                 **rhs.inputs("rhs_"), **coarser.open)  # fmt: skip
+                 **rhs.inputs("rhs_"), **coarser.bounds)  # fmt: skip
         self.device.pass_("viscosity/scaling.frag")(self._scaling, products=self._sum.shrink(self._products))
         damp = self.device.pass_("viscosity/damp.frag")
         damp(coarser.rhs.fields, region=coarser.region, part=self._scaling, **wanted.inputs(), **left.inputs("r_"))
@@ -363,7 +363,7 @@ class Multigrid:
         """The residual as rhs of the coarser level; with a `weight` the first sweep on it too, from rest."""
         if not weight:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
-            restrict(coarser.rhs.fields, region=coarser.region, **residual.inputs(), **coarser.open)
+            restrict(coarser.rhs.fields, region=coarser.region, **residual.inputs(), **coarser.bounds)
             return 0
         restrict = self.device.pass_("viscosity/restrict.frag", START=1, **coarser.defines)
         restrict(
@@ -389,7 +389,3 @@ class Multigrid:
         """Free the textures."""
         for item in (*self.levels, *self._fields, self._sum, self._transform):
             item.release()
-
-
-def _slip(walls: Walls) -> dict[str, Any]:
-    return {"NO_SLIP": 1} if walls.slip == "none" else {}

@@ -17,6 +17,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.passes import Region
 from solver.packing import DoublePackedFaces, PackedFaces, framed, packed
+from solver.params import NoSlip
 from solver.viscosity.changed import Box, whole
 
 # Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 64 unknowns. BLAS inverts 128 in
@@ -101,9 +102,16 @@ class Coefficients:
 
 
 def coefficients(
-    viscosity: np.ndarray, solid: np.ndarray, dt: float, spacing: tuple[float, float], no_slip: bool
+    viscosity: np.ndarray,
+    solid: np.ndarray,
+    dt: float,
+    spacing: tuple[float, float],
+    no_slip: NoSlip,
+    box: tuple[int, int] | None = None,
 ) -> Coefficients:
     """K on the finest level from the viscosity of the cells, lengths^2 / s, (ny, nx), and the solid ones.
+
+    `box`: (nx, ny) of the cells between the walls, if they are not all.
 
     mu at a node is the harmonic mean of the fluid cells that meet there. A wall node's shear is nil at free-slip walls;
     at no-slip ones a face beyond it stands still at the node, half a cell away, which doubles K; at a convex corner the
@@ -119,7 +127,8 @@ def coefficients(
     node = np.divide(meeting, _corners(resistance), out=np.zeros_like(meeting), where=meeting > 0)
     open_u, open_v = wet[:, 1:] & wet[:, :-1], wet[1:] & wet[:-1]
     moving = open_u[1:].astype(int) + open_u[:-1] + open_v[:, 1:] + open_v[:, :-1]
-    node *= np.where(moving < 2, 2.0, 1.0) if no_slip else moving == 4
+    sticks = _where_it_sticks(no_slip, node.shape, box or (columns, rows))
+    node *= np.where(sticks, np.where(moving < 2, 2.0, 1.0), moving == 4)
     hx, hy = spacing
     return Coefficients(
         (2.0 / hx**2 * amount,),
@@ -131,8 +140,8 @@ def coefficients(
     )
 
 
-def coarsened(fine: Coefficients, no_slip: bool) -> Coefficients:
-    """K of the next coarser level: S' K S / 16.
+def coarsened(fine: Coefficients, no_slip: NoSlip, box: tuple[int, int], at: tuple[int, int] = (0, 0)) -> Coefficients:
+    """K of the next coarser level: S' K S / 16; `box`: (nx, ny) of its cells between the walls; `at`: its first one.
 
     A coarse face is open if all the fine faces beside it are, so a correction never pushes through a wall.
     """
@@ -142,16 +151,20 @@ def coarsened(fine: Coefficients, no_slip: bool) -> Coefficients:
     v = fine.open_v[:, ::2] & fine.open_v[:, 1::2]
     open_u = u[:, ::2] & u[:, 1::2] & _behind(u, 1)[:, ::2]
     open_v = v[::2] & v[1::2] & _behind(v, 0)[::2]
-    moves_x, moves_y = (open_u | _ahead(open_u, 1)) | no_slip, (open_v | _ahead(open_v, 0)) | no_slip
+    below = np.arange(rows)[:, None] + at[1] >= box[1]
+    behind = np.arange(columns) + at[0] >= box[0]
+    moves_x = (open_u | _ahead(open_u, 1)) | np.where(below, no_slip.bottom, no_slip.solids)
+    moves_y = (open_v | _ahead(open_v, 0)) | np.where(behind, no_slip.right, no_slip.solids)
     xx = _coarsened_cells([k[:, ::2] + k[:, 1::2] for k in fine.xx], moves_x)
     yy = [k.T for k in _coarsened_cells([k[::2].T + k[1::2].T for k in fine.yy], moves_y.T)]
     nodes = _coarsened_nodes(fine.nodes)
-    if not no_slip:
+    if not all(no_slip):
         full_u, full_v = (framed(faces, (1, 1), (1, 1)) for faces in (open_u, open_v))
-        moving = (full_u[1:, 1:] & full_u[:-1, 1:] & full_v[1:, 1:] & full_v[1:, :-1]).astype(np.float64)
+        moving = full_u[1:, 1:] & full_u[:-1, 1:] & full_v[1:, 1:] & full_v[1:, :-1]
+        moving |= _where_it_sticks(no_slip, moving.shape, box, at)
         around = framed(moving, (1, 1), (1, 1))
         for (down, right), k in nodes.items():
-            k *= moving * around[1 + down :, 1 + right :][: rows + 1, : columns + 1]
+            k *= moving & around[1 + down :, 1 + right :][: rows + 1, : columns + 1]
     return Coefficients(
         tuple(framed(k, *even) for k in xx),
         tuple(framed(k, *even) for k in yy),
@@ -164,17 +177,32 @@ def coarsened(fine: Coefficients, no_slip: bool) -> Coefficients:
 
 def change_finest(
     level: Coefficients, box: Box, viscosity: np.ndarray, solid: np.ndarray, dt: float, spacing: tuple[float, float],
-    no_slip: bool,
+    no_slip: NoSlip,
 ) -> None:  # fmt: skip
     """Make K of the finest `level` that of another viscosity, which differs in a box; bit for bit what all is."""
     window = box.grown(FINE_HALO, level.open_u.shape)
     level.put(box, coefficients(viscosity[window.cells], solid[window.cells], dt, spacing, no_slip), window)
 
 
-def change_coarse(level: Coefficients, box: Box, fine: Coefficients, no_slip: bool) -> None:
-    """Make K of a coarse `level` that of the `fine` one, which has changed it in a box; bit for bit what all is."""
+def change_coarse(level: Coefficients, box: Box, fine: Coefficients, no_slip: NoSlip, between: tuple[int, int]) -> None:
+    """Make K of a coarse `level` that of the `fine` one, which has changed it in a box; bit for bit what all is.
+
+    `between`: (nx, ny) of its cells between the walls.
+    """
     window = box.grown(COARSE_HALO, level.open_u.shape)
-    level.put(box, coarsened(fine.part(window.finer), no_slip), window)
+    level.put(box, coarsened(fine.part(window.finer), no_slip, between, (window.left, window.top)), window)
+
+
+def _where_it_sticks(
+    no_slip: NoSlip, shape: tuple[int, ...], box: tuple[int, int], at: tuple[int, int] = (0, 0)
+) -> np.ndarray:
+    """Whether the fluid sticks to a wall at the nodes of cells from `at` on, `box` of them between the grid's sides."""
+    rows, columns = np.arange(shape[0])[:, None] + at[1], np.arange(shape[1]) + at[0]
+    sticks = np.full(shape, no_slip.solids)
+    sides = columns <= 0, columns >= box[0], rows <= 0, rows >= box[1]
+    for side, holds in zip(sides, no_slip, strict=False):
+        sticks = np.where(side, holds, sticks)
+    return sticks
 
 
 def _behind(values: np.ndarray, axis: int) -> np.ndarray:
@@ -288,13 +316,14 @@ class Level:
         self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
         # Without solids, what walls leave of a grid whose last column or row is only half in it.
         self.box = finest[0] >> depth, finest[1] >> depth
-        # What passes read of it: the operator, which faces are open, and what stress.frag multiplies with.
+        # What passes read: the operator, what stress.frag multiplies with, open faces, and where the fluid sticks.
         self.operator: dict[str, Any] = {}
         self.stencil: dict[str, Any] = {}
         self.open: dict[str, Any] = {}
+        self.walls: dict[str, Any] = {}
         self.defines: dict[str, Any] = {}
 
-    def set_coefficients(self, level: Coefficients, slip: dict[str, Any], box: Box | None = None) -> None:
+    def set_coefficients(self, level: Coefficients, no_slip: NoSlip, box: Box | None = None) -> None:
         """Take the operator from coefficients of each cell, of which only those in a box are others, if it is given."""
         box = box or whole(level.open_u.shape)
         # Faces next to the box feel its strains; one texel more is there to be read only.
@@ -303,7 +332,7 @@ class Level:
         self.open = {"open": self.packed["open"]}
         names = ("inverse_u", "inverse_v", "open") + (() if self.depth else ("cells", "nodes"))
         self.operator = {**{name: self.packed[name] for name in names}, "shear": level.shear}
-        self.defines = {"COARSE": 1, **slip} if self.depth else slip
+        self._take_walls({"COARSE": 1} if self.depth else {}, no_slip)
         if self.depth:
             self.stencil = {name: field for name, field in self.packed.items() if name not in names}
             self.stencil["shear"] = level.shear
@@ -341,11 +370,23 @@ class Level:
             viewport = (*at, texels.shape[1], texels.shape[0])
             self.packed[name].texture.write(np.ascontiguousarray(texels), viewport)
 
-    def set_uniform(self, stiffness: float, shear: tuple[float, float], slip: dict[str, Any]) -> None:
+    def set_uniform(self, stiffness: float, shear: tuple[float, float], no_slip: NoSlip) -> None:
         """Take the operator of one viscosity in a box without solids, dt mu / (hx hy) of this level."""
         self.open, self.stencil = {"box": self.box}, {}
         self.operator = {"stiffness": stiffness, "shear": shear, **self.open}
-        self.defines = {"UNIFORM": 1, **slip}
+        self._take_walls({"UNIFORM": 1}, no_slip)
+
+    def _take_walls(self, defines: dict[str, Any], no_slip: NoSlip) -> None:
+        self.defines, self.walls = defines, {}
+        if any(no_slip):
+            self.defines = {**defines, "NO_SLIP": 1}
+            self.walls = {"no_slip": tuple(map(float, no_slip[:4])), "solids_no_slip": float(no_slip.solids)}
+            self.operator |= self.walls | {"box": self.box}
+
+    @property
+    def bounds(self) -> dict[str, Any]:
+        """What a pass reads that asks which faces are open, and where the fluid sticks."""
+        return {**self.open, **self.walls, "box": self.box}
 
     @property
     def is_coarsest(self) -> bool:

@@ -50,7 +50,7 @@ class Viscosity:
 
     def set_coefficients(self, viscosity: Field, solid: Field, dt: float, walls: Walls) -> None:
         """Take up another viscosity (cells, lengths^2 / s), solid cells (1 = solid), time step (s) or walls."""
-        self._wall_speed = walls.speed if walls.slip == "none" else (0.0, 0.0, 0.0, 0.0)
+        self._wall_speed = walls.drag
         hx, hy = self.spacing
         frozen, amount = solid.get() > 0, viscosity.get()
         fluid = amount[~frozen] if frozen.any() else amount
@@ -59,10 +59,10 @@ class Viscosity:
         self.plan = plan_for(kappa * least, kappa * largest)
         self.deflation.clear()
         if least == largest and not frozen.any():
-            self.multigrid.set_uniform(least, dt, walls)
+            self.multigrid.set_uniform(least, dt, walls.no_slip)
             coefficients = None
         else:
-            coefficients = self.multigrid.set_coefficients(amount, frozen, dt, walls)
+            coefficients = self.multigrid.set_coefficients(amount, frozen, dt, walls.no_slip)
         if self.plan.method != "smooth" and self.multigrid.direct_level is self.multigrid.finest:
             self.plan = Plan("direct")
         elif coefficients and self.plan.stiff:

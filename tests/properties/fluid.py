@@ -5,6 +5,7 @@ Each `check_<name>(device, seed)` asserts, and gives figures that tell how near 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -97,7 +98,8 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
         if step % 100 == 0:
             fluid.params = FluidParams(Walls(rng.choice(["free", "none"])), drag=rng.choice([0.0, 1.0]))
             thick = 10 ** rng.uniform(-6, 3) if rng.random() < 0.7 else 0.0
-            masks.set_base(thick * 10 ** rng.uniform(-3, 3, (grid.ny, grid.nx)), random_solid(rng, grid))
+            masks.set_base(thick * 10 ** rng.uniform(-3, 3, (grid.ny, grid.nx)))
+            masks.set_frozen(random_solid(rng, grid))
             masks.apply(fluid)
             warp.hold(fluid.solid)
             dt = 10 ** rng.uniform(-4, 1)
@@ -188,6 +190,18 @@ def turned_cells(cells: np.ndarray, turn: str) -> np.ndarray:
     return cells[::-1] if "y" in turn else cells
 
 
+def turned_walls(walls: Walls, turn: str) -> Walls:
+    """The same of the sides that the fluid sticks to."""
+    left, right, top, bottom = walls.sticky
+    if "t" in turn:
+        left, right, top, bottom = top, bottom, left, right
+    if "x" in turn:
+        left, right = right, left
+    if "y" in turn:
+        top, bottom = bottom, top
+    return replace(walls, sticky=(left, right, top, bottom))
+
+
 def turned_map(displacement: np.ndarray, turn: str) -> np.ndarray:
     """The same of a vector at cells."""
     u, v = displacement[..., 0], displacement[..., 1]
@@ -202,7 +216,7 @@ def check_symmetry(device: Device, seed: int, masked: bool = False) -> dict[str,
     rng = np.random.default_rng(seed)
     grid = Grid(*((32, 32), (40, 24), (26, 34))[rng.integers(3)])
     dt, ticks = 1 / 60, 60
-    walls = Walls(rng.choice(["free", "none"]))
+    walls = Walls(rng.choice(["free", "none"]), sticky=tuple((rng.random(4) < 0.5).tolist()))
     start = random_faces(rng, grid)
     for axis in (0, 1):  # none of it through the walls
         start[:, 0, 0] = start[0, :, 1] = 0.0
@@ -228,7 +242,11 @@ def check_symmetry(device: Device, seed: int, masked: bool = False) -> dict[str,
 
     def warped(turn: str) -> np.ndarray:
         other = Grid(grid.ny, grid.nx) if "t" in turn else grid
-        fluid, warp, brush = Fluid(device, other, FluidParams(walls)), WarpMap(device, other), Brush(device)
+        fluid, warp, brush = (
+            Fluid(device, other, FluidParams(turned_walls(walls, turn))),
+            WarpMap(device, other),
+            Brush(device),
+        )
         fluid.set_viscosity(turned_cells(viscosity, turn))
         fluid.set_solid(turned_cells(solid, turn))
         fluid.set_velocity(turned(start, turn))

@@ -94,6 +94,13 @@ def eddies(rng: Rng, nx: int, ny: int) -> np.ndarray:
     return (faces / np.abs(faces).max()).astype(np.float32)
 
 
+def random_walls(rng: Rng) -> Walls:
+    """Free-slip, no-slip, or sides of either kind."""
+    kind = rng.integers(3)
+    left, right, top, bottom = rng.random(4) < 0.5
+    return (Walls(), Walls("none"), Walls(sticky=(left, right, top, bottom)))[kind]
+
+
 @dataclass
 class Case:
     """A step of random input; dt / h^2 is one, and so mu is kappa."""
@@ -107,13 +114,13 @@ class Case:
     def random(
         cls, kind: str, size: tuple[int, int], contrast: float, softest: float, rng: Rng, plain: bool = True
     ) -> Case:
-        """A mask of the kind; unless `plain`, between no-slip walls and with a solid disc half of the times each."""
+        """A mask of the kind; unless `plain`, between random walls, and half of the times with a solid disc."""
         nx, ny = size
         viscosity = (softest * contrast ** CLASSES[kind](rng, nx, ny)).astype(np.float32)
         faces = eddies(rng, nx, ny)
         solid, walls = np.zeros((ny, nx), bool), Walls()
         if not plain and rng.random() < 0.5:
-            walls = Walls("none")
+            walls = random_walls(rng)
         if not plain and rng.random() < 0.5:
             y, x = np.mgrid[:ny, :nx]
             solid = np.hypot(x - rng.uniform(0, nx), y - rng.uniform(0, ny)) < rng.uniform(0.03, 0.2) * max(nx, ny)
@@ -137,7 +144,7 @@ class Case:
         return found, solver.conjugate_gradients.iterations
 
     def exact(self) -> np.ndarray:
-        no_slip = self.walls.slip == "none"
+        no_slip = self.walls.no_slip
         return reference.viscous_step(
             self.faces, self.viscosity.astype(np.float64), 1.0, 1.0, solid=self.solid, no_slip=no_slip
         )
@@ -173,7 +180,7 @@ def check_viscous_step_is_stable(device: Device, seed: int) -> dict[str, float]:
     faces[solid] = faces[:, 0, 0] = faces[0, :, 1] = 0.0
     faces[:, 1:, 0][solid[:, :-1]] = 0.0
     faces[1:, :, 1][solid[:-1]] = 0.0
-    case = Case(viscosity.astype(np.float32), faces, Walls("none" if rng.random() < 0.5 else "free"), solid)
+    case = Case(viscosity.astype(np.float32), faces, random_walls(rng), solid)
     found, iterations = case.solved(device)
     growth = float(np.linalg.norm(found) / max(np.linalg.norm(faces), 1e-30))
     assert growth <= 1.001, f"seed {seed}: {nx} x {ny}, growth {growth:.4f}"
