@@ -39,6 +39,7 @@ class Stroke(Model):
         hardness: 0 is a soft falloff, 1 a hard edge.
         strength: 1 carries along at the pointer's speed (push), or works at the tool's own rate.
         reverse: the tool's opposite: push against the drag, twirl anticlockwise.
+        local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 
     tool: Tool
@@ -46,6 +47,7 @@ class Stroke(Model):
     hardness: Fraction01 = 0.5
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0
     reverse: bool = False
+    local: Fraction01 = 0.0
     samples: Annotated[Several[Sample], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -126,7 +128,7 @@ class Stroke(Model):
         return last if last in following else last + 1
 
     def _head(self) -> tuple[object, ...]:
-        return self.tool, self.radius, self.hardness, self.strength, self.reverse
+        return self.tool, self.radius, self.hardness, self.strength, self.reverse, self.local
 
 
 class Change(Model):

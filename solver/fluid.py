@@ -89,6 +89,7 @@ class Fluid(Scheme):
         See `Scheme.step`. Unconditionally stable: without forces the energy never grows (equation S6).
         """
         dt = check_step(dt)
+        self.local.clear()
         w1 = self._add_force(forces, dt)
         w2 = self._advect(w1, dt)
         w3 = self._diffuse(w2, dt)
@@ -219,15 +220,25 @@ class Fluid(Scheme):
     def trace(self, dt: float) -> Field:
         """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells.
 
-        Valid until the velocity changes. The warp map and the next step both follow it.
+        Valid until the velocity changes. The next step follows it.
         """
         if self._trace is None or self._trace.dt != dt:
-            hx, hy = self.grid.spacing
-            with self.device.stage("trace"):
-                trace = self.device.pass_("step/trace.frag", **self._wall_defines())
-                trace(self._trace_field, velocity=self.faces(), cells_a_speed=(dt / hx, dt / hy), **self._wall_inputs())
-            self._trace = Trace(self._trace_field, dt)
+            self._trace = Trace(self._traced(self.faces(), dt), dt)
         return self._trace.field
+
+    def carrier_trace(self, dt: float) -> Field:
+        """The same of what carries the picture: `trace`, unless something `local` does too. The map follows it."""
+        if self.local.is_empty:
+            return self.trace(dt)
+        self._trace = None
+        return self._traced(self.carrier(), dt)
+
+    def _traced(self, velocity: Field, dt: float) -> Field:
+        hx, hy = self.grid.spacing
+        with self.device.stage("trace"):
+            trace = self.device.pass_("step/trace.frag", **self._wall_defines())
+            trace(self._trace_field, velocity=velocity, cells_a_speed=(dt / hx, dt / hy), **self._wall_inputs())
+        return self._trace_field
 
     # -- what is put in ---------------------------------------------------------------------------------------------
 

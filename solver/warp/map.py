@@ -90,7 +90,7 @@ class WarpMap:
 
     def follow(self, fluid: Fluid, dt: float) -> None:
         """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
-        self.advance_traced(fluid.trace(check_step(dt)))
+        self.advance_traced(fluid.carrier_trace(check_step(dt)))
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
