@@ -58,14 +58,17 @@ class LoadedForce:
     law: Law
     faces: Field | None
     divergence: Field | None
+    motion: Field | None
     strongest: float
     widest: float
+    fastest: float
 
     @classmethod
     def of(cls, device: Device, force: BuiltForce) -> LoadedForce:
-        fields = [None if a is None else device.upload(a, force.label) for a in (force.faces, force.divergence)]
-        peaks = [0.0 if a is None else float(np.abs(a).max()) for a in (force.faces, force.divergence)]
-        return cls(force.label, force.law, fields[0], fields[1], peaks[0], peaks[1])
+        arrays = force.faces, force.divergence, force.motion
+        faces, divergence, motion = (None if a is None else device.upload(a, force.label) for a in arrays)
+        strongest, widest, fastest = (0.0 if a is None else float(np.abs(a).max()) for a in arrays)
+        return cls(force.label, force.law, faces, divergence, motion, strongest, widest, fastest)
 
     def acts_within(self, start: float, end: float) -> bool:
         """True if it is at work between two times, in seconds; one that is fed back always may be."""
@@ -78,7 +81,7 @@ class LoadedForce:
             UserError: if it throws the fluid farther than the picture, or swells it out of all measure, within a tick.
         """
         mend = "make its 'strength' or 'fluid.dt' smaller"
-        if (thrown := self.strongest * abs(impulse) * dt) > FARTHEST:
+        if (thrown := (self.strongest * dt + self.fastest) * abs(impulse)) > FARTHEST:
             raise UserError(
                 f"{self.label}: at t = {time:.3g} s it throws the fluid {thrown:.3g} times the picture's size within "
                 f"one tick; {mend}"
@@ -116,6 +119,7 @@ class Replay:
         self._brush = Brush(device)
         self._passing: Moment | None = None
         self._leading: list[Motion] = []
+        self._motions: list[tuple[Field, float]] = []  # of forces, and their part in this tick
         self._build()
 
     # -- going through time -----------------------------------------------------------------------------------------
@@ -263,10 +267,11 @@ class Replay:
             if painted:
                 self._apply_masks()
         self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
+        self._carry()
         with self.device.stage("warp map"):
             self.warp.follow(self.fluid, dt * part)
         if self.density is not None:
-            self.density.advance(self.fluid.faces(), self.grid, dt * part)
+            self.density.advance(self.fluid.carrier(), self.grid, dt * part)
 
     def _change(self, change: Change) -> None:
         if change.clear_velocity:
@@ -299,8 +304,9 @@ class Replay:
         self.warp.hold(self.fluid.solid)
 
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
-        """The force fields and their impulses in this tick; sources go into the fluid's own."""
+        """The force fields and their impulses in this tick; sources go into the fluid's own, motions are kept."""
         start, pushes = self.tick * dt, []
+        self._motions.clear()
         for force in self.forces:
             impulse = force.law.impulse(start, start + dt, self)
             force.check(impulse, dt, start)
@@ -309,6 +315,8 @@ class Replay:
             if impulse and force.divergence is not None:
                 # The velocity that holds during this tick has to make all the room that the tick shall make.
                 self.fluid.add_source(force.divergence, impulse / dt)
+            if impulse and force.motion is not None:
+                self._motions.append((force.motion, impulse / dt))
         return pushes
 
     def _draw(self, stroke: Stroke, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
@@ -322,7 +330,7 @@ class Replay:
             case "push":
                 far, fluid = stroke.travelled(self.tick, self.grid.extent) / stroke.radius, self.settings
                 limit = strain_limit(whole, dt, far, fluid.drag, fluid.viscosity)
-                self._lead(Push(whole, dt, pressed, slip_factor(far), limit))
+                self._lead(Push(whole, dt, pressed, slip_factor(far), limit, stroke.local))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
@@ -355,6 +363,15 @@ class Replay:
         with self.device.stage("brush"):
             for motion in self._leading:
                 self._brush.make_up(self.fluid, motion, velocity, self.warp)
+
+    def _carry(self) -> None:
+        """Let what is local of brushes and forces carry the picture besides the fluid."""
+        with self.device.stage("brush"):
+            for motion in self._leading:
+                if isinstance(motion, Push):
+                    self._brush.carry(self.fluid, motion, self.warp)
+            for field, amount in self._motions:
+                self.fluid.add_local(field, amount)
 
     def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
         match stroke.tool:
@@ -417,7 +434,7 @@ class Replay:
         return viscosity(self.recipe.viscosity, base, grid, self.pictures)
 
     def _release_simulation(self) -> None:
-        fields = [field for force in self.forces for field in (force.faces, force.divergence)]
+        fields = [field for force in self.forces for field in (force.faces, force.divergence, force.motion)]
         for thing in (self.fluid, self.warp, self.masks, self.density, *fields):
             if thing is not None:
                 thing.release()

@@ -42,6 +42,7 @@ class Stroke(Model):
         reverse: the tool's opposite: push against the drag, twirl anticlockwise.
         detail: cells along the picture's longer side that the flow is solved with, in a window around the brush (see
             `app.windows`); 0: on the grid of the whole picture.
+        local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 
     tool: Tool
@@ -50,6 +51,7 @@ class Stroke(Model):
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0
     reverse: bool = False
     detail: Annotated[int, Field(ge=0, le=FINEST_DETAIL)] = 0
+    local: Fraction01 = 0.0
     samples: Annotated[Several[Sample], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -130,7 +132,7 @@ class Stroke(Model):
         return last if last in following else last + 1
 
     def _head(self) -> tuple[object, ...]:
-        return self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail
+        return self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.local
 
 
 class Change(Model):

@@ -27,11 +27,12 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True)
 class BrushSettings:
-    """A brush as the person sets it: radius in longer sides, hardness and strength 0-1."""
+    """A brush as the person sets it: radius in longer sides, the rest 0-1; see `Stroke`."""
 
     radius: float = 0.15
     hardness: float = 0.0
     strength: float = 1.0
+    local: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,7 @@ class Tool:
         gesture: from a press to its strokes; None for tools that move the view and not the picture.
         directions: what its two directions are called.
         masks: it paints a mask, which then is shown.
+        own: what of the brush is set for it alone.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Tool:
     gesture: Callable[[Press, Touch], Gesture] | None = None
     directions: tuple[str, str] | None = None
     masks: bool = False
+    own: tuple[str, ...] = ()
 
 
 def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke:
@@ -87,6 +90,7 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> S
         hardness=brush.hardness,
         strength=brush.strength,
         reverse=reverse,
+        local=brush.local if name == "push" else 0.0,
         samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )
 
@@ -204,7 +208,8 @@ def _curve(press: Press, first: Touch) -> Gesture:
 
 
 TOOLS = (
-    Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against")),
+    Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
+         own=("local",)),
     Tool("curve", "Curve", "c", "Draw a path: the picture is blown along it", _curve, ("Forwards", "Backwards")),
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
     Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),

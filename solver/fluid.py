@@ -83,6 +83,7 @@ class Fluid(Scheme):
         See `Scheme.step`. Unconditionally stable: without forces the energy never grows (equation S6).
         """
         dt = check_step(dt)
+        self.local.clear()
         w1 = self._add_force(forces, dt)
         w2 = self._advect(w1, dt)
         w3 = self._diffuse(w2, dt)
@@ -211,20 +212,29 @@ class Fluid(Scheme):
     def trace(self, dt: float) -> Field:
         """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells.
 
-        Valid until the velocity changes. The warp map and the next step both follow it.
+        Valid until the velocity changes. The next step follows it.
         """
-        if tracing := self.begin_trace(dt):
+        if self._traced != dt:
+            self._traced, tracing = dt, self._tracing(self.faces(), dt)
             with self.device.stage("trace"):
                 self.device.pass_("step/trace.frag", **tracing.defines)(tracing.target, **tracing.inputs)
         return self._trace
 
     def begin_trace(self, dt: float) -> Tracing | None:
-        """For whoever draws the trace, which must then be done, beside something else; None if it is there already."""
+        """The trace of what carries the picture, for whoever then draws it beside something else; None if it is `trace`
+        and that is there already.
+        """
+        if not self.local.is_empty:
+            self._traced = None  # what is drawn is not the fluid's own
+            return self._tracing(self.carrier(), dt)
         if self._traced == dt:
             return None
         self._traced = dt
+        return self._tracing(self.faces(), dt)
+
+    def _tracing(self, velocity: Field, dt: float) -> Tracing:
         hx, hy = self.grid.spacing
-        inputs = {"velocity": self.faces(), "cells_a_speed": (dt / hx, dt / hy), **self._wall_inputs()}
+        inputs = {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **self._wall_inputs()}
         return Tracing(self._trace, self._wall_defines(), inputs)
 
     # -- what is put in ---------------------------------------------------------------------------------------------

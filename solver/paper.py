@@ -39,6 +39,7 @@ class PaperFluid(Scheme):
 
     def step(self, dt: float, forces: Forces = (), steer: Callable[[Field], None] | None = None) -> None:
         dt = check_step(dt)
+        self.local.clear()
         self.add_force(forces, dt)
         self.advect(dt)
         self.diffuse(dt)
@@ -134,6 +135,15 @@ class PaperFluid(Scheme):
         self.device.pass_("paper/to_faces.frag", **self._wall_defines())(self._faces, velocity=self.velocity.read)
         return self._faces
 
+    def carrier_at_centres(self) -> Field:
+        """What carries the picture, at cell centres; see `carrier`."""
+        if self.local.is_empty:
+            return self.velocity.read
+        self._carrier.copy_from(self.velocity.read)
+        add = self.device.pass_("paper/add_force.frag")
+        add(self._carrier, add=True, force=self.local.field, impulse=1.0)
+        return self._carrier
+
     def velocity_at_centres(self) -> np.ndarray:
         return self.velocity.read.get()
 
@@ -179,7 +189,7 @@ class PaperWarpMap(WarpMap):
     def follow(self, fluid: Scheme, dt: float) -> None:
         if not isinstance(fluid, PaperFluid):
             raise TypeError("a PaperWarpMap follows a PaperFluid")
-        self.advance(fluid.velocity.read, dt)
+        self.advance(fluid.carrier_at_centres(), dt)
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity at cell centres, such as `PaperFluid.velocity.read`."""

@@ -184,6 +184,7 @@ class Scheme(ABC):
         viscosity, solid: at cells, lengths^2 / s, and 1 for solid; call `masks_changed` after drawing into them.
         impulse: what brushes have drawn on MAC faces for the next step, lengths / s.
         source: the divergence that the next projection shall leave, at cells, 1 / s: bloat, or pinch.
+        local: a motion on MAC faces, lengths / s, that carries the picture until the next step and not the fluid.
         measuring: let every step leave its `residuals`; it changes no result, and is slow.
     """
 
@@ -196,6 +197,8 @@ class Scheme(ABC):
         self.solid = device.field(grid.size, 1, "solid", "f1")
         self.impulse = Gathered(device, grid.size, 2, "impulse")
         self.source = Gathered(device, grid.size, 1, "divergence source")
+        self.local = Gathered(device, grid.size, 2, "local motion")
+        self._carrier = device.field(grid.size, 2, "what carries the picture")
         self.measuring = False
         self.residuals = Residuals()
 
@@ -263,11 +266,26 @@ class Scheme(ABC):
         add = self.device.pass_("step/add_source.frag")
         self.source.add(lambda field: add(field, add=True, source=source, amount=amount))
 
+    def add_local(self, motion: Field, amount: float = 1.0) -> None:
+        """Let `amount` times `motion` (MAC faces, lengths / s) carry the picture until the next step; see `local`."""
+        check_finite("an amount of a motion", amount)
+        add = self.device.pass_("step/add_impulse.frag")
+        self.local.add(lambda field: add(field, add=True, force=motion, impulse=amount))
+
     # -- what is read out -------------------------------------------------------------------------------------------
 
     @abstractmethod
     def faces(self) -> Field:
-        """The velocity on MAC faces, as the warp map, the overlays and the density take it."""
+        """The fluid's velocity on MAC faces."""
+
+    def carrier(self) -> Field:
+        """What carries the picture, a velocity on MAC faces: the fluid's, and `local` but on the faces of solids."""
+        faces = self.faces()
+        if self.local.is_empty:
+            return faces
+        carry = self.device.pass_("step/carry.frag")
+        carry(self._carrier, velocity=faces, local=self.local.field, solid=self.solid)
+        return self._carrier
 
     @abstractmethod
     def velocity_at_centres(self) -> np.ndarray:
@@ -336,6 +354,7 @@ class Scheme(ABC):
         self.time = float(state.values["time"])
         self.impulse.clear()
         self.source.clear()
+        self.local.clear()
         self.masks_changed()
 
     @abstractmethod
@@ -344,7 +363,7 @@ class Scheme(ABC):
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self.viscosity, self.solid, self.impulse, self.source):
+        for item in (self.viscosity, self.solid, self.impulse, self.source, self.local, self._carrier):
             item.release()
 
     def __repr__(self) -> str:

@@ -517,29 +517,34 @@ def test_the_inspector_comes_in_a_small_window(small: Robot) -> None:
     assert scaled(small, small.editor.layout.canvas).width >= min(wide, 200)
 
 
+BRUSH = {"radius", "hardness", "strength", "local"}  # of a push
+
+
 def test_everything_about_the_brush_can_be_set_in_a_small_window(small: Robot) -> None:
     """What the bar has no room for is behind the button that ends it."""
     scale, width = small.editor.ui.scale, small.size[0]
     changed = set()
     for x in range(60, int(width / scale) - 270, 16):
-        small.editor.state.brush = before = replace(small.editor.state.brush, radius=0.1, hardness=0.5, strength=0.5)
+        small.editor.state.brush = before = replace(
+            small.editor.state.brush, radius=0.1, hardness=0.5, strength=0.5, local=0.5
+        )
         small.click(x * scale, 24 * scale)
         changed |= differing(small, before)
         small.frame(count=2)
         if small.editor._popup_open:
-            for y in range(60, 200, 12):
+            for y in range(60, 240, 12):
                 small.editor.state.brush = before
                 small.click((x + 30) * scale, y * scale)
                 if small.editor._popup_open:
                     changed |= differing(small, before)
             small.key("escape")
             small.frame(count=2)
-    assert changed == {"radius", "hardness", "strength"}
+    assert changed == BRUSH
 
 
 def differing(robot: Robot, before: object) -> set[str]:
     now = robot.editor.state.brush
-    return {name for name in ("radius", "hardness", "strength") if getattr(now, name) != getattr(before, name)}
+    return {name for name in BRUSH if getattr(now, name) != getattr(before, name)}
 
 
 def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> None:

@@ -31,6 +31,10 @@ strength = 2
 tool = "push"
 samples = [[3, 0.3, 0.3, 1], [12, 0.5, 0.4, 1]]
 [[stroke]]
+tool = "push"
+local = 0.8
+samples = [[4, 0.6, 0.6, 1], [9, 0.5, 0.7, 1]]
+[[stroke]]
 tool = "freeze"
 samples = [[5, 0.8, 0.8, 1], [8, 0.85, 0.8, 1]]
 [[stroke]]

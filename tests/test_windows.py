@@ -70,7 +70,9 @@ def test_what_no_window_holds_has_a_coarser_one_or_the_whole_picture():
     assert wide is not None
     assert 256 < wide.detail < 1365
     assert Window.of([(stroke(), at(0.0, 0.5, 1.0, 0.5))], None, WHOLE) is None
-    assert Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5)), (stroke(detail=0), at(0.5, 0.5, 0.5, 0.5))], None, WHOLE) is None
+    assert (
+        Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5)), (stroke(detail=0), at(0.5, 0.5, 0.5, 0.5))], None, WHOLE) is None
+    )
     far = [(stroke(), at(0.1, 0.5, 0.1, 0.5)), (stroke(), at(0.9, 0.5, 0.9, 0.5))]
     assert Window.of(far, None, WHOLE) is None
 

@@ -185,7 +185,7 @@ class Canvas:
             inputs |= {"frozen": replay.masks.frozen, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
         if shown["velocity"].shown:
             defines["ARROWS"] = 1
-            inputs |= {"velocity": replay.fluid.faces(), "arrow": ARROW * scale, "speed": 0.4}
+            inputs |= {"velocity": replay.fluid.carrier(), "arrow": ARROW * scale, "speed": 0.4}
             inputs |= {"arrows_opacity": shown["velocity"].opacity, "arrow_colour": (1.0, 1.0, 1.0)}
 
 

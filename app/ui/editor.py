@@ -15,6 +15,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import internal
 
 from app.errors import UserError
+from app.presets import Feel
 from app.project import Project
 from app.recovery import Found
 from app.session import Session
@@ -365,6 +366,11 @@ class Editor:
         self.state.tool_name = name
         if self.state.tool.directions:
             self.state.opposite[name] = opposite
+
+    def choose_feel(self, feel: Feel) -> None:
+        """Let the fluid feel so from now on, and pushes be as local as is best for it."""
+        self.session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+        self.state.brush = replace(self.state.brush, local=feel.local)
 
     def resize_brush(self, factor: float) -> None:
         brush = self.state.brush

@@ -52,8 +52,7 @@ def _fluid(ui: Ui, editor: Editor) -> None:
     now = next((feel for feel in FEELS if feel.fits(fluid)), None)
     chosen = ui.segmented("feel", [feel.name for feel in FEELS], FEELS.index(now) if now else -1, -1)
     if chosen >= 0 and FEELS[chosen] is not now:
-        feel = FEELS[chosen]
-        session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+        editor.choose_feel(FEELS[chosen])
     ui.dim(f"{now.line}." if now else "Your own mixture.")
     viscosity = max(fluid.viscosity, 1e-5)
     slid = ui.slider(
