@@ -401,6 +401,7 @@ def test_messages_of_the_window_name_no_options_of_the_command_line(robot: Robot
     robot.drop(tmp_path / "strip.png")
     robot.drop(tmp_path / "forward.exr")
     narrow, forward = (message.text for message in robot.editor.messages.shown)
+    assert narrow.startswith("strip.png is ")
     assert "too narrow for any grid" in narrow
     assert "tells where each point goes" in forward
     assert "--" not in narrow + forward
@@ -487,6 +488,7 @@ def scaled(robot: Robot, rect: Rect) -> Rect:
 
 def test_every_tool_can_be_clicked_in_a_small_window(small: Robot) -> None:
     strip, scale = small.editor.layout.strip, small.editor.ui.scale
+    assert strip is not None
     chosen = set()
     y = strip.y + 20 * scale
     while y < strip.bottom:

@@ -334,7 +334,7 @@ def load_any(path: Path, fluid: dict[str, Any] | None = None) -> Project:
         project = projects.load(path)
     else:
         project = projects.from_picture(path, fresh_recipe(fluid))
-    check_picture(project.picture)
+    check_picture(project.picture, path.name)
     return project
 
 
