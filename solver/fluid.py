@@ -30,8 +30,8 @@ from solver.scheme import (
 )
 from solver.viscosity.solve import Viscosity
 
-# Of u and of v, four faces of a row a texel (see `depart.frag`), and how far they reach beyond the grid: columns and rows
-# on either side.
+# Of u and of v, four faces of a row a texel (see `depart.frag`); and how far they reach beyond the grid, columns and
+# rows on either side.
 Rows = tuple[Field, Field]
 BEYOND = 1, 2
 
