@@ -30,10 +30,7 @@ from solver.scheme import (
 )
 from solver.viscosity.solve import Viscosity
 
-# Of u and of v, four faces of a row a texel (see `depart.frag`), and how far they reach beyond the grid: columns and rows
-# on either side.
-Rows = tuple[Field, Field]
-BEYOND = 1, 2
+Rows = tuple[Field, Field]  # of u and of v, four faces of a row a texel: see `depart.frag`
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,7 @@ class Fluid(Scheme):
         self.velocity = device.double_field(grid.size, 2, "velocity")
         # Half the last pressure gradient, which the next step takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
-        rows = grid.nx + 2 * BEYOND[0], grid.ny + 2 * BEYOND[1]
+        rows = grid.nx // 2 + 3, grid.ny + 4
         self._departing = device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")
         self._trace = device.field(grid.size, 2, "trace")
         self._traced: float | None = None  # the step that it is of; None if the velocity has changed since
@@ -319,13 +316,13 @@ class Fluid(Scheme):
 
     def _depart(self, **parts: Any) -> Rows:
         """The velocity, less what is `carried` and with a `force`, if they are given, as advection reads it."""
-        rows = self._departing
+        rows, (nx, ny) = self._departing, self.grid.size
         width, height = rows[0].size
-        # A texel holds the faces from one before its own to two behind.
-        left, right, above = BEYOND[0] + 1, BEYOND[0] + 2, BEYOND[1]
-        inside = (left, above, width - left - right, height - 2 * above)
-        around = [(0, 0, width, above), (0, height - above, width, above)]
-        around += [(0, above, left, height - 2 * above), (width - right, above, right, height - 2 * above)]
+        # Texels whose faces are all inside: none beyond a wall or on it.
+        left, right, above, below = 2, (nx + 1) // 2, 3, ny + 2
+        inside = (left, above, right - left, below - above)
+        around = [(0, 0, width, above), (0, below, width, height - below)]
+        around += [(0, above, left, below - above), (right, above, width - right, below - above)]
         given = {name.upper(): 1 for name in parts if name != "impulse"}
         self.device.pass_("step/depart.frag", **given)(rows, region=inside, velocity=self.velocity.read, **parts)
         edges = self.device.pass_("step/depart.frag", EDGES=1, **given, **self._wall_defines())
