@@ -74,16 +74,20 @@ class Window(NamedTuple):
         return Grid(*size, extent, (self.column * hx, self.row * hy), whole.picture)  # pyright: ignore[reportArgumentType]
 
     @classmethod
-    def of(cls, strokes: Sequence[tuple[Stroke, tuple[Dab, ...]]], now: Self | None, whole: Grid) -> Self | None:
-        """The window for the strokes that are at work in a tick, with the pieces of their paths passed in it.
+    def of(
+        cls, strokes: Sequence[tuple[Stroke, tuple[Dab, ...]]], tick: int, now: Self | None, whole: Grid
+    ) -> Self | None:
+        """The window for the strokes that are at work in a tick.
 
         Args:
-            strokes: at least one, of `FLOWING` tools.
+            strokes: at least one, of `FLOWING` tools, and the pieces of their paths that are passed in it.
+            tick: to tell strokes that begin from those that go on.
             now: the window until now, None if it is the whole picture.
             whole: the grid of the whole picture.
 
         Returns:
-            `now` if they have room there. None if one of them wants the whole picture, or they have room in no window of
+            `now` if they have room there; strokes that go on also stay in one that is coarser than they asked for, which
+            some wide movement has needed. None if one of them wants the whole picture, or they have room in no window of
             cells that are finer than those of `whole`.
         """
         detail, finest = min(stroke.detail for stroke, _ in strokes), max(whole.size)
@@ -97,6 +101,8 @@ class Window(NamedTuple):
                         reach = ROOM * stroke.radius
                         room[axis] = min(room[axis], max(point[axis] - reach, 0.0))
                         room[2 + axis] = max(room[2 + axis], min(point[axis] + reach, whole.picture[axis]))
+        if now is not None and detail > now.detail and all(stroke.first_tick < tick for stroke, _ in strokes):
+            detail = now.detail
         while detail > finest:
             lattice = _lattice(detail, whole.picture)
             if min(lattice) < SMALLEST_GRID:

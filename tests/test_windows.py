@@ -41,18 +41,18 @@ def test_what_acts_on_the_whole_picture_has_no_window():
 
 
 def test_a_window_stays_while_the_brush_has_room_and_is_dragged_along_by_whole_cells():
-    window = Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5))], None, WHOLE)
+    window = Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5))], 0, None, WHOLE)
     assert window is not None
     grid = window.grid_in(WHOLE)
     assert grid.size == (CELLS, CELLS)
     x, y = grid.centres()
     assert abs(x.mean() - 0.5) < 2 * grid.h
     assert abs(y.mean() - 0.5 * 2 / 3) < 2 * grid.h
-    assert Window.of([(stroke(), at(0.5, 0.5, 0.51, 0.5))], window, WHOLE) == window
+    assert Window.of([(stroke(), at(0.5, 0.5, 0.51, 0.5))], 0, window, WHOLE) == window
     moved, place = window, 0.5
     seen = set()
     while place < 0.99:
-        moved = Window.of([(stroke(), at(place, 0.5, place + 0.01, 0.5))], moved, WHOLE)
+        moved = Window.of([(stroke(), at(place, 0.5, place + 0.01, 0.5))], 0, moved, WHOLE)
         assert moved is not None
         assert moved.row == window.row
         seen.add(moved.column)
@@ -66,13 +66,16 @@ def test_a_window_stays_while_the_brush_has_room_and_is_dragged_along_by_whole_c
 
 
 def test_what_no_window_holds_has_a_coarser_one_or_the_whole_picture():
-    wide = Window.of([(stroke(), at(0.4, 0.5, 0.5, 0.5))], None, WHOLE)
+    wide = Window.of([(stroke(), at(0.4, 0.5, 0.5, 0.5))], 0, None, WHOLE)
     assert wide is not None
     assert 256 < wide.detail < 1365
-    assert Window.of([(stroke(), at(0.0, 0.5, 1.0, 0.5))], None, WHOLE) is None
-    assert Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5)), (stroke(detail=0), at(0.5, 0.5, 0.5, 0.5))], None, WHOLE) is None
+    assert Window.of([(stroke(), at(0.0, 0.5, 1.0, 0.5))], 0, None, WHOLE) is None
+    assert (
+        Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5)), (stroke(detail=0), at(0.5, 0.5, 0.5, 0.5))], 0, None, WHOLE)
+        is None
+    )
     far = [(stroke(), at(0.1, 0.5, 0.1, 0.5)), (stroke(), at(0.9, 0.5, 0.9, 0.5))]
-    assert Window.of(far, None, WHOLE) is None
+    assert Window.of(far, 0, None, WHOLE) is None
 
 
 @pytest.mark.parametrize("size", [(6000, 4000), (5000, 1), (8, 4000), (12, 12), (601, 599)])
@@ -80,7 +83,7 @@ def test_what_no_window_holds_has_a_coarser_one_or_the_whole_picture():
 def test_a_window_lies_in_any_picture(size: tuple[int, int], place: tuple[float, float]):
     whole = Grid.for_picture(*size, 64)
     for detail in (1, 100, 1365, 65536):
-        window = Window.of([(stroke(detail=detail), at(*place, *place))], None, whole)
+        window = Window.of([(stroke(detail=detail), at(*place, *place))], 0, None, whole)
         if window is not None:
             window.grid_in(whole)  # which a grid beyond the picture refuses
             assert max(window.grid_in(whole).size) <= CELLS
