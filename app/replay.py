@@ -336,6 +336,7 @@ class Replay:
             self.fluid = self._fluids[window.detail]
         if isinstance(self.fluid, Fluid):
             self.fluid.lay_on(grid)
+        self.masks.forget_fluid()
         self.warp.move_to(grid)
 
     def _use_viscosity(self, base: float) -> None:

@@ -51,7 +51,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Flow:
-    """A flow on the faces of another grid: the time, the velocity, and half the last pressure gradient if it is known."""
+    """A flow on the faces of a grid: time, velocity, and half the last pressure gradient where that is known."""
 
     time: float
     velocity: Field
@@ -303,7 +303,7 @@ class Fluid(Scheme):
         return Flow(self.time, *fields)
 
     def go_on_with(self, flow: Flow) -> None:
-        """Take over a flow on this grid, from `flow_on`, and let it be free of divergence among these walls and solids."""
+        """Take over a flow on this grid, from `flow_on`, made free of divergence between its walls and solids."""
         self.velocity.read.copy_from(flow.velocity)
         self._forget_last_step()
         self.project()

@@ -73,7 +73,7 @@ class Masks:
         self._base: Base = 0.0
         self._cells = FieldPool(device, "masks")
         # The fluid that was told last, if it need not be told everything, and the texels that have changed since.
-        self._applied_to: tuple[Scheme, Grid] | None = None
+        self._applied_to: Scheme | None = None
         self._changed: Region | None = None
 
     # -- what is painted over ---------------------------------------------------------------------------------------
@@ -144,7 +144,7 @@ class Masks:
         """
         grid = fluid.grid
         base = self._cells.get("base viscosity", grid.size, 1)
-        if self._applied_to != (fluid, grid):
+        if self._applied_to is not fluid:
             viscosity = self._base(grid) if callable(self._base) else self._base
             base.set(np.broadcast_to(np.asarray(viscosity, np.float32), (grid.ny, grid.nx)))
             region = (0, 0, *grid.size)
@@ -168,8 +168,12 @@ class Masks:
         x, y, width, height = region
         widened = (x - 2, y - 2, width + 4, height + 4)
         self.device.pass_("step/widen_solid.frag")(fluid.solid, region=widened, frozen=frozen)
-        self._applied_to, self._changed = (fluid, grid), None
+        self._applied_to, self._changed = fluid, None
         fluid.masks_changed()
+
+    def forget_fluid(self) -> None:
+        """Tell the fluid everything next time: it lies elsewhere now, or is another one."""
+        self._applied_to = None
 
     @property
     def base_viscosity(self) -> Field:
