@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import lru_cache
 from math import hypot
 
 import numpy as np
@@ -15,9 +15,10 @@ from app.forces import BuiltForce, build
 from app.masks import solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
-from app.strokes import Change, Dab, Stroke
+from app.strokes import FINEST_DETAIL, Change, Dab, Stroke
 from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
+from app.windows import FLOWING, Window, may_have_windows
 from solver.brush.brush import Brush, Motion
 from solver.brush.masks import Masks, canvas_of
 from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
@@ -105,6 +106,8 @@ class Replay:
 
     Attributes:
         tick: the steps made so far; strokes and changes at this tick come next.
+        grid: of the whole picture.
+        window: where the flow is solved on finer cells instead, None if nowhere; `fluid.grid` are its cells.
         fluid, warp, masks, density: the simulation at this moment; `density` only in density mode.
         forces: the recipe's own.
         steps: made in all, whichever way; for measuring.
@@ -190,11 +193,19 @@ class Replay:
             ValueError: if it is not of this simulation.
         """
         self._leave_passing()
-        now = self._save()
+        before = self._save()
         try:
-            then = now.with_arrays(self.device, snapshot)
+            self._look_at(_window(snapshot.get("settings/window", np.zeros(0))))
+            now = self._save()
+            try:
+                then = now.with_arrays(self.device, snapshot)
+            finally:
+                now.release()
+        except ValueError:
+            self._restore(before)
+            raise
         finally:
-            now.release()
+            before.release()
         self._restore(then)
         then.release()
         self.tick = tick
@@ -257,6 +268,7 @@ class Replay:
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
+        self._follow_strokes()
         self._set_parameters()
         painted = False
         self._leading.clear()
@@ -287,12 +299,50 @@ class Replay:
     def _set_parameters(self) -> None:
         settings = self.settings
         slip = "free" if settings.walls == "free-slip" else "none"
-        params = FluidParams(walls=Walls(slip=slip), drag=settings.drag, sweeps=settings.sweeps)
+        params = FluidParams(walls=Walls.of(slip, self.fluid.grid), drag=settings.drag, sweeps=settings.sweeps)
         if params != self.fluid.params:
             self.fluid.params = params
         if settings.viscosity != self._viscosity_in_force:
             self._use_viscosity(settings.viscosity)
             self._apply_masks()
+
+    def _follow_strokes(self) -> None:
+        """Let the flow be solved where the strokes of this tick want it; without any it stays where it is."""
+        at_work = [(stroke, stroke.at(self.tick)) for stroke in self.recipe.stroke if stroke.tool in FLOWING]
+        at_work = [(stroke, dabs) for stroke, dabs in at_work if dabs]
+        if at_work and self._has_windows:
+            window = Window.of(at_work, self.tick, self.window, self.grid)
+            if window != self.window:
+                assert isinstance(self.fluid, Fluid)
+                with self.device.stage("window"):
+                    flow = self.fluid.flow_on(self._cells_of(window))
+                    self._look_at(window)
+                    self._set_parameters()
+                    self._apply_masks()
+                    self.fluid.go_on_with(flow)
+                    flow.release()
+
+    def _cells_of(self, window: Window | None) -> Grid:
+        return self.grid if window is None else window.grid_in(self.grid)
+
+    def _look_at(self, window: Window | None) -> None:
+        """Go on in another window, with a fluid at rest that no masks have been applied to; the map stays as it was."""
+        if window == self.window:
+            return
+        grid, self.window = self._cells_of(window), window
+        if window is None:
+            self.fluid = self._fluids[0]
+        else:
+            if window.detail not in self._fluids:
+                # Of those on windows one is kept, that of the brush in hand.
+                for detail in [detail for detail in self._fluids if detail]:
+                    self._fluids.pop(detail).release()
+                self._fluids[window.detail] = Fluid(self.device, grid)
+            self.fluid = self._fluids[window.detail]
+        if isinstance(self.fluid, Fluid):
+            self.fluid.lay_on(grid)
+        self.masks.forget_fluid()
+        self.warp.move_to(grid)
 
     def _use_viscosity(self, base: float) -> None:
         """Let the masks be painted over the recipe's layers on another base."""
@@ -397,7 +447,10 @@ class Replay:
         recipe, source = self.recipe, self.pictures.source
         self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
         fluid, warp = SOLVERS[recipe.fluid.solver]
+        self.window: Window | None = None
+        self._has_windows = may_have_windows(recipe)
         self.fluid = fluid(self.device, self.grid)
+        self._fluids = {0: self.fluid}  # by the detail of their windows
         largest = self.device.limits.max_texture_size
         self.warp = warp(self.device, self.grid, map_size(self.grid, (source.width, source.height), largest))
         if recipe.map is not None:
@@ -410,7 +463,7 @@ class Replay:
         self._viscosity_in_force: float | None = None
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
-        self._viscosity = cache(self._viscosity_over)
+        self._viscosity = lru_cache(4)(self._viscosity_over)
         self._set_parameters()
 
     def _begin_with(self, name: str) -> None:
@@ -435,7 +488,7 @@ class Replay:
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence, force.motion)]
-        for thing in (self.fluid, self.warp, self.masks, self.density, *fields):
+        for thing in (*self._fluids.values(), self.warp, self.masks, self.density, *fields):
             if thing is not None:
                 thing.release()
 
@@ -446,9 +499,11 @@ class Replay:
 
     def _save(self) -> Moment:
         states = {name: part.save() for name, part in self._parts().items()}
-        return Moment(states | {"settings": State({}, {"viscosity": np.array(self._viscosity_in_force)})})
+        settings = {"viscosity": np.array(self._viscosity_in_force), "window": np.array(self.window or (), np.int64)}
+        return Moment(states | {"settings": State({}, settings)})
 
     def _restore(self, moment: Moment) -> None:
+        self._look_at(_window(moment.states["settings"].values["window"]))
         for name, part in self._parts().items():
             part.restore(moment.states[name])
         viscosity = float(moment.states["settings"].values["viscosity"])
@@ -481,3 +536,17 @@ class Replay:
             *(change.tick for change in self.recipe.change),
         )
         return self.tick in events
+
+
+def _window(saved: np.ndarray) -> Window | None:
+    """The window that a state was saved in.
+
+    Raises:
+        ValueError: if it is none.
+    """
+    numbers = saved.tolist()
+    if not numbers:
+        return None
+    if saved.shape != (3,) or saved.dtype != np.int64 or not 0 < numbers[0] <= FINEST_DETAIL or min(numbers) < 0:
+        raise ValueError("it is of no window")
+    return Window(*numbers)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from app.strokes import Stroke
 from app.strokes import Tool as StrokeTool
+from app.windows import FLOWING
 
 FASTEST = 2.0  # longer sides per second that a brush can follow
 LINE_SPEED = 0.8  # longer sides per second at which a stroke is drawn that was only clicked
@@ -45,6 +46,7 @@ class Press:
         extent: (width, height) of the picture, the longer of them 1.
         dt: seconds a tick.
         last: where the last stroke ended, for a straight line from there.
+        detail: how finely the flow of such a brush is solved; see `app.windows`.
     """
 
     brush: BrushSettings
@@ -52,6 +54,7 @@ class Press:
     extent: tuple[float, float]
     dt: float
     last: tuple[float, float] | None = None
+    detail: int = 0
 
 
 Gesture = Generator[Stroke | None, Touch | None, Stroke | None]
@@ -90,6 +93,7 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> S
         hardness=brush.hardness,
         strength=brush.strength,
         reverse=reverse,
+        detail=press.detail if name in FLOWING else 0,
         local=brush.local if name == "push" else 0.0,
         samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )

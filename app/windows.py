@@ -23,7 +23,7 @@ CELLS = 192  # along a side of a window; its levels divide it by two down to thr
 LEAST_PER_RADIUS, STEP = 12.0, 4 / 3
 # How much finer than the whole picture's cells those of a window must be to be worth it.
 FINER = 1.5
-# Radii around the brush that a window's own sides keep away from it, and how far ahead one that is dragged along is laid.
+# Radii around the brush that a window's own sides keep away from it; and how far ahead it is laid when dragged along.
 ROOM, AHEAD = 4.0, 1.0
 # Seconds in which a brush's own flow fades to a third: one that flows longer soon reaches beyond any window.
 LONGEST_FLOW = 1.0
@@ -32,20 +32,20 @@ FLOWING = ("push", "curve", "twirl", "bloat", "pinch")
 """The tools that move the fluid."""
 
 
-def detail_for(stroke: Stroke, recipe: Recipe, settings: FluidSettings) -> int:
-    """The detail that a stroke made now deserves: 0, unless its brush is small and its flow soon at rest.
+def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
+    """The detail that a stroke deserves which is made now: 0, unless its brush is small and its flow soon at rest.
 
     Args:
-        stroke: as it begins.
-        recipe: which it is made in.
+        radius: of the brush, in longer sides.
+        recipe: which the stroke is made in.
         settings: the fluid's at that tick.
     """
-    if stroke.tool not in FLOWING or not may_have_windows(recipe):
+    if not may_have_windows(recipe):
         return 0
-    fading = settings.drag + SQUARED_WAVENUMBER * settings.viscosity / stroke.radius**2
+    fading = settings.drag + SQUARED_WAVENUMBER * settings.viscosity / radius**2
     if fading * LONGEST_FLOW < 1.0:
         return 0
-    steps = ceil(log(LEAST_PER_RADIUS / stroke.radius / CELLS) / log(STEP) - 1e-9)
+    steps = ceil(log(LEAST_PER_RADIUS / radius / CELLS) / log(STEP) - 1e-9)
     detail = min(round(CELLS * STEP**steps), FINEST_DETAIL)
     return detail if detail >= FINER * settings.grid else 0
 
@@ -74,17 +74,21 @@ class Window(NamedTuple):
         return Grid(*size, extent, (self.column * hx, self.row * hy), whole.picture)  # pyright: ignore[reportArgumentType]
 
     @classmethod
-    def of(cls, strokes: Sequence[tuple[Stroke, tuple[Dab, ...]]], now: Self | None, whole: Grid) -> Self | None:
-        """The window for the strokes that are at work in a tick, with the pieces of their paths passed in it.
+    def of(
+        cls, strokes: Sequence[tuple[Stroke, tuple[Dab, ...]]], tick: int, now: Self | None, whole: Grid
+    ) -> Self | None:
+        """The window for the strokes that are at work in a tick.
 
         Args:
-            strokes: at least one, of `FLOWING` tools.
+            strokes: at least one, of `FLOWING` tools, and the pieces of their paths that are passed in it.
+            tick: to tell strokes that begin from those that go on.
             now: the window until now, None if it is the whole picture.
             whole: the grid of the whole picture.
 
         Returns:
-            `now` if they have room there. None if one of them wants the whole picture, or they have room in no window of
-            cells that are finer than those of `whole`.
+            `now` if they have room there; strokes that go on also stay in one that is coarser than they asked for, as a
+            wide movement has needed it. None if one of them wants the whole picture, or if no window with cells finer
+            than those of `whole` has room for them.
         """
         detail, finest = min(stroke.detail for stroke, _ in strokes), max(whole.size)
         ends, room = [], [1.0, 1.0, 0.0, 0.0]
@@ -97,6 +101,8 @@ class Window(NamedTuple):
                         reach = ROOM * stroke.radius
                         room[axis] = min(room[axis], max(point[axis] - reach, 0.0))
                         room[2 + axis] = max(room[2 + axis], min(point[axis] + reach, whole.picture[axis]))
+        if now is not None and detail > now.detail and all(stroke.first_tick < tick for stroke, _ in strokes):
+            detail = now.detail
         while detail > finest:
             lattice = _lattice(detail, whole.picture)
             if min(lattice) < SMALLEST_GRID:
@@ -144,7 +150,7 @@ def _laid(
     ends: list[tuple[float, float]],
     picture: tuple[float, float],
 ) -> tuple[int, int] | None:
-    """Where a window begins that holds the box `room`, and around the last of the `ends` what it can, ahead a little."""
+    """Where a window begins that holds the box `room`, and what it can around the last of the `ends`, a bit ahead."""
     h, firsts = _spacing(lattice, picture), []
     way = [after - before for before, after in zip(*ends, strict=True)]
     far = max(map(abs, way)) or 1.0

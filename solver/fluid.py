@@ -42,6 +42,21 @@ class Tracing:
     inputs: dict[str, Any]
 
 
+@dataclass(frozen=True)
+class Flow:
+    """A flow on the faces of a grid: time, velocity, and half the last pressure gradient where that is known."""
+
+    time: float
+    velocity: Field
+    carried: Field | None = None
+
+    def release(self) -> None:
+        """Free the textures."""
+        for field in (self.velocity, self.carried):
+            if field is not None:
+                field.release()
+
+
 class Fluid(Scheme):
     """An incompressible fluid of spatially varying viscosity on a MAC grid; see solver/README.md.
 
@@ -258,6 +273,49 @@ class Fluid(Scheme):
         """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
         self._coefficients_of = None
         self._has_new_solids = True
+
+    # -- on another grid of the picture ------------------------------------------------------------------------------
+
+    def lay_on(self, grid: Grid) -> None:
+        """Go on at rest with the same cells elsewhere in the picture; viscosity and solid cells are to be set anew.
+
+        Raises:
+            ValueError: if there are not as many, or they are larger or smaller.
+        """
+        if grid.size != self.grid.size or not np.allclose(grid.spacing, self.grid.spacing, rtol=1e-6):
+            raise ValueError(f"a fluid of {self.grid} cannot be laid on {grid}")
+        self.grid = grid
+        self.clear_velocity()
+        self.masks_changed()
+
+    def flow_on(self, grid: Grid) -> Flow:
+        """The flow on the faces of another grid of the same picture, which the caller releases; see `go_on_with`.
+
+        Where that is the same cells, moved by whole ones, it is the same to the bit, and else a mean over each face, so
+        that as much flows through it. Outside the fluid's own grid all is at rest.
+        """
+        step = np.divide(grid.spacing, self.grid.spacing)
+        origin = np.subtract(grid.origin, self.grid.origin) / self.grid.spacing
+        is_moved = bool(np.allclose(step, 1.0, rtol=0.0, atol=1e-6))
+        if is_moved:
+            step, origin = np.ones(2), np.round(origin)
+        inputs: dict[str, Any] = {"origin": tuple(origin.tolist()), "step": tuple(step.tolist())}
+        inputs |= {"samples": tuple(np.maximum(np.ceil(step), 1.0).tolist()), **self._wall_inputs()}
+        carry_over, fields = self.device.pass_("step/carry_over.frag", **self._wall_defines()), []
+        for live in (self.velocity.read, self._carried.read)[: 2 if is_moved else 1]:
+            fields.append(self.device.field(grid.size, 2, f"{live.label}, carried over"))
+            carry_over(fields[-1], velocity=live, **inputs)
+        return Flow(self.time, *fields)
+
+    def go_on_with(self, flow: Flow) -> None:
+        """Take over a flow on this grid, from `flow_on`, made free of divergence between its walls and solids."""
+        self.velocity.read.copy_from(flow.velocity)
+        self._forget_last_step()
+        self.project()
+        if flow.carried is not None:
+            self._carried.read.copy_from(flow.carried)
+        self._pressure_solver.forget()
+        self.time = flow.time
 
     # -- what is read out -------------------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.grid import Grid
 
 LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
@@ -90,6 +91,7 @@ class Canvas:
             "origin": (rect.x * density, rect.y * density),
             "step": (1 / (rect.width * density), 1 / (rect.height * density)),
             "extent": session.extent,
+            "window": _window_of(session.replay.fluid.grid),
             "target_height": float(height),
         }
         if state.before or state.split is not None:
@@ -187,6 +189,11 @@ class Canvas:
             defines["ARROWS"] = 1
             inputs |= {"velocity": replay.fluid.carrier(), "arrow": ARROW * scale, "speed": 0.4}
             inputs |= {"arrows_opacity": shown["velocity"].opacity, "arrow_colour": (1.0, 1.0, 1.0)}
+
+
+def _window_of(grid: Grid) -> tuple[float, ...]:
+    """Left, top, width and height of a grid, 0-1 of the picture."""
+    return tuple(np.divide((*grid.origin, *grid.extent), grid.picture * 2).tolist())
 
 
 def shown_pixels(picture: Picture, largest: int) -> np.ndarray:

@@ -20,6 +20,7 @@ uniform sampler2D u_displacement;
 uniform vec2 u_origin;
 uniform vec2 u_step;
 uniform vec2 u_extent;
+uniform vec4 u_window; // where the flow is solved: left, top, width and height, 0-1 of the picture
 #ifdef SPLIT
 uniform float u_split;
 #endif
@@ -91,10 +92,11 @@ float arrow(vec2 p, vec2 v, float soft) {
     return 1.0 - smoothstep(-soft, soft, min(shaft, tip));
 }
 
-// `seen` with arrows over it, one in every square of `side` pixels, along `field`, of which `most` fills an arrow.
-vec3 with_arrows(vec3 seen, vec2 pixel, sampler2D field, float most, float side, vec3 colour, float opacity) {
+// `seen` with arrows over it, one in every square of `side` pixels, along `field`, which lies over `window`, of which
+// `most` fills an arrow.
+vec3 with_arrows(vec3 seen, vec2 pixel, sampler2D field, vec4 window, float most, float side, vec3 colour, float opacity) {
     vec2 tile = (floor(pixel / side) + 0.5) * side;
-    vec2 middle = tile * u_step;
+    vec2 middle = (tile * u_step - window.xy) / window.zw;
     if (inside(middle) < 0.5) return seen;
     vec2 v = texture(field, middle).rg / most;
     float size = length(v);
@@ -127,7 +129,9 @@ void main() {
     vec3 seen = colour.rgb;
     if (warped) {
 #ifdef VISCOSITY
-        float thicker = log(max(texture(u_viscosity, x).r, 1e-6) / u_base) * 0.4342945 + decades(texture(u_thickness, x).r);
+        vec2 cell = (x - u_window.xy) / u_window.zw;
+        float thicker = inside(cell) * log(max(texture(u_viscosity, cell).r, 1e-6) / u_base) * 0.4342945
+                      + decades(texture(u_thickness, x).r);
         vec3 tint = thicker > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
         seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(thicker) * 0.28, 0.0, 0.75));
 #endif
@@ -153,10 +157,11 @@ void main() {
         float room = texture(u_room, x).r;
         vec3 swelling = room > 0.0 ? vec3(0.90, 0.62, 0.0) : vec3(0.34, 0.71, 0.91);
         seen = mix(seen, swelling, u_forces_opacity * 0.9 * sqrt(min(abs(room), 1.0)));
-        seen = with_arrows(seen, pixel, u_force, 1.0, u_force_arrow, u_force_colour, u_forces_opacity);
+        const vec4 all = vec4(0.0, 0.0, 1.0, 1.0);
+        seen = with_arrows(seen, pixel, u_force, all, 1.0, u_force_arrow, u_force_colour, u_forces_opacity);
 #endif
 #ifdef ARROWS
-        seen = with_arrows(seen, pixel, u_velocity, u_speed, u_arrow, u_arrow_colour, u_arrows_opacity);
+        seen = with_arrows(seen, pixel, u_velocity, u_window, u_speed, u_arrow, u_arrow_colour, u_arrows_opacity);
 #endif
     }
     out_colour = vec4(seen, 1.0);

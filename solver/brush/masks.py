@@ -171,6 +171,10 @@ class Masks:
         self._applied_to, self._changed = fluid, None
         fluid.masks_changed()
 
+    def forget_fluid(self) -> None:
+        """Tell the fluid everything next time: it lies elsewhere now, or is another one."""
+        self._applied_to = None
+
     @property
     def base_viscosity(self) -> Field:
         """What is painted over, on the cells of the fluid that was told last, lengths^2 / s."""

@@ -56,8 +56,8 @@ class Plan:
     two_grid: bool = False
 
 
-def plan_for(least: float, largest: float) -> Plan:
-    """The plan for kappa between `least` and `largest`."""
+def plan_for(least: float, largest: float, sticks: bool = False) -> Plan:
+    """The plan for kappa between `least` and `largest`; `sticks`: to a wall, so that no sines solve a coarser level."""
     if largest <= BARELY_VISCOUS:
         return Plan("smooth", (2, 0), levels=0)
     if largest <= NEARLY_UNIFORM * least:
@@ -65,6 +65,8 @@ def plan_for(least: float, largest: float) -> Plan:
         sweeps = 2 if largest <= 1.0 else 1
         # What a nested cycle meets is smooth only where the viscosity reaches far.
         nested = 0 if largest <= 5.0 else 1 if largest <= 50.0 else 2
+        if sticks:
+            return Plan("fmg", (2, 2), nested=3)
         return Plan("fmg", (sweeps, 2), nested=nested, two_grid=largest <= 150.0)
     is_soft = least <= ONE_SWEEP
     count = 1 if is_soft else 2

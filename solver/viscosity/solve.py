@@ -56,7 +56,7 @@ class Viscosity:
         fluid = amount[~frozen] if frozen.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         kappa = dt / (hx * hy)
-        self.plan = plan_for(kappa * least, kappa * largest)
+        self.plan = plan_for(kappa * least, kappa * largest, any(walls.no_slip))
         self.deflation.clear()
         if least == largest and not frozen.any():
             self.multigrid.set_uniform(least, dt, walls.no_slip)

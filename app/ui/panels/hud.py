@@ -210,8 +210,9 @@ def _statistics(ui: Ui, editor: Editor) -> None:
         if stats.map is not None:
             ui.dim(f"det J  {stats.map.det_min:.2f} to {stats.map.det_max:.2f}    folds {stats.map.folds}")
             ui.dim(f"Divergence  {stats.divergence:.1e} / s")
-        grid = session.replay.grid
-        ui.dim(f"Grid {grid.nx} x {grid.ny}    tick {session.tick}")
+        grid, window = session.replay.fluid.grid, session.replay.window
+        part = f" of {window.detail} around the brush" if window else ""
+        ui.dim(f"Grid {grid.nx} x {grid.ny}{part}    tick {session.tick}")
 
 
 def _catching_up(ui: Ui, editor: Editor) -> None:
