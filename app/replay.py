@@ -29,8 +29,9 @@ from solver.gl.field import Field, FieldError
 from solver.grid import Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
+from solver.warp.accumulated import map_size
 from solver.warp.density import Density
-from solver.warp.map import WarpMap, map_size
+from solver.warp.map import WarpMap
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +78,10 @@ class SavedTiles:
         for place, shape, values in zip(places, shapes, np.split(texels, ends[:-1]), strict=False):
             tiles.flat[place] = _Tile(device.upload(values.reshape(shape), "saved tile", dtype))
         return _held(SavedTiles(self.kind, tiles))
+
+    def held(self) -> SavedTiles:
+        """The same once more, to be released by whoever has it."""
+        return _held(self)
 
     def release(self) -> None:
         """Free the textures that no other save holds."""
@@ -160,6 +164,13 @@ class TiledField(Field):
     def copy_from(self, other: Field, region: Region | None = None) -> None:
         """Take over the texels of `other`, of the same size and components, or those in (x, y, width, height)."""
         self._copy(other, region, (0, 0))
+
+    def take(self, other: TiledField, tiles: Iterable[Region]) -> None:
+        """Take over whole tiles of a field of the same kind, and share what they were saved as."""
+        for region in tiles:
+            self._copy(other, region, (0, 0))
+            place = region[1] // self.tile, region[0] // self.tile
+            self._same[place] = other._same[place]
 
     def _copy(self, other: Field, region: Region | None, offset: tuple[int, int]) -> None:
         self.device.pass_("gl/copy.frag")(self, region=region, field=other, offset=offset)
