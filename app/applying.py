@@ -231,7 +231,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     values = cropped(given).values
     width, height = given.width, given.height
     grid = Grid.for_picture(width, height, min(max(width, height), MOST_CELLS))
-    warp = WarpMap(device, grid)
+    warp = WarpMap(device, grid, (width, height))
     try:
         warp.set(values)
         found = warp.forward.read((width, height))

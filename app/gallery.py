@@ -25,7 +25,7 @@ from solver.gl.device import Device
 from solver.grid import Grid
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
-from solver.warp.map import MapStatistics
+from solver.warp.distortion import MapStatistics
 
 FPS = 30
 LINGER = 24  # frames that the last one stands still

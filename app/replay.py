@@ -19,19 +19,19 @@ from app.strokes import Change, Dab, Stroke
 from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
 from solver.brush.brush import Brush, Motion
-from solver.brush.masks import Masks, canvas_of
+from solver.brush.masks import Masks
 from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
 from solver.brush.tip import Tip
 from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
-from solver.grid import Grid
+from solver.grid import SMALLEST_GRID, Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
 from solver.scheme import State
 from solver.warp.density import Density
-from solver.warp.map import WarpMap
+from solver.warp.map import WarpMap, map_size
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought
@@ -381,10 +381,12 @@ class Replay:
         self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.fluid = fluid(self.device, self.grid)
-        self.warp = warp(self.device, self.grid)
+        largest = self.device.limits.max_texture_size
+        fine = map_size(self.grid, (source.width, source.height), largest)
+        self.warp = warp(self.device, self.grid, fine)
         if recipe.map is not None:
             self._begin_with(recipe.map)
-        canvas = canvas_of((source.width, source.height), self.grid, self.device.limits.max_texture_size)
+        canvas = Grid(max(fine[0], SMALLEST_GRID), max(fine[1], SMALLEST_GRID), self.grid.picture)
         self.masks = Masks(self.device, canvas)
         if recipe.freeze:
             self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))

@@ -170,8 +170,8 @@ class PaperWarpMap(WarpMap):
     It blurs a little at every step, which is what the default map is measured against. Velocities are at cell centres.
     """
 
-    def __init__(self, device: Device, grid: Grid) -> None:
-        super().__init__(device, grid, scale=1)
+    def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None) -> None:
+        super().__init__(device, grid, grid.size)  # of whatever size it is wanted: it stays the identity
 
     def hold(self, solid: Field) -> None:
         """Nothing: the paper's map is what its scheme makes of it."""

@@ -14,7 +14,7 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.schema import frozen
 from solver.gl.device import Device
-from solver.warp.map import MapStatistics
+from solver.warp.distortion import MapStatistics
 
 BLACK = np.zeros((200, 300, 3), np.uint8)
 

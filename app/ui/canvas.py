@@ -150,7 +150,7 @@ class Canvas:
         """The displacement to show."""
         if session.is_rebuilding and self._kept is not None:
             return self._kept
-        displacement = session.replay.warp.composed(1 if session.is_moving else None)
+        displacement = session.replay.warp.composed(session.replay.grid.size if session.is_moving else None)
         if not session.is_moving and session.changes != self._kept_at:
             self._kept_at = session.changes
             if self._kept is None or self._kept.size != displacement.size:

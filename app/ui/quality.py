@@ -135,7 +135,7 @@ class Quality:
             self._spent.append([])
         start = time.perf_counter()
         self._trial.advance()
-        self._trial.warp.composed(1)
+        self._trial.warp.composed(self._trial.grid.size)
         finish()
         self._spent[-1].append((time.perf_counter() - start) * 1e3)
         if len(self._spent[-1]) < TICKS:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from solver.gl.points import draw_at
 from solver.gl.reduction import Reduction
 from solver.grid import Grid
 from solver.scheme import State, check_field, check_step, on_faces
+from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.inverse import ForwardMap
 
 if TYPE_CHECKING:
@@ -26,65 +27,72 @@ CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the 
 STEEPEST = 1.0  # largest |grad D| that the cubic carries well
 
 
-@dataclass(frozen=True)
-class MapStatistics:
-    """How a map distorts, by central differences at the simulation's cell centres.
+LEAST_TEXELS = 4  # of the accumulated map along a cell, with which its own interpolation costs nothing
+MOST_TEXELS = 2**25  # of it in all: 256 MiB each of its two textures
 
-    Attributes:
-        det_min, det_max: of the Jacobian of x + D(x): how many times larger an area it is looked up in.
-        folds: cells where it is zero or negative.
-        det_error: mean of |det - 1|.
-        displacement_max, displacement_mean: |D|, longer sides.
+
+def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, int]:
+    """Texels of the accumulated map of a picture, (width, height).
+
+    The picture's own pixels, or one for a whole number of them where that would be more than `MOST_TEXELS` or `largest`
+    along a side; whole numbers to a pixel where a cell of the grid would have fewer than `LEAST_TEXELS`, as far as that
+    is not too many.
     """
-
-    det_min: float
-    det_max: float
-    folds: int
-    det_error: float
-    displacement_max: float
-    displacement_mean: float
+    width, height = picture
+    shrunk = max(math.ceil(math.sqrt(width * height / MOST_TEXELS)), math.ceil(max(width, height) / largest))
+    if shrunk > 1:
+        return math.ceil(width / shrunk), math.ceil(height / shrunk)
+    wanted = [LEAST_TEXELS * side / step for side, step in zip(grid.picture, grid.spacing, strict=True)]
+    across, down = (math.ceil(texels / pixels) for texels, pixels in zip(wanted, picture, strict=True))
+    while across * width * down * height > MOST_TEXELS or max(across * width, down * height) > largest:
+        if across == down == 1:
+            break
+        across, down = max(1, across - 1), max(1, down - 1)
+    return across * width, down * height
 
 
 class WarpMap:
     """The map x -> x + D(x) from the result to the original, carried along by a fluid without blurring.
 
-    Two levels (the characteristic mapping method): a submap of what has moved lately, on the simulation's grid, and the
-    accumulated map A, on a finer one, which takes the submap S in (a remap) before that is bent so far that
-    interpolating it every step would show. D(x) = S(x) + A(x + S(x)); longer sides, RG32F at cell centres.
+    Two levels (the characteristic mapping method): a submap of what has moved lately, on the simulation's grid, which
+    may be a window of the picture, and the accumulated map A of the whole picture, which takes the submap S in (a
+    remap) before that is bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0
+    outside the window; longer sides, RG32F at the centres of cells and texels.
     Every place x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set` had looked.
 
     Args:
         device: the device.
         grid: the simulation's grid.
-        scale: texels of the accumulated map along a cell.
+        size: (width, height) of the accumulated map in texels, as of `map_size`; by default `LEAST_TEXELS` a cell.
         remap_every: most steps between two remaps.
     """
 
-    def __init__(self, device: Device, grid: Grid, scale: int = 2, remap_every: int = 64) -> None:
+    def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None, remap_every: int = 64) -> None:
         self.device = device
-        self.grid = grid
-        self.scale = scale
         self.remap_every = remap_every
-        fine = grid.nx * scale, grid.ny * scale
-        self._submap = device.double_field(grid.size, 2, "submap")
-        self._accumulated = device.double_field(fine, 2, "accumulated map")
-        self._trace = device.field(grid.size, 2, "warp map, trace")
-        self._largest = device.field(grid.size, 4, "warp map, largest distortion")
-        self._total = device.field(grid.size, 4, "warp map, total distortion")
-        half = -(-grid.nx // 2), -(-grid.ny // 2)
-        self._steepness = device.field(half, 1, "warp map, steepness")
-        self._find_steepest = Reduction(device, half, 1, "max")
-        self._find_largest = Reduction(device, grid.size, 4, "max")
-        self._find_total = Reduction(device, grid.size, 4, "sum")
-        self._scratch = self._trace, self._steepness, self._largest, self._total
-        self._reductions = self._find_steepest, self._find_largest, self._find_total
+        if size is None:
+            across, down = (side / step for side, step in zip(grid.picture, grid.spacing, strict=True))
+            size = round(LEAST_TEXELS * across), round(LEAST_TEXELS * down)
+        self.size = size
+        self.extent = grid.picture  # the longer of them 1
+        self._accumulated = device.double_field(size, 2, "accumulated map")
         self._held: Field | None = None
         self._held_cells: np.ndarray | None = None  # what it holds; None if no cell
-        self._composed: dict[tuple[int, bool], Field] = {}
-        self._fresh: set[tuple[int, bool]] = set()  # of these, what holds the present map
-        self._steps = 0  # since the last remap
-        self._limits = self._picture = (0.0, 0.0, *grid.extent)  # of the places looked up: left, top, right, bottom
+        self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
+        self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
+        self._limits = self._picture = (0.0, 0.0, *self.extent)  # of the places looked up: left, top, right, bottom
         self.version = 0  # counts the changes, for those who keep what they made of the map
+        self._begin_on(grid)
+
+    def _begin_on(self, grid: Grid) -> None:
+        """A submap of nothing on a grid."""
+        self.grid = grid
+        self._submap = self.device.double_field(grid.size, 2, "submap")
+        self._trace = self.device.field(grid.size, 2, "warp map, trace")
+        half = -(-grid.nx // 2), -(-grid.ny // 2)
+        self._steepness = self.device.field(half, 1, "warp map, steepness")
+        self._find_steepest = Reduction(self.device, half, 1, "max")
+        self._steps = 0  # since the last remap
 
     # -- moving it --------------------------------------------------------------------------------------------------
 
@@ -122,7 +130,7 @@ class WarpMap:
         Args:
             velocity: a function (x, y, t) -> (u, v) on float64 arrays, lengths per second, followed back by a
                 fourth-order Runge-Kutta step of its own exact values; or an array (ny, nx, 2) on the MAC grid.
-                What would come from beyond the picture's edge comes from the edge.
+                What would come from beyond the grid's edge comes from the edge.
             dt: the step.
             time: where it begins, for the function.
 
@@ -137,18 +145,34 @@ class WarpMap:
             return
         x, y = self.grid.centres()
         back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
-        width, height = self.grid.extent
-        back = np.stack([np.clip(back_x, 0, width) - x, np.clip(back_y, 0, height) - y], axis=-1)
+        left, top, width, height = self._window
+        back = np.stack([np.clip(back_x, left, left + width) - x, np.clip(back_y, top, top + height) - y], axis=-1)
         self._trace.set(back / self.grid.spacing)
         self.advance_traced(self._trace)
 
     def remap(self) -> None:
         """Let the accumulated map take in what has moved lately; the whole map stays what it was."""
         if self._steps:
-            self._compose(self._accumulated.write)
+            self._compose(self._accumulated.write, REMAP=1)
             self._accumulated.swap()
             self._submap.read.clear()
             self._steps = 0
+
+    def move_to(self, grid: Grid) -> None:
+        """Go on with a submap on another grid of the same picture; the map stays what it was, and nothing is held.
+
+        Raises:
+            ValueError: if it is a grid of another picture.
+        """
+        if grid == self.grid:
+            return
+        if grid.picture != self.extent:
+            raise ValueError(f"a map of a picture of {self.extent} cannot go on in one of {grid.picture}")
+        self.remap()
+        self._set_held(None)
+        self._release_submap()
+        self._begin_on(grid)
+        self._changed()
 
     def hold(self, solid: Field) -> None:
         """From now on, change nothing inside solids: in the solid cells whose eight neighbours are solid as well.
@@ -173,17 +197,12 @@ class WarpMap:
             hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
             amount: 0-1, the part of the displacement that is taken away at the centre.
         """
-        for pair in (self._submap, self._accumulated):
-            self.device.pass_("warp/restore.frag", **self._held_defines())(
-                pair.write,
-                displacement=pair.read,
-                extent=self.grid.extent,
-                center=center,
-                radius=radius,
-                hardness=min(hardness, 0.99),
-                amount=amount,
-                **self._held_inputs(),
-            )
+        restore = self.device.pass_("warp/restore.frag", **self._held_defines())
+        inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
+        if self._held:
+            inputs |= {"held": self._held, "held_window": self._window}
+        for pair, window in ((self._submap, self._window), (self._accumulated, self._picture)):
+            restore(pair.write, displacement=pair.read, window=window, **inputs)
             pair.swap()
         self._changed()
 
@@ -247,57 +266,57 @@ class WarpMap:
         return {"submap": self._submap.read, "accumulated map": self._accumulated.read}
 
     @property
-    def extent(self) -> tuple[float, float]:
-        """(width, height) of the domain, the longer of them 1."""
-        return self.grid.extent
-
-    @property
     def nbytes(self) -> int:
         """Bytes of texture memory, as long as nothing is read at other sizes."""
-        own = [
-            self._submap.read,
-            self._submap.write,
-            self._accumulated.read,
-            self._accumulated.write,
-            *self._composed.values(),
-        ]
-        return sum(thing.nbytes for thing in (*own, *self._scratch, *self._reductions))
+        pairs = self._submap, self._accumulated
+        fields = *(field for pair in pairs for field in (pair.read, pair.write)), *self._composed.values()
+        return sum(thing.nbytes for thing in (*fields, self._trace, self._steepness, self._find_steepest))
 
     def release(self) -> None:
         """Free the textures."""
         self._set_held(None)
-        for thing in (self._submap, self._accumulated, *self._composed.values(), *self._scratch, *self._reductions):
+        self._release_submap()
+        for thing in (self._accumulated, *self._composed.values()):
             thing.release()
         if "forward" in self.__dict__:
             self.forward.release()
 
+    def _release_submap(self) -> None:
+        for thing in (self._submap, self._trace, self._steepness, self._find_steepest):
+            thing.release()
+
     # -- reading it -------------------------------------------------------------------------------------------------
 
-    def composed(self, scale: int | None = None, exact: bool = False) -> Field:
-        """The whole map's displacement on `scale` texels a cell, by default the accumulated map's.
+    def composed(self, size: tuple[int, int] | None = None, exact: bool = False) -> Field:
+        """The whole map's displacement on `size` texels (width, height), by default the accumulated map's.
 
         Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, so is the
         accumulated map for it.
         """
-        scale = scale or self.scale
-        if scale == self.scale and self._steps == 0:
+        size = size or self.size
+        if size == self.size and self._steps == 0:
             return self._accumulated.read
-        key = scale, exact
+        key = size, exact
         if key not in self._composed:
-            size = self.grid.nx * scale, self.grid.ny * scale
-            self._composed[key] = self.device.field(size, 2, f"warp map at {scale}")
+            self._composed[key] = self.device.field(size, 2, f"warp map at {size[0]} x {size[1]}")
         if key not in self._fresh:
             self._compose(self._composed[key], **({} if exact else {"CUBIC": 1}))
             self._fresh.add(key)
         return self._composed[key]
 
+    @property
+    def coarse_size(self) -> tuple[int, int]:
+        """(width, height) in texels as large as the grid's cells, with the whole picture."""
+        across, down = (side / step for side, step in zip(self.extent, self.grid.spacing, strict=True))
+        return round(across), round(down)
+
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
-        """The displacement at the pixel centres of a picture of `size` (width, height), by default the grid's.
+        """The displacement at the pixel centres of a picture of `size` (width, height), by default `coarse_size`.
 
         Returns:
             float32 (height, width, 2), longer sides.
         """
-        field = self.device.field(size or self.grid.size, 2, "warp map, to read")
+        field = self.device.field(size or self.coarse_size, 2, "warp map, to read")
         self._compose(field)
         displacement = field.get()
         field.release()
@@ -305,14 +324,12 @@ class WarpMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
-        return draw_at(
-            self.device, points, self.grid.extent, "warp/compose.frag", self._held_defines(), **self._parts()
-        )
+        return draw_at(self.device, points, self.extent, "warp/compose.frag", self._defines(), **self._parts())
 
     def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:
-        """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the domain."""
+        """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the picture."""
         origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
-        compose = self.device.pass_("warp/compose.frag", **self._held_defines())
+        compose = self.device.pass_("warp/compose.frag", **self._defines())
         compose(target, **self._parts(), origin=origin, step=step)
 
     @cached_property
@@ -322,35 +339,36 @@ class WarpMap:
 
     def statistics(self) -> MapStatistics:
         """How the whole map distorts; waits for the GPU."""
-        targets = self._largest, self._total
-        self.device.pass_("warp/distortion.frag")(targets, displacement=self.composed(1), spacing=self.grid.spacing)
-        largest, total = self._find_largest(self._largest).tolist(), self._find_total(self._total).tolist()
-        cells = self.grid.nx * self.grid.ny
-        return MapStatistics(
-            det_min=-largest[0],
-            det_max=largest[1],
-            folds=int(total[0]),
-            det_error=total[2] / cells,
-            displacement_max=largest[2],
-            displacement_mean=total[1] / cells,
-        )
+        size, (width, height) = self.coarse_size, self.extent
+        return distortion(self.device, self.composed(size), (width / size[0], height / size[1]))
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
     def _compose(self, target: Field, **defines: object) -> None:
-        compose = self.device.pass_("warp/compose.frag", **self._held_defines(), **defines)
+        compose = self.device.pass_("warp/compose.frag", **self._defines() | defines)
         compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
 
     def _parts(self) -> dict[str, Any]:
         """What `compose.frag` puts together."""
         maps = {"submap": self._submap.read, "accumulated": self._accumulated.read}
-        return {**maps, "extent": self.grid.extent, "limits": self._limits, **self._held_inputs()}
+        inputs = {**maps, "window": self._window, "picture": self.extent, "limits": self._limits}
+        return inputs | ({"held": self._held} if self._held else {})
+
+    @property
+    def _window(self) -> tuple[float, float, float, float]:
+        """Left, top, width and height that the submap covers, longer sides."""
+        return *self.grid.origin, *self.grid.extent
+
+    def _defines(self) -> dict[str, object]:
+        """How the accumulated map is looked into."""
+        texels = (
+            texels * step / side for texels, step, side in zip(self.size, self.grid.spacing, self.extent, strict=True)
+        )
+        is_fine = min(texels) > LEAST_TEXELS - 1e-6
+        return self._held_defines() | ({"CUBIC": 1} if is_fine else {})
 
     def _held_defines(self) -> dict[str, object]:
         return {"HELD": 1} if self._held else {}
-
-    def _held_inputs(self) -> dict[str, Any]:
-        return {"held": self._held} if self._held else {}
 
     def _set_held(self, cells: np.ndarray | None) -> None:
         if self._held is not None:
