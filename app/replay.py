@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
-from math import hypot
+from functools import lru_cache
+from math import ceil, hypot
 
 import numpy as np
 
 from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.errors import UserError
 from app.forces import BuiltForce, build
-from app.masks import solid, viscosity
+from app.masks import FINEST, solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
 from app.strokes import Change, Dab, Stroke
@@ -291,7 +291,7 @@ class Replay:
 
     def _use_viscosity(self, base: float) -> None:
         """Let the masks be painted over the recipe's layers on another base."""
-        self.masks.set_base(lambda grid: self._viscosity(base, grid))
+        self.masks.set_base(lambda grid: self._viscosity_on(base, grid))
         self._viscosity_in_force = base
 
     def _apply_masks(self) -> None:
@@ -394,7 +394,7 @@ class Replay:
         self._viscosity_in_force: float | None = None
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
-        self._viscosity = cache(self._viscosity_over)
+        self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters()
 
     def _begin_with(self, name: str) -> None:
@@ -414,8 +414,18 @@ class Replay:
         colours, alpha = channels(self.pictures.source)
         return np.concatenate([colours, alpha[..., None]], axis=2)
 
-    def _viscosity_over(self, base: float, grid: Grid) -> np.ndarray:
-        return viscosity(self.recipe.viscosity, base, grid, self.pictures)
+    def _viscosity_on(self, base: float, grid: Grid) -> np.ndarray | float:
+        """The recipe's viscosity on a grid; in a window, of cells as small over the whole picture those in it."""
+        if not self.recipe.viscosity:
+            return base
+        if grid.is_whole:
+            return self._viscosity(base, grid)
+        source = self.pictures.source
+        whole = Grid.for_picture(source.width, source.height, min(ceil(1 / min(grid.spacing)), FINEST))
+        x, y = grid.centres()
+        (hx, hy), last = whole.spacing, np.array(whole.size) - 1
+        column, row = np.minimum(x[0] // hx, last[0]).astype(int), np.minimum(y[:, 0] // hy, last[1]).astype(int)
+        return self._viscosity(base, whole)[np.ix_(row, column)]
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence)]
