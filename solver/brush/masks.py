@@ -20,6 +20,7 @@ from solver.scheme import LARGEST_VISCOSITY, Scheme, State, check_finite
 # Thickness is kept in 16 bits: so many steps a decade and the step that is zero leave room for 3 decades that painting
 # may thin by and 5 that it may thicken by; `lib/decades.glsl` has them too.
 STEPS, ZERO, MOST = 8192, 24576, 65535
+BLANK = {"thickness": ZERO / MOST, "frozen": 0.0}
 LEAST_VISCOSITY = 1e-6  # that painting starts from where there is none
 SMOOTHED = 1 / 8  # radii over which `smooth` takes means
 
@@ -40,19 +41,19 @@ class Masks:
         self.device = device
         self.canvas = canvas
         self._kinds = {
-            "thickness": Kind(canvas.size, 1, "nu2", TILE, ZERO / MOST),
-            "frozen": Kind(canvas.size, 1, "f1", TILE, 0.0),
+            "thickness": Kind(canvas.size, 1, "nu2", TILE),
+            "frozen": Kind(canvas.size, 1, "f1", TILE),
         }
         self._painted: dict[str, TiledField] = {}
         self._nothing: dict[str, Field] = {
-            name: TiledField(device, (1, 1), 1, f"no {name}", kind.dtype, blank=kind.blank)
+            name: TiledField(device, (1, 1), 1, f"no {name}", kind.dtype, blank=BLANK[name])
             for name, kind in self._kinds.items()
         }
         self._frozen_before: SavedTiles | None = None  # what is frozen by the recipe
         self._base: Base = 0.0
         self._cells = FieldPool(device, "masks")
         # The fluid that was told last, if it need not be told everything, and the texels of a mask changed since.
-        self._applied_to: Scheme | None = None
+        self._applied_to: tuple[Scheme, Grid] | None = None
         self._changed: dict[str, Region] = {}
 
     # -- what is painted over ---------------------------------------------------------------------------------------
@@ -123,7 +124,7 @@ class Masks:
         """
         grid = fluid.grid
         base = self._cells.get("base viscosity", grid.size, 1)
-        if self._applied_to is not fluid:
+        if self._applied_to != (fluid, grid):
             viscosity = self._base(grid) if callable(self._base) else self._base
             base.set(np.broadcast_to(np.asarray(viscosity, np.float32), (grid.ny, grid.nx)))
             fluid.viscosity.copy_from(base)
@@ -153,7 +154,7 @@ class Masks:
             )
             widened = (x - 2, y - 2, width + 4, height + 4)
             self.device.pass_("step/widen_solid.frag")(fluid.solid, region=widened, frozen=frozen)
-        self._applied_to = fluid
+        self._applied_to = fluid, grid
         self._changed.clear()
         fluid.masks_changed()
 
@@ -182,7 +183,7 @@ class Masks:
     def save(self) -> State:
         """A copy of this moment, on the GPU, which the caller releases; it shares what did not change."""
         tiles = {
-            name: self._painted[name].save() if name in self._painted else SavedTiles.blank(kind)
+            name: self._painted[name].save() if name in self._painted else SavedTiles.nothing(kind, BLANK[name])
             for name, kind in self._kinds.items()
         }
         return State({}, {}, tiles)
@@ -220,7 +221,7 @@ class Masks:
         if name not in self._painted:
             kind = self._kinds[name]
             self._painted[name] = TiledField(
-                self.device, kind.size, kind.components, f"painted {name}", kind.dtype, kind.tile, kind.blank
+                self.device, kind.size, kind.components, f"painted {name}", kind.dtype, kind.tile, BLANK[name]
             )
             self._applied_to = None
         return self._painted[name]
