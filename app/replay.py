@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
-from math import hypot
+from functools import lru_cache
+from math import ceil, hypot
 
 import numpy as np
 
 from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.errors import UserError
 from app.forces import BuiltForce, build
-from app.masks import solid, viscosity
+from app.masks import FINEST, solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
 from app.strokes import Change, Dab, Stroke
@@ -26,9 +26,10 @@ from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
-from solver.grid import Grid
+from solver.grid import SMALLEST_GRID, Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
+from solver.scheme import State
 from solver.warp.accumulated import map_size
 from solver.warp.density import Density
 from solver.warp.map import WarpMap
@@ -286,13 +287,17 @@ class Replay:
         if params != self.fluid.params:
             self.fluid.params = params
         if settings.viscosity != self._viscosity_in_force:
-            self.masks.set_base(self._viscosity(settings.viscosity), self._frozen)
+            self._use_viscosity(settings.viscosity)
             self._apply_masks()
-            self._viscosity_in_force = settings.viscosity
+
+    def _use_viscosity(self, base: float) -> None:
+        """Let the masks be painted over the recipe's layers on another base."""
+        self.masks.set_base(lambda grid: self._viscosity_on(base, grid))
+        self._viscosity_in_force = base
 
     def _apply_masks(self) -> None:
         self.masks.apply(self.fluid)
-        self.warp.hold(self.fluid.solid)
+        self.warp.hold(self.masks.frozen_field)
 
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
         """The force fields and their impulses in this tick; sources go into the fluid's own."""
@@ -378,16 +383,19 @@ class Replay:
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.fluid = fluid(self.device, self.grid)
         largest = self.device.limits.max_texture_size
-        self.warp = warp(self.device, self.grid, map_size(self.grid, (source.width, source.height), largest))
+        fine = map_size(self.grid, (source.width, source.height), largest)
+        self.warp = warp(self.device, self.grid, fine)
         if recipe.map is not None:
             self._begin_with(recipe.map)
-        self.masks = Masks(self.device, self.grid)
+        canvas = Grid(max(fine[0], SMALLEST_GRID), max(fine[1], SMALLEST_GRID), self.grid.picture)
+        self.masks = Masks(self.device, canvas)
+        if recipe.freeze:
+            self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
-        self._frozen = solid(recipe.freeze, self.grid, self.pictures)
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
-        self._viscosity = cache(self._viscosity_over)
+        self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters()
 
     def _begin_with(self, name: str) -> None:
@@ -407,8 +415,18 @@ class Replay:
         colours, alpha = channels(self.pictures.source)
         return np.concatenate([colours, alpha[..., None]], axis=2)
 
-    def _viscosity_over(self, base: float) -> np.ndarray:
-        return viscosity(self.recipe.viscosity, base, self.grid, self.pictures)
+    def _viscosity_on(self, base: float, grid: Grid) -> np.ndarray | float:
+        """The recipe's viscosity on a grid; in a window, of cells as small over the whole picture those in it."""
+        if not self.recipe.viscosity:
+            return base
+        if grid.is_whole:
+            return self._viscosity(base, grid)
+        source = self.pictures.source
+        whole = Grid.for_picture(source.width, source.height, min(ceil(1 / min(grid.spacing)), FINEST))
+        x, y = grid.centres()
+        (hx, hy), last = whole.spacing, np.array(whole.size) - 1
+        column, row = np.minimum(x[0] // hx, last[0]).astype(int), np.minimum(y[:, 0] // hy, last[1]).astype(int)
+        return self._viscosity(base, whole)[np.ix_(row, column)]
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence)]
@@ -422,13 +440,15 @@ class Replay:
         return {name: part for name, part in parts.items() if part is not None}
 
     def _save(self) -> Moment:
-        return Moment({name: part.save() for name, part in self._parts().items()})
+        states = {name: part.save() for name, part in self._parts().items()}
+        return Moment(states | {"settings": State({}, {"viscosity": np.array(self._viscosity_in_force)})})
 
     def _restore(self, moment: Moment) -> None:
         for name, part in self._parts().items():
             part.restore(moment.states[name])
-        # Which base the masks were painted over then is worked out anew.
-        self._viscosity_in_force = None
+        viscosity = float(moment.states["settings"].values["viscosity"])
+        if viscosity != self._viscosity_in_force:
+            self._use_viscosity(viscosity)
 
     def _load(self, checkpoint: Checkpoint | None) -> None:
         if checkpoint is None:

@@ -187,10 +187,10 @@ def test_smoothing_softens_a_mask(robot: Robot) -> None:
     robot.key("v")
     robot.key("]")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=6)
-    peak = robot.editor.session.replay.masks.thickness.read.get().max()
+    peak = robot.editor.session.replay.masks.thickness.get().max()
     robot.key("s")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=10)
-    assert robot.editor.session.replay.masks.thickness.read.get().max() < peak
+    assert robot.editor.session.replay.masks.thickness.get().max() < peak
 
 
 def test_restore_brings_the_picture_back(robot: Robot) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
 import reference
 from solver.fluid import Fluid
@@ -62,26 +61,6 @@ def test_add_force_and_source(device: Device) -> None:
     velocity, force = device.upload(faces), device.upload(faces[::-1].copy())
     device.pass_("step/add_impulse.frag")(velocity, add=True, force=force, impulse=0.25)
     np.testing.assert_allclose(velocity.get(), faces + np.float32(0.25) * faces[::-1], rtol=1e-6)
-
-
-def test_masks_compose(device: Device) -> None:
-    from solver.brush.masks import LEAST_VISCOSITY, Masks
-
-    grid = Grid(12, 9)
-    rng = np.random.default_rng(5)
-    base, frozen = rng.uniform(0, 1, (9, 12)), (rng.uniform(0, 1, (9, 12)) > 0.98).astype(float)
-    base[0] = 0
-    masks, fluid = Masks(device, grid), Fluid(device, grid)
-    masks.set_base(base, frozen)
-    thickness = rng.uniform(-2, 4, (9, 12)) * (rng.uniform(0, 1, (9, 12)) > 0.5)
-    painted = rng.uniform(-1, 0.52, (9, 12))
-    masks.thickness.read.set(thickness)
-    masks.frozen.read.set(painted)
-    masks.apply(fluid)
-    wanted = np.where(thickness == 0, base, np.maximum(base, LEAST_VISCOSITY) * 10**thickness)
-    np.testing.assert_allclose(fluid.viscosity.get(), wanted, rtol=1e-5)
-    around = ndimage.binary_dilation(frozen + painted >= 0.5, np.ones((5, 5)))
-    np.testing.assert_array_equal(fluid.solid.get() > 127, around)
 
 
 @pytest.mark.parametrize(("nx", "ny"), SIZES)

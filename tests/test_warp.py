@@ -285,6 +285,7 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
     rng = np.random.default_rng(9)
     warp, sampler = WarpMap(device, grid), Sampler(device)
     masks, fluid = Masks(device, grid), Fluid(device, grid)
+    masks.set_base(1e-4)
     picture = rng.integers(0, 256, (193, 301, 3), np.uint8)
     row, column = np.mgrid[0:193, 0:301]
     row, column = row * grid.ny // 193, column * grid.nx // 301
@@ -293,7 +294,7 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
     fluid.set_velocity(smooth(rng, grid.size, 0.3))
     for share in (0.005, 0.03, 0.0, 0.02):
         frozen = rng.random((grid.ny, grid.nx)) < share
-        masks.set_base(1e-4, frozen)
+        masks.set_frozen(frozen)
         masks.apply(fluid)
         warp.hold(device.upload(frozen.astype(np.uint8) * 255))
         fluid.step(0.02)
@@ -320,7 +321,8 @@ def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> N
     found = []
     for held in (False, True):
         masks, fluid, warp = Masks(device, grid), Fluid(device, grid), WarpMap(device, grid)
-        masks.set_base(1e-2, disc)
+        masks.set_base(1e-2)
+        masks.set_frozen(disc)
         masks.apply(fluid)
         if held:
             warp.hold(device.upload(disc.astype(np.uint8) * 255))

@@ -107,7 +107,9 @@ class Canvas:
         before = target.viewport
         target.viewport = _from_below(seen, height)
         draw = self.device.pass_("view/canvas.frag", **defines)
-        draw.draw_into(target, ("displacement", "viscosity", "solid", "velocity", "force", "room"), **inputs)
+        draw.draw_into(
+            target, ("displacement", "viscosity", "thickness", "frozen", "velocity", "force", "room"), **inputs
+        )
         target.viewport = before
 
     def release(self) -> None:
@@ -176,11 +178,11 @@ class Canvas:
         if shown["viscosity"].shown or (painting and state.tool_name in ("thicken", "smooth")):
             defines["VISCOSITY"] = 1
             base = max(session.replay.settings.viscosity, 1e-6)
-            inputs |= {"viscosity": replay.fluid.viscosity, "base": base}
+            inputs |= {"viscosity": replay.masks.base_viscosity, "thickness": replay.masks.thickness, "base": base}
             inputs["viscosity_opacity"] = shown["viscosity"].opacity
         if shown["frozen"].shown or (painting and state.tool_name in ("freeze", "smooth")):
             defines["FROZEN"] = 1
-            inputs |= {"solid": replay.fluid.solid, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
+            inputs |= {"frozen": replay.masks.frozen, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
         if shown["velocity"].shown:
             defines["ARROWS"] = 1
             inputs |= {"velocity": replay.fluid.faces(), "arrow": ARROW * scale, "speed": 0.4}

@@ -5,11 +5,13 @@
 // 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
 // square of the checkerboard, pixels.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
-// GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY, FROZEN: tint of decades of
-// viscosity over u_base, hatch. ARROWS: velocity on MAC faces, lengths / s, of which u_speed fills an arrow.
+// GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY: tint of decades over
+// u_base, u_viscosity of the recipe's and u_thickness painted. FROZEN: hatch where u_frozen is 1/2 or more. ARROWS: velocity
+// on MAC faces, lengths / s, of which u_speed fills an arrow.
 // FORCES: u_force on MAC faces, 1 at its strongest, as arrows of u_force_colour; where u_room swells or shrinks, a tint.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
 // reads: 2, and up to 8 with overlays
+#include "lib/decades.glsl"
 #ifndef EDGES
 #define EDGES 2
 #endif
@@ -34,11 +36,12 @@ uniform float u_pixel;
 #endif
 #ifdef VISCOSITY
 uniform sampler2D u_viscosity;
+uniform sampler2D u_thickness;
 uniform float u_base;
 uniform float u_viscosity_opacity;
 #endif
 #ifdef FROZEN
-uniform sampler2D u_solid;
+uniform sampler2D u_frozen;
 uniform float u_frozen_opacity;
 uniform float u_hatch;
 #endif
@@ -124,12 +127,13 @@ void main() {
     vec3 seen = colour.rgb;
     if (warped) {
 #ifdef VISCOSITY
-        float decades = log(max(texture(u_viscosity, x).r, 1e-9) / u_base) * 0.4342945;
-        vec3 tint = decades > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
-        seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(decades) * 0.28, 0.0, 0.75));
+        float thicker = log(max(texture(u_viscosity, x).r, 1e-6) / u_base) * 0.4342945 + decades(texture(u_thickness, x).r);
+        vec3 tint = thicker > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
+        seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(thicker) * 0.28, 0.0, 0.75));
 #endif
 #ifdef FROZEN
-        float frozen = smoothstep(0.3, 0.7, texture(u_solid, x).r);
+        // One pixel wide at the edge, whether the mask's texels are smaller or larger than that.
+        float inside = texture(u_frozen, x).r - 0.5, frozen = clamp(inside / max(fwidth(inside), 1e-3) + 0.5, 0.0, 1.0);
         float stripe = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / u_hatch) - 0.5) * 2.0;
         vec3 ice = mix(vec3(0.0, 0.45, 0.70), vec3(0.80, 0.93, 1.0), smoothstep(0.60, 0.75, stripe));
         seen = mix(seen, ice, u_frozen_opacity * frozen * 0.72);

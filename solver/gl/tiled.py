@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +15,38 @@ from solver.gl.passes import Region
 TILE = 256  # texels along a tile
 
 
+class Kind(NamedTuple):
+    """What a save must have in common with a field to be taken back.
+
+    Attributes:
+        size, components, dtype: of the field.
+        tile: texels along a tile.
+    """
+
+    size: tuple[int, int]
+    components: int
+    dtype: str
+    tile: int
+
+    @property
+    def rows_and_columns(self) -> tuple[int, int]:
+        """How many tiles there are down and across."""
+        return -(-self.size[1] // self.tile), -(-self.size[0] // self.tile)
+
+    @property
+    def regions(self) -> list[Region]:
+        """The tiles by rows."""
+        (width, height), side = self.size, self.tile
+        return [
+            (x, y, min(side, width - x), min(side, height - y))
+            for y in range(0, height, side)
+            for x in range(0, width, side)
+        ]
+
+
 @dataclass
 class _Tile:
-    """A copy of one tile, shared by all that hold it; `field` is None for a tile of zeros."""
+    """A copy of one tile, shared by all that hold it; `field` is None for a blank one."""
 
     field: Field | None
     holders: int = 0
@@ -32,12 +62,24 @@ class SavedTiles:
     """What a `TiledField` held at a moment; whoever has it releases it.
 
     Attributes:
-        kind: (size, components, dtype, tile) of the field.
+        kind: of the field.
         tiles: its tiles, (rows, columns), each shared with other saves where nothing was drawn in between.
+        blank: what all components of a blank tile are.
     """
 
-    kind: tuple[tuple[int, int], int, str, int]
+    kind: Kind
     tiles: np.ndarray
+    blank: float = 0.0
+
+    @classmethod
+    def nothing(cls, kind: Kind, blank: float = 0.0) -> SavedTiles:
+        """What a field of this kind holds before anything is drawn into it."""
+        return _held(cls(kind, np.full(kind.rows_and_columns, _Tile(None)), blank))
+
+    @property
+    def is_blank(self) -> bool:
+        """True if nothing has been drawn into any tile."""
+        return all(tile.field is None for tile in self.tiles.flat)
 
     @property
     def textures(self) -> list[Field]:
@@ -45,16 +87,18 @@ class SavedTiles:
         return [tile.field for tile in self.tiles.flat if tile.field is not None]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The tiles that are not zero, off the GPU: `places` (n,), counted by rows, and all their `texels` in a row."""
+        """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them."""
         places, texels = list[int](), list[np.ndarray]()
+        dtype = np.dtype(DTYPES[self.kind.dtype])
+        blank = round(self.blank * np.iinfo(dtype).max) if dtype.kind == "u" else self.blank
+        bits = np.array([blank], dtype).view(f"u{dtype.itemsize}")
         for place, tile in enumerate(self.tiles.flat):
             if tile.field is not None:
                 values = tile.field.get().ravel()
-                if values.view(f"u{values.itemsize}").any():
+                if (values.view(bits.dtype) != bits).any():
                     places.append(place)
                     texels.append(values)
-        empty = np.zeros(0, np.dtype(DTYPES[self.kind[2]]))
-        return {"places": np.array(places, np.int32), "texels": np.concatenate(texels) if texels else empty}
+        return {"places": np.array(places, np.int32), "texels": np.concatenate([np.zeros(0, dtype), *texels])}
 
     def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> SavedTiles:
         """A new one of the same kind, holding what `arrays()` gave.
@@ -62,22 +106,20 @@ class SavedTiles:
         Raises:
             ValueError: if that is of something else.
         """
-        size, components, dtype, side = self.kind
+        kind, regions = self.kind, self.kind.regions
         places, texels = arrays.get("places"), arrays.get("texels")
-        regions = list(_regions(size, side))
-        if places is None or texels is None or texels.dtype != DTYPES[dtype]:
+        if places is None or texels is None or texels.dtype != DTYPES[kind.dtype]:
             raise ValueError("tiles are missing, or of another kind")
         if places.ndim != 1 or ((places < 0) | (places >= len(regions))).any() or (np.diff(places) <= 0).any():
             raise ValueError("tiles lie outside the field")
-        shapes = [(regions[place][3], regions[place][2], components) for place in places]
+        shapes = [(regions[place][3], regions[place][2], kind.components) for place in places]
         ends = np.cumsum([np.prod(shape) for shape in shapes], dtype=int)
         if texels.shape != (ends[-1] if len(ends) else 0,):
             raise ValueError("tiles are of another size")
-        blank = _Tile(None)
-        tiles = np.full(self.tiles.shape, blank)
+        tiles = np.full(self.tiles.shape, _Tile(None))
         for place, shape, values in zip(places, shapes, np.split(texels, ends[:-1]), strict=False):
-            tiles.flat[place] = _Tile(device.upload(values.reshape(shape), "saved tile", dtype))
-        return _held(SavedTiles(self.kind, tiles))
+            tiles.flat[place] = _Tile(device.upload(values.reshape(shape), "saved tile", kind.dtype))
+        return _held(SavedTiles(kind, tiles, self.blank))
 
     def held(self) -> SavedTiles:
         """The same once more, to be released by whoever has it."""
@@ -90,11 +132,12 @@ class SavedTiles:
 
 
 class TiledField(Field):
-    """A field that begins as zeros, and of which saves share the tiles that were not drawn into in between.
+    """A field of which saves share the tiles that were not drawn into in between.
 
     Every pass that draws into it, `set`, `clear` and `copy_from` are noticed; who draws in another way calls `drawn`.
 
     Args:
+        blank: what all its components are at first, and where `clear` is not told another value.
         tile: texels along a tile; the other arguments are those of `Field`.
     """
 
@@ -106,39 +149,37 @@ class TiledField(Field):
         label: str,
         dtype: str = "f4",
         tile: int = TILE,
+        blank: float = 0.0,
     ) -> None:
+        self.kind = Kind(size, components, dtype, tile)
         self.tile = tile
+        self.blank = blank
         # What each tile was last saved as or restored from; None where something was drawn since.
-        self._same = np.full((-(-size[1] // tile), -(-size[0] // tile)), None, object)
+        self._same = np.full(self.kind.rows_and_columns, None, object)
         super().__init__(device, size, components, label, dtype)
-
-    @property
-    def kind(self) -> tuple[tuple[int, int], int, str, int]:
-        """What a save must have in common with it to be taken back."""
-        return self.size, self.components, self.dtype, self.tile
 
     def drawn(self, region: Region | None = None) -> None:
         if region is None:
             self._same[...] = None
             return
         x, y, width, height = region
-        side = self.tile
+        side = self.kind.tile
         self._same[y // side : -(-(y + height) // side), x // side : -(-(x + width) // side)] = None
 
     def clear(self, *values: float) -> None:
-        super().clear(*values)
-        if not any(values):
+        super().clear(*(values or self._blank_values))
+        if not values:
             self._same[...] = _Tile(None)
 
     def save(self) -> SavedTiles:
         """A copy of this moment, sharing with earlier ones what is the same."""
-        for place, (x, y, width, height) in enumerate(_regions(self.size, self.tile)):
+        for place, (x, y, width, height) in enumerate(self.kind.regions):
             same: _Tile | None = self._same.flat[place]
             if same is None or (same.field is not None and same.holders == 0):
                 copy = Field(self.device, (width, height), self.components, f"{self.label}, saved tile", self.dtype)
                 self.device.pass_("gl/copy.frag")(copy, field=self, offset=(x, y))
                 self._same.flat[place] = _Tile(copy)
-        return _held(SavedTiles(self.kind, self._same.copy()))
+        return _held(SavedTiles(self.kind, self._same.copy(), self.blank))
 
     def restore(self, saved: SavedTiles) -> list[Region]:
         """Go back to what was saved, exactly; the regions that were another.
@@ -146,15 +187,15 @@ class TiledField(Field):
         Raises:
             ValueError: if it was saved of another field.
         """
-        if saved.kind != self.kind:
+        if (saved.kind, saved.blank) != (self.kind, self.blank):
             raise ValueError(f"{self.label}: what was saved is of another size or kind")
         changed = list[Region]()
-        for place, region in enumerate(_regions(self.size, self.tile)):
+        for place, region in enumerate(self.kind.regions):
             tile, same = saved.tiles.flat[place], self._same.flat[place]
             if tile is same or (same is not None and tile.field is None and same.field is None):
                 continue
             if tile.field is None:
-                self.framebuffer.clear(viewport=region)
+                self.framebuffer.clear(*self._blank_values, viewport=region)
             else:
                 self._copy(tile.field, region, (-region[0], -region[1]))
             self._same.flat[place] = tile
@@ -172,6 +213,10 @@ class TiledField(Field):
             place = region[1] // self.tile, region[0] // self.tile
             self._same[place] = other._same[place]
 
+    @property
+    def _blank_values(self) -> tuple[float, float, float, float]:
+        return self.blank, self.blank, self.blank, self.blank
+
     def _copy(self, other: Field, region: Region | None, offset: tuple[int, int]) -> None:
         self.device.pass_("gl/copy.frag")(self, region=region, field=other, offset=offset)
 
@@ -180,11 +225,3 @@ def _held(saved: SavedTiles) -> SavedTiles:
     for tile in saved.tiles.flat:
         tile.holders += 1
     return saved
-
-
-def _regions(size: tuple[int, int], side: int) -> Iterator[Region]:
-    """The tiles of a field by rows."""
-    width, height = size
-    for y in range(0, height, side):
-        for x in range(0, width, side):
-            yield x, y, min(side, width - x), min(side, height - y)

@@ -34,10 +34,10 @@ class Frozen:
         self._mask: TiledField | None = None
         self._cell = (0.0, 0.0)
 
-    def differs(self, saved: SavedTiles) -> bool:
+    def differs(self, saved: SavedTiles | None) -> bool:
         """True if it is not what was saved."""
-        if self.saved is None:
-            return not _is_blank(saved)
+        if self.saved is None or saved is None:
+            return any(some is not None and not _is_blank(some) for some in (self.saved, saved))
         return self.saved.kind != saved.kind or not _same(self.saved, saved)
 
     def restore(self, saved: SavedTiles | None, cell: tuple[float, float]) -> None:

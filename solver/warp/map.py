@@ -18,7 +18,7 @@ from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen, saved_of
 from solver.warp.inverse import ForwardMap
-from solver.warp.state import MapState, grid_in, values_of
+from solver.warp.state import MapState, grid_in, kind_values, values_of
 from solver.warp.submap import Submap, window_of
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ class WarpMap:
         Over one cell from there the map goes over into what flows.
         """
         saved = None if frozen is None else saved_of(frozen)
-        if saved is None or self._frozen.differs(saved):
+        if self._frozen.differs(saved):
             self.remap()
             self._frozen.restore(saved, self._cell)
             self._changed()
@@ -249,6 +249,7 @@ class WarpMap:
         state = MapState.of(self.device, fields, **values)
         if self._frozen.saved is not None:
             state.tiles["frozen"] = self._frozen.saved.held()
+            state.values["frozen kind"] = kind_values(self._frozen.saved.kind)
         return state
 
     def restore(self, state: State) -> None:

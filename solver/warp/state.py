@@ -7,6 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.field import DTYPES
+from solver.gl.tiled import Kind, SavedTiles
 from solver.grid import Grid
 from solver.scheme import State
 
@@ -30,7 +32,10 @@ class MapState(State):
                     if (given.shape, given.dtype) != ((grid.ny, grid.nx, 2), np.float32):
                         raise ValueError(f"its {name} is not of its grid")
                     made.fields[name] = device.upload(given, f"{name}, given")
-            for name, saved in self.tiles.items():
+            tiles = {name: saved for name, saved in self.tiles.items() if name != "frozen"}
+            if "frozen kind" in rest:
+                tiles["frozen"] = SavedTiles.nothing(_kind_in(arrays))
+            for name, saved in tiles.items():
                 parts = {key.removeprefix(f"{name}/"): rest.pop(key) for key in arrays if key.startswith(f"{name}/")}
                 made.tiles[name] = saved.with_arrays(device, parts)
         except ValueError:
@@ -38,6 +43,20 @@ class MapState(State):
             raise
         made.values.update(rest)
         return made
+
+
+def kind_values(kind: Kind) -> np.ndarray:
+    """The kind of a mask as numbers, for `MapState`, (5,)."""
+    return np.array([*kind.size, kind.components, kind.tile, np.dtype(DTYPES[kind.dtype]).num])
+
+
+def _kind_in(arrays: Mapping[str, np.ndarray]) -> Kind:
+    numbers = arrays["frozen kind"]
+    dtypes = {np.dtype(dtype).num: name for name, dtype in DTYPES.items()}
+    if numbers.shape != (5,) or min(numbers[:4]) < 1 or int(numbers[4]) not in dtypes:
+        raise ValueError("its mask is of no kind")
+    width, height, components, tile, dtype = numbers.tolist()
+    return Kind((width, height), components, dtypes[dtype], tile)
 
 
 def values_of(grid: Grid) -> np.ndarray:

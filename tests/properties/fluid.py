@@ -97,7 +97,8 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
         if step % 100 == 0:
             fluid.params = FluidParams(Walls(rng.choice(["free", "none"])), drag=rng.choice([0.0, 1.0]))
             thick = 10 ** rng.uniform(-6, 3) if rng.random() < 0.7 else 0.0
-            masks.set_base(thick * 10 ** rng.uniform(-3, 3, (grid.ny, grid.nx)), random_solid(rng, grid))
+            masks.set_base(thick * 10 ** rng.uniform(-3, 3, (grid.ny, grid.nx)))
+            masks.set_frozen(random_solid(rng, grid))
             masks.apply(fluid)
             warp.hold(fluid.solid)
             dt = 10 ** rng.uniform(-4, 1)

@@ -45,11 +45,14 @@ def draw(ui: Ui, editor: Editor) -> None:
 
 
 def _ring(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
-    """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard."""
+    """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard.
+
+    What is frozen is so as far as the brush reaches, however hard it is.
+    """
     hand, brush = editor.hand, editor.state.brush
     x, y = hand._start if hand.drag == "brush" else (hand.x, hand.y)
     reach = brush.radius * editor.view.longer
-    core = 0.9 * brush.hardness
+    core = 1.0 if editor.state.tool_name == "freeze" else 0.9 * brush.hardness
     # Where the brush is half as strong as in its middle: (1 - q^2)^3 = 1/2, between the core and the reach.
     half = reach * (core + 0.4542 * (1 - core))
     middle, count = ImVec2(x, y), max(32, min(int(reach), 96))
