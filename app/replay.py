@@ -296,7 +296,7 @@ class Replay:
 
     def _apply_masks(self) -> None:
         self.masks.apply(self.fluid)
-        self.warp.hold(self.fluid.solid)
+        self.warp.hold(self.masks.frozen_field)
 
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
         """The force fields and their impulses in this tick; sources go into the fluid's own."""
