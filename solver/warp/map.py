@@ -82,10 +82,7 @@ class WarpMap:
         """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
         check_field("a velocity", fluid.faces(), self.grid)
         if tracing := fluid.begin_trace(check_step(dt)):
-            advance = self.device.pass_("warp/advance.frag", TRACE=1, **tracing.defines)
-            targets = self._submap.write, tracing.target
-            advance(targets, displacement=self._submap.read, spacing=self.grid.spacing, **tracing.inputs)
-            self._submap.swap()
+            self._submap.advance_tracing(tracing.target, tracing.defines, tracing.inputs)
             self._advanced()
         else:
             self.advance_traced(fluid.trace(dt))
@@ -103,6 +100,10 @@ class WarpMap:
         """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
         check_field("a trace", trace, self.grid)
         self._submap.advance(trace)
+        self._advanced()
+
+    def _advanced(self) -> None:
+        """A step was made: remap as far as it is time to."""
         self._steps += 1
         self._changed()
         if self._pending is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
 from solver.gl.reduction import Reduction
@@ -34,6 +36,12 @@ class Submap(DoubleField):
         """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
         advance = self.device.pass_("warp/advance.frag")
         advance(self.write, displacement=self.read, trace=trace, spacing=self.grid.spacing)
+        self.swap()
+
+    def advance_tracing(self, trace: Field, defines: dict[str, Any], inputs: dict[str, Any]) -> None:
+        """Carry it one step and draw `trace`, the fluid's own, beside it: the defines and inputs of `trace.frag`."""
+        advance = self.device.pass_("warp/advance.frag", TRACE=1, **defines)
+        advance((self.write, trace), displacement=self.read, spacing=self.grid.spacing, **inputs)
         self.swap()
 
     def replace(self) -> Field:
