@@ -14,6 +14,11 @@ def test_viscous_step_is_near_the_direct_solution(device: Device, seed: int) -> 
     viscosity.check_viscous_step(device, seed)
 
 
+@pytest.mark.parametrize("seed", range(16))
+def test_viscous_step_is_the_same_in_the_mirror(device: Device, seed: int) -> None:
+    viscosity.check_viscous_step_in_the_mirror(device, seed)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_viscous_step_is_stable(device: Device, seed: int) -> None:
     viscosity.check_viscous_step_is_stable(device, seed)

@@ -96,8 +96,6 @@ class Viscosity:
             draw(self._change.write.fields, region=finest.region, **solution.inputs("x_"), **v_star.inputs())
             self._change.swap()
             return solution
-        if self.plan.method == "fmg":
-            return self.multigrid.correct(v_star, rhs)
         if self.plan.method == "direct":
             self.multigrid.direct_solve(rhs)
         else:
