@@ -286,8 +286,8 @@ class Level:
         self.stress = [device.field(ringed, 4, f"{label} stress {name}") for name in ("xx", "yy", "xy") if depth]
         self.rhs = PackedFaces(device, ringed, f"{label} right-hand side")
         self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
-        # Without solids, what walls leave of a grid whose last column or row is only half in it.
-        self.box = finest[0] >> depth, finest[1] >> depth
+        # Without solids, what walls leave of a grid whose last column or row is only half in it, at least a channel.
+        self.box = max(finest[0] >> depth, 1), max(finest[1] >> depth, 1)
         # What passes read of it: the operator, which faces are open, and what stress.frag multiplies with.
         self.operator: dict[str, Any] = {}
         self.stencil: dict[str, Any] = {}

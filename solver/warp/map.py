@@ -71,9 +71,9 @@ class WarpMap:
         self._trace = device.field(grid.size, 2, "warp map, trace")
         self._largest = device.field(grid.size, 4, "warp map, largest distortion")
         self._total = device.field(grid.size, 4, "warp map, total distortion")
-        half = -(-grid.nx // 2), -(-grid.ny // 2)
-        self._steepness = device.field(half, 1, "warp map, steepness")
-        self._find_steepest = Reduction(device, half, 1, "max")
+        corners = grid.nx - 1, grid.ny - 1
+        self._steepness = device.field(corners, 1, "warp map, steepness")
+        self._find_steepest = Reduction(device, corners, 1, "max")
         self._find_largest = Reduction(device, grid.size, 4, "max")
         self._find_total = Reduction(device, grid.size, 4, "sum")
         self._scratch = self._trace, self._steepness, self._largest, self._total
@@ -156,6 +156,8 @@ class WarpMap:
         The outermost solid cells let the map go over into what moves. Looking a picture up reaches into the next cell,
         so that pixels whose cells lie two inside a solid stay as they are to the bit, moved before or not.
         """
+        if solid.size != self.grid.size:
+            raise ValueError(f"solid cells are {solid}, {self.grid.nx} x {self.grid.ny} are wanted")
         cells = _inside(solid.get() > 0)
         given = cells if cells.any() else None
         if not _same(given, self._held_cells):
