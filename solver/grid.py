@@ -35,14 +35,16 @@ class Grid:
     picture: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if min(self.nx, self.ny) < SMALLEST_GRID:
-            raise ValueError(f"a grid of {self.nx} x {self.ny} is below {SMALLEST_GRID} x {SMALLEST_GRID}")
+        if min(self.nx, self.ny) < SMALLEST_GRID or self.nx != int(self.nx) or self.ny != int(self.ny):
+            raise ValueError(
+                f"a grid of {self.nx} x {self.ny} is none of whole cells, or below {SMALLEST_GRID} x {SMALLEST_GRID}"
+            )
         if self.extent == (0.0, 0.0):
             longer = max(self.nx, self.ny)
             object.__setattr__(self, "extent", (self.nx / longer, self.ny / longer))
         if self.picture == (0.0, 0.0):
             object.__setattr__(self, "picture", self.extent)
-        if not (max(self.picture) == 1.0 and min(self.picture) > 0.0):
+        if not (all(0.0 < side <= 1.0 for side in self.picture) and max(self.picture) == 1.0):
             raise ValueError(f"a picture of {self.picture} longer sides: the longer must be 1, the other above 0")
         within = (
             start >= 0.0 < side and start + side <= whole + ROUNDING
@@ -59,6 +61,8 @@ class Grid:
         narrow that it would have fewer than 8 of them there gets more along it instead, up to `MOST_ALONG`.
         """
         longer, shorter = max(width, height), min(width, height)
+        if not min(shorter, cells) >= 1:
+            raise ValueError(f"{cells} cells along a picture of {width} x {height} pixels were asked for")
         along = max(cells, min(ceil(SMALLEST_GRID * longer / shorter), MOST_ALONG))
         nx, ny = (max(SMALLEST_GRID, round(along * side / longer)) for side in (width, height))
         return cls(nx, ny, (width / longer, height / longer))

@@ -13,11 +13,9 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.tiled import SavedTiles, TiledField
 from solver.grid import Grid
-from solver.params import FluidParams
+from solver.params import LARGEST_SPEED, FluidParams
 
-# Longer sides per second, and as much for what is put in: the solvers multiply sums of squares over the grid, which
-# then stay below float32's 3e38. Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below it too.
-LARGEST_SPEED = 1e6
+# Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below what float32 holds.
 LONGEST_STEP = 1e4
 LARGEST_VISCOSITY = 1e6
 
@@ -251,8 +249,8 @@ class Scheme(ABC):
         """
         array = np.asarray(solid)
         check_shape("solid cells", array, (self.grid.ny, self.grid.nx))
-        if np.isnan(array).any():
-            raise ValueError("solid cells must be true or false, not NaN")
+        if array.dtype.kind not in "fiub" or np.isnan(array).any():
+            raise ValueError("solid cells must be true or false, or numbers")
         self.solid.set(np.where(array, 255, 0).astype(np.uint8))
         self.masks_changed()
 
@@ -262,6 +260,8 @@ class Scheme(ABC):
 
     def add_source(self, source: Field, amount: float = 1.0) -> None:
         """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
+        if source.size != self.grid.size or source.components != 1:
+            raise ValueError(f"a source is {source}, {self.grid.nx} x {self.grid.ny} x 1 is wanted")
         check_finite("an amount of a source", amount)
         add = self.device.pass_("step/add_source.frag")
         self.source.add(lambda field: add(field, add=True, source=source, amount=amount))
@@ -409,11 +409,15 @@ def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.nda
         ValueError: on another shape or a value that is not finite.
     """
     if callable(vector):
-        parts = [vector(*points, time)[axis] for axis, points in enumerate((grid.u_faces(), grid.v_faces()))]
+        both = vector(*grid.u_faces(), time), vector(*grid.v_faces(), time)
+        if {len(parts) for parts in both} != {2}:
+            raise ValueError(f"{what} has two components, and the function gave {len(both[0])}")
         shape = grid.ny, grid.nx
-        array = np.stack([np.broadcast_to(np.asarray(part, np.float64), shape) for part in parts], axis=-1)
+        array = np.stack([np.broadcast_to(parts[axis], shape) for axis, parts in enumerate(both)], axis=-1)
     else:
         array = np.asarray(vector)
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{what} is of {array.dtype}, real numbers are wanted")
     check_shape(what, array, (grid.ny, grid.nx, 2))
     if not np.isfinite(array).all():
         raise ValueError(f"{what} holds a value that is not finite")

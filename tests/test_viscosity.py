@@ -339,7 +339,7 @@ def test_strokes_over_a_stiff_disc_end_where_exact_steps_would(device: Device) -
             force = device.upload(np.stack(stroke, axis=-1).astype(np.float32))
             if exactly and step == 1:
                 solver = fluid._viscosity_solver
-                solver.plan = dataclasses.replace(solver.plan, iterations=30, tolerance=0.0, sweeps=(2, 2))
+                solver.plan = dataclasses.replace(solver.plan, iterations=30, tolerance=0.0, sweeps=2)
             fluid.step(dt, [(force, 0.03)] if step < 25 else [])
             warp.follow(fluid, dt)
             force.release()

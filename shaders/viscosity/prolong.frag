@@ -1,10 +1,5 @@
-// Prolong: the coarse correction on the finer grid, added to the iterate; or, with START, a first iterate: the coarse
-// solution, and for what the coarse grid cannot carry of the right-hand side, each face by itself:
-// f = P e + D^-1 (b - P b_coarse).
-// u_coarse_u, u_coarse_v: coarse faces e; u_u, u_v: the iterate, or b; u_coarse_rhs_u, u_coarse_rhs_v: b_coarse;
-// With CORRECT, u_u, u_v are v*, of which only the part u_part is taken (at most 1), and a damped Jacobi sweep is made on
-// it: u_r_u, u_r_v: the residual of all of v*; u_weight: of the sweep; with DRAGGED u_rhs_u, u_rhs_v: the right-hand
-// side, where it is not v* itself.
+// Prolong: the coarse correction on the finer grid, added to the iterate, f + P e.
+// u_coarse_u, u_coarse_v: coarse faces e; u_u, u_v: the iterate f.
 // Linear along the face's normal; 3/4 and 1/4 of the two nearest across it. A coarse face that is exactly zero is
 // fixed (or at rest, which makes no difference): at free-slip walls the other one then counts whole.
 // reads: 12
@@ -13,20 +8,6 @@ uniform sampler2D u_coarse_u;
 uniform sampler2D u_coarse_v;
 uniform sampler2D u_u;
 uniform sampler2D u_v;
-#ifdef START
-uniform sampler2D u_coarse_rhs_u;
-uniform sampler2D u_coarse_rhs_v;
-#endif
-#ifdef CORRECT
-uniform float u_weight;
-uniform sampler2D u_r_u;
-uniform sampler2D u_r_v;
-uniform sampler2D u_part;
-#endif
-#ifdef DRAGGED
-uniform sampler2D u_rhs_u;
-uniform sampler2D u_rhs_v;
-#endif
 in vec2 v_uv;
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -63,24 +44,6 @@ void main() {
     vec2 texel = 1.0 / vec2(textureSize(u_coarse_u, 0)), p = (vec2(place >> 1) + 1.5) * texel;
     vec2 first = vec2(place >> 1) * 2.0, box = floor(0.5 * u_box);
     vec2 x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
-#if defined(START) || defined(CORRECT)
-    Faces inverse = inverse_diagonal(v_uv);
-#endif
-    vec4 u = texture(u_u, v_uv), v = texture(u_v, v_uv);
-#ifdef START
-    u = inverse.u * (u - spread(u_coarse_rhs_u, p, x, y, false, odd.x, odd.y, first.y, box.y, u_no_slip.zw));
-    v = inverse.v * (v - spread(u_coarse_rhs_v, p, y, x, true, odd.y, odd.x, first.x, box.x, u_no_slip.xy).xzyw);
-#endif
-#ifdef CORRECT
-#ifdef DRAGGED
-    vec4 rhs_u = texture(u_rhs_u, v_uv), rhs_v = texture(u_rhs_v, v_uv);
-#else
-    vec4 rhs_u = u, rhs_v = v;
-#endif
-    float part = texelFetch(u_part, ivec2(0), 0).x;
-    u = part * u + u_weight * inverse.u * mix(rhs_u, texture(u_r_u, v_uv), part);
-    v = part * v + u_weight * inverse.v * mix(rhs_v, texture(u_r_v, v_uv), part);
-#endif
-    out_u = u + open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y, first.y, box.y, u_no_slip.zw);
-    out_v = v + open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x, first.x, box.x, u_no_slip.xy).xzyw;
+    out_u = texture(u_u, v_uv) + open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y, first.y, box.y, u_no_slip.zw);
+    out_v = texture(u_v, v_uv) + open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x, first.x, box.x, u_no_slip.xy).xzyw;
 }

@@ -4,9 +4,7 @@
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a fixed neighbour.
 // With START a second pair of outputs, the first damped Jacobi sweep on it from rest: u_weight D^-1 times it.
-// With WEIGHED that of v* and, as a second pair, of the right-hand side b it was of, u_rhs_u, u_rhs_v; and texel by
-// texel the scalar products b . b and b . A v*, by which scaling.frag tells which part of v* to keep.
-// reads: 29, and 53 when WEIGHED
+// reads: 29
 uniform sampler2D u_u;
 uniform sampler2D u_v;
 #include "viscosity/operator.glsl"
@@ -15,13 +13,6 @@ uniform float u_weight;
 in vec2 v_uv;
 layout(location = 2) out vec4 out_start_u;
 layout(location = 3) out vec4 out_start_v;
-#endif
-#ifdef WEIGHED
-uniform sampler2D u_rhs_u;
-uniform sampler2D u_rhs_v;
-layout(location = 2) out vec4 out_rhs_u;
-layout(location = 3) out vec4 out_rhs_v;
-layout(location = 4) out vec4 out_products;
 #endif
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -58,12 +49,6 @@ void main() {
     vec4 open_here_v = open_v(here).xzyw, right = open_v(here + x).xzyw, below = open_u(here + y);
     out_u = gather(u_u, p, fx, fy, false, above, open_here_u, below, 2.0 * here.y, u_box.y, u_no_slip.zw);
     out_v = gather(u_v, p, fy, fx, true, left, open_here_v, right, 2.0 * here.x, u_box.x, u_no_slip.xy).xzyw;
-#ifdef WEIGHED
-    out_rhs_u = gather(u_rhs_u, p, fx, fy, false, above, open_here_u, below, 2.0 * here.y, u_box.y, u_no_slip.zw);
-    out_rhs_v = gather(u_rhs_v, p, fy, fx, true, left, open_here_v, right, 2.0 * here.x, u_box.x, u_no_slip.xy).xzyw;
-    float wanted = dot(out_rhs_u, out_rhs_u) + dot(out_rhs_v, out_rhs_v);
-    out_products = vec4(wanted, wanted - dot(out_rhs_u, out_u) - dot(out_rhs_v, out_v), 0.0, 0.0);
-#endif
 #ifdef START
     Faces inverse = inverse_diagonal(v_uv);
     out_start_u = u_weight * inverse.u * out_u;

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from solver.gl.device import Device
-from solver.gl.field import Field
-from solver.gl.reduction import Reduction
 from solver.packing import PackedFaces
 from solver.params import NoSlip
 from solver.viscosity.changed import Box, changed
@@ -89,12 +86,6 @@ class Multigrid:
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
         self._largest = 0.0  # kappa
-        ringed = self.levels[0].rhs.u.size
-        self._residual = PackedFaces(device, ringed, "viscous residual of v*")
-        coarser = self.levels[min(1, len(self.levels) - 1)].rhs.u.size
-        self._products = device.field(coarser, 4, "viscous scaling products")
-        self._sum = Reduction(device, coarser, 4, "sum")
-        self._scaling = device.field((1, 1), 1, "viscous scaling")
 
     # -- what is solved ---------------------------------------------------------------------------------------------
 
@@ -163,7 +154,7 @@ class Multigrid:
     @property
     def last(self) -> Level:
         """The coarsest level that is visited."""
-        return self.levels[min(self.plan.levels, self.direct_level.depth)]
+        return self.finest if self.plan.method == "smooth" else self.direct_level
 
     # -- cycles -----------------------------------------------------------------------------------------------------
 
@@ -172,146 +163,51 @@ class Multigrid:
         self.cycle(self.finest, rhs, begun=0 if start else self._begin(self.finest, rhs))
         return self.finest.faces.read
 
-    def cycle(self, level: Level, rhs: PackedFaces, begun: int, two_grid: bool = False, scaling: float = 0.0) -> None:
-        """One multigrid cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`.
-
-        A two-grid cycle goes one level down only. Of D^-1 rhs so much as `scaling` is taken away at the end.
-        """
+    def cycle(self, level: Level, rhs: PackedFaces, begun: int) -> None:
+        """One multigrid cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`."""
         if level is self.direct_level:
             self.direct_solve(rhs)
-            if scaling:
-                self._start(level, rhs, level.faces.read, -scaling, add=True)
             return
         weights = self.weights(level)
-        if level is self.last:
-            self.smooth(level, rhs, weights[begun:], scaling=scaling)
-            return
         self.smooth(level, rhs, weights[begun:])
-        self._coarse_correction(level, rhs, two_grid)
-        self.smooth(level, rhs, weights[::-1], scaling=scaling)
+        self._coarse_correction(level, rhs)
+        self.smooth(level, rhs, weights[::-1])
 
-    def _coarse_correction(self, level: Level, rhs: PackedFaces, two_grid: bool) -> None:
+    def _coarse_correction(self, level: Level, rhs: PackedFaces) -> None:
         # The write side is free until the correction is added.
         self.residual(level, level.faces.read, rhs, level.faces.write)
         coarser = self.levels[level.depth + 1]
-        if two_grid:
-            first, *others = self.weights(coarser, is_last=True)
-            self._restrict(level.faces.write, coarser, first)
-            self.smooth(coarser, coarser.rhs, others)
-        else:
-            first = self._first_weight(coarser)
-            self._restrict(level.faces.write, coarser, first)
-            self.cycle(coarser, coarser.rhs, begun=1 if first else 0)
+        self.cycle(coarser, coarser.rhs, begun=self._restrict(level.faces.write, coarser))
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines)
-        prolong(
-            level.faces.write.fields,
-            region=level.region,
-            **coarser.faces.read.inputs("coarse_"),
-            **level.faces.read.inputs(),
-            **level.operator,
-        )
+        prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"),
+                **level.faces.read.inputs(), **level.open)  # fmt: skip
         level.faces.swap()
-
-    def correct(self, v_star: PackedFaces, rhs: PackedFaces) -> PackedFaces:
-        """The step for one viscosity: a part of v*, corrected once by full multigrid, and smoothed.
-
-        What the coarser levels do not carry of the right-hand side is divided by the diagonal, face by face.
-        """
-        finest, coarser, residual = self.finest, self.levels[1], self._residual
-        weights = self.weights(finest, 1 + self.plan.sweeps[0])
-        self.residual(finest, v_star, rhs, residual)
-        self._restrict_scaled(rhs, residual)
-        # The part that the coarser level does carry is not to be added face by face once more.
-        k = self._largest
-        self._full_multigrid(scaling=weights[0] * (1.0 + 1.5 * k) / (1.0 + 6.0 * k))
-        dragged: dict[str, Any] = {} if rhs is v_star else {"DRAGGED": 1}
-        finish = self.device.pass_("viscosity/prolong.frag", CORRECT=1, **dragged, **finest.defines)
-        finish(
-            finest.faces.write.fields,
-            region=finest.region,
-            weight=weights[0],
-            part=self._scaling,
-            **coarser.faces.read.inputs("coarse_"),
-            **v_star.inputs(),
-            **residual.inputs("r_"),
-            **(rhs.inputs("rhs_") if dragged else {}),
-            **finest.operator,
-        )
-        finest.faces.swap()
-        self.smooth(finest, rhs, weights[1:])
-        return finest.faces.read
-
-    def _restrict_scaled(self, rhs: PackedFaces, residual: PackedFaces) -> None:
-        """The right-hand side of the next level: what that part of v* leaves which has least energy there."""
-        coarser = self.levels[1]
-        wanted, left = coarser.faces.write, coarser.faces.read
-        restrict = self.device.pass_("viscosity/restrict.frag", WEIGHED=1, **coarser.defines)
-        restrict((*left.fields, *wanted.fields, self._products), region=coarser.region, **residual.inputs(),
-                 **rhs.inputs("rhs_"), **coarser.bounds)  # fmt: skip
-        self.device.pass_("viscosity/scaling.frag")(self._scaling, products=self._sum.shrink(self._products))
-        damp = self.device.pass_("viscosity/damp.frag")
-        damp(coarser.rhs.fields, region=coarser.region, part=self._scaling, **wanted.inputs(), **left.inputs("r_"))
-
-    def _full_multigrid(self, scaling: float) -> None:
-        """A correction on the coarser levels: solved on the last, then carried up and improved level by level.
-
-        From the finest of them so much of D^-1 rhs as `scaling` is taken away.
-        """
-        last = self.last
-        levels = self.levels[1 : last.depth + 1]
-        right_hand_sides = [level.rhs for level in levels]
-        begun = 0
-        for rhs, coarser in zip(right_hand_sides, levels[1:], strict=False):
-            begun = self._restrict(rhs, coarser, self._first_weight(coarser) if coarser is last else 0.0)
-        if len(levels) == 1:
-            begun = self._begin(last, last.rhs)
-        self.cycle(last, last.rhs, begun, scaling=scaling if len(levels) == 1 else 0.0)
-        for finer, coarser, rhs in reversed(list(zip(levels, levels[1:], right_hand_sides, strict=False))):
-            prolong = self.device.pass_("viscosity/prolong.frag", START=1, **finer.defines)
-            prolong(
-                finer.faces.write.fields,
-                region=finer.region,
-                **coarser.faces.read.inputs("coarse_"),
-                **coarser.rhs.inputs("coarse_rhs_"),
-                **rhs.inputs(),
-                **finer.operator,
-            )
-            finer.faces.swap()
-            # A cycle overwrites the right-hand sides of coarser levels only, and those are used up by now.
-            is_nested, at_end = finer.depth <= self.plan.nested, scaling if finer is levels[0] else 0.0
-            self.smooth(finer, rhs, self.weights(finer)[::-1], scaling=0.0 if is_nested else at_end)
-            if is_nested:
-                self.cycle(finer, rhs, begun=0, two_grid=self.plan.two_grid, scaling=at_end)
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
-    def weights(self, level: Level, count: int = 0, is_last: bool = False) -> list[float]:
-        """Chebyshev weights of the smoothing sweeps; `is_last`: no coarser level follows."""
-        is_last = is_last or level is self.last
-        count = count or self.plan.sweeps[0 if level.depth == 0 else 1]
+    def weights(self, level: Level) -> list[float]:
+        """Chebyshev weights of the smoothing sweeps."""
+        count = self.plan.sweeps
         if self.plan.method == "cg":
-            largest = LARGEST_EIGENVALUE[min(level.depth, 1)]
+            largest = LARGEST_EIGENVALUE[1 if level.stencil else 0]
             return chebyshev_weights(largest / SMOOTHED[count], largest, count)
-        # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient, D is
-        # 1 + 6 k, and the coarser level takes over about where |q|^2 is 1.
-        k = self._largest / 4.0**level.depth
-        taken_over = 0.0 if is_last else 1.0
-        return chebyshev_weights((1.0 + taken_over * k) / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), count)
+        # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient; D is
+        # 1 + 6 k, and no coarser level takes over.
+        k = self._largest
+        return chebyshev_weights(1.0 / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), count)
 
     def smooth(
-        self, level: Level, rhs: PackedFaces, weights: list[float], start: PackedFaces | None = None,
-        scaling: float = 0.0,
+        self, level: Level, rhs: PackedFaces, weights: list[float], start: PackedFaces | None = None
     ) -> None:  # fmt: skip
-        """One sweep for each weight, on from the level's iterate or from `start`; see `cycle` for `scaling`."""
+        """One sweep for each weight, on from the level's iterate or from `start`."""
         smooth = self.device.pass_("viscosity/smooth.frag", **level.defines)
-        for number, weight in enumerate(weights, 1):
+        for weight in weights:
             iterate = start or level.faces.read
             self._stress(level, iterate)
             smooth(
                 level.faces.write.fields,
                 region=level.region,
                 weight=weight,
-                scaling=scaling if number == len(weights) else 0.0,
                 **iterate.inputs(),
                 **rhs.inputs("rhs_"),
                 **level.operator,
@@ -347,21 +243,15 @@ class Multigrid:
         """The first sweep from rest, where there is one; how many were made."""
         if level is self.direct_level:
             return 0
-        self._start(level, rhs, level.faces.write, self.weights(level)[0])
+        start = self.device.pass_("viscosity/start.frag", **level.defines)
+        start(level.faces.write.fields, region=level.region, weight=self.weights(level)[0], **rhs.inputs("rhs_"),
+              **level.operator)  # fmt: skip
         level.faces.swap()
         return 1
 
-    def _start(self, level: Level, rhs: PackedFaces, target: PackedFaces, weight: float, add: bool = False) -> None:
-        start = self.device.pass_("viscosity/start.frag", **level.defines)
-        start(target.fields, add=add, region=level.region, weight=weight, **rhs.inputs("rhs_"), **level.operator)
-
-    def _first_weight(self, level: Level) -> float:
-        """Of the sweep that a cycle begins with, from rest; 0 where the level is solved directly instead."""
-        return 0.0 if level is self.direct_level else self.weights(level)[0]
-
-    def _restrict(self, residual: PackedFaces, coarser: Level, weight: float) -> int:
-        """The residual as rhs of the coarser level; with a `weight` the first sweep on it too, from rest."""
-        if not weight:
+    def _restrict(self, residual: PackedFaces, coarser: Level) -> int:
+        """The residual as rhs of the coarser level, and the first sweep on it if it has any; how many were made."""
+        if coarser is self.direct_level:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
             restrict(coarser.rhs.fields, region=coarser.region, **residual.inputs(), **coarser.bounds)
             return 0
@@ -369,7 +259,7 @@ class Multigrid:
         restrict(
             coarser.rhs.fields + coarser.faces.write.fields,
             region=coarser.region,
-            weight=weight,
+            weight=self.weights(coarser)[0],
             **residual.inputs(),
             **coarser.operator,
         )
@@ -377,15 +267,11 @@ class Multigrid:
         return 1
 
     @property
-    def _fields(self) -> tuple[Field, ...]:
-        return *self._residual.fields, self._inverse, self._products, self._scaling
-
-    @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(item.nbytes for item in (*self.levels, *self._fields, self._sum, self._transform))
+        return sum(item.nbytes for item in (*self.levels, self._inverse, self._transform))
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self.levels, *self._fields, self._sum, self._transform):
+        for item in (*self.levels, self._inverse, self._transform):
             item.release()

@@ -314,8 +314,8 @@ class Level:
         self.stress = [device.field(ringed, 4, f"{label} stress {name}") for name in ("xx", "yy", "xy") if depth]
         self.rhs = PackedFaces(device, ringed, f"{label} right-hand side")
         self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
-        # Without solids, what walls leave of a grid whose last column or row is only half in it.
-        self.box = finest[0] >> depth, finest[1] >> depth
+        # Without solids, what walls leave of a grid whose last column or row is only half in it, at least a channel.
+        self.box = max(finest[0] >> depth, 1), max(finest[1] >> depth, 1)
         # What passes read: the operator, what stress.frag multiplies with, open faces, and where the fluid sticks.
         self.operator: dict[str, Any] = {}
         self.stencil: dict[str, Any] = {}

@@ -28,9 +28,9 @@ class Submap(DoubleField):
         self.device = device
         self.grid = grid
         self.trace = device.field(grid.size, 2, "submap, trace")
-        half = -(-grid.nx // 2), -(-grid.ny // 2)
-        self._steepness = device.field(half, 1, "submap, steepness")
-        self._find_steepest = Reduction(device, half, 1, "max")
+        corners = grid.nx - 1, grid.ny - 1
+        self._steepness = device.field(corners, 1, "submap, steepness")
+        self._find_steepest = Reduction(device, corners, 1, "max")
 
     def advance(self, trace: Field) -> None:
         """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""

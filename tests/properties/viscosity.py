@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 import reference
+from properties.fluid import TURNS, turned, turned_cells
 from solver.gl.device import Device
 from solver.params import Walls
 from solver.viscosity.solve import Viscosity
@@ -143,6 +144,11 @@ class Case:
             item.release()
         return found, solver.conjugate_gradients.iterations
 
+    def turned(self, turn: str) -> Case:
+        """The same in the mirror, or transposed; see `TURNS`."""
+        faces = turned(self.faces, turn).astype(np.float32)
+        return Case(turned_cells(self.viscosity, turn), faces, self.walls, turned_cells(self.solid, turn))
+
     def exact(self) -> np.ndarray:
         no_slip = self.walls.no_slip
         return reference.viscous_step(
@@ -168,6 +174,26 @@ def check_viscous_step(device: Device, seed: int) -> dict[str, float]:
     assert left < min(ERROR.get(contrast, np.inf), nothing), told
     assert iterations <= ITERATIONS[softest] or contrast not in ERROR, told
     return {"error": left, "doing nothing": nothing, "iterations": iterations}
+
+
+def check_viscous_step_in_the_mirror(device: Device, seed: int) -> dict[str, float]:
+    """One viscosity or a mask, on odd and even grids of any aspect: near the direct solution, also mirrored."""
+    rng = np.random.default_rng(seed)
+    nx, ny = (round(10 ** rng.uniform(0.91, 2.1)) for _ in "xy")
+    if rng.random() < 0.6:
+        kind, contrast, softest = "one viscosity", 1e2, float(10 ** rng.uniform(-2, 6))
+        walls, solid = Walls(rng.choice(["free", "none"])), np.zeros((ny, nx), bool)
+        case = Case(np.full((ny, nx), softest, np.float32), eddies(rng, nx, ny), walls, solid)
+    else:
+        kind, contrast, softest = str(rng.choice(list(CLASSES))), float(rng.choice([1e2, 1e5])), 1.0
+        case = Case.random(kind, (nx, ny), contrast, softest, rng, plain=False)
+    found, _ = case.solved(device)
+    left, size = error(found, case.exact()), float(np.linalg.norm(found))
+    off = max(float(np.linalg.norm(case.turned(t).solved(device)[0] - turned(found, t))) / size for t in TURNS)
+    told = f"seed {seed}: {kind}, {nx} x {ny}, {case.walls.slip}, contrast {contrast:g}, kappa {softest:g}"
+    assert left < ERROR[contrast], f"{told}: {left:.4f} left"
+    assert off < 2 * ERROR[contrast], f"{told}: {off:.4f} off in the mirror"
+    return {"error": left, "off in the mirror": off}
 
 
 def check_viscous_step_is_stable(device: Device, seed: int) -> dict[str, float]:
