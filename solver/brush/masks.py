@@ -22,7 +22,6 @@ from solver.scheme import LARGEST_VISCOSITY, Scheme, State, check_finite
 STEPS, ZERO, MOST = 8192, 24576, 65535
 BLANK = {"thickness": ZERO / MOST, "frozen": 0.0}
 LEAST_VISCOSITY = 1e-6  # that painting starts from where there is none
-ENOUGH = 0.4999  # of a cell: a half, whatever rounding leaves of it
 SMOOTHED = 1 / 8  # radii over which `smooth` takes means
 
 Base = float | np.ndarray | Callable[[Grid], np.ndarray | float]
@@ -119,8 +118,10 @@ class Masks:
     def apply(self, fluid: Scheme) -> None:
         """Give a fluid, on the whole picture or a window, its viscosity and solid cells; the next step takes them up.
 
-        They are averages over the cells, worked out where a mask has changed since it was told last. Cells are solid
-        where half of them is frozen; that no bit changes of what is, `WarpMap.hold` sees to.
+        They are averages over the cells, worked out where a mask has changed since it was told last. Solid are the
+        cells with something frozen in them and those within two of them: there the map, which holds what is frozen to
+        the bit (`WarpMap.hold`), goes over into what flows. Were only cells solid of which half is frozen, the fluid
+        would glide along the edge, and the map tear there.
         """
         grid = fluid.grid
         base = self._cells.get("base viscosity", grid.size, 1)
@@ -147,9 +148,13 @@ class Masks:
                 **cells,
             )
         if changed := self._changed.get("frozen"):
-            average = self.device.pass_("step/average_frozen.frag")
-            region = self._cells_over(changed, grid)
-            average(fluid.solid, region=region, frozen=self.frozen, enough=ENOUGH, **cells)
+            frozen = self._cells.get("frozen", grid.size, 1, "f1")
+            x, y, width, height = region = self._cells_over(changed, grid)
+            self.device.pass_("step/average_frozen.frag")(
+                frozen, region=region, frozen=self.frozen, enough=1e-3, **cells
+            )
+            widened = (x - 2, y - 2, width + 4, height + 4)
+            self.device.pass_("step/widen_solid.frag")(fluid.solid, region=widened, frozen=frozen)
         self._applied_to = fluid, grid
         self._changed.clear()
         fluid.masks_changed()

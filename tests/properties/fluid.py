@@ -109,13 +109,13 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
             masks.set_base(thick * 10 ** rng.uniform(-3, 3, (grid.ny, grid.nx)))
             masks.set_frozen(random_solid(rng, grid))
             masks.apply(fluid)
-            warp.hold(masks.frozen_field)
+            warp.hold(fluid.solid)
             dt = 10 ** rng.uniform(-4, 1)
         if rng.random() < 0.05:
             masks.thicken(tip(), rng.normal(0, 3))
             masks.freeze(tip(), rng.normal(0, 1))
             masks.apply(fluid)
-            warp.hold(masks.frozen_field)
+            warp.hold(fluid.solid)
         forces, motion = [], None
         if rng.random() < 0.3:
             forces.append(strength * random_faces(rng, grid) / dt)
