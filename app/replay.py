@@ -310,6 +310,7 @@ class Replay:
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
+                    self._set_parameters()  # also of a fluid that has just been restored
                     flow = self.fluid.flow_on(self._cells_of(window))
                     self._look_at(window)
                     self._set_parameters()
