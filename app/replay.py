@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from math import hypot
+from math import ceil, hypot
 
 import numpy as np
 
 from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.errors import UserError
 from app.forces import BuiltForce, build
-from app.masks import solid, viscosity
+from app.masks import FINEST, solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
 from app.strokes import FINEST_DETAIL, Change, Dab, Stroke
@@ -20,19 +20,20 @@ from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
 from app.windows import FLOWING, Window, may_have_windows
 from solver.brush.brush import Brush, Motion
-from solver.brush.masks import Masks, canvas_of
+from solver.brush.masks import Masks
 from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
 from solver.brush.tip import Tip
 from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
-from solver.grid import Grid
+from solver.grid import SMALLEST_GRID, Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
 from solver.scheme import State
+from solver.warp.accumulated import map_size
 from solver.warp.density import Density
-from solver.warp.map import WarpMap, map_size
+from solver.warp.map import WarpMap
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought
@@ -342,12 +343,12 @@ class Replay:
 
     def _use_viscosity(self, base: float) -> None:
         """Let the masks be painted over the recipe's layers on another base."""
-        self.masks.set_base(lambda grid: self._viscosity(base, grid))
+        self.masks.set_base(lambda grid: self._viscosity_on(base, grid))
         self._viscosity_in_force = base
 
     def _apply_masks(self) -> None:
         self.masks.apply(self.fluid)
-        self.warp.hold(self.fluid.solid)
+        self.warp.hold(self.masks.frozen_field)
 
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
         """The force fields and their impulses in this tick; sources go into the fluid's own."""
@@ -436,10 +437,11 @@ class Replay:
         self.fluid = fluid(self.device, self.grid)
         self._fluids = {0: self.fluid}  # by the detail of their windows
         largest = self.device.limits.max_texture_size
-        self.warp = warp(self.device, self.grid, map_size(self.grid, (source.width, source.height), largest))
+        fine = map_size(self.grid, (source.width, source.height), largest)
+        self.warp = warp(self.device, self.grid, fine)
         if recipe.map is not None:
             self._begin_with(recipe.map)
-        canvas = canvas_of((source.width, source.height), self.grid, self.device.limits.max_texture_size)
+        canvas = Grid(max(fine[0], SMALLEST_GRID), max(fine[1], SMALLEST_GRID), self.grid.picture)
         self.masks = Masks(self.device, canvas)
         if recipe.freeze:
             self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
@@ -447,7 +449,7 @@ class Replay:
         self._viscosity_in_force: float | None = None
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
-        self._viscosity = lru_cache(4)(self._viscosity_over)
+        self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters()
 
     def _begin_with(self, name: str) -> None:
@@ -467,8 +469,18 @@ class Replay:
         colours, alpha = channels(self.pictures.source)
         return np.concatenate([colours, alpha[..., None]], axis=2)
 
-    def _viscosity_over(self, base: float, grid: Grid) -> np.ndarray:
-        return viscosity(self.recipe.viscosity, base, grid, self.pictures)
+    def _viscosity_on(self, base: float, grid: Grid) -> np.ndarray | float:
+        """The recipe's viscosity on a grid; in a window, of cells as small over the whole picture those in it."""
+        if not self.recipe.viscosity:
+            return base
+        if grid.is_whole:
+            return self._viscosity(base, grid)
+        source = self.pictures.source
+        whole = Grid.for_picture(source.width, source.height, min(ceil(1 / min(grid.spacing)), FINEST))
+        x, y = grid.centres()
+        (hx, hy), last = whole.spacing, np.array(whole.size) - 1
+        column, row = np.minimum(x[0] // hx, last[0]).astype(int), np.minimum(y[:, 0] // hy, last[1]).astype(int)
+        return self._viscosity(base, whole)[np.ix_(row, column)]
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence)]

@@ -173,7 +173,7 @@ class PaperWarpMap(WarpMap):
     def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None) -> None:
         super().__init__(device, grid, grid.size)  # of whatever size it is wanted: it stays the identity
 
-    def hold(self, solid: Field) -> None:
+    def hold(self, frozen: Field | None) -> None:
         """Nothing: the paper's map is what its scheme makes of it."""
 
     def follow(self, fluid: Scheme, dt: float) -> None:

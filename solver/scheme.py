@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class State:
     tiles: dict[str, SavedTiles] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, device: Device, fields: Mapping[str, Field], **values: object) -> State:
+    def of(cls, device: Device, fields: Mapping[str, Field], **values: object) -> Self:
         """Copy `fields` and `values`; a value that is None is left out."""
         copies, tiles = dict[str, Field](), dict[str, SavedTiles]()
         for name, live in fields.items():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from solver.brush.masks import LEAST_VISCOSITY, MOST, MOST_TEXELS, STEPS, ZERO, Masks, canvas_of
+from solver.brush.masks import LEAST_VISCOSITY, MOST, STEPS, ZERO, Masks
 from solver.brush.tip import Tip
 from solver.fluid import Fluid
 from solver.gl.device import Device
@@ -48,25 +48,6 @@ def covered(values: np.ndarray, canvas: Grid, grid: Grid) -> np.ndarray:
         parts = (np.minimum(high, np.arange(n) + 1) - np.maximum(low, np.arange(n))).clip(0)
         values = np.moveaxis(np.tensordot(parts / parts.sum(axis=1, keepdims=True), values, (1, axis)), 0, axis)
     return values
-
-
-@pytest.mark.parametrize(
-    ("pixels", "grid", "size"),
-    [
-        ((6000, 4000), Grid.for_picture(6000, 4000, 256), (6000, 4000)),
-        ((12000, 9000), Grid.for_picture(12000, 9000, 256), (6000, 4500)),
-        ((300, 200), Grid.for_picture(300, 200, 256), (1200, 800)),
-        ((30000, 6), Grid.for_picture(30000, 6, 256), (15000, 8)),
-        ((8, 8), Grid.for_picture(8, 8, 2048), (5792, 5792)),
-    ],
-)
-def test_the_canvas_is_as_fine_as_the_picture_within_bounds(
-    pixels: tuple[int, int], grid: Grid, size: tuple[int, int]
-) -> None:
-    canvas = canvas_of(pixels, grid, 16384)
-    assert canvas.size == size
-    assert canvas.nx * canvas.ny <= MOST_TEXELS
-    assert canvas.extent == grid.picture
 
 
 def test_nothing_is_kept_of_masks_that_are_not_painted(device: Device, masks: Masks) -> None:
@@ -121,8 +102,8 @@ def test_thickness_is_painted_with_the_brush_s_falloff_within_its_limits(masks: 
 
 
 GRIDS = {
-    "whole": GRID,
-    "no multiple": Grid(37, 25, CANVAS.extent),
+    "whole": Grid(60, 40),
+    "no multiple": Grid(47, 31, CANVAS.extent),
     "window": Grid(20, 12, (0.23, 0.11), (0.31, 0.42), CANVAS.extent),
     "finer than the canvas": Grid(60, 40, (0.05, 0.03), (0.4, 0.2), CANVAS.extent),
 }
@@ -144,13 +125,27 @@ def test_a_cell_takes_the_mean_of_its_decades(grid: Grid, device: Device, masks:
     np.testing.assert_allclose(viscosity[sure], wanted[sure], rtol=2e-3)
 
 
+def test_of_many_texels_a_cell_some_stand_for_all(device: Device) -> None:
+    """Means of 8 x 8 to 15 x 15 places of a cell: an edge is found to a 16th of a cell, soft brushes better."""
+    canvas, grid = Grid(2310, 1540), Grid(60, 40)
+    masks = Masks(device, canvas)
+    masks.set_base(1.0)
+    masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.15, 1.0), 4)
+    masks.thicken(Tip((0.3, 0.4), (0.6, 0.2), 0.1, 0.0), -2)
+    viscosity, _ = told(masks, device, grid)
+    off = np.abs(np.log10(viscosity) - covered(decades(masks), canvas, grid))
+    assert off.max() < 4 / 16
+    assert off.mean() < 0.002
+    masks.release()
+
+
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
 def test_cells_are_solid_up_to_two_from_what_is_frozen(grid: Grid, device: Device, masks: Masks) -> None:
     masks.freeze(Tip((0.4, 0.3), (0.4, 0.3), 0.1), 1)
     _, solid = told(masks, device, grid)
     frozen = covered((masks.frozen.get() >= 128).astype(float), CANVAS, grid)
     surely, perhaps = (
-        np.asarray(ndimage.binary_dilation(frozen > least, np.ones((5, 5))), bool) for least in (1e-3, 0)
+        np.asarray(ndimage.binary_dilation(frozen > least, np.ones((5, 5))), bool) for least in (2e-3, 0)
     )
     assert solid[surely].all()
     assert not solid[~perhaps].any()

@@ -14,7 +14,9 @@ from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
 from app.strokes import Stroke
+from solver.fluid import Fluid
 from solver.gl.device import Device
+from solver.grid import Grid
 from solver.resample.sampler import Sampler
 
 RECIPE = Recipe.parse("""
@@ -229,3 +231,20 @@ def test_a_frozen_pixel_is_the_same_in_every_later_frame(device: Device) -> None
     assert kept > 1000, "what had moved before it was frozen"
     sampler.release()
     replay.release()
+
+
+def test_a_window_has_the_viscosity_that_the_whole_picture_has_there(device: Device) -> None:
+    text = 'version = 1\npicture = "a.png"\nduration = 1.0\n[fluid]\ngrid = 64\n'
+    layers = '[[viscosity]]\nkind = "picture"\nrange = [1e-3, 1.0]\n[[viscosity]]\nkind = "path"\nscale = 2.0\n'
+    recipe = Recipe.parse(text + layers + "points = [[0.3, 0.4], [0.6, 0.5]]\n")
+    replay = Replay(device, recipe, pictures(), budget=0)
+    whole = replay.grid.refined(3)
+    window = Grid(60, 45, (60 / 192, 45 / 192), (48 / 192, 30 / 192), whole.picture)
+    fluids = Fluid(device, whole), Fluid(device, window)
+    for fluid in fluids:
+        replay.masks.apply(fluid)
+    wanted, found = (fluid.viscosity.get() for fluid in fluids)
+    np.testing.assert_array_equal(found, wanted[30:75, 48:108])
+    assert found.max() > 100 * found.min()
+    for thing in (*fluids, replay):
+        thing.release()

@@ -14,7 +14,8 @@ from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
 from solver.resample.sampler import Sampler
-from solver.warp.map import WarpMap, map_size
+from solver.warp.accumulated import map_size
+from solver.warp.map import WarpMap
 
 
 def smooth(rng: np.random.Generator, size: tuple[int, int], amplitude: float) -> np.ndarray:
@@ -57,7 +58,7 @@ def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) 
         )
     before = warp.read()
     warp.remap()
-    assert difference(warp.read((2 * size[0], 2 * size[1])), warp._accumulated.read.get()) < 1e-5
+    assert difference(warp.read((2 * size[0], 2 * size[1])), warp._accumulated.now.get()) < 1e-5
     assert difference(warp.read(), before) < 0.1
 
 
@@ -127,40 +128,94 @@ def test_rest_is_the_identity_exactly(device: Device) -> None:
     assert warp.statistics().det_min == warp.statistics().det_max == 1.0
 
 
-def test_saved_state_goes_on_bit_for_bit(device: Device) -> None:
-    grid = Grid(24, 24)
+@pytest.mark.parametrize("at", [5, 9, 13, 21, 24])
+def test_saved_state_goes_on_bit_for_bit(device: Device, at: int) -> None:
+    """From anywhere between two remaps, and where one is half done; also off the GPU, into another map."""
+    grid = Grid(48, 48)
     velocity = device.upload(vortex_faces(grid, 0.0))
 
     def go(warp: WarpMap, steps: int) -> None:
         for _ in range(steps):
-            warp.advance(velocity, 0.05)
+            warp.advance(velocity, 0.02)
 
-    warp = WarpMap(device, grid)
-    go(warp, 21)
+    warp = WarpMap(device, grid, (700, 700))
+    go(warp, at)
     state = warp.save()
+    assert ("pending" in state.fields) == (at >= 8), "remaps begin at steps 8, 16 and 24"
     go(warp, 30)
     straight = warp.read()
     warp.restore(state)
     go(warp, 30)
     np.testing.assert_array_equal(warp.read(), straight)
-    assert state.nbytes == 24 * 24 * 8 * 17
-    state.release()
+    other = WarpMap(device, grid, (700, 700))
+    other.advance(velocity, 0.3)
+    template = other.save()
+    resumed = template.with_arrays(device, state.arrays())
+    other.restore(resumed)
+    go(other, 30)
+    np.testing.assert_array_equal(other.read(), straight)
+    for made in (state, template, resumed):
+        made.release()
+    for made in (warp, other):
+        made.release()
+
+
+def test_looking_changes_nothing(device: Device) -> None:
+    """Whoever reads the map, in whatever way and between whatever steps, it goes on to the same bits."""
+    grid = Grid(48, 48)
+    velocity = device.upload(vortex_faces(grid, 0.0))
+    found = []
+    for looked in (False, True):
+        warp = WarpMap(device, grid, (700, 700))
+        for _ in range(29):
+            warp.advance(velocity, 0.02)
+            if looked:
+                warp.read((50, 50)), warp.composed(), warp.statistics(), warp.at(np.array([[0.3, 0.4]]))
+                warp.save().release()
+        found.append(warp.read())
+        warp.release()
+    np.testing.assert_array_equal(*found)
+
+
+def test_a_remap_touches_only_what_has_moved(device: Device) -> None:
+    """In a window, and saves share the rest; what is moved and what is not meet without a seam."""
+    whole = Grid(96, 96)
+    warp = WarpMap(device, whole, (1024, 1024))
+    warp.set(smooth(np.random.default_rng(1), (64, 64), 0.05))
+    first = warp.save()
+    warp.move_to(window(whole.refined(2), 60, 60, 48, 48))
+    before = warp.read((1024, 1024))
+    flow = swirl((84 / 192, 84 / 192), 20 / 192)
+    for _ in range(24):
+        warp.advance_prescribed(flow, 0.1)
+    second = warp.save()
+    shared = {*first.tiles["accumulated map"].textures} & {*second.tiles["accumulated map"].textures}
+    assert len(shared) == 16 - 4, "the window lies in four of the tiles"
+    warp.remap()
+    after = warp.read((1024, 1024))
+    outside = np.ones((1024, 1024), bool)
+    outside[320:576, 320:576] = False
+    np.testing.assert_array_equal(after[outside], before[outside])
+    assert np.abs(after - before).max() > 0.05
+    first.release()
+    second.release()
 
 
 def test_statistics_of_linear_maps(device: Device) -> None:
     grid = Grid(32, 16)
     x, y = grid.centres()
-    warp = WarpMap(device, grid)
+    warp = WarpMap(device, grid, (64, 32))
     warp.set(np.stack([0.2 * x, -0.5 * y], axis=-1))
     found = warp.statistics()
     assert found.det_min == pytest.approx(0.6, abs=1e-4)
     assert found.det_max == pytest.approx(0.6, abs=1e-4)
     assert found.folds == 0
+    x, y = grid.refined(2).centres()
     displacement = np.hypot(0.2 * x, 0.5 * y)
     assert found.displacement_max == pytest.approx(displacement.max(), rel=1e-4)
     assert found.displacement_mean == pytest.approx(displacement.mean(), rel=1e-4)
     warp.set(np.stack([-2.0 * x, 0 * y], axis=-1))
-    assert warp.statistics().folds == 32 * 16
+    assert warp.statistics().folds == warp.statistics().places == 64 * 32
     assert warp.statistics().det_error == pytest.approx(2.0, abs=1e-3)
 
 
@@ -241,7 +296,7 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
         frozen = rng.random((grid.ny, grid.nx)) < share
         masks.set_frozen(frozen)
         masks.apply(fluid)
-        warp.hold(fluid.solid)
+        warp.hold(device.upload(frozen.astype(np.uint8) * 255))
         fluid.step(0.02)
         flow = fluid.faces().get()
         before = warp.read((301, 193)), sampler.apply(warp, picture), warp.at(points)
@@ -270,7 +325,7 @@ def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> N
         masks.set_frozen(disc)
         masks.apply(fluid)
         if held:
-            warp.hold(fluid.solid)
+            warp.hold(device.upload(disc.astype(np.uint8) * 255))
         fluid.set_velocity(0.3 * vortex_faces(grid, 0.0))
         for _ in range(20):
             fluid.step(1 / 60)

@@ -14,37 +14,17 @@ from solver.gl.device import Device
 from solver.gl.field import Field, FieldPool
 from solver.gl.passes import Blend, Region
 from solver.gl.tiled import TILE, Kind, SavedTiles, TiledField
-from solver.grid import SMALLEST_GRID, Grid
+from solver.grid import Grid
 from solver.scheme import LARGEST_VISCOSITY, Scheme, State, check_finite
 
 # Thickness is kept in 16 bits: so many steps a decade and the step that is zero leave room for 3 decades that painting
 # may thin by and 5 that it may thicken by; `lib/decades.glsl` has them too.
 STEPS, ZERO, MOST = 8192, 24576, 65535
+BLANK = {"thickness": ZERO / MOST, "frozen": 0.0}
 LEAST_VISCOSITY = 1e-6  # that painting starts from where there is none
-MOST_TEXELS = 32 * 2**20
-FINER = 4  # texels a cell, at least, where there is room
 SMOOTHED = 1 / 8  # radii over which `smooth` takes means
 
 Base = float | np.ndarray | Callable[[Grid], np.ndarray | float]
-
-
-def canvas_of(pixels: tuple[int, int], grid: Grid, longest: int) -> Grid:
-    """The canvas of masks over a picture of `pixels` (width, height): its pixels, as long as there is room for them.
-
-    A larger picture, or one with a side above `longest`, has a canvas smaller by a whole number; a picture with fewer
-    than four pixels a cell of `grid` has one larger by a whole number, again as long as there is room.
-    """
-    times = max(ceil(FINER * cells / side) for cells, side in zip(grid.size, pixels, strict=True))
-    while times > 1 and not _fits([side * times for side in pixels], longest):
-        times -= 1
-    over = 1
-    while not _fits(size := [max(ceil(side * times / over), SMALLEST_GRID) for side in pixels], longest):
-        over += 1
-    return Grid(size[0], size[1], grid.picture)
-
-
-def _fits(size: list[int], longest: int) -> bool:
-    return max(size) <= longest and size[0] * size[1] <= MOST_TEXELS
 
 
 class Masks:
@@ -54,27 +34,27 @@ class Masks:
 
     Args:
         device: where they live.
-        canvas: the texels they are painted on, over the whole picture; see `canvas_of`.
+        canvas: the texels they are painted on, over the whole picture; see `map_size`.
     """
 
     def __init__(self, device: Device, canvas: Grid) -> None:
         self.device = device
         self.canvas = canvas
         self._kinds = {
-            "thickness": Kind(canvas.size, 1, "nu2", TILE, ZERO / MOST),
-            "frozen": Kind(canvas.size, 1, "f1", TILE, 0.0),
+            "thickness": Kind(canvas.size, 1, "nu2", TILE),
+            "frozen": Kind(canvas.size, 1, "f1", TILE),
         }
         self._painted: dict[str, TiledField] = {}
         self._nothing: dict[str, Field] = {
-            name: TiledField(device, (1, 1), 1, f"no {name}", kind.dtype, blank=kind.blank)
+            name: TiledField(device, (1, 1), 1, f"no {name}", kind.dtype, blank=BLANK[name])
             for name, kind in self._kinds.items()
         }
         self._frozen_before: SavedTiles | None = None  # what is frozen by the recipe
         self._base: Base = 0.0
         self._cells = FieldPool(device, "masks")
-        # The fluid that was told last, if it need not be told everything, and the texels that have changed since.
-        self._applied_to: Scheme | None = None
-        self._changed: Region | None = None
+        # The fluid that was told last, if it need not be told everything, and the texels of a mask changed since.
+        self._applied_to: tuple[Scheme, Grid] | None = None
+        self._changed: dict[str, Region] = {}
 
     # -- what is painted over ---------------------------------------------------------------------------------------
 
@@ -138,37 +118,44 @@ class Masks:
     def apply(self, fluid: Scheme) -> None:
         """Give a fluid, on the whole picture or a window, its viscosity and solid cells; the next step takes them up.
 
-        They are averages over the cells, worked out where the masks have changed since it was told last. Solid are the
+        They are averages over the cells, worked out where a mask has changed since it was told last. Solid are the
         frozen cells and those within two of them, so that with `WarpMap.hold` no bit of a picture changes in a frozen
         cell.
         """
         grid = fluid.grid
         base = self._cells.get("base viscosity", grid.size, 1)
-        if self._applied_to is not fluid:
+        if self._applied_to != (fluid, grid):
             viscosity = self._base(grid) if callable(self._base) else self._base
             base.set(np.broadcast_to(np.asarray(viscosity, np.float32), (grid.ny, grid.nx)))
-            region = (0, 0, *grid.size)
-        elif self._changed:
-            region = self._cells_over(self._changed, grid)
-        else:
+            fluid.viscosity.copy_from(base)
+            fluid.solid.clear()
+            self._changed = dict.fromkeys(self._painted, (0, 0, *self.canvas.size))
+        elif not self._changed:
             return
-        frozen = self._cells.get("frozen", grid.size, 1, "f1")
-        self.device.pass_("step/average_masks.frag", **{name.upper(): 1 for name in self._painted})(
-            (fluid.viscosity, frozen),
-            region=region,
-            base_viscosity=base,
-            thickness=self.thickness,
-            frozen=self.frozen,
-            origin=tuple(a / b for a, b in zip(grid.origin, grid.picture, strict=True)),
-            cell=tuple(a / b for a, b in zip(grid.spacing, grid.picture, strict=True)),
-            least=LEAST_VISCOSITY,
-            most=LARGEST_VISCOSITY,
-            enough=1e-6,
-        )
-        x, y, width, height = region
-        widened = (x - 2, y - 2, width + 4, height + 4)
-        self.device.pass_("step/widen_solid.frag")(fluid.solid, region=widened, frozen=frozen)
-        self._applied_to, self._changed = fluid, None
+        cells: dict[str, Any] = {
+            "origin": tuple(a / b for a, b in zip(grid.origin, grid.picture, strict=True)),
+            "cell": tuple(a / b for a, b in zip(grid.spacing, grid.picture, strict=True)),
+        }
+        if changed := self._changed.get("thickness"):
+            self.device.pass_("step/average_thickness.frag")(
+                fluid.viscosity,
+                region=self._cells_over(changed, grid),
+                base_viscosity=base,
+                thickness=self.thickness,
+                least=LEAST_VISCOSITY,
+                most=LARGEST_VISCOSITY,
+                **cells,
+            )
+        if changed := self._changed.get("frozen"):
+            frozen = self._cells.get("frozen", grid.size, 1, "f1")
+            x, y, width, height = region = self._cells_over(changed, grid)
+            self.device.pass_("step/average_frozen.frag")(
+                frozen, region=region, frozen=self.frozen, enough=1e-3, **cells
+            )
+            widened = (x - 2, y - 2, width + 4, height + 4)
+            self.device.pass_("step/widen_solid.frag")(fluid.solid, region=widened, frozen=frozen)
+        self._applied_to = fluid, grid
+        self._changed.clear()
         fluid.masks_changed()
 
     def forget_fluid(self) -> None:
@@ -200,7 +187,7 @@ class Masks:
     def save(self) -> State:
         """A copy of this moment, on the GPU, which the caller releases; it shares what did not change."""
         tiles = {
-            name: self._painted[name].save() if name in self._painted else SavedTiles.blank(kind)
+            name: self._painted[name].save() if name in self._painted else SavedTiles.nothing(kind, BLANK[name])
             for name, kind in self._kinds.items()
         }
         return State({}, {}, tiles)
@@ -216,7 +203,7 @@ class Masks:
         for name, saved in state.tiles.items():
             if name in self._painted or not saved.is_blank:
                 for region in self._field(name).restore(saved):
-                    self._has_changed(region)
+                    self._has_changed(name, region)
 
     @property
     def nbytes(self) -> int:
@@ -238,7 +225,7 @@ class Masks:
         if name not in self._painted:
             kind = self._kinds[name]
             self._painted[name] = TiledField(
-                self.device, kind.size, kind.components, f"painted {name}", kind.dtype, kind.tile, kind.blank
+                self.device, kind.size, kind.components, f"painted {name}", kind.dtype, kind.tile, BLANK[name]
             )
             self._applied_to = None
         return self._painted[name]
@@ -252,7 +239,7 @@ class Masks:
         if region[2] and region[3]:
             inputs |= tip.inputs(self.canvas)
             self.device.pass_(shader)(self._field(name), blend=blend, region=region, **inputs)
-            self._has_changed(region)
+            self._has_changed(name, region)
 
     def _region(self, tip: Tip) -> Region:
         """The texels of the canvas that a tip touches."""
@@ -261,13 +248,13 @@ class Masks:
         right, bottom = min(x + width, self.canvas.nx), min(y + height, self.canvas.ny)
         return left, top, max(right - left, 0), max(bottom - top, 0)
 
-    def _has_changed(self, region: Region) -> None:
+    def _has_changed(self, name: str, region: Region) -> None:
         x, y, width, height = region
-        if self._changed:
-            left, top, wide, high = self._changed
+        if name in self._changed:
+            left, top, wide, high = self._changed[name]
             x, right, y, bottom = min(x, left), max(x + width, left + wide), min(y, top), max(y + height, top + high)
             width, height = right - x, bottom - y
-        self._changed = x, y, width, height
+        self._changed[name] = x, y, width, height
 
     def _cells_over(self, region: Region, grid: Grid) -> Region:
         """The cells over texels of the canvas."""

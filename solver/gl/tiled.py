@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,21 +15,18 @@ from solver.gl.passes import Region
 TILE = 256  # texels along a tile
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """What a save must have in common with a field to be taken back.
 
     Attributes:
         size, components, dtype: of the field.
         tile: texels along a tile.
-        blank: what it holds before anything is drawn into it.
     """
 
     size: tuple[int, int]
     components: int
     dtype: str
     tile: int
-    blank: float
 
     @property
     def rows_and_columns(self) -> tuple[int, int]:
@@ -44,12 +42,6 @@ class Kind:
             for y in range(0, height, side)
             for x in range(0, width, side)
         ]
-
-    @property
-    def blank_texel(self) -> np.ndarray:
-        """One component of a blank texel, (1,)."""
-        dtype = np.dtype(DTYPES[self.dtype])
-        return np.array([round(self.blank * np.iinfo(dtype).max) if dtype.kind == "u" else self.blank], dtype)
 
 
 @dataclass
@@ -72,15 +64,17 @@ class SavedTiles:
     Attributes:
         kind: of the field.
         tiles: its tiles, (rows, columns), each shared with other saves where nothing was drawn in between.
+        blank: what all components of a blank tile are.
     """
 
     kind: Kind
     tiles: np.ndarray
+    blank: float = 0.0
 
     @classmethod
-    def blank(cls, kind: Kind) -> SavedTiles:
+    def nothing(cls, kind: Kind, blank: float = 0.0) -> SavedTiles:
         """What a field of this kind holds before anything is drawn into it."""
-        return _held(cls(kind, np.full(kind.rows_and_columns, _Tile(None))))
+        return _held(cls(kind, np.full(kind.rows_and_columns, _Tile(None)), blank))
 
     @property
     def is_blank(self) -> bool:
@@ -96,11 +90,12 @@ class SavedTiles:
         """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them."""
         places, texels = list[int](), list[np.ndarray]()
         dtype = np.dtype(DTYPES[self.kind.dtype])
-        blank = self.kind.blank_texel.view(f"u{dtype.itemsize}")
+        blank = round(self.blank * np.iinfo(dtype).max) if dtype.kind == "u" else self.blank
+        bits = np.array([blank], dtype).view(f"u{dtype.itemsize}")
         for place, tile in enumerate(self.tiles.flat):
             if tile.field is not None:
                 values = tile.field.get().ravel()
-                if (values.view(blank.dtype) != blank).any():
+                if (values.view(bits.dtype) != bits).any():
                     places.append(place)
                     texels.append(values)
         return {"places": np.array(places, np.int32), "texels": np.concatenate([np.zeros(0, dtype), *texels])}
@@ -124,7 +119,11 @@ class SavedTiles:
         tiles = np.full(self.tiles.shape, _Tile(None))
         for place, shape, values in zip(places, shapes, np.split(texels, ends[:-1]), strict=False):
             tiles.flat[place] = _Tile(device.upload(values.reshape(shape), "saved tile", kind.dtype))
-        return _held(SavedTiles(kind, tiles))
+        return _held(SavedTiles(kind, tiles, self.blank))
+
+    def held(self) -> SavedTiles:
+        """The same once more, to be released by whoever has it."""
+        return _held(self)
 
     def release(self) -> None:
         """Free the textures that no other save holds."""
@@ -152,7 +151,9 @@ class TiledField(Field):
         tile: int = TILE,
         blank: float = 0.0,
     ) -> None:
-        self.kind = Kind(size, components, dtype, tile, blank)
+        self.kind = Kind(size, components, dtype, tile)
+        self.tile = tile
+        self.blank = blank
         # What each tile was last saved as or restored from; None where something was drawn since.
         self._same = np.full(self.kind.rows_and_columns, None, object)
         super().__init__(device, size, components, label, dtype)
@@ -178,7 +179,7 @@ class TiledField(Field):
                 copy = Field(self.device, (width, height), self.components, f"{self.label}, saved tile", self.dtype)
                 self.device.pass_("gl/copy.frag")(copy, field=self, offset=(x, y))
                 self._same.flat[place] = _Tile(copy)
-        return _held(SavedTiles(self.kind, self._same.copy()))
+        return _held(SavedTiles(self.kind, self._same.copy(), self.blank))
 
     def restore(self, saved: SavedTiles) -> list[Region]:
         """Go back to what was saved, exactly; the regions that were another.
@@ -186,7 +187,7 @@ class TiledField(Field):
         Raises:
             ValueError: if it was saved of another field.
         """
-        if saved.kind != self.kind:
+        if (saved.kind, saved.blank) != (self.kind, self.blank):
             raise ValueError(f"{self.label}: what was saved is of another size or kind")
         changed = list[Region]()
         for place, region in enumerate(self.kind.regions):
@@ -205,10 +206,16 @@ class TiledField(Field):
         """Take over the texels of `other`, of the same size and components, or those in (x, y, width, height)."""
         self._copy(other, region, (0, 0))
 
+    def take(self, other: TiledField, tiles: Iterable[Region]) -> None:
+        """Take over whole tiles of a field of the same kind, and share what they were saved as."""
+        for region in tiles:
+            self._copy(other, region, (0, 0))
+            place = region[1] // self.tile, region[0] // self.tile
+            self._same[place] = other._same[place]
+
     @property
     def _blank_values(self) -> tuple[float, float, float, float]:
-        blank = self.kind.blank
-        return blank, blank, blank, blank
+        return self.blank, self.blank, self.blank, self.blank
 
     def _copy(self, other: Field, region: Region | None, offset: tuple[int, int]) -> None:
         self.device.pass_("gl/copy.frag")(self, region=region, field=other, offset=offset)
