@@ -313,6 +313,16 @@ class WarpMap:
             self._fresh.add(key)
         return self._composed[key]
 
+    def size_for(self, picture: tuple[int, int], result: tuple[int, int]) -> tuple[int, int]:
+        """Texels to compose for a result of a picture, both in pixels: not finer than either needs.
+
+        The accumulated map's, or one for a whole number of them: as many as the result has pixels, or else the picture,
+        or two a cell.
+        """
+        sides = zip(self.size, result, picture, self.coarse_size, strict=True)
+        times = max(1, min(own // min(wanted, max(given, 2 * cells)) for own, wanted, given, cells in sides))
+        return -(-self.size[0] // times), -(-self.size[1] // times)
+
     @property
     def coarse_size(self) -> tuple[int, int]:
         """(width, height) in texels as large as the grid's cells, with the whole picture."""
