@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
 CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last remap
-MOST_PLACES = 2**21  # at which its distortion is looked at
+MOST_PLACES = 2**19  # at which its distortion is looked at
 REMAP_STEPS = CHECK_EVERY  # steps over which a remap is spread; the next one cannot begin before they are over
 
 
