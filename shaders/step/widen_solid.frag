@@ -1,5 +1,5 @@
-// Widen solid cells by two: looking a picture up interpolates the map, and from a cell that is frozen reaches as far.
-// u_frozen: cells, 1 = frozen.
+// Widen solid cells by two: there the map goes over from what it holds into what flows.
+// u_frozen: cells, 1 where something in them is frozen.
 // reads: 25
 uniform sampler2D u_frozen;
 in vec2 v_uv;

@@ -119,8 +119,9 @@ class Masks:
         """Give a fluid, on the whole picture or a window, its viscosity and solid cells; the next step takes them up.
 
         They are averages over the cells, worked out where a mask has changed since it was told last. Solid are the
-        frozen cells and those within two of them, so that with `WarpMap.hold` no bit of a picture changes in a frozen
-        cell.
+        cells with something frozen in them and those within two of them: there the map, which holds what is frozen to
+        the bit (`WarpMap.hold`), goes over into what flows. Were only cells solid of which half is frozen, the fluid
+        would glide along the edge, and the map tear there.
         """
         grid = fluid.grid
         base = self._cells.get("base viscosity", grid.size, 1)
