@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import threading
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -36,9 +38,16 @@ class ExportProcess:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._wish = context.Event()
-        self._process = context.Process(target=_work, args=(job, theirs, self._wish), daemon=True)
+        self._process = context.Process(target=_work, args=(theirs, self._wish), daemon=True)
         self._process.start()
         theirs.close()
+        # A picture is more than a pipe holds: given at the start it would keep the window waiting until the other process
+        # is awake, and for ever if it dies before.
+        threading.Thread(target=self._hand_over, daemon=True).start()
+
+    def _hand_over(self) -> None:
+        with suppress(OSError):  # it has died, as `poll` will find
+            self._pipe.send(self.job)
 
     def poll(self) -> None:
         """Hear how far it is."""
@@ -69,7 +78,7 @@ class ExportProcess:
             self._process.terminate()
 
 
-def _work(job: Job, pipe: Connection, wish: Any) -> None:
+def _work(pipe: Connection, wish: Any) -> None:
     from app.errors import Cancelled, UserError
     from app.export import run
     from app.progress import Progress
@@ -78,6 +87,7 @@ def _work(job: Job, pipe: Connection, wish: Any) -> None:
     def report(done: int, total: int | None) -> None:
         pipe.send(("part", done / total if total else 0.0))
 
+    job = pipe.recv()
     try:
         with Device.headless() as device:
             told = run(device, job, Progress(None, report, wish.is_set, lambda state: pipe.send(("state", state))))

@@ -1,0 +1,59 @@
+"""An export in a process of its own: what happens to it, the window hears of."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.export import Job
+from app.export_process import ExportProcess
+from app.pictures import read_picture
+from app.recipe import Recipe
+
+PICTURE = Path(__file__).parent.parent / "assets" / "pictures" / "coffee.png"
+PATIENCE = 60.0  # seconds
+
+
+class Deadly:
+    """Whoever unpickles it ends at once, as a process does that the system kills."""
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[int]]:
+        return os._exit, (9,)
+
+
+@dataclass(frozen=True)
+class Dying(Job):
+    """A job that kills its process before all of it is read."""
+
+    deadly: Any = None
+    rest: bytes = b""
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return Dying, (Deadly(), self.rest)
+
+
+def ended(process: ExportProcess) -> ExportProcess:
+    deadline = time.monotonic() + PATIENCE
+    while not process.is_done and time.monotonic() < deadline:
+        process.poll()
+        time.sleep(0.01)
+    assert process.is_done, "still at work"
+    return process
+
+
+def test_a_process_that_dies_while_it_gets_its_job_is_told_of(tmp_path: Path):
+    """Nor does whoever started it wait, though the picture is more than a pipe holds."""
+    picture = read_picture(PICTURE)
+    job = Dying(Recipe(), picture, tmp_path, tmp_path / "out.png", rest=bytes(10_000_000))
+    assert "stopped unexpectedly" in ended(ExportProcess(job)).error
+
+
+def test_a_picture_larger_than_a_pipe_is_exported(tmp_path: Path):
+    recipe = Recipe.parse("duration = 0.0\n[fluid]\ngrid = 16\n")
+    process = ended(ExportProcess(Job(recipe, read_picture(PICTURE), tmp_path, tmp_path / "out.png")))
+    assert process.error == ""
+    assert (read_picture(tmp_path / "out.png").pixels == read_picture(PICTURE).pixels).all()
