@@ -41,8 +41,8 @@ class ExportProcess:
         self._process = context.Process(target=_work, args=(theirs, self._wish), daemon=True)
         self._process.start()
         theirs.close()
-        # A picture is more than a pipe holds: given at the start it would keep the window waiting until the other process
-        # is awake, and for ever if it dies before.
+        # A picture is more than a pipe holds: given at the start it would keep the window waiting until the other is
+        # awake, and for ever if it dies before.
         threading.Thread(target=self._hand_over, daemon=True).start()
 
     def _hand_over(self) -> None:

@@ -53,7 +53,7 @@ def test_a_process_that_dies_while_it_gets_its_job_is_told_of(tmp_path: Path):
 
 
 def test_a_picture_larger_than_a_pipe_is_exported(tmp_path: Path):
-    recipe = Recipe.parse("duration = 0.0\n[fluid]\ngrid = 16\n")
+    recipe = Recipe.parse("duration = 0.1\n[fluid]\ngrid = 16\n")
     process = ended(ExportProcess(Job(recipe, read_picture(PICTURE), tmp_path, tmp_path / "out.png")))
     assert process.error == ""
     assert (read_picture(tmp_path / "out.png").pixels == read_picture(PICTURE).pixels).all()
