@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,15 +14,7 @@ from solver.gl.reduction import Reduction
 from solver.packing import PackedFaces
 from solver.params import Walls
 from solver.viscosity.changed import Box, changed
-from solver.viscosity.operator import (
-    Coefficients,
-    Level,
-    change_coarse,
-    change_finest,
-    coarsened,
-    coefficients,
-    inverse_matrix,
-)
+from solver.viscosity.operator import Coefficients, Level, inverse_matrix
 from solver.viscosity.plan import Plan
 from solver.viscosity.transform import SineCosineTransform
 
@@ -42,20 +34,17 @@ def chebyshev_weights(least: float, largest: float, count: int) -> list[float]:
     return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
 
 
-@dataclass(frozen=True)
-class TakenUp:
-    """What the coefficients in the textures were made from, and these.
+class TakenUp(NamedTuple):
+    """What the coefficients in the textures were made from.
 
     Attributes:
         basis: (time step, whether walls hold the fluid, depth of the last level): with others nothing can be kept.
         viscosity, solid: of the cells.
-        levels: the coefficients, the finest first.
     """
 
     basis: tuple[float, bool, int]
     viscosity: np.ndarray
     solid: np.ndarray
-    levels: list[Coefficients]
 
 
 class Multigrid:
@@ -75,9 +64,10 @@ class Multigrid:
         self.spacing = spacing
         self.plan = Plan()
         self.levels: list[Level] = []
-        finest = size
+        finest, (hx, hy) = size, spacing
+        shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
         while not self.levels or not self.levels[-1].is_coarsest:
-            self.levels.append(Level(device, size, len(self.levels), finest))
+            self.levels.append(Level(device, size, len(self.levels), finest, shear))
             size = -(-size[0] // 2), -(-size[1] // 2)
         # Between free-slip walls one viscosity is solved directly on a much finer level than any other.
         first = 0 if math.prod(self.levels[0].texels) <= SMALL_GRID else 1
@@ -101,55 +91,42 @@ class Multigrid:
     def set_uniform(self, viscosity: float, dt: float, walls: Walls) -> None:
         """Take up one viscosity, lengths^2 / s, in a box without solids."""
         self._taken_up = None
-        hx, hy = self.spacing
-        self._largest = dt * viscosity / (hx * hy)
-        shear, slip = (math.sqrt(hx / hy), math.sqrt(hy / hx)), _slip(walls)
+        self._largest, slip = viscosity * self._scale(dt), _slip(walls)
         for level in self.levels:
-            level.set_uniform(self._largest / 4.0**level.depth, shear, slip)
+            level.set_uniform(self._largest / 4.0**level.depth, slip)
         self.has_transform = not slip
-        if not self.has_transform and self.last is self.levels[-1]:
-            columns, rows = (2 * count for count in self.last.texels)
-            (across, down), scale = self.last.box, 2.0**self.last.depth
-            outside = (np.arange(columns) >= across) | (np.arange(rows)[:, None] >= down)
-            everywhere, spacing = np.full((rows, columns), viscosity), (hx * scale, hy * scale)
-            self._inverse.set(inverse_matrix(coefficients(everywhere, outside, dt, spacing, bool(slip))))
+        last = self.last
+        if not self.has_transform and last is self.levels[-1]:
+            uniform = Coefficients.uniform(last.operator["stiffness"], last.box, last.texels, last.shear)
+            self._inverse.set(inverse_matrix(uniform))
 
-    def set_coefficients(self, viscosity: np.ndarray, solid: np.ndarray, dt: float, walls: Walls) -> Coefficients:
-        """Take up the viscosity of the cells, lengths^2 / s, and the solid ones, (ny, nx) both; those of the finest.
+    def set_coefficients(
+        self, viscosity: Field, solid: Field, amount: np.ndarray, is_solid: np.ndarray, dt: float, walls: Walls
+    ) -> None:
+        """Take up the `viscosity` of the cells, lengths^2 / s, and the `solid` ones, also as arrays (ny, nx).
 
         What is made again is what has changed: a dab of a brush changes few cells.
         """
         slip, self.has_transform = _slip(walls), False
-        self._largest = dt * float(viscosity[~solid].max(initial=0.0)) / (self.spacing[0] * self.spacing[1])
-        taken_up, self._taken_up = self._taken_up, None
-        basis = dt, bool(slip), self.last.depth
-        if taken_up and taken_up.basis == basis and np.array_equal(taken_up.solid, solid):
-            levels = taken_up.levels
-            self._change(levels, changed(taken_up.viscosity, viscosity), viscosity, solid, dt, slip)
-        else:
-            levels = [coefficients(viscosity, solid, dt, self.spacing, bool(slip))]
-            while len(levels) <= self.last.depth:
-                levels.append(coarsened(levels[-1], bool(slip)))
-            for grid, level in zip(self.levels, levels, strict=False):
-                grid.set_coefficients(level, slip)
+        self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
+        taken_up, basis = self._taken_up, (dt, bool(slip), self.last.depth)
+        self._taken_up = TakenUp(basis, amount, is_solid)
+        box: Box | None = Box(0, amount.shape[0], 0, amount.shape[1])
+        is_new = not taken_up or taken_up.basis != basis or not np.array_equal(taken_up.solid, is_solid)
+        if taken_up and not is_new:
+            box = changed(taken_up.viscosity, amount)
+            if box is None:
+                return
+        self.finest.set_masks(viscosity, solid, self._scale(dt), slip, box)
+        for finer, level in pairwise(self.levels[: self.last.depth + 1]):
+            box = box.coarser
+            level.coarsen(finer, slip, box, is_new)
         if self.last is self.levels[-1]:
-            self._inverse.set(inverse_matrix(levels[-1]))
-        self._taken_up = TakenUp(basis, viscosity, solid, levels)
-        return levels[0]
+            self._inverse.set(inverse_matrix(self.last.coefficients()))
 
-    def _change(
-        self, levels: list[Coefficients], box: Box | None, viscosity: np.ndarray, solid: np.ndarray, dt: float,
-        slip: dict[str, Any],
-    ) -> None:  # fmt: skip
-        """Make the coefficients of all levels those of another viscosity, which differs in a box of cells."""
-        if box is None:
-            return
-        change_finest(levels[0], box, viscosity, solid, dt, self.spacing, bool(slip))
-        self.finest.set_coefficients(levels[0], slip, box)
-        for grid, level, fine in zip(self.levels[1:], levels[1:], levels, strict=False):
-            box = box.coarser(level.open_u.shape)
-            change_coarse(level, box, fine, bool(slip))
-            grid.set_coefficients(level, slip, box)
+    def _scale(self, dt: float) -> float:
+        """kappa of a viscosity of one."""
+        return dt / (self.spacing[0] * self.spacing[1])
 
     @property
     def finest(self) -> Level:

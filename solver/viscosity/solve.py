@@ -33,7 +33,7 @@ class Viscosity:
         self.multigrid = Multigrid(device, size, self.spacing)
         finest = self.multigrid.finest
         self.conjugate_gradients = ConjugateGradients(device, finest)
-        self.deflation = Deflation(device, finest.texels)
+        self.deflation = Deflation(device, finest)
         ringed = finest.rhs.u.size
         # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
         self._change = DoublePackedFaces(device, ringed, "viscous change")
@@ -57,17 +57,15 @@ class Viscosity:
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         kappa = dt / (hx * hy)
         self.plan = plan_for(kappa * least, kappa * largest)
-        self.deflation.clear()
+        self.deflation.set_stiff(None)
         if least == largest and not frozen.any():
             self.multigrid.set_uniform(least, dt, walls)
-            coefficients = None
         else:
-            coefficients = self.multigrid.set_coefficients(amount, frozen, dt, walls)
+            self.multigrid.set_coefficients(viscosity, solid, amount, frozen, dt, walls)
         if self.plan.method != "smooth" and self.multigrid.direct_level is self.multigrid.finest:
             self.plan = Plan("direct")
-        elif coefficients and self.plan.stiff:
-            stiffness = 0.5 * coefficients.xx[0] * hx / hy
-            self.deflation.find(stiffness, coefficients, self.plan.stiff)
+        elif self.plan.stiff:
+            self.deflation.set_stiff(~frozen & (kappa * amount > self.plan.stiff), self.plan.stiff)
 
     @property
     def v_star(self) -> PackedFaces:
