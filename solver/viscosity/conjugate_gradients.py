@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
+from math import inf, isfinite
 
 from solver.gl.device import Device
 from solver.gl.field import Field
@@ -48,10 +48,15 @@ class ConjugateGradients:
     ) -> PackedFaces:
         """The solution, from the best first guess in the plane of `v_star` and the last step's `change`.
 
-        Ends after an iteration that has brought less than the part `tolerance`^2 of the energy, or after so many at
-        most. `precondition(r)` returns about A^-1 r.
+        Ends when less than half of the part `tolerance`^2 of the energy is left, or after so many at most. What is left
+        is the rest of the geometric series of what iterations bring, and no less than half of what the last brought.
+        `precondition(r)` returns about A^-1 r.
         """
         found, curvature = self._galerkin_initial_guess(v_star, change, rhs)
+        self.iterations = 0
+        if rhs is v_star and not curvature:
+            return v_star  # at rest
+        before = inf
         for self.iterations in range(1, most + 1):
             z = precondition(self._r.read)
             rz, z_az, z_ap = self._apply_operator(z)
@@ -61,8 +66,9 @@ class ConjugateGradients:
             self._update(z, self._az, alpha, beta)
             gained = alpha**2 * curvature
             found += gained
-            if gained <= tolerance**2 * found:
+            if max(gained, 2.0 * _series(gained, before)) <= tolerance**2 * found:
                 break
+            before = gained
         return self._x.read
 
     def _galerkin_initial_guess(
@@ -90,7 +96,7 @@ class ConjugateGradients:
             a, b = 0.0, 0.0
         self._update(v_star, self._az, a, b / a if a else 0.0, x=self._rest, r=rhs, p=change)
         energy = a * bv + b * bd
-        return energy, energy / a**2 if a else 0.0
+        return energy, energy / a**2 if a else vav
 
     def _apply_operator(self, z: PackedFaces) -> tuple[float, float, float]:
         """A z, and r . z, z . A z, z . A p."""
@@ -149,6 +155,11 @@ class ConjugateGradients:
         """Free the textures."""
         for item in (*self._pairs, self._products, self._change_product, self._sum, self._change_sum):
             item.release()
+
+
+def _series(last: float, before: float) -> float:
+    """The rest of the geometric series that two terms belong to."""
+    return last**2 / (before - last) if before > last else inf
 
 
 def cg_coefficients(rz: float, z_az: float, z_ap: float, p_ap: float) -> tuple[float, float, float]:
