@@ -10,7 +10,6 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.reduction import Reduction
 from solver.packing import PackedFaces
 from solver.params import Walls
 from solver.viscosity.changed import Box, changed
@@ -78,22 +77,16 @@ class Multigrid:
         self._taken_up: TakenUp | None = None
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
-        self._largest = 0.0  # kappa
-        ringed = self.levels[0].rhs.u.size
-        self._residual = PackedFaces(device, ringed, "viscous residual of v*")
-        coarser = self.levels[min(1, len(self.levels) - 1)].rhs.u.size
-        self._products = device.field(coarser, 4, "viscous scaling products")
-        self._sum = Reduction(device, coarser, 4, "sum")
-        self._scaling = device.field((1, 1), 1, "viscous scaling")
+        self.largest = 0.0  # kappa
 
     # -- what is solved ---------------------------------------------------------------------------------------------
 
     def set_uniform(self, viscosity: float, dt: float, walls: Walls) -> None:
         """Take up one viscosity, lengths^2 / s, in a box without solids."""
         self._taken_up = None
-        self._largest, slip = viscosity * self._scale(dt), _slip(walls)
+        self.largest, slip = viscosity * self._scale(dt), _slip(walls)
         for level in self.levels:
-            level.set_uniform(self._largest / 4.0**level.depth, slip)
+            level.set_uniform(self.largest / 4.0**level.depth, slip)
         self.has_transform = not slip
         last = self.last
         if not self.has_transform and last is self.levels[-1]:
@@ -108,7 +101,7 @@ class Multigrid:
         What is made again is what has changed: a dab of a brush changes few cells.
         """
         slip, self.has_transform = _slip(walls), False
-        self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
+        self.largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
         taken_up, basis = self._taken_up, (dt, bool(slip), self.last.depth)
         self._taken_up = TakenUp(basis, amount, is_solid)
         box: Box | None = Box(0, amount.shape[0], 0, amount.shape[1])
@@ -146,7 +139,7 @@ class Multigrid:
 
     def precondition(self, rhs: PackedFaces, start: bool) -> PackedFaces:
         """About A^-1 rhs, by one cycle from rest, or from what the finest level's iterate holds if it is to `start`."""
-        self.cycle(self.finest, rhs, begun=0 if start else self._begin(self.finest, rhs))
+        self.cycle(self.finest, rhs, begun=0 if start else self.begin(self.finest, rhs))
         return self.finest.faces.read
 
     def cycle(self, level: Level, rhs: PackedFaces, begun: int, two_grid: bool = False, scaling: float = 0.0) -> None:
@@ -173,11 +166,11 @@ class Multigrid:
         coarser = self.levels[level.depth + 1]
         if two_grid:
             first, *others = self.weights(coarser, is_last=True)
-            self._restrict(level.faces.write, coarser, first)
+            self.restrict(level.faces.write, coarser, first)
             self.smooth(coarser, coarser.rhs, others)
         else:
-            first = self._first_weight(coarser)
-            self._restrict(level.faces.write, coarser, first)
+            first = self.first_weight(coarser)
+            self.restrict(level.faces.write, coarser, first)
             self.cycle(coarser, coarser.rhs, begun=1 if first else 0)
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines)
         prolong(
@@ -188,77 +181,6 @@ class Multigrid:
             **level.operator,
         )
         level.faces.swap()
-
-    def correct(self, v_star: PackedFaces, rhs: PackedFaces) -> PackedFaces:
-        """The step for one viscosity: a part of v*, corrected once by full multigrid, and smoothed.
-
-        What the coarser levels do not carry of the right-hand side is divided by the diagonal, face by face.
-        """
-        finest, coarser, residual = self.finest, self.levels[1], self._residual
-        weights = self.weights(finest, 1 + self.plan.sweeps[0])
-        self.residual(finest, v_star, rhs, residual)
-        self._restrict_scaled(rhs, residual)
-        # The part that the coarser level does carry is not to be added face by face once more.
-        k = self._largest
-        self._full_multigrid(scaling=weights[0] * (1.0 + 1.5 * k) / (1.0 + 6.0 * k))
-        dragged: dict[str, Any] = {} if rhs is v_star else {"DRAGGED": 1}
-        finish = self.device.pass_("viscosity/prolong.frag", CORRECT=1, **dragged, **finest.defines)
-        finish(
-            finest.faces.write.fields,
-            region=finest.region,
-            weight=weights[0],
-            part=self._scaling,
-            **coarser.faces.read.inputs("coarse_"),
-            **v_star.inputs(),
-            **residual.inputs("r_"),
-            **(rhs.inputs("rhs_") if dragged else {}),
-            **finest.operator,
-        )
-        finest.faces.swap()
-        self.smooth(finest, rhs, weights[1:])
-        return finest.faces.read
-
-    def _restrict_scaled(self, rhs: PackedFaces, residual: PackedFaces) -> None:
-        """The right-hand side of the next level: what that part of v* leaves which has least energy there."""
-        coarser = self.levels[1]
-        wanted, left = coarser.faces.write, coarser.faces.read
-        restrict = self.device.pass_("viscosity/restrict.frag", WEIGHED=1, **coarser.defines)
-        restrict((*left.fields, *wanted.fields, self._products), region=coarser.region, **residual.inputs(),
-                 **rhs.inputs("rhs_"), **coarser.open)  # fmt: skip
-        self.device.pass_("viscosity/scaling.frag")(self._scaling, products=self._sum.shrink(self._products))
-        damp = self.device.pass_("viscosity/damp.frag")
-        damp(coarser.rhs.fields, region=coarser.region, part=self._scaling, **wanted.inputs(), **left.inputs("r_"))
-
-    def _full_multigrid(self, scaling: float) -> None:
-        """A correction on the coarser levels: solved on the last, then carried up and improved level by level.
-
-        From the finest of them so much of D^-1 rhs as `scaling` is taken away.
-        """
-        last = self.last
-        levels = self.levels[1 : last.depth + 1]
-        right_hand_sides = [level.rhs for level in levels]
-        begun = 0
-        for rhs, coarser in zip(right_hand_sides, levels[1:], strict=False):
-            begun = self._restrict(rhs, coarser, self._first_weight(coarser) if coarser is last else 0.0)
-        if len(levels) == 1:
-            begun = self._begin(last, last.rhs)
-        self.cycle(last, last.rhs, begun, scaling=scaling if len(levels) == 1 else 0.0)
-        for finer, coarser, rhs in reversed(list(zip(levels, levels[1:], right_hand_sides, strict=False))):
-            prolong = self.device.pass_("viscosity/prolong.frag", START=1, **finer.defines)
-            prolong(
-                finer.faces.write.fields,
-                region=finer.region,
-                **coarser.faces.read.inputs("coarse_"),
-                **coarser.rhs.inputs("coarse_rhs_"),
-                **rhs.inputs(),
-                **finer.operator,
-            )
-            finer.faces.swap()
-            # A cycle overwrites the right-hand sides of coarser levels only, and those are used up by now.
-            is_nested, at_end = finer.depth <= self.plan.nested, scaling if finer is levels[0] else 0.0
-            self.smooth(finer, rhs, self.weights(finer)[::-1], scaling=0.0 if is_nested else at_end)
-            if is_nested:
-                self.cycle(finer, rhs, begun=0, two_grid=self.plan.two_grid, scaling=at_end)
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
@@ -271,7 +193,7 @@ class Multigrid:
             return chebyshev_weights(largest / SMOOTHED[count], largest, count)
         # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient, D is
         # 1 + 6 k, and the coarser level takes over about where |q|^2 is 1.
-        k = self._largest / 4.0**level.depth
+        k = self.largest / 4.0**level.depth
         taken_over = 0.0 if is_last else 1.0
         return chebyshev_weights((1.0 + taken_over * k) / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), count)
 
@@ -320,7 +242,7 @@ class Multigrid:
             stress = self.device.pass_("viscosity/stress.frag")
             stress(level.stress, region=(x, y, width + 1, height + 1), **faces.inputs(), **level.stencil)
 
-    def _begin(self, level: Level, rhs: PackedFaces) -> int:
+    def begin(self, level: Level, rhs: PackedFaces) -> int:
         """The first sweep from rest, where there is one; how many were made."""
         if level is self.direct_level:
             return 0
@@ -332,11 +254,11 @@ class Multigrid:
         start = self.device.pass_("viscosity/start.frag", **level.defines)
         start(target.fields, add=add, region=level.region, weight=weight, **rhs.inputs("rhs_"), **level.operator)
 
-    def _first_weight(self, level: Level) -> float:
+    def first_weight(self, level: Level) -> float:
         """Of the sweep that a cycle begins with, from rest; 0 where the level is solved directly instead."""
         return 0.0 if level is self.direct_level else self.weights(level)[0]
 
-    def _restrict(self, residual: PackedFaces, coarser: Level, weight: float) -> int:
+    def restrict(self, residual: PackedFaces, coarser: Level, weight: float) -> int:
         """The residual as rhs of the coarser level; with a `weight` the first sweep on it too, from rest."""
         if not weight:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
@@ -354,17 +276,13 @@ class Multigrid:
         return 1
 
     @property
-    def _fields(self) -> tuple[Field, ...]:
-        return *self._residual.fields, self._inverse, self._products, self._scaling
-
-    @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(item.nbytes for item in (*self.levels, *self._fields, self._sum, self._transform))
+        return sum(item.nbytes for item in (*self.levels, self._inverse, self._transform))
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self.levels, *self._fields, self._sum, self._transform):
+        for item in (*self.levels, self._inverse, self._transform):
             item.release()
 
 

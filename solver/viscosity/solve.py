@@ -12,6 +12,7 @@ from solver.packing import DoublePackedFaces, PackedFaces, Packing
 from solver.params import Walls
 from solver.viscosity.conjugate_gradients import ConjugateGradients
 from solver.viscosity.deflation import Deflation
+from solver.viscosity.full_multigrid import FullMultigrid
 from solver.viscosity.multigrid import Multigrid
 from solver.viscosity.plan import Plan, plan_for
 
@@ -31,6 +32,7 @@ class Viscosity:
         self.spacing = spacing or (1.0 / max(size), 1.0 / max(size))
         self._wall_speed: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
         self.multigrid = Multigrid(device, size, self.spacing)
+        self.full_multigrid = FullMultigrid(self.multigrid)
         finest = self.multigrid.finest
         self.conjugate_gradients = ConjugateGradients(device, finest)
         self.deflation = Deflation(device, finest)
@@ -95,7 +97,7 @@ class Viscosity:
             self._change.swap()
             return solution
         if self.plan.method == "fmg":
-            return self.multigrid.correct(v_star, rhs)
+            return self.full_multigrid.correct(v_star, rhs)
         if self.plan.method == "direct":
             self.multigrid.direct_solve(rhs)
         else:
@@ -154,13 +156,17 @@ class Viscosity:
         return found / wanted if wanted else 0.0
 
     @property
+    def _parts(self) -> tuple[Multigrid | FullMultigrid | ConjugateGradients | Deflation, ...]:
+        return self.multigrid, self.full_multigrid, self.conjugate_gradients, self.deflation
+
+    @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
         pairs = self._change.read, self._change.write, self._dragged
         fields = [field for pair in pairs for field in pair.fields]
-        return sum(item.nbytes for item in (*fields, self.multigrid, self.conjugate_gradients, self.deflation))
+        return sum(item.nbytes for item in (*fields, *self._parts))
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self._change, self._dragged, self.multigrid, self.conjugate_gradients, self.deflation):
+        for item in (self._change, self._dragged, *self._parts):
             item.release()
