@@ -385,7 +385,7 @@ def test_what_was_solved_before_does_not_matter(device: Device) -> None:
 
 @pytest.mark.parametrize("softest", [1.0, 30.0])
 def test_cell_by_cell_noise_is_solved_until_little_is_left(device: Device, softest: float) -> None:
-    """Each iteration brings two thirds of the one before: what it brings says too little of what is left."""
+    """Each iteration brings four fifths of the one before or more: that says too little of what is left."""
     size = 96, 96
     step = Step(device, softest * 1e5 ** np.random.default_rng(0).random(size))
     faces = vortices(*size)

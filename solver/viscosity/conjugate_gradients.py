@@ -48,8 +48,8 @@ class ConjugateGradients:
     ) -> PackedFaces:
         """The solution, from the best first guess in the plane of `v_star` and the last step's `change`.
 
-        Ends when less than half of the part `tolerance`^2 of the energy is left, or after so many at most. What is left
-        is the rest of the geometric series of what iterations bring, and no less than half of what the last brought.
+        Ends when less than the part `tolerance`^2 of the energy is left, or after so many at most. What is left is the
+        rest of the geometric series of what iterations bring, and taken for no less than what the last has brought.
         `precondition(r)` returns about A^-1 r.
         """
         found, curvature = self._galerkin_initial_guess(v_star, change, rhs)
@@ -66,7 +66,7 @@ class ConjugateGradients:
             self._update(z, self._az, alpha, beta)
             gained = alpha**2 * curvature
             found += gained
-            if max(gained, 2.0 * _series(gained, before)) <= tolerance**2 * found:
+            if max(gained, _series(gained, before)) <= tolerance**2 * found:
                 break
             before = gained
         return self._x.read

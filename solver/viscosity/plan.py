@@ -18,8 +18,8 @@ STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
 # Softest kappa up to which one sweep before and after the coarser levels does as well as two, and costs three fifths.
 ONE_SWEEP = 4.0
-# Conjugate gradients end when less than half of this part of the energy, squared, is left: below 1 % of the velocity
-# where the viscosity varies so much at most, and below 5 % beyond.
+# Conjugate gradients end when less than this part of the energy, squared, is left: the error is below 1 % where the
+# viscosity varies so much at most, and below 5 % beyond.
 MODERATE = 300.0
 TOLERANCE = 0.017
 TOLERANCE_STIFF = 0.07, 0.036  # for the softest kappa below and above ONE_SWEEP
