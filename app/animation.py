@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,9 +17,9 @@ import numpy as np
 from app import ffmpeg
 from app.errors import Cancelled, UserError
 from app.files import NUMBER, cannot_write, is_sequence, replacing, replacing_many, temporary_beside, temporary_file
-from app.pictures import FORMATS, WEBP, Picture, check_picture_output, to_bits, write_picture
+from app.pictures import FORMATS, WEBP, Picture, check_picture_output, lost, to_bits, write_picture
 from app.progress import never
-from app.video import sound_codec
+from app.video import Clip, sound_codec
 
 T = TypeVar("T")
 
@@ -190,6 +191,26 @@ def check_animation(
             f"Cannot write {path}: the result is {size[0]} x {size[1]} pixels, and {used} holds no more than "
             f"{most[0]} x {most[1]}; make it smaller, or write name.%04d.png."
         )
+
+
+def unheld_of_clip(path: str | os.PathLike[str], codec: str | None, clip: Clip) -> str:
+    """What of a clip's depth and of its colours' resolution a video's format has no room for, in a sentence, or ""."""
+    container = ANIMATIONS.get(Path(path).suffix.lower())
+    if container is None or container.passes > 1 or is_sequence(path):
+        return ""
+    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0)
+    (bits, chroma), (room, kept) = map(_depth, (clip.pixel_format, options[options.index("-pix_fmt") + 1]))
+    losses = [f"its {bits} bits a channel become {room}"] if bits > room else []
+    losses += [f"its colours of 4:{chroma} become 4:{kept}"] if chroma > kept else []
+    return lost(clip.path, losses)
+
+
+def _depth(pixel_format: str) -> tuple[int, str]:
+    """Bits a channel of one of ffmpeg's formats, and its chroma subsampling: the digits after the 4."""
+    deep = re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format)
+    planar = re.search(r"4([0-4])([0-4])p", pixel_format)
+    chroma = ":".join(planar.groups()) if planar else "2:0" if pixel_format.startswith("gray") else "4:4"
+    return {48: 16, 64: 16}.get(bits := int(deep[1]) if deep else 8, bits), chroma
 
 
 def check_output(

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from app import maps
-from app.animation import animation_writer, check_output, is_animation, passes
+from app.animation import animation_writer, check_output, is_animation, passes, unheld_of_clip
 from app.errors import UserError
 from app.export import longer_side, looked_up, steps_for
 from app.files import check_kept, is_sequence, number_in, writable
@@ -111,6 +111,7 @@ class Application:
         animated = is_animation(self.output)
         source = open_source(self.source, self.maps.max_pixels)
         notices = [source.picture.note, unheld(self.output, source.picture)]
+        notices += [unheld_of_clip(self.output, self.codec, source.clip)] if source.clip else []
         check_output(self.output, size=self._size(source))
         if animated != (self.maps.is_sequence or source.clip is not None):
             what = "a still" if not animated else "an animation"
@@ -231,7 +232,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     values = cropped(given).values
     width, height = given.width, given.height
     grid = Grid.for_picture(width, height, min(max(width, height), MOST_CELLS))
-    warp = WarpMap(device, grid)
+    warp = WarpMap(device, grid, (width, height))
     try:
         warp.set(values)
         found = warp.forward.read((width, height))

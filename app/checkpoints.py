@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,6 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from app.recipe import Recipe
+from solver.gl.device import Device
+from solver.gl.field import Field
 from solver.scheme import State
 
 DEFAULT_BUDGET = 512 * 2**20
@@ -24,25 +27,29 @@ class Moment:
         """Everything in it off the GPU, named `part/name`."""
         return {f"{part}/{name}": a for part, state in self.states.items() for name, a in state.arrays().items()}
 
-    def with_arrays(self, arrays: Mapping[str, np.ndarray]) -> Moment:
-        """This moment filled with what `arrays()` gave.
+    def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> Moment:
+        """A moment like this one that holds what `arrays()` gave.
 
         Raises:
             ValueError: if that was of another simulation.
         """
-        filled = {}
-        for part, state in self.states.items():
-            own = {name.removeprefix(f"{part}/"): a for name, a in arrays.items() if name.startswith(f"{part}/")}
-            filled[part] = state.with_arrays(own)
-        return Moment(filled)
+        filled = Moment({})
+        try:
+            for part, state in self.states.items():
+                own = {name.removeprefix(f"{part}/"): a for name, a in arrays.items() if name.startswith(f"{part}/")}
+                filled.states[part] = state.with_arrays(device, own)
+        except ValueError:
+            filled.release()
+            raise
+        return filled
 
     @cached_property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(state.nbytes for state in self.states.values())
+    def textures(self) -> list[Field]:
+        """The textures that it holds, some of them together with other moments."""
+        return [texture for state in self.states.values() for texture in state.textures]
 
     def release(self) -> None:
-        """Free the textures."""
+        """Free the textures that no other moment holds."""
         for state in self.states.values():
             state.release()
 
@@ -67,15 +74,12 @@ class Checkpoints:
 
     def __init__(self, budget: int = DEFAULT_BUDGET) -> None:
         self.budget = budget
+        self.nbytes = 0  # of texture memory, what several share counted once
         self._kept: list[Checkpoint] = []
+        self._holders = Counter[Field]()
 
     def __len__(self) -> int:
         return len(self._kept)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(checkpoint.moment.nbytes for checkpoint in self._kept)
 
     def nearest(self, recipe: Recipe, tick: int) -> Checkpoint | None:
         """The last checkpoint at or before `tick` that is valid for `recipe`."""
@@ -89,6 +93,9 @@ class Checkpoints:
     def add(self, checkpoint: Checkpoint) -> None:
         """Keep a checkpoint; those that are missed least go where there is no room, and none stays with no budget."""
         self._kept.append(checkpoint)
+        for texture in checkpoint.moment.textures:
+            self._holders[texture] += 1
+            self.nbytes += texture.nbytes if self._holders[texture] == 1 else 0
         while self.nbytes > self.budget and self._kept:
             self._drop(self._least_missed(checkpoint))
 
@@ -112,4 +119,9 @@ class Checkpoints:
 
     def _drop(self, checkpoint: Checkpoint) -> None:
         self._kept.remove(checkpoint)
+        for texture in checkpoint.moment.textures:
+            self._holders[texture] -= 1
+            if not self._holders[texture]:
+                del self._holders[texture]
+                self.nbytes -= texture.nbytes
         checkpoint.moment.release()

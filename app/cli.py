@@ -276,9 +276,7 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     from app.progress import leave, on_terminal
 
     def tell(outcome: Outcome) -> None:
-        named = outcome.error.startswith(f"Cannot read {shown(outcome.label)}") or not outcome.error
-        line = outcome.error if named else f"{outcome.label}: {outcome.error}"
-        _tell(line, *(f"{outcome.label}: {notice}" for notice in outcome.notices))
+        _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices) if said))
 
     written = 0
 
@@ -296,6 +294,14 @@ def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     if failures:
         others = "all others are written" if failures < len(tasks) else "none is written"
         raise UserError(f"{failures} of {len(tasks)} pictures failed; {others}")
+
+
+def _about(label: str, said: str) -> str:
+    """What is said of a picture, with its whole name in it once."""
+    label = shown(label)
+    if said.startswith((f"Cannot read {label}", label)):
+        return said
+    return f"{label}: {said.removeprefix(f'{Path(label).name}: ')}"
 
 
 @cli.command()

@@ -25,6 +25,7 @@ from app.animation import (
     is_animation,
     passes,
     reordered,
+    unheld_of_clip,
 )
 from app.checkpoints import DEFAULT_BUDGET
 from app.errors import UserError
@@ -151,6 +152,10 @@ class Job:
                     f"{self.maps.path} numbers the maps of an animation and {self.output} is a picture; "
                     f"give one map's name, or leave out --output to write the maps alone"
                 )
+        start, end = self.recipe.time.start, self.recipe.duration
+        if self.has_frames and start > end:
+            late = f"the animation ends at {end:g} s, and cannot begin at {start:g} s"
+            raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
         if self.part != (0, None) and not self.has_frames:
             raise UserError(f"only an animation has --frames, and {self.output} is a picture; write f.%04d.png or .mp4")
         if self.clip is not None and self.recipe.mode == "density":
@@ -297,7 +302,10 @@ class _Export:
         if folded:
             cells = self.replay.grid.nx * self.replay.grid.ny
             self.pictures.notice(f"the warp folds over itself in {folded} of {cells} cells of the grid")
-        if self.job.output is not None and (said := unheld(self.job.output, self.job.picture)):
+        output, clip = self.job.output, self.job.clip
+        if output is not None and (said := unheld(output, self.job.picture)):
+            self.pictures.notice(said)
+        if output is not None and clip is not None and (said := unheld_of_clip(output, self.job.codec, clip)):
             self.pictures.notice(said)
 
     def _steps_for_stills(self) -> int:

@@ -2,12 +2,14 @@
 
 A force that pushes has `faces`: an acceleration on the MAC faces, lengths / s^2 (an impulse, lengths / s, if it is
 instantaneous). One that makes or takes room has a `divergence`, 1 / s, which the projection leaves in the velocity: an
-incompressible fluid could not swell otherwise. Both are for a time law of 1; `build` makes them ready for the solver.
+incompressible fluid could not swell otherwise. One that is local has a `motion`, lengths / s, which carries the picture
+and not the fluid. All are for a time law of 1; `build` makes them ready for the solver.
 """
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -29,7 +31,7 @@ from app.sampling import (
     places,
     to_grid,
 )
-from app.schema import Radius, Several
+from app.schema import Fraction01, Radius, Several
 from app.timelaws import Law, Timed
 from solver.grid import Grid
 
@@ -60,15 +62,47 @@ class _Force(Timed):
         """Divergence (ny, nx) float32 the velocity shall have, of zero net; None if it has none."""
         return None
 
+    def motion(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+        """Velocity (ny, nx, 2) float32 on left and upper faces that carries the picture alone; None if it has none."""
+        return None
 
-class PointForce(_Force):
+
+class _Push(_Force):
+    """What a point and a curve have in common.
+
+    Attributes:
+        radius: in longer sides; see `falloff`.
+        falloff: "smooth" is (1 - q^2)^3, nothing beyond the radius; "gaussian" has half the radius as its deviation.
+        local: from 0, a force on the fluid, to 1, a motion of what is under it and of nothing else, whatever the fluid
+            does; in between, that part of the one and of the other. Of the motion, strength is the speed, lengths / s;
+            at an instant it is how far.
+    """
+
+    radius: Radius = 0.1
+    falloff: Falloff = "smooth"
+    local: Fraction01 = 0.0
+
+    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+        return None if self.local == 1 else (1 - self.local) * self._force(grid)
+
+    def motion(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+        return None if self.local == 0 else self.local * self._bare(grid)
+
+    def _force(self, grid: Grid) -> np.ndarray:
+        """The acceleration on the faces, of a force that is not local."""
+        return self._bare(grid)
+
+    @abstractmethod
+    def _bare(self, grid: Grid) -> np.ndarray:
+        """Its strength, direction and falloff on the faces, and nothing beside it."""
+
+
+class PointForce(_Push):
     """A push at a point. Strength: the acceleration at the point.
 
     Attributes:
         point: where.
         direction: (x, y), y down; its length does not matter.
-        radius: in longer sides; see `falloff`.
-        falloff: "smooth" is (1 - q^2)^3, nothing beyond the radius; "gaussian" has half the radius as its deviation.
         divergence_free: with the return flow on both sides that an incompressible fluid has, so that projection changes
             nothing; without, the bare push, of which projection leaves about half.
     """
@@ -76,23 +110,26 @@ class PointForce(_Force):
     kind: Literal["point"]
     point: Point
     direction: tuple[float, float]
-    radius: Radius = 0.1
-    falloff: Falloff = "smooth"
     divergence_free: bool = True
 
     _unit = field_validator("direction")(lambda direction: _checked_direction(direction))
 
-    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def _force(self, grid: Grid) -> np.ndarray:
+        if not self.divergence_free:
+            return self._bare(grid)
         (centre,) = places([self.point], grid)
         push = self.strength * _unit(self.direction)
-        if self.divergence_free:
 
-            def stream(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-                # Its curl is u(0) = push, and for the Gaussian `numerics.md` section 6.
-                weight = _profile(np.hypot(x, y), self.radius, self.falloff)
-                return weight * (push[0] * y - push[1] * x)
+        def stream(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            # Its curl is u(0) = push, and for the Gaussian `numerics.md` section 6.
+            weight = _profile(np.hypot(x, y), self.radius, self.falloff)
+            return weight * (push[0] * y - push[1] * x)
 
-            return _curl(grid, centre, stream)
+        return _curl(grid, centre, stream)
+
+    def _bare(self, grid: Grid) -> np.ndarray:
+        (centre,) = places([self.point], grid)
+        push = self.strength * _unit(self.direction)
         u, v = (
             push[axis] * _profile(np.hypot(x - centre[0], y - centre[1]), self.radius, self.falloff)
             for axis, (x, y) in enumerate((grid.u_faces(), grid.v_faces()))
@@ -100,7 +137,7 @@ class PointForce(_Force):
         return _on_faces(u, v)
 
 
-class CurveForce(_Force):
+class CurveForce(_Push):
     """A push all along a curve. Strength: the acceleration on a straight piece of it.
 
     The force is the falloff convolved with the curve, so that it has no seams at corners; it ends softly at the ends,
@@ -111,7 +148,6 @@ class CurveForce(_Force):
         spline: a Catmull-Rom spline through the points instead of a polyline.
         direction: along its "tangent", from the first to the last point; along its "normal", to the right of that; or
             [x, y], y down.
-        radius, falloff: as of a point.
     """
 
     kind: Literal["curve"]
@@ -119,7 +155,6 @@ class CurveForce(_Force):
     spline: bool = False
     direction: Literal["tangent", "normal"] | tuple[float, float] = "tangent"
     radius: Radius = 0.05
-    falloff: Falloff = "smooth"
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -131,7 +166,7 @@ class CurveForce(_Force):
             _checked_direction(self.direction)
         return self
 
-    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def _bare(self, grid: Grid) -> np.ndarray:
         at, tangents, lengths = _along(places(self.points, grid), self.spline, self.radius / 8)
         if self.direction == "tangent":
             pushes = tangents
@@ -316,12 +351,13 @@ Force = Annotated[
 
 @dataclass(frozen=True)
 class BuiltForce:
-    """A force on a grid: its time law multiplies `faces` and `divergence`, either of which may be missing."""
+    """A force on a grid: its time law multiplies `faces`, `divergence` and `motion`, any of which may be missing."""
 
     label: str
     law: Law
     faces: np.ndarray | None
     divergence: np.ndarray | None
+    motion: np.ndarray | None
 
 
 def build(forces: Sequence[Force], grid: Grid, pictures: Pictures, duration: float) -> list[BuiltForce]:
@@ -336,7 +372,8 @@ def build(forces: Sequence[Force], grid: Grid, pictures: Pictures, duration: flo
         try:
             if remark := force.law.check(duration):
                 pictures.notice(f"{label} {remark}")
-            built.append(BuiltForce(label, force.law, force.faces(grid, pictures), force.divergence(grid, pictures)))
+            fields = (field(grid, pictures) for field in (force.faces, force.divergence, force.motion))
+            built.append(BuiltForce(label, force.law, *fields))
         except (ValueError, UserError) as error:
             raise UserError(f"{label}: {error}") from None
     return built

@@ -14,7 +14,7 @@ from app.animation import animation_writer
 from app.errors import UserError
 from app.export import displacement
 from app.files import MENDS
-from app.forces import GradientForce
+from app.forces import CurveForce, GradientForce, PointForce
 from app.masks import solid
 from app.pictures import Picture, read_picture, srgb_to_linear, to_bits, write_picture
 from app.progress import Progress
@@ -25,7 +25,7 @@ from solver.gl.device import Device
 from solver.grid import Grid
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
-from solver.warp.map import MapStatistics
+from solver.warp.distortion import MapStatistics
 
 FPS = 30
 LINGER = 24  # frames that the last one stands still
@@ -402,11 +402,13 @@ def _mirrored(index: np.ndarray, n: int) -> np.ndarray:
 
 
 def force_field(recipe: Recipe, grid: Grid, pictures: Pictures) -> np.ndarray:
-    """The sum of the recipe's forces at the cells' centres, (ny, nx, 2); a swelling one as its flow."""
+    """The sum of the recipe's forces at the cells' centres, (ny, nx, 2); swelling and local ones as their flow."""
     total = np.zeros((grid.ny + 1, grid.nx + 1, 2), np.float32)
     for force in recipe.force:
         if isinstance(force, GradientForce):
             force = force.model_copy(update={"swell": False})
+        elif isinstance(force, PointForce | CurveForce):
+            force = force.model_copy(update={"local": 0.0})
         faces = force.faces(grid, pictures)
         if faces is not None:
             total[:-1, :-1] += faces

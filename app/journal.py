@@ -81,11 +81,13 @@ class Work:
         entries: all of its history, from the oldest.
         index: which of them is the present.
         saved: the recipe as it was saved last, or opened.
+        is_grid_automatic: nobody has chosen the grid.
     """
 
     entries: tuple[Entry, ...]
     index: int
     saved: Recipe
+    is_grid_automatic: bool = False
 
     @property
     def recipe(self) -> Recipe:
@@ -119,7 +121,8 @@ def beginning(origin: Origin, work: Work) -> Iterator[bytes]:
     # What was saved is mostly one of the entries; otherwise it is the present but for a few ticks of coming to rest.
     same = (number for number, entry in enumerate(work.entries) if entry.recipe is work.saved)
     nearest = next(same, work.index)
-    yield _line({"index": work.index, "saved": [nearest, _difference(work.saved, work.entries[nearest].recipe)]})
+    saved = [nearest, _difference(work.saved, work.entries[nearest].recipe)]
+    yield _line({"index": work.index, "saved": saved, "automatic": work.is_grid_automatic})
 
 
 def continuation(work: Work, before: Work) -> bytes:
@@ -130,10 +133,12 @@ def continuation(work: Work, before: Work) -> bytes:
     old = old[dropped:]
     kept = next((number for number, pair in enumerate(zip(old, new, strict=False)) if pair[0] is not pair[1]), None)
     kept = min(len(old), len(new)) if kept is None else kept
-    if not dropped and kept == before.index == work.index == len(new) - 1 and old[kept].name == new[kept].name:
+    same = not dropped and kept == before.index == work.index == len(new) - 1 and old[kept].name == new[kept].name
+    if same and work.is_grid_automatic == before.is_grid_automatic:
         # The same edit, while the fluid comes to rest.
         return _line({"amend": _difference(new[kept].recipe, old[kept].recipe)})
     record: dict[str, Any] = {"drop": dropped, "keep": kept, "index": work.index}
+    record["automatic"] = work.is_grid_automatic
     earlier = [new[kept - 1].recipe if kept else Recipe(), *(entry.recipe for entry in new[kept:])]
     record["add"] = [_told(entry, recipe) for entry, recipe in zip(new[kept:], earlier, strict=False)]
     return _line(record)
@@ -227,7 +232,7 @@ def _followed(work: Work, record: dict[str, Any]) -> Work:
     index = record["index"]
     if not 0 <= index < len(entries):
         raise IndexError
-    return Work(tuple(entries), index, saved)
+    return Work(tuple(entries), index, saved, bool(record.get("automatic", work.is_grid_automatic)))
 
 
 def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:

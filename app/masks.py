@@ -40,6 +40,7 @@ from app.schema import Fraction01, Model, Radius, Several
 from solver.grid import Grid
 
 MOST_VISCOUS = 1e6
+FINEST = 2048  # texels along the longer side, at most, that what is frozen is worked out on
 FINE = 1024  # cells along the longer side, at least, that a picture is quantised on
 Viscosity = Annotated[float, Field(ge=0, le=MOST_VISCOUS)]
 
@@ -250,12 +251,18 @@ def viscosity(layers: Sequence[ViscosityLayer], base: float, grid: Grid, picture
 
 
 def solid(layers: Sequence[FreezeLayer], grid: Grid, pictures: Pictures) -> np.ndarray:
-    """The frozen cells, (ny, nx) bool: none, with the layers on top, in order.
+    """What is frozen on a grid or a canvas, (ny, nx) bool: nothing, with the layers on top, in order.
+
+    On a canvas above `FINEST` along its longer side it is worked out on one of that size, and its edge interpolated.
 
     Raises:
         UserError: naming the layer by its index and name, and what is wrong with it.
     """
-    result = np.zeros((grid.ny, grid.nx), bool)
+    width, height = grid.size
+    if max(width, height) > FINEST:
+        coarse = solid(layers, Grid.for_picture(width, height, FINEST), pictures)
+        return to_grid(coarse.astype(np.float32), grid) >= 0.5
+    result = np.zeros((height, width), bool)
     for index, layer in enumerate(layers):
         try:
             result = layer.onto(result, layer.intensity(grid, pictures), layer.coverage(grid))

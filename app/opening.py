@@ -44,14 +44,14 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
     return Source(Picture(first, note=clip.note), clip)
 
 
-def check_picture(picture: Picture) -> None:
-    """Make sure that a picture can be covered by cells that are about square.
+def check_picture(picture: Picture, name: str = "the picture") -> None:
+    """Make sure that a picture can be covered by cells that are about square; `name`: what it is called.
 
     Raises:
         UserError: if it is too small or too narrow for any grid.
     """
     shorter, longer = sorted((picture.width, picture.height))
-    size = f"the picture is {picture.width} x {picture.height} pixels"
+    size = f"{name} is {picture.width} x {picture.height} pixels"
     if shorter < SMALLEST_SIDE:
         raise UserError(f"{size}; a side must have at least {SMALLEST_SIDE}, so enlarge or crop it")
     if SMALLEST_GRID * longer > MOST_ALONG * shorter:

@@ -128,6 +128,7 @@ PRIMARIES = {5: "BT.601", 6: "BT.601", 9: "BT.2020", 10: "XYZ", 11: "DCI-P3", 12
 TRANSFERS = {4: "gamma 2.2", 5: "gamma 2.8", 8: "linear", 16: "PQ", 18: "HLG"}
 USUAL_PRIMARIES, USUAL_TRANSFERS = (1, 2), (1, 2, 6, 13, 14, 15)
 INK = "its inks (CMYK) become RGB"
+UNKEPT_CHUNKS = {b"bKGD": "background colour", b"sBIT": "number of significant bits", b"tIME": "date"}
 COLOUR_CHUNKS = {b"cICP": 4, b"gAMA": 4, b"cHRM": 32, b"sRGB": 1, b"mDCV": 24, b"cLLI": 8}  # and their lengths
 USUAL_GAMMA = range(45000, 46000)  # 1 / 2.2, as sRGB has it on the whole
 REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
@@ -326,8 +327,10 @@ def _read_pillow(file: Path, name: str, max_pixels: int) -> Picture:
     with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
         check_size(file, *image.size, max_pixels)
         icc = image.info.get("icc_profile")
-        chunks = _png_colours(file) if name == "PNG" else {}
+        chunks, unkept = _png_chunks(file) if name == "PNG" else ({}, [])
         losses = _colours_lost(file, name, chunks, icc is not None)
+        if unkept:
+            losses.append(f"what it says of its {', '.join(unkept)} is not kept")
         if name == "PNG" and _png_bits(file) == 16:
             import imagecodecs
 
@@ -390,18 +393,21 @@ def _png_bits(file: Path) -> int:
         return stream.read(25)[24]
 
 
-def _png_colours(file: Path) -> dict[bytes, bytes]:
-    """The chunks of a PNG that say what its colours mean; all of them stand before the pixels."""
+def _png_chunks(file: Path) -> tuple[dict[bytes, bytes], list[str]]:
+    """The chunks of a PNG that say what its colours mean, and in words those that are not kept."""
     found: dict[bytes, bytes] = {}
+    unkept: dict[str, None] = {}
     with file.open("rb") as stream:
         stream.seek(8)
-        while len(head := stream.read(8)) == 8 and head[4:] != b"IDAT":
+        while len(head := stream.read(8)) == 8 and (kind := head[4:]) != b"IEND":
             length = int.from_bytes(head[:4], "big")
             end = stream.tell() + length + 4
-            if COLOUR_CHUNKS.get(head[4:]) == length:
-                found[head[4:]] = stream.read(length)
+            if kind in UNKEPT_CHUNKS:
+                unkept[UNKEPT_CHUNKS[kind]] = None
+            if COLOUR_CHUNKS.get(kind) == length:
+                found[kind] = stream.read(length)
             stream.seek(end)
-    return found
+    return found, list(unkept)
 
 
 def _colours_lost(file: Path, name: str, chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:
@@ -422,7 +428,7 @@ def _colours_lost(file: Path, name: str, chunks: Mapping[bytes, bytes], has_prof
         x_y = np.frombuffer(chunks[b"cHRM"], ">u4") / 100000
         if not np.allclose(np.roll(x_y, -2), REC709, atol=2e-3):
             told.append("primaries (cHRM)")
-    return [f"its {' and '.join(told)} are kept in a PNG alone, and its colours mixed as if sRGB"] if told else []
+    return [f"a PNG alone keeps its {' and '.join(told)}, and its colours are mixed as if sRGB"] if told else []
 
 
 def _avif_bits(file: Path) -> int:

@@ -9,18 +9,24 @@ from app.recipe import FluidSettings
 
 @dataclass(frozen=True)
 class Feel:
-    """A named fluid: viscosity in longer sides squared per second, drag per second, and what it feels like."""
+    """A named fluid: viscosity in longer sides squared per second, drag per second, and what it feels like.
+
+    Attributes:
+        local: how local a push is where it is chosen; see `Stroke`.
+    """
 
     name: str
     line: str
     viscosity: float
     drag: float
+    local: float = 0.0
 
     def fits(self, fluid: FluidSettings) -> bool:
         return fluid.viscosity == self.viscosity and fluid.drag == self.drag
 
 
-PUTTY = Feel("Putty", "Stops with the brush", 0.3, 0.0)
+# Local, for faces: small pushes along a jaw leave bulges as large as they are where the fluid flows back beside them.
+PUTTY = Feel("Putty", "Stops with the brush", 0.3, 0.0, local=1.0)
 HONEY = Feel("Honey", "Sinks softly to rest", 0.03, 2.0)
 # As thin as a single stroke of moderate length allows: thinner, its whirls wind up into layers thinner than a cell, and
 # the map folds. There is no drag, which would end the wide, slow whirls as soon as the small ones, though they bend

@@ -17,7 +17,7 @@ from app.masks import FreezeLayer, ViscosityLayer
 from app.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
 from app.strokes import Change, Stroke
 
-VERSION = 1
+VERSION = 2
 MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
@@ -152,7 +152,7 @@ class Recipe(Model):
     """Everything that makes a warp; see the modules of its parts for the units.
 
     Attributes:
-        version: of this format.
+        version: of this format. In version 1 strokes had no `detail`; one that is read becomes one of this version.
         name: a title.
         picture: the source, relative to the recipe's own folder.
         map: a warp map to begin with instead of the picture as it is, in any format of `app.maps`.
@@ -162,7 +162,7 @@ class Recipe(Model):
         viscosity, freeze, force, stroke, change: applied in the order they are written in.
     """
 
-    version: Literal[1] = VERSION
+    version: Literal[2] = VERSION
     name: str = ""
     picture: FileName | None = None
     map: FileName | None = None
@@ -179,6 +179,14 @@ class Recipe(Model):
     force: Several[Force] = ()
     change: Several[Change] = ()
     stroke: Several[Stroke] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_this_version(cls, data: Any) -> Any:
+        """What an older version had not, this one has by default, and it means the same."""
+        if isinstance(data, dict) and type(data.get("version")) is int and 1 <= data["version"] < VERSION:
+            return {**data, "version": VERSION}
+        return data
 
     @model_validator(mode="after")
     def _affordable(self) -> Self:

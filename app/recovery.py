@@ -98,18 +98,18 @@ class Journal:
         self._written: tuple[Project, Work] | None = None
         self._leaving = False
         self._changed, self._urgent, self._handed = threading.Event(), threading.Event(), threading.Event()
-        self._asking = threading.Lock()  # `_handed` is of what is wanted now, and not of what was before
+        self._asking = threading.Lock()  # what is wanted, how urgently, and whether it is handed over go together
         self._thread: threading.Thread | None = None
         self._file: int | None = None
         self._size = self._most = 0
 
-    def keep(self, project: Project, document: Document) -> None:
+    def keep(self, project: Project, document: Document, is_grid_automatic: bool = False) -> None:
         """Take note of what the work is now; costs next to nothing where it is as it was."""
         history, saved = document.history, document.saved_recipe
-        before, self._seen = self._seen, (project, history.recipe, history.index, saved)
+        before, self._seen = self._seen, (project, history.recipe, history.index, saved, is_grid_automatic)
         if before and all(a is b for a, b in zip(before, self._seen, strict=True)):
             return
-        work = Work(history.entries, history.index, saved)
+        work = Work(history.entries, history.index, saved, is_grid_automatic)
         is_just_saved = bool(before) and before[0] is not project
         if is_just_saved or not work.is_unsaved:
             work = None
@@ -154,9 +154,10 @@ class Journal:
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="journal", daemon=True)
             self._thread.start()
-        if urgent:
-            self._urgent.set()
-        self._changed.set()
+        with self._asking:
+            if urgent:
+                self._urgent.set()
+            self._changed.set()
 
     # In the thread.
 
@@ -164,10 +165,12 @@ class Journal:
         leaving = False
         while not leaving:
             self._changed.wait()
-            urgent = self._urgent.wait(PAUSE)
-            self._changed.clear()
-            self._urgent.clear()
-            leaving, wanted = self._leaving, self._wanted
+            self._urgent.wait(PAUSE)
+            with self._asking:  # what is asked for from here on wakes it again, and is not cleared away unheard
+                urgent = self._urgent.is_set()
+                self._changed.clear()
+                self._urgent.clear()
+                leaving, wanted = self._leaving, self._wanted
             try:
                 if wanted is None:
                     self._forget()

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
-from math import hypot
+from functools import lru_cache
+from math import ceil, hypot
 
 import numpy as np
 
 from app.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.errors import UserError
 from app.forces import BuiltForce, build
-from app.masks import solid, viscosity
+from app.masks import FINEST, solid, viscosity
 from app.recipe import FluidSettings, Recipe
 from app.sampling import Pictures, channels
-from app.strokes import Change, Dab, Stroke
+from app.strokes import FINEST_DETAIL, Change, Dab, Stroke
 from app.timelaws import Feedback, Law
 from app.timeline import Observation, Sentinel
+from app.windows import FLOWING, Window, may_have_windows
 from solver.brush.brush import Brush, Motion
 from solver.brush.masks import Masks
 from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
@@ -26,9 +27,11 @@ from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
-from solver.grid import Grid
+from solver.grid import SMALLEST_GRID, Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
+from solver.scheme import State
+from solver.warp.accumulated import map_size
 from solver.warp.density import Density
 from solver.warp.map import WarpMap
 
@@ -57,14 +60,17 @@ class LoadedForce:
     law: Law
     faces: Field | None
     divergence: Field | None
+    motion: Field | None
     strongest: float
     widest: float
+    fastest: float
 
     @classmethod
     def of(cls, device: Device, force: BuiltForce) -> LoadedForce:
-        fields = [None if a is None else device.upload(a, force.label) for a in (force.faces, force.divergence)]
-        peaks = [0.0 if a is None else float(np.abs(a).max()) for a in (force.faces, force.divergence)]
-        return cls(force.label, force.law, fields[0], fields[1], peaks[0], peaks[1])
+        arrays = force.faces, force.divergence, force.motion
+        faces, divergence, motion = (None if a is None else device.upload(a, force.label) for a in arrays)
+        strongest, widest, fastest = (0.0 if a is None else float(np.abs(a).max()) for a in arrays)
+        return cls(force.label, force.law, faces, divergence, motion, strongest, widest, fastest)
 
     def acts_within(self, start: float, end: float) -> bool:
         """True if it is at work between two times, in seconds; one that is fed back always may be."""
@@ -77,7 +83,7 @@ class LoadedForce:
             UserError: if it throws the fluid farther than the picture, or swells it out of all measure, within a tick.
         """
         mend = "make its 'strength' or 'fluid.dt' smaller"
-        if (thrown := self.strongest * abs(impulse) * dt) > FARTHEST:
+        if (thrown := (self.strongest * dt + self.fastest) * abs(impulse)) > FARTHEST:
             raise UserError(
                 f"{self.label}: at t = {time:.3g} s it throws the fluid {thrown:.3g} times the picture's size within "
                 f"one tick; {mend}"
@@ -101,6 +107,8 @@ class Replay:
 
     Attributes:
         tick: the steps made so far; strokes and changes at this tick come next.
+        grid: of the whole picture.
+        window: where the flow is solved on finer cells instead, None if nowhere; `fluid.grid` are its cells.
         fluid, warp, masks, density: the simulation at this moment; `density` only in density mode.
         forces: the recipe's own.
         steps: made in all, whichever way; for measuring.
@@ -115,6 +123,7 @@ class Replay:
         self._brush = Brush(device)
         self._passing: Moment | None = None
         self._leading: list[Motion] = []
+        self._motions: list[tuple[Field, float]] = []  # of forces, and their part in this tick
         self._build()
 
     # -- going through time -----------------------------------------------------------------------------------------
@@ -185,11 +194,21 @@ class Replay:
             ValueError: if it is not of this simulation.
         """
         self._leave_passing()
-        moment = self._save()
+        before = self._save()
         try:
-            self._restore(moment.with_arrays(snapshot))
+            self._look_at(_window(snapshot.get("settings/window", np.zeros(0))))
+            now = self._save()
+            try:
+                then = now.with_arrays(self.device, snapshot)
+            finally:
+                now.release()
+        except ValueError:
+            self._restore(before)
+            raise
         finally:
-            moment.release()
+            before.release()
+        self._restore(then)
+        then.release()
         self.tick = tick
 
     def release(self) -> None:
@@ -250,6 +269,7 @@ class Replay:
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
+        self._follow_strokes()
         self._set_parameters()
         painted = False
         self._leading.clear()
@@ -260,10 +280,11 @@ class Replay:
             if painted:
                 self._apply_masks()
         self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
+        self._carry()
         with self.device.stage("warp map"):
             self.warp.follow(self.fluid, dt * part)
         if self.density is not None:
-            self.density.advance(self.fluid.faces(), self.grid, dt * part)
+            self.density.advance(self.fluid.carrier(), self.grid, dt * part)
 
     def _change(self, change: Change) -> None:
         if change.clear_velocity:
@@ -279,21 +300,64 @@ class Replay:
     def _set_parameters(self) -> None:
         settings = self.settings
         slip = "free" if settings.walls == "free-slip" else "none"
-        params = FluidParams(walls=Walls(slip=slip), drag=settings.drag, sweeps=settings.sweeps)
+        params = FluidParams(walls=Walls.of(slip, self.fluid.grid), drag=settings.drag, sweeps=settings.sweeps)
         if params != self.fluid.params:
             self.fluid.params = params
         if settings.viscosity != self._viscosity_in_force:
-            self.masks.set_base(self._viscosity(settings.viscosity), self._frozen)
+            self._use_viscosity(settings.viscosity)
             self._apply_masks()
-            self._viscosity_in_force = settings.viscosity
+
+    def _follow_strokes(self) -> None:
+        """Let the flow be solved where the strokes of this tick want it; without any it stays where it is."""
+        at_work = [(stroke, stroke.at(self.tick)) for stroke in self.recipe.stroke if stroke.tool in FLOWING]
+        at_work = [(stroke, dabs) for stroke, dabs in at_work if dabs]
+        if at_work and self._has_windows:
+            window = Window.of(at_work, self.tick, self.window, self.grid)
+            if window != self.window:
+                assert isinstance(self.fluid, Fluid)
+                with self.device.stage("window"):
+                    flow = self.fluid.flow_on(self._cells_of(window))
+                    self._look_at(window)
+                    self._set_parameters()
+                    self._apply_masks()
+                    self.fluid.go_on_with(flow)
+                    flow.release()
+
+    def _cells_of(self, window: Window | None) -> Grid:
+        return self.grid if window is None else window.grid_in(self.grid)
+
+    def _look_at(self, window: Window | None) -> None:
+        """Go on in another window, with a fluid at rest that no masks have been applied to; the map stays as it was."""
+        if window == self.window:
+            return
+        grid, self.window = self._cells_of(window), window
+        if window is None:
+            self.fluid = self._fluids[0]
+        else:
+            if window.detail not in self._fluids:
+                # Of those on windows one is kept, that of the brush in hand.
+                for detail in [detail for detail in self._fluids if detail]:
+                    self._fluids.pop(detail).release()
+                self._fluids[window.detail] = Fluid(self.device, grid)
+            self.fluid = self._fluids[window.detail]
+        if isinstance(self.fluid, Fluid):
+            self.fluid.lay_on(grid)
+        self.masks.forget_fluid()
+        self.warp.move_to(grid)
+
+    def _use_viscosity(self, base: float) -> None:
+        """Let the masks be painted over the recipe's layers on another base."""
+        self.masks.set_base(lambda grid: self._viscosity_on(base, grid))
+        self._viscosity_in_force = base
 
     def _apply_masks(self) -> None:
         self.masks.apply(self.fluid)
-        self.warp.hold(self.fluid.solid)
+        self.warp.hold(self.masks.frozen_field)
 
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
-        """The force fields and their impulses in this tick; sources go into the fluid's own."""
+        """The force fields and their impulses in this tick; sources go into the fluid's own, motions are kept."""
         start, pushes = self.tick * dt, []
+        self._motions.clear()
         for force in self.forces:
             impulse = force.law.impulse(start, start + dt, self)
             force.check(impulse, dt, start)
@@ -302,6 +366,8 @@ class Replay:
             if impulse and force.divergence is not None:
                 # The velocity that holds during this tick has to make all the room that the tick shall make.
                 self.fluid.add_source(force.divergence, impulse / dt)
+            if impulse and force.motion is not None:
+                self._motions.append((force.motion, impulse / dt))
         return pushes
 
     def _draw(self, stroke: Stroke, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
@@ -315,7 +381,7 @@ class Replay:
             case "push":
                 far, fluid = stroke.travelled(self.tick, self.grid.extent) / stroke.radius, self.settings
                 limit = strain_limit(whole, dt, far, fluid.drag, fluid.viscosity)
-                self._lead(Push(whole, dt, pressed, slip_factor(far), limit))
+                self._lead(Push(whole, dt, pressed, slip_factor(far), limit, stroke.local))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
@@ -349,6 +415,15 @@ class Replay:
             for motion in self._leading:
                 self._brush.make_up(self.fluid, motion, velocity, self.warp)
 
+    def _carry(self) -> None:
+        """Let what is local of brushes and forces carry the picture besides the fluid."""
+        with self.device.stage("brush"):
+            for motion in self._leading:
+                if isinstance(motion, Push):
+                    self._brush.carry(self.fluid, motion, self.warp)
+            for field, amount in self._motions:
+                self.fluid.add_local(field, amount)
+
     def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
         match stroke.tool:
             case "thicken":
@@ -373,17 +448,24 @@ class Replay:
         recipe, source = self.recipe, self.pictures.source
         self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
         fluid, warp = SOLVERS[recipe.fluid.solver]
+        self.window: Window | None = None
+        self._has_windows = may_have_windows(recipe)
         self.fluid = fluid(self.device, self.grid)
-        self.warp = warp(self.device, self.grid)
+        self._fluids = {0: self.fluid}  # by the detail of their windows
+        largest = self.device.limits.max_texture_size
+        fine = map_size(self.grid, (source.width, source.height), largest)
+        self.warp = warp(self.device, self.grid, fine)
         if recipe.map is not None:
             self._begin_with(recipe.map)
-        self.masks = Masks(self.device, self.grid)
+        canvas = Grid(max(fine[0], SMALLEST_GRID), max(fine[1], SMALLEST_GRID), self.grid.picture)
+        self.masks = Masks(self.device, canvas)
+        if recipe.freeze:
+            self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
-        self._frozen = solid(recipe.freeze, self.grid, self.pictures)
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
-        self._viscosity = cache(self._viscosity_over)
+        self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters()
 
     def _begin_with(self, name: str) -> None:
@@ -403,12 +485,22 @@ class Replay:
         colours, alpha = channels(self.pictures.source)
         return np.concatenate([colours, alpha[..., None]], axis=2)
 
-    def _viscosity_over(self, base: float) -> np.ndarray:
-        return viscosity(self.recipe.viscosity, base, self.grid, self.pictures)
+    def _viscosity_on(self, base: float, grid: Grid) -> np.ndarray | float:
+        """The recipe's viscosity on a grid; in a window, of cells as small over the whole picture those in it."""
+        if not self.recipe.viscosity:
+            return base
+        if grid.is_whole:
+            return self._viscosity(base, grid)
+        source = self.pictures.source
+        whole = Grid.for_picture(source.width, source.height, min(ceil(1 / min(grid.spacing)), FINEST))
+        x, y = grid.centres()
+        (hx, hy), last = whole.spacing, np.array(whole.size) - 1
+        column, row = np.minimum(x[0] // hx, last[0]).astype(int), np.minimum(y[:, 0] // hy, last[1]).astype(int)
+        return self._viscosity(base, whole)[np.ix_(row, column)]
 
     def _release_simulation(self) -> None:
-        fields = [field for force in self.forces for field in (force.faces, force.divergence)]
-        for thing in (self.fluid, self.warp, self.masks, self.density, *fields):
+        fields = [field for force in self.forces for field in (force.faces, force.divergence, force.motion)]
+        for thing in (*self._fluids.values(), self.warp, self.masks, self.density, *fields):
             if thing is not None:
                 thing.release()
 
@@ -418,13 +510,17 @@ class Replay:
         return {name: part for name, part in parts.items() if part is not None}
 
     def _save(self) -> Moment:
-        return Moment({name: part.save() for name, part in self._parts().items()})
+        states = {name: part.save() for name, part in self._parts().items()}
+        settings = {"viscosity": np.array(self._viscosity_in_force), "window": np.array(self.window or (), np.int64)}
+        return Moment(states | {"settings": State({}, settings)})
 
     def _restore(self, moment: Moment) -> None:
+        self._look_at(_window(moment.states["settings"].values["window"]))
         for name, part in self._parts().items():
             part.restore(moment.states[name])
-        # Which base the masks were painted over then is worked out anew.
-        self._viscosity_in_force = None
+        viscosity = float(moment.states["settings"].values["viscosity"])
+        if viscosity != self._viscosity_in_force:
+            self._use_viscosity(viscosity)
 
     def _load(self, checkpoint: Checkpoint | None) -> None:
         if checkpoint is None:
@@ -452,3 +548,17 @@ class Replay:
             *(change.tick for change in self.recipe.change),
         )
         return self.tick in events
+
+
+def _window(saved: np.ndarray) -> Window | None:
+    """The window that a state was saved in.
+
+    Raises:
+        ValueError: if it is none.
+    """
+    numbers = saved.tolist()
+    if not numbers:
+        return None
+    if saved.shape != (3,) or saved.dtype != np.int64 or not 0 < numbers[0] <= FINEST_DETAIL or min(numbers) < 0:
+        raise ValueError("it is of no window")
+    return Window(*numbers)

@@ -19,6 +19,7 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.strokes import Change, Stroke
 from app.tools import Gesture, Press, Tool, Touch
+from app.windows import detail_for
 from solver.gl.device import Device
 
 REST = 0.004  # longer sides a second: a pixel of a screen in four frames
@@ -154,7 +155,8 @@ class Session:
         self._tool, self._opposite = tool, press.opposite
         self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
         self.path = [self._touch[1:3]]
-        self._gesture = tool.gesture(replace(press, last=self.last_place), self._touch)
+        detail = detail_for(press.brush.radius, self._base, self._base.fluid_at(self._pen))
+        self._gesture = tool.gesture(replace(press, last=self.last_place, detail=detail), self._touch)
         self.replay.checkpoint()
         self._hear(next(self._gesture))
 

@@ -12,6 +12,7 @@ from app.schema import Fraction01, Model, Place, Radius, Several
 
 Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
 Tick = Annotated[int, Field(ge=0, le=10_000_000)]
+FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1 / 200 of such a cell
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
 
@@ -39,6 +40,9 @@ class Stroke(Model):
         hardness: 0 is a soft falloff, 1 a hard edge.
         strength: 1 carries along at the pointer's speed (push), or works at the tool's own rate.
         reverse: the tool's opposite: push against the drag, twirl anticlockwise.
+        detail: cells along the picture's longer side that the flow is solved with, in a window around the brush (see
+            `app.windows`); 0: on the grid of the whole picture.
+        local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 
     tool: Tool
@@ -46,6 +50,8 @@ class Stroke(Model):
     hardness: Fraction01 = 0.5
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0
     reverse: bool = False
+    detail: Annotated[int, Field(ge=0, le=FINEST_DETAIL)] = 0
+    local: Fraction01 = 0.0
     samples: Annotated[Several[Sample], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -126,7 +132,7 @@ class Stroke(Model):
         return last if last in following else last + 1
 
     def _head(self) -> tuple[object, ...]:
-        return self.tool, self.radius, self.hardness, self.strength, self.reverse
+        return self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.local
 
 
 class Change(Model):

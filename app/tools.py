@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from app.strokes import Stroke
 from app.strokes import Tool as StrokeTool
+from app.windows import FLOWING
 
 FASTEST = 2.0  # longer sides per second that a brush can follow
 LINE_SPEED = 0.8  # longer sides per second at which a stroke is drawn that was only clicked
@@ -27,11 +28,12 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True)
 class BrushSettings:
-    """A brush as the person sets it: radius in longer sides, hardness and strength 0-1."""
+    """A brush as the person sets it: radius in longer sides, the rest 0-1; see `Stroke`."""
 
     radius: float = 0.15
     hardness: float = 0.0
     strength: float = 1.0
+    local: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ class Press:
         extent: (width, height) of the picture, the longer of them 1.
         dt: seconds a tick.
         last: where the last stroke ended, for a straight line from there.
+        detail: how finely the flow of such a brush is solved; see `app.windows`.
     """
 
     brush: BrushSettings
@@ -51,6 +54,7 @@ class Press:
     extent: tuple[float, float]
     dt: float
     last: tuple[float, float] | None = None
+    detail: int = 0
 
 
 Gesture = Generator[Stroke | None, Touch | None, Stroke | None]
@@ -68,6 +72,7 @@ class Tool:
         gesture: from a press to its strokes; None for tools that move the view and not the picture.
         directions: what its two directions are called.
         masks: it paints a mask, which then is shown.
+        own: what of the brush is set for it alone.
     """
 
     name: str
@@ -77,6 +82,7 @@ class Tool:
     gesture: Callable[[Press, Touch], Gesture] | None = None
     directions: tuple[str, str] | None = None
     masks: bool = False
+    own: tuple[str, ...] = ()
 
 
 def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke:
@@ -87,6 +93,8 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> S
         hardness=brush.hardness,
         strength=brush.strength,
         reverse=reverse,
+        detail=press.detail if name in FLOWING else 0,
+        local=brush.local if name == "push" else 0.0,
         samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )
 
@@ -204,7 +212,8 @@ def _curve(press: Press, first: Touch) -> Gesture:
 
 
 TOOLS = (
-    Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against")),
+    Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
+         own=("local",)),
     Tool("curve", "Curve", "c", "Draw a path: the picture is blown along it", _curve, ("Forwards", "Backwards")),
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
     Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),

@@ -14,7 +14,7 @@ import numpy as np
 
 from app import ffmpeg
 from app.errors import UserError
-from app.inputs import read_start
+from app.inputs import open_input, read_start
 from app.pictures import MAX_PIXELS, check_size, lost
 from app.progress import never
 
@@ -34,6 +34,7 @@ class Clip:
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
     rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
+    pixel_format: ffmpeg's name of what it is stored in, such as yuv420p.
     note: what of it is lost, in a sentence; "" if nothing. file_size, inode: of the file when it was looked into.
     sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
     as a rule after its sound; 0 where an older ffmpeg does not tell. bits: 8, or 16 for what has more than 8.
@@ -48,6 +49,7 @@ class Clip:
     sound: str | None
     late: float
     bits: int
+    pixel_format: str
     alpha: bool
     decoder: tuple[str, ...]
     filters: str
@@ -106,7 +108,9 @@ class Clip:
 def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
     """Look into a video file; raises `UserError` when it is none."""
     file = Path(path)
-    told, seen = _banner(file), file.stat()
+    with open_input(file, "video") as stream:
+        seen = os.fstat(stream.fileno())  # before it is looked into: what is written after that is a change
+    told = _banner(file)
     video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
     if video is None:
         raise UserError(f"Cannot read {path}: it is no video, or damaged; give the name of a video.")
@@ -136,16 +140,17 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
         sound=_sound_codec(told),
         late=late,
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
+        pixel_format=pixel_format,
         alpha=alpha,
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
-        note=lost(file, _losses(told, video)),
+        note=lost(file, _losses(told, video, fps)),
         file_size=seen.st_size,
         inode=(seen.st_dev, seen.st_ino),
     )
 
 
-def _losses(told: str, video: str) -> list[str]:
+def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     """What of a clip is not understood, or not carried over, by ffmpeg's words about its first video stream."""
     found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
     words = [word.strip() for word in found[1].split(",")] if found else []
@@ -159,6 +164,10 @@ def _losses(told: str, video: str) -> list[str]:
             losses.append(f"its colours are {' '.join(NAMES.get(name, name) for name in odd)} and are taken for BT.709")
     if any(word.startswith(("top", "bottom")) for word in words):
         losses.append("it is interlaced, and its fields are taken for whole frames")
+    if rates := re.search(r", ([\d.]+) fps, ([\d.]+)(k?) tbr", video):  # on average, and of the shortest frames
+        times = float(rates[2]) * (1000 if rates[3] else 1) / float(rates[1])
+        if min(abs(times - 1), abs(times - 2)) > 0.02:  # 2: of fields
+            losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
     for kind, kept in (("Video", "picture tracks"), ("Audio", "sound tracks")):
         count = sum("attached pic" not in line for line in re.findall(rf"Stream #0.*: {kind}: .*", told))
         if count > 1:

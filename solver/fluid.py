@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,24 +30,31 @@ from solver.scheme import (
 )
 from solver.viscosity.solve import Viscosity
 
-# How far the rows of faces that are advected reach beyond the grid, columns and rows on either side.
-BEYOND = 1, 2
+Rows = tuple[Field, Field]  # of u and of v, four faces of a row a texel: see `depart.frag`
 
 
 @dataclass(frozen=True)
-class Departing:
-    """w1, as advection takes it: on MAC faces, and the same four faces of a row a texel (see `lay_rows.frag`)."""
+class Tracing:
+    """What drawing the trace takes: where to, and the defines and inputs of `trace.frag`."""
 
-    faces: Field
-    rows: tuple[Field, Field]
+    target: Field
+    defines: dict[str, Any]
+    inputs: dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Trace:
-    """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells."""
+class Flow:
+    """A flow on the faces of a grid: time, velocity, and half the last pressure gradient where that is known."""
 
-    field: Field
-    dt: float
+    time: float
+    velocity: Field
+    carried: Field | None = None
+
+    def release(self) -> None:
+        """Free the textures."""
+        for field in (self.velocity, self.carried):
+            if field is not None:
+                field.release()
 
 
 class Fluid(Scheme):
@@ -63,17 +71,15 @@ class Fluid(Scheme):
         self.velocity = device.double_field(grid.size, 2, "velocity")
         # Half the last pressure gradient, which the next step takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
-        rows = grid.nx + 2 * BEYOND[0], grid.ny + 2 * BEYOND[1]
-        self._departing = Departing(
-            device.field(grid.size, 2, "departing velocity"),
-            (device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")),
-        )
-        self._trace_field = device.field(grid.size, 2, "trace")
-        self._trace: Trace | None = None  # of the velocity as it is
-        blocks = -(-grid.nx // 2), -(-grid.ny // 2)
-        self._squares = device.field(blocks, 2, "energies")
-        self._sum_of_squares = Reduction(device, blocks, 2, "sum")
-        self._limited = PackedFaces(device, (blocks[0] + 2, blocks[1] + 2), "limited velocity")
+        rows = grid.nx // 2 + 3, grid.ny + 4
+        self._departing = device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")
+        self._trace = device.field(grid.size, 2, "trace")
+        self._traced: float | None = None  # the step that it is of; None if the velocity has changed since
+        packed = -(-grid.nx // 2) + 2, -(-grid.ny // 2) + 2
+        self._departed = device.field(packed, 1, "departed energy")
+        self._squares = device.field(packed, 2, "energies")
+        self._sum_of_squares = Reduction(device, packed, 2, "sum")
+        self._limited = PackedFaces(device, packed, "limited velocity")
         self._viscosity_solver = Viscosity(device, grid.size, grid.spacing)
         self._pressure_solver = Projection(device, grid.size, grid.spacing)
         # What the solvers hold of the masks; None if they have to look.
@@ -89,17 +95,18 @@ class Fluid(Scheme):
         See `Scheme.step`. Unconditionally stable: without forces the energy never grows (equation S6).
         """
         dt = check_step(dt)
+        self.local.clear()
         w1 = self._add_force(forces, dt)
         w2 = self._advect(w1, dt)
         w3 = self._diffuse(w2, dt)
         viscous_residual = self._viscous_residual(w3) if self.measuring else None
-        w3 = self._bound_energy(w1, w3)
+        w3 = self._bound_energy(w3)
         self._project(w3 if steer is None else self._steered(w3, steer))
         if self.measuring:
             self.residuals = replace(self.residuals, viscous_residual=viscous_residual)
         self.time += dt
 
-    def _add_force(self, forces: Forces, dt: float) -> Departing:
+    def _add_force(self, forces: Forces, dt: float) -> Rows:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn.
 
         g is half the last pressure gradient: with the projection, where the fluid arrives, pressure then acts along the
@@ -108,17 +115,13 @@ class Fluid(Scheme):
         schemes.
         """
         self._check_source()
-        fields = self._fields_of(forces, dt)
+        force = self._force(forces, dt)
         with self.device.stage("add force"):
-            departing = self._departing.faces
-            inputs: dict[str, Any] = {"velocity": self.velocity.read, "carried": self._carried.read}
-            for force, impulse in fields[:1]:
-                inputs |= {"force": force, "impulse": impulse}
-            self.device.pass_("step/add_force.frag", **({"FORCE": 1} if fields else {}))(departing, **inputs)
-            self._add_fields(departing, fields[1:])
-        return self._lay_rows(departing)
+            departing = self._depart(carried=self._carried.read, **force)
+        self.impulse.clear()
+        return departing
 
-    def _advect(self, departing: Departing, dt: float) -> PackedFaces:
+    def _advect(self, departing: Rows, dt: float) -> PackedFaces:
         """w2(x) = w1(x_d): second-order backtrace, cubic interpolation, each component from where it departs; and drag.
 
         Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has
@@ -129,7 +132,7 @@ class Fluid(Scheme):
         with self.device.stage("advect"):
             advected, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
             advect = self.device.pass_("step/advect.frag", **packing.defines)
-            advect(advected.fields, region=packing.region, rows_u=departing.rows[0], rows_v=departing.rows[1],
+            advect((*advected.fields, self._departed), region=packing.region, rows_u=departing[0], rows_v=departing[1],
                    trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
         return advected
 
@@ -140,7 +143,7 @@ class Fluid(Scheme):
         with self.device.stage("diffuse"):
             return self._viscosity_solver.solve()
 
-    def _bound_energy(self, departing: Departing, diffused: PackedFaces) -> PackedFaces:
+    def _bound_energy(self, diffused: PackedFaces) -> PackedFaces:
         """w3, made smaller where it has more energy than departed: advection moves energy and viscosity takes it.
 
         A semi-Lagrangian step reads some places more often than others and so may make energy; see equation (S6). Walls
@@ -151,13 +154,13 @@ class Fluid(Scheme):
         """
         with self.device.stage("diffuse"):
             energy = self.device.pass_("step/energy.frag")
-            energy(self._squares, **diffused.inputs(), departing=departing.faces)
+            energy(self._squares, **diffused.inputs(), departed=self._departed)
             after, before = self._sum_of_squares(self._squares).tolist()
             cells = self.grid.nx * self.grid.ny
-            if not before <= cells * LARGEST_SPEED**2:
+            if not (before <= cells * LARGEST_SPEED**2 and math.isfinite(after)):
                 self._forget_last_step()
                 raise ValueError("the forces and brushes of this step are beyond all measure")
-            moved = max(map(abs, self.params.walls.speed)) if self.params.walls.slip == "none" else 0.0
+            moved = max(map(abs, self.params.walls.drag))
             most = math.sqrt(before) + moved * math.sqrt(cells)
             if math.sqrt(after) <= most:
                 return diffused
@@ -189,27 +192,29 @@ class Fluid(Scheme):
                 packed=diffused,
             )
             self.source.clear()
-            self._trace = None
+            self._traced = None
         self.residuals = Residuals(before, self._divergence_norm(wanted))
 
     # -- its stages, each alone -------------------------------------------------------------------------------------
 
     def add_force(self, forces: Forces, dt: float) -> None:
         """Add forces, and what brushes have drawn, to the velocity; see `step`."""
-        self._add_fields(self.velocity.read, self._fields_of(forces, check_step(dt)))
-        self._trace = None
+        if force := self._force(forces, check_step(dt)):
+            self.device.pass_("step/add_impulse.frag")(self.velocity.read, add=True, **force)
+        self.impulse.clear()
+        self._traced = None
 
     def advect(self, dt: float) -> None:
         """Let the velocity carry itself for `dt` seconds; the result is not free of divergence."""
         dt = check_step(dt)
-        self._unpack(self._advect(self._lay_rows(self.velocity.read), dt))
+        self._unpack(self._advect(self._depart(), dt))
 
     def diffuse(self, dt: float) -> None:
         """Let viscosity act on the velocity for `dt` seconds; the result is not free of divergence."""
         self._take_up_masks(check_step(dt))
         with self.device.stage("diffuse"):
             self._viscosity_solver.diffuse(self.velocity)
-            self._trace = None
+            self._traced = None
 
     def project(self) -> None:
         """Make the velocity free of divergence, but for what brushes ask for."""
@@ -219,15 +224,30 @@ class Fluid(Scheme):
     def trace(self, dt: float) -> Field:
         """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells.
 
-        Valid until the velocity changes. The warp map and the next step both follow it.
+        Valid until the velocity changes. The next step follows it.
         """
-        if self._trace is None or self._trace.dt != dt:
-            hx, hy = self.grid.spacing
+        if self._traced != dt:
+            self._traced, tracing = dt, self._tracing(self.faces(), dt)
             with self.device.stage("trace"):
-                trace = self.device.pass_("step/trace.frag", **self._wall_defines())
-                trace(self._trace_field, velocity=self.faces(), cells_a_speed=(dt / hx, dt / hy), **self._wall_inputs())
-            self._trace = Trace(self._trace_field, dt)
-        return self._trace.field
+                self.device.pass_("step/trace.frag", **tracing.defines)(tracing.target, **tracing.inputs)
+        return self._trace
+
+    def begin_trace(self, dt: float) -> Tracing | None:
+        """The trace of what carries the picture, for whoever then draws it beside something else; None if it is `trace`
+        and that is there already.
+        """
+        if not self.local.is_empty:
+            self._traced = None  # what is drawn is not the fluid's own
+            return self._tracing(self.carrier(), dt)
+        if self._traced == dt:
+            return None
+        self._traced = dt
+        return self._tracing(self.faces(), dt)
+
+    def _tracing(self, velocity: Field, dt: float) -> Tracing:
+        hx, hy = self.grid.spacing
+        inputs = {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **self._wall_inputs()}
+        return Tracing(self._trace, self._wall_defines(), inputs)
 
     # -- what is put in ---------------------------------------------------------------------------------------------
 
@@ -254,6 +274,49 @@ class Fluid(Scheme):
         self._coefficients_of = None
         self._has_new_solids = True
 
+    # -- on another grid of the picture ------------------------------------------------------------------------------
+
+    def lay_on(self, grid: Grid) -> None:
+        """Go on at rest with the same cells elsewhere in the picture; viscosity and solid cells are to be set anew.
+
+        Raises:
+            ValueError: if there are not as many, or they are larger or smaller.
+        """
+        if grid.size != self.grid.size or not np.allclose(grid.spacing, self.grid.spacing, rtol=1e-6):
+            raise ValueError(f"a fluid of {self.grid} cannot be laid on {grid}")
+        self.grid = grid
+        self.clear_velocity()
+        self.masks_changed()
+
+    def flow_on(self, grid: Grid) -> Flow:
+        """The flow on the faces of another grid of the same picture, which the caller releases; see `go_on_with`.
+
+        Where that is the same cells, moved by whole ones, it is the same to the bit, and else a mean over each face, so
+        that as much flows through it. Outside the fluid's own grid all is at rest.
+        """
+        step = np.divide(grid.spacing, self.grid.spacing)
+        origin = np.subtract(grid.origin, self.grid.origin) / self.grid.spacing
+        is_moved = bool(np.allclose(step, 1.0, rtol=0.0, atol=1e-6))
+        if is_moved:
+            step, origin = np.ones(2), np.round(origin)
+        inputs: dict[str, Any] = {"origin": tuple(origin.tolist()), "step": tuple(step.tolist())}
+        inputs |= {"samples": tuple(np.maximum(np.ceil(step), 1.0).tolist()), **self._wall_inputs()}
+        carry_over, fields = self.device.pass_("step/carry_over.frag", **self._wall_defines()), []
+        for live in (self.velocity.read, self._carried.read)[: 2 if is_moved else 1]:
+            fields.append(self.device.field(grid.size, 2, f"{live.label}, carried over"))
+            carry_over(fields[-1], velocity=live, **inputs)
+        return Flow(self.time, *fields)
+
+    def go_on_with(self, flow: Flow) -> None:
+        """Take over a flow on this grid, from `flow_on`, made free of divergence between its walls and solids."""
+        self.velocity.read.copy_from(flow.velocity)
+        self._forget_last_step()
+        self.project()
+        if flow.carried is not None:
+            self._carried.read.copy_from(flow.carried)
+        self._pressure_solver.forget()
+        self.time = flow.time
+
     # -- what is read out -------------------------------------------------------------------------------------------
 
     def faces(self) -> Field:
@@ -274,11 +337,11 @@ class Fluid(Scheme):
 
     def restore(self, state: State) -> None:
         super().restore(state)
-        self._trace = None
+        self._traced = None
 
     def release(self) -> None:
         super().release()
-        for item in (self.velocity, self._carried, self._departing.faces, *self._departing.rows, self._trace_field):
+        for item in (self.velocity, self._carried, *self._departing, self._trace, self._departed):
             item.release()
         for item in (self._squares, self._sum_of_squares, self._limited, self._viscosity_solver, self._pressure_solver):
             item.release()
@@ -291,40 +354,43 @@ class Fluid(Scheme):
 
     # -- parts of the stages ----------------------------------------------------------------------------------------
 
-    def _fields_of(self, forces: Forces, dt: float) -> list[tuple[Field, float]]:
-        """All that acts in a step as fields with their impulses; arrays and functions go where brushes draw."""
+    def _force(self, forces: Forces, dt: float) -> dict[str, Any]:
+        """All that acts in a step as one `force` and its `impulse`, empty if nothing does.
+
+        More than one are added up where brushes draw.
+        """
         fields, faces = self._acting(forces, dt)
-        if faces is not None:
-            upload = self.device.upload(faces, "force")
+        upload = None if faces is None else self.device.upload(faces, "force")
+        if upload:
+            fields.append((upload, 1.0))
+        if upload or len(fields) > 1 or not self.impulse.is_empty:
             add = self.device.pass_("step/add_impulse.frag")
-            self.impulse.add(lambda target: add(target, add=True, force=upload, impulse=1.0))
+            for force, impulse in fields:
+                self.impulse.add(partial(add, add=True, force=force, impulse=impulse))
+            fields = [(self.impulse.field, 1.0)]
+        if upload:
             upload.release()
-        return fields if self.impulse.is_empty else [*fields, (self.impulse.field, 1.0)]
+        return {"force": fields[0][0], "impulse": fields[0][1]} if fields else {}
 
-    def _add_fields(self, target: Field, fields: list[tuple[Field, float]]) -> None:
-        add = self.device.pass_("step/add_impulse.frag")
-        for force, impulse in fields:
-            add(target, add=True, force=force, impulse=impulse)
-        self.impulse.clear()
-
-    def _lay_rows(self, faces: Field) -> Departing:
-        with self.device.stage("advect"):
-            rows = self._departing.rows
-            width, height = rows[0].size
-            # A texel holds the faces from one before its own to two behind.
-            left, right, above = BEYOND[0] + 1, BEYOND[0] + 2, BEYOND[1]
-            inside = (left, above, width - left - right, height - 2 * above)
-            around = [(0, 0, width, above), (0, height - above, width, above)]
-            around += [(0, above, left, height - 2 * above), (width - right, above, right, height - 2 * above)]
-            self.device.pass_("step/lay_rows.frag")(rows, region=inside, velocity=faces)
-            edges = self.device.pass_("step/lay_rows.frag", EDGES=1, **self._wall_defines())
-            edges(rows, region=around, velocity=faces, **self._wall_inputs())
-            return Departing(faces, rows)
+    def _depart(self, **parts: Any) -> Rows:
+        """The velocity, less what is `carried` and with a `force`, if they are given, as advection reads it."""
+        rows, (nx, ny) = self._departing, self.grid.size
+        width, height = rows[0].size
+        # Texels whose faces are all inside: none beyond a wall or on it.
+        left, right, above, below = 2, (nx + 1) // 2, 3, ny + 2
+        inside = (left, above, right - left, below - above)
+        around = [(0, 0, width, above), (0, below, width, height - below)]
+        around += [(0, above, left, below - above), (right, above, width - right, below - above)]
+        given = {name.upper(): 1 for name in parts if name != "impulse"}
+        self.device.pass_("step/depart.frag", **given)(rows, region=inside, velocity=self.velocity.read, **parts)
+        edges = self.device.pass_("step/depart.frag", EDGES=1, **given, **self._wall_defines())
+        edges(rows, region=around, velocity=self.velocity.read, **parts, **self._wall_inputs())
+        return rows
 
     def _unpack(self, faces: PackedFaces) -> None:
         """Let packed faces be the velocity."""
         self._viscosity_solver.unpack(faces, self.velocity.read)
-        self._trace = None
+        self._traced = None
 
     def _check_source(self) -> None:
         if self.source.is_empty:
@@ -341,7 +407,7 @@ class Fluid(Scheme):
 
     def _forget_last_step(self) -> None:
         self.impulse.clear()
-        self._trace = None
+        self._traced = None
         self._carried.read.clear()
         self._viscosity_solver.forget()
         self._pressure_solver.forget()

@@ -1,4 +1,4 @@
-"""The simulation's grid: cells over a picture whose longer side is 1."""
+"""The simulation's grid: cells over a picture whose longer side is 1, or over a window of it."""
 
 from __future__ import annotations
 
@@ -8,31 +8,50 @@ from math import ceil
 import numpy as np
 
 SMALLEST_GRID = 8
+ROUNDING = 1e-9  # longer sides
 MOST_ALONG = 4096  # cells that a narrow picture gets along it: twice as many texels of the map a GL must have
 
 
 @dataclass(frozen=True)
 class Grid:
-    """`nx x ny` cells over a picture whose longer side is 1; x to the right, y down, row 0 on top.
+    """`nx x ny` cells over a picture whose longer side is 1, or a window of it; x to the right, y down, row 0 on top.
 
     Attributes:
         nx, ny: whole cells along the width and the height, each from 8.
-        extent: (width, height) of the picture, the longer of them 1; by default that of square cells. The cells divide
-            it evenly, so that they are a little wider or narrower than high where it is no whole number of squares.
+        extent: (width, height) of what they cover, in longer sides of the picture; by default that of square cells. The
+            cells divide it evenly, so that they are a little wider or narrower than high where it is no whole number of
+            squares.
+        origin: the top left corner of what they cover.
+        picture: (width, height) of the picture, the longer of them 1; by default the cells cover all of it.
+
+    Raises:
+        ValueError: on fewer cells, a picture whose longer side is not 1, or a window that reaches beyond it.
     """
 
     nx: int
     ny: int
     extent: tuple[float, float] = (0.0, 0.0)
+    origin: tuple[float, float] = (0.0, 0.0)
+    picture: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if min(self.nx, self.ny) < SMALLEST_GRID:
-            raise ValueError(f"a grid of {self.nx} x {self.ny} is below {SMALLEST_GRID} x {SMALLEST_GRID}")
+        if min(self.nx, self.ny) < SMALLEST_GRID or self.nx != int(self.nx) or self.ny != int(self.ny):
+            raise ValueError(
+                f"a grid of {self.nx} x {self.ny} is none of whole cells, or below {SMALLEST_GRID} x {SMALLEST_GRID}"
+            )
         if self.extent == (0.0, 0.0):
             longer = max(self.nx, self.ny)
             object.__setattr__(self, "extent", (self.nx / longer, self.ny / longer))
-        if not (max(self.extent) == 1.0 and min(self.extent) > 0.0):
-            raise ValueError(f"a picture of {self.extent} longer sides: the longer must be 1, the other above 0")
+        if self.picture == (0.0, 0.0):
+            object.__setattr__(self, "picture", self.extent)
+        if not (all(0.0 < side <= 1.0 for side in self.picture) and max(self.picture) == 1.0):
+            raise ValueError(f"a picture of {self.picture} longer sides: the longer must be 1, the other above 0")
+        within = (
+            start >= 0.0 < side and start + side <= whole + ROUNDING
+            for start, side, whole in zip(self.origin, self.extent, self.picture, strict=True)
+        )
+        if not all(within):
+            raise ValueError(f"a window of {self.extent} at {self.origin} is not within a picture of {self.picture}")
 
     @classmethod
     def for_picture(cls, width: int, height: int, cells: int) -> Grid:
@@ -42,13 +61,26 @@ class Grid:
         narrow that it would have fewer than 8 of them there gets more along it instead, up to `MOST_ALONG`.
         """
         longer, shorter = max(width, height), min(width, height)
+        if not min(shorter, cells) >= 1:
+            raise ValueError(f"{cells} cells along a picture of {width} x {height} pixels were asked for")
         along = max(cells, min(ceil(SMALLEST_GRID * longer / shorter), MOST_ALONG))
         nx, ny = (max(SMALLEST_GRID, round(along * side / longer)) for side in (width, height))
         return cls(nx, ny, (width / longer, height / longer))
 
     def refined(self, times: int) -> Grid:
         """The grid with so many cells for each of these, both ways."""
-        return Grid(self.nx * times, self.ny * times, self.extent)
+        return Grid(self.nx * times, self.ny * times, self.extent, self.origin, self.picture)
+
+    @property
+    def is_whole(self) -> bool:
+        """True if the cells cover the whole picture."""
+        return self.origin == (0.0, 0.0) and self.extent == self.picture
+
+    @property
+    def at_edge(self) -> tuple[bool, bool, bool, bool]:
+        """Whether the left, right, top and bottom sides lie on the picture's own edges."""
+        (left, top), (width, height), (right, bottom) = self.origin, self.extent, self.picture
+        return left == 0.0, left + width >= right - ROUNDING, top == 0.0, top + height >= bottom - ROUNDING
 
     @property
     def size(self) -> tuple[int, int]:
@@ -66,7 +98,7 @@ class Grid:
         return max(self.spacing)
 
     def centres(self) -> tuple[np.ndarray, np.ndarray]:
-        """x and y of the cell centres, float64, each (ny, nx)."""
+        """x and y of the cell centres in the picture, float64, each (ny, nx)."""
         return self._points(0.5, 0.5)
 
     def u_faces(self) -> tuple[np.ndarray, np.ndarray]:
@@ -82,6 +114,6 @@ class Grid:
         return self._points(0.0, 0.0)
 
     def _points(self, dx: float, dy: float) -> tuple[np.ndarray, np.ndarray]:
-        (width, height), (nx, ny) = self.extent, self.size
-        x, y = np.meshgrid((np.arange(nx) + dx) / nx * width, (np.arange(ny) + dy) / ny * height)
+        (left, top), (width, height), (nx, ny) = self.origin, self.extent, self.size
+        x, y = np.meshgrid(left + (np.arange(nx) + dx) / nx * width, top + (np.arange(ny) + dy) / ny * height)
         return x, y

@@ -3,20 +3,71 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from math import inf
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    from solver.grid import Grid
+
+
+class NoSlip(NamedTuple):
+    """Where fluid sticks: at the left, right, top and bottom sides of the grid, and at solid cells."""
+
+    left: bool
+    right: bool
+    top: bool
+    bottom: bool
+    solids: bool
+
+
+# Longer sides per second, and as much for what is put in: the solvers multiply sums of squares over the grid, which
+# then stay below float32's 3e38.
+LARGEST_SPEED = 1e6
 
 
 @dataclass(frozen=True)
 class Walls:
-    """What the fluid does at the edges of the picture and at frozen cells.
+    """What the fluid does at the sides of the grid and at frozen cells.
 
     Attributes:
         slip: "free" glides along walls, "none" sticks to them.
-        speed: tangential velocity of the left, right, top and bottom wall, for `slip="none"` (a moving lid).
+        speed: tangential velocity of the left, right, top and bottom wall, where it sticks (a moving lid).
+        sticky: sides (left, right, top, bottom) that it sticks to whatever `slip` is, as those of a window do which are
+            not the picture's edge.
+
+    Raises:
+        ValueError: for another slip, or speeds that are not four finite ones, none beyond all measure.
     """
 
     slip: Literal["free", "none"] = "free"
     speed: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    sticky: tuple[bool, bool, bool, bool] = (False, False, False, False)
+
+    @classmethod
+    def of(cls, slip: Literal["free", "none"], grid: Grid) -> Walls:
+        """Those of a grid: this `slip` at the edges of the picture, and all other sides stick."""
+        left, right, top, bottom = grid.at_edge
+        return cls(slip, sticky=(not left, not right, not top, not bottom))
+
+    @property
+    def no_slip(self) -> NoSlip:
+        """Where it sticks."""
+        everywhere = self.slip == "none"
+        left, right, top, bottom = (everywhere or side for side in self.sticky)
+        return NoSlip(left, right, top, bottom, everywhere)
+
+    @property
+    def drag(self) -> tuple[float, ...]:
+        """The speeds of the walls that it sticks to, 0 for the others."""
+        return tuple(speed if sticks else 0.0 for speed, sticks in zip(self.speed, self.no_slip, strict=False))
+
+    def __post_init__(self) -> None:
+        if self.slip not in ("free", "none"):
+            raise ValueError(f'walls of slip {self.slip!r} were asked for; it must be "free" or "none"')
+        if len(self.speed) != 4 or not all(abs(speed) <= LARGEST_SPEED for speed in self.speed):
+            raise ValueError(
+                f"walls of the speeds {self.speed} were asked for; there must be four, to {LARGEST_SPEED:g}"
+            )
 
 
 @dataclass(frozen=True)
@@ -28,9 +79,19 @@ class FluidParams:
         drag: rate at which all motion dies away, per second; 0 is the paper's fluid.
         pressure_cycles: multigrid cycles of the projection; None: as many as leave a thousandth of the divergence.
         sweeps: Jacobi sweeps of the paper's own scheme (solver "paper"), for viscosity and for pressure each.
+
+    Raises:
+        ValueError: for a drag that is negative or not finite, or numbers of cycles or sweeps that are none.
     """
 
     walls: Walls = Walls()
     drag: float = 0.0
     pressure_cycles: int | None = None
     sweeps: int = 40
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.drag < inf:
+            raise ValueError(f"a drag of {self.drag} was asked for; it must be finite and not negative")
+        for what, count in (("pressure cycles", self.pressure_cycles), ("sweeps", self.sweeps)):
+            if count is not None and not (count == int(count) and count >= 1):
+                raise ValueError(f"{count} {what} were asked for; it must be a whole number from 1")

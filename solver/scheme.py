@@ -5,18 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.tiled import SavedTiles, TiledField
 from solver.grid import Grid
-from solver.params import FluidParams
+from solver.params import LARGEST_SPEED, FluidParams
 
-# Longer sides per second, and as much for what is put in: the solvers multiply sums of squares over the grid, which
-# then stay below float32's 3e38. Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below it too.
-LARGEST_SPEED = 1e6
+# Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below what float32 holds.
 LONGEST_STEP = 1e4
 LARGEST_VISCOSITY = 1e6
 
@@ -62,19 +61,25 @@ class State:
     Attributes:
         fields: the textures by name.
         values: what is no texture, by name.
+        tiles: what is saved of tiled fields, by name.
     """
 
     fields: dict[str, Field]
     values: dict[str, np.ndarray] = field(default_factory=dict)
+    tiles: dict[str, SavedTiles] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, device: Device, fields: Mapping[str, Field], **values: object) -> State:
+    def of(cls, device: Device, fields: Mapping[str, Field], **values: object) -> Self:
         """Copy `fields` and `values`; a value that is None is left out."""
-        copies = {}
+        copies, tiles = dict[str, Field](), dict[str, SavedTiles]()
         for name, live in fields.items():
-            copies[name] = device.field(live.size, live.components, f"{live.label}, saved", live.dtype)
-            copies[name].copy_from(live)
-        return cls(copies, {name: np.array(value) for name, value in values.items() if value is not None})
+            if isinstance(live, TiledField):
+                tiles[name] = live.save()
+            else:
+                copies[name] = device.field(live.size, live.components, f"{live.label}, saved", live.dtype)
+                copies[name].copy_from(live)
+        given = {name: np.array(value) for name, value in values.items() if value is not None}
+        return cls(copies, given, tiles)
 
     def write_to(self, fields: Mapping[str, Field]) -> None:
         """Copy the saved textures back into the live ones of the same names.
@@ -82,41 +87,60 @@ class State:
         Raises:
             ValueError: if they are those of something else.
         """
-        kinds = [
-            {name: (item.size, item.components, item.dtype) for name, item in some.items()}
-            for some in (self.fields, fields)
-        ]
-        if kinds[0] != kinds[1]:
+        saved = {name: (item.size, item.components, item.dtype) for name, item in self.fields.items()}
+        saved |= {name: item.kind for name, item in self.tiles.items()}
+        kinds = {
+            name: item.kind if isinstance(item, TiledField) else (item.size, item.components, item.dtype)
+            for name, item in fields.items()
+        }
+        if saved != kinds:
             raise ValueError("the state is of another grid or of another scheme")
-        for name, saved in self.fields.items():
-            fields[name].copy_from(saved)
+        for name, live in fields.items():
+            if isinstance(live, TiledField):
+                live.restore(self.tiles[name])
+            else:
+                live.copy_from(self.fields[name])
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Everything in it by name, off the GPU."""
-        return {name: saved.get() for name, saved in self.fields.items()} | self.values
+        """Everything in it by name, off the GPU; of tiled fields what is not zero."""
+        tiles = {f"{name}/{part}": a for name, item in self.tiles.items() for part, a in item.arrays().items()}
+        return {name: saved.get() for name, saved in self.fields.items()} | tiles | self.values
 
-    def with_arrays(self, arrays: Mapping[str, np.ndarray]) -> State:
-        """This state with its textures filled from what `arrays()` gave.
+    def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> State:
+        """A state like this one that holds what `arrays()` gave.
 
         Raises:
             ValueError: if those were of something else.
         """
-        for name, saved in self.fields.items():
-            given = arrays.get(name)
-            now = saved.get()
-            if given is None or (given.shape, given.dtype) != (now.shape, now.dtype):
-                raise ValueError(f"its {name} is missing or of another size")
-            saved.set(given)
-        return State(self.fields, {name: array for name, array in arrays.items() if name not in self.fields})
+        rest, fields, tiles = dict(arrays), dict[str, Field](), dict[str, SavedTiles]()
+        made = State(fields, rest, tiles)
+        try:
+            for name, saved in self.fields.items():
+                given, now = rest.pop(name, None), saved.get()
+                if given is None or (given.shape, given.dtype) != (now.shape, now.dtype):
+                    raise ValueError(f"its {name} is missing or of another size")
+                fields[name] = device.upload(given, f"{saved.label}, given", saved.dtype)
+            for name, saved in self.tiles.items():
+                parts = {key.removeprefix(f"{name}/"): rest.pop(key) for key in arrays if key.startswith(f"{name}/")}
+                tiles[name] = saved.with_arrays(device, parts)
+        except ValueError:
+            made.release()
+            raise
+        return made
+
+    @property
+    def textures(self) -> list[Field]:
+        """The textures that it holds, alone or, of tiled fields, together with other states."""
+        return [*self.fields.values(), *(texture for saved in self.tiles.values() for texture in saved.textures)]
 
     @property
     def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(saved.nbytes for saved in self.fields.values())
+        """Bytes of texture memory, with all that it shares."""
+        return sum(texture.nbytes for texture in self.textures)
 
     def release(self) -> None:
-        """Free the textures."""
-        for saved in self.fields.values():
+        """Free the textures that no other state holds."""
+        for saved in (*self.fields.values(), *self.tiles.values()):
             saved.release()
 
 
@@ -158,6 +182,7 @@ class Scheme(ABC):
         viscosity, solid: at cells, lengths^2 / s, and 1 for solid; call `masks_changed` after drawing into them.
         impulse: what brushes have drawn on MAC faces for the next step, lengths / s.
         source: the divergence that the next projection shall leave, at cells, 1 / s: bloat, or pinch.
+        local: a motion on MAC faces, lengths / s, that carries the picture until the next step and not the fluid.
         measuring: let every step leave its `residuals`; it changes no result, and is slow.
     """
 
@@ -170,6 +195,8 @@ class Scheme(ABC):
         self.solid = device.field(grid.size, 1, "solid", "f1")
         self.impulse = Gathered(device, grid.size, 2, "impulse")
         self.source = Gathered(device, grid.size, 1, "divergence source")
+        self.local = Gathered(device, grid.size, 2, "local motion")
+        self._carrier = device.field(grid.size, 2, "what carries the picture")
         self.measuring = False
         self.residuals = Residuals()
 
@@ -222,8 +249,8 @@ class Scheme(ABC):
         """
         array = np.asarray(solid)
         check_shape("solid cells", array, (self.grid.ny, self.grid.nx))
-        if np.isnan(array).any():
-            raise ValueError("solid cells must be true or false, not NaN")
+        if array.dtype.kind not in "fiub" or np.isnan(array).any():
+            raise ValueError("solid cells must be true or false, or numbers")
         self.solid.set(np.where(array, 255, 0).astype(np.uint8))
         self.masks_changed()
 
@@ -233,15 +260,32 @@ class Scheme(ABC):
 
     def add_source(self, source: Field, amount: float = 1.0) -> None:
         """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
+        if source.size != self.grid.size or source.components != 1:
+            raise ValueError(f"a source is {source}, {self.grid.nx} x {self.grid.ny} x 1 is wanted")
         check_finite("an amount of a source", amount)
         add = self.device.pass_("step/add_source.frag")
         self.source.add(lambda field: add(field, add=True, source=source, amount=amount))
+
+    def add_local(self, motion: Field, amount: float = 1.0) -> None:
+        """Let `amount` times `motion` (MAC faces, lengths / s) carry the picture until the next step; see `local`."""
+        check_finite("an amount of a motion", amount)
+        add = self.device.pass_("step/add_impulse.frag")
+        self.local.add(lambda field: add(field, add=True, force=motion, impulse=amount))
 
     # -- what is read out -------------------------------------------------------------------------------------------
 
     @abstractmethod
     def faces(self) -> Field:
-        """The velocity on MAC faces, as the warp map, the overlays and the density take it."""
+        """The fluid's velocity on MAC faces."""
+
+    def carrier(self) -> Field:
+        """What carries the picture, a velocity on MAC faces: the fluid's, and `local` but on the faces of solids."""
+        faces = self.faces()
+        if self.local.is_empty:
+            return faces
+        carry = self.device.pass_("step/carry.frag")
+        carry(self._carrier, velocity=faces, local=self.local.field, solid=self.solid)
+        return self._carrier
 
     @abstractmethod
     def velocity_at_centres(self) -> np.ndarray:
@@ -269,10 +313,10 @@ class Scheme(ABC):
         """dv/dx - du/dy at the cells' corners, (ny + 1, nx + 1) float32, 1 / s, positive clockwise on the screen."""
         hx, hy = self.grid.spacing
         u, v = np.pad(self.u, ((1, 1), (0, 0)), mode="edge"), np.pad(self.v, ((0, 0), (1, 1)), mode="edge")
-        if self.params.walls.slip == "none":
-            left, right, top, bottom = self.params.walls.speed
-            u[0], u[-1] = 2 * top - u[0], 2 * bottom - u[-1]
-            v[:, 0], v[:, -1] = 2 * left - v[:, 0], 2 * right - v[:, -1]
+        beyond = v[:, 0], v[:, -1], u[0], u[-1]
+        for image, sticks, speed in zip(beyond, self.params.walls.no_slip, self.params.walls.speed, strict=False):
+            if sticks:
+                image[:] = 2 * speed - image
         return np.diff(v, axis=1) / np.float32(hx) - np.diff(u, axis=0) / np.float32(hy)
 
     def stream_function(self) -> np.ndarray:
@@ -310,6 +354,7 @@ class Scheme(ABC):
         self.time = float(state.values["time"])
         self.impulse.clear()
         self.source.clear()
+        self.local.clear()
         self.masks_changed()
 
     @abstractmethod
@@ -318,7 +363,7 @@ class Scheme(ABC):
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self.viscosity, self.solid, self.impulse, self.source):
+        for item in (self.viscosity, self.solid, self.impulse, self.source, self.local, self._carrier):
             item.release()
 
     def __repr__(self) -> str:
@@ -348,10 +393,13 @@ class Scheme(ABC):
         return fields, total
 
     def _wall_defines(self) -> dict[str, Any]:
-        return {"NO_SLIP": 1} if self.params.walls.slip == "none" else {}
+        return {"NO_SLIP": 1} if any(self.params.walls.no_slip) else {}
 
     def _wall_inputs(self) -> dict[str, Any]:
-        return {"wall_speed": self.params.walls.speed} if self.params.walls.slip == "none" else {}
+        walls = self.params.walls
+        if not any(walls.no_slip):
+            return {}
+        return {"wall_speed": walls.speed, "wall_image": tuple(-1.0 if side else 1.0 for side in walls.no_slip[:4])}
 
 
 def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.ndarray:
@@ -361,11 +409,15 @@ def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.nda
         ValueError: on another shape or a value that is not finite.
     """
     if callable(vector):
-        parts = [vector(*points, time)[axis] for axis, points in enumerate((grid.u_faces(), grid.v_faces()))]
+        both = vector(*grid.u_faces(), time), vector(*grid.v_faces(), time)
+        if {len(parts) for parts in both} != {2}:
+            raise ValueError(f"{what} has two components, and the function gave {len(both[0])}")
         shape = grid.ny, grid.nx
-        array = np.stack([np.broadcast_to(np.asarray(part, np.float64), shape) for part in parts], axis=-1)
+        array = np.stack([np.broadcast_to(parts[axis], shape) for axis, parts in enumerate(both)], axis=-1)
     else:
         array = np.asarray(vector)
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{what} is of {array.dtype}, real numbers are wanted")
     check_shape(what, array, (grid.ny, grid.nx, 2))
     if not np.isfinite(array).all():
         raise ValueError(f"{what} holds a value that is not finite")

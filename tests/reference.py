@@ -18,18 +18,16 @@ PAD = 4
 
 
 def padded_faces(
-    faces: Faces, no_slip: bool = False, speed: tuple[float, ...] = (0, 0, 0, 0)
+    faces: Faces, no_slip: tuple[bool, ...] = (False,) * 5, speed: tuple[float, ...] = (0, 0, 0, 0)
 ) -> tuple[np.ndarray, ...]:
     """u and v with PAD ghost faces on every side, from (ny, nx, 2): the normal component zero on walls and odd beyond,
-    the tangential one even, or 2 U minus its image."""
+    the tangential one even, or 2 U minus its image where the left, right, top or bottom is `no_slip`."""
     u, v = (np.array(faces[..., axis], np.float64) for axis in (0, 1))
     u = np.pad(u[:, 1:], ((PAD, PAD), (0, 0)), mode="symmetric")
     v = np.pad(v[1:], ((0, 0), (PAD, PAD)), mode="symmetric")
-    if no_slip:
-        u[:PAD] = 2 * speed[2] - u[:PAD]
-        u[-PAD:] = 2 * speed[3] - u[-PAD:]
-        v[:, :PAD] = 2 * speed[0] - v[:, :PAD]
-        v[:, -PAD:] = 2 * speed[1] - v[:, -PAD:]
+    for beyond, sticks, wall in zip((v[:, :PAD], v[:, -PAD:], u[:PAD], u[-PAD:]), no_slip, speed, strict=False):
+        if sticks:
+            beyond[:] = 2 * wall - beyond
     # The walls' faces are added as zeros, and what is beyond them mirrored with the other sign.
     u = np.pad(np.pad(u, ((0, 0), (1, 1))), ((0, 0), (PAD, PAD)), mode="reflect", reflect_type="odd")
     v = np.pad(np.pad(v, ((1, 1), (0, 0))), ((PAD, PAD), (0, 0)), mode="reflect", reflect_type="odd")
@@ -250,12 +248,12 @@ def viscous_system(
     dt: float,
     h: float | tuple[float, float],
     solid: np.ndarray | None = None,
-    no_slip: bool = False,
+    no_slip: tuple[bool, ...] = (False,) * 5,
     speed: tuple[float, ...] = (0, 0, 0, 0),
 ) -> tuple[sparse.csc_matrix, np.ndarray, np.ndarray]:
     """(I - dt div mu (grad + grad^T)) on MAC faces as a sparse matrix over (u, v) of (ny, nx) each; what moving walls
     (left, right, top, bottom) add to the right-hand side; and which faces are free, the others being zero.
-    `h` is the side of a cell, or (hx, hy)."""
+    `h` is the side of a cell, or (hx, hy); `no_slip` is said of the same walls, and of solid cells."""
     ny, nx = viscosity.shape
     hx, hy = h if isinstance(h, tuple) else (h, h)
     fluid = np.pad(~(np.zeros((ny, nx), bool) if solid is None else np.asarray(solid, bool)), 1)
@@ -276,7 +274,8 @@ def viscous_system(
         for i in range(1, nx + 2):
             around = [(j - 1, i - 1), (j - 1, i), (j, i - 1), (j, i)]
             wet = [cell for cell in around if fluid[cell]]
-            if not wet or (len(wet) < 4 and not no_slip):
+            sides = [side for side, at in zip(no_slip, (i == 1, i == nx + 1, j == 1, j == ny + 1), strict=False) if at]
+            if not wet or (len(wet) < 4 and not (any(sides) if sides else no_slip[4])):
                 continue
             node = len(wet) / sum(1 / mu[cell] for cell in wet)
             strain, moving = {u[j, i]: 1 / hy, u[j - 1, i]: -1 / hy, v[j, i]: 1 / hx, v[j, i - 1]: -1 / hx}, 0.0

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from app import animation, ffmpeg, files
+from app import animation, ffmpeg, files, video
 from app.animation import (
     animation_writer,
     check_animation,
@@ -637,6 +637,54 @@ def test_further_tracks_of_a_clip_are_told(tmp_path: Path):
     tracks = ["-map", "0:v", "-map", "1:a", "-map", "1:a", "-map", "2:s", "-c:v", "ffv1"]
     clip = read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", *inputs, *tracks))
     assert clip.note == "a.mkv: of its 2 sound tracks the first is taken; its subtitles are not kept"
+
+
+def test_a_rate_that_varies_is_told(tmp_path: Path):
+    slower = "setpts='if(lt(N,10),N/25,10/25+(N-10)/10)/TB'"
+    path = generate(
+        tmp_path / "a.mp4", "testsrc=s=64x48:r=25:d=1", "-vf", f"{slower},format=yuv420p", "-fps_mode", "vfr"
+    )
+    assert read_clip(path).note == "a.mp4: its frames come at a rate that varies, and become 25 a second"
+    for rate in ("24000/1001", "25", "30000/1001", "60", "12.5"):
+        assert read_clip(generate(path, f"testsrc=s=64x48:r={rate}:d=2", "-vf", "format=yuv420p")).note == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "ending", "codec", "told"),
+    [
+        ("yuv420p", ".mp4", None, ""),
+        ("yuv420p10le", ".mp4", None, "its 10 bits a channel become 8"),
+        ("yuv420p10le", ".webm", "av1", ""),
+        ("yuv444p", ".mp4", None, "its colours of 4:4:4 become 4:2:0"),
+        ("yuv422p10le", ".mp4", None, "its 10 bits a channel become 8; its colours of 4:2:2 become 4:2:0"),
+        ("yuv422p10le", ".mov", "prores-422-hq", ""),
+        ("gbrp16le", ".mov", None, "its 16 bits a channel become 10"),
+        ("gbrp16le", ".mkv", None, ""),
+        ("gray10le", ".mp4", None, "its 10 bits a channel become 8"),
+        ("yuv420p10le", ".%04d.png", None, ""),
+    ],
+)
+def test_depth_and_colours_of_a_clip_that_a_format_has_no_room_for_are_told(
+    tmp_path: Path, kind: str, ending: str, codec: str | None, told: str
+):
+    path = generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=0.2", "-vf", f"format={kind}", "-c:v", "ffv1")
+    said = animation.unheld_of_clip(tmp_path / f"b{ending}", codec, read_clip(path))
+    assert said == (told and f"a.mkv: {told}")
+
+
+def test_a_clip_that_grows_while_it_is_looked_into_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = generate(tmp_path / "a.avi", "testsrc=s=64x48:r=10:d=1", "-c:v", "mjpeg")
+    look = video._banner
+
+    def slow_look(file: Path) -> str:
+        told = look(file)
+        with file.open("ab") as stream:
+            stream.write(bytes(99))
+        return told
+
+    monkeypatch.setattr(video, "_banner", slow_look)
+    with pytest.raises(UserError, match="it changed while it was read"):
+        list(read_clip(path).read_frames())
 
 
 NOISE = "nullsrc=s=640x480:r=10:d=4,geq=random(1)*255"

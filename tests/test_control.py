@@ -14,7 +14,7 @@ from app.replay import Replay
 from app.sampling import Pictures
 from app.schema import frozen
 from solver.gl.device import Device
-from solver.warp.map import MapStatistics
+from solver.warp.distortion import MapStatistics
 
 BLACK = np.zeros((200, 300, 3), np.uint8)
 
@@ -74,6 +74,23 @@ def test_push_and_twirl_keep_areas(force: dict[str, Any], device: Device) -> Non
     # Of all that the tool reaches; within it, what the projection has left over moves area about a little.
     for disc, allowed in ((0.29, 1e-3), (0.06, 1e-2)):
         assert area_of_disc(displacement, disc) == pytest.approx(math.pi * disc**2, rel=allowed)
+
+
+@pytest.mark.parametrize("law", [{"at": 0.0, "strength": 0.05}, {"during": [0.0, 0.4], "strength": 0.125}])
+def test_a_local_force_moves_by_its_strength_what_is_under_it(law: dict[str, Any], device: Device) -> None:
+    point = {"kind": "point", "point": [0.5, 0.5], "direction": [0, 1], "radius": 0.15, "local": 1.0}
+    displacement, found = warp_of(device, {**point, **law})
+    height, width = displacement.shape[:2]
+    y = (np.arange(height) + 0.5 - height / 2) / width
+    # dy/dt = 0.05 (1 - y^2 / R^2)^3, for a second, from the middle.
+    moved, steps = 0.0, 2000
+    for _ in range(steps):
+        moved += 0.05 / steps * (1 - (moved / 0.15) ** 2) ** 3
+    assert np.interp(0.0, y + displacement[:, width // 2, 1], y) == pytest.approx(moved, rel=0.03)
+    # But for what the map's interpolation reaches, nothing moves beyond the radius.
+    x = (np.arange(width) + 0.5) / width - 0.5
+    assert not displacement[np.hypot(x, y[:, None]) > 0.15 + 4 / 128].any()
+    assert found.folds == 0
 
 
 def test_a_force_means_the_same_at_every_grid_and_dt(device: Device) -> None:

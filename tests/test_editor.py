@@ -187,10 +187,10 @@ def test_smoothing_softens_a_mask(robot: Robot) -> None:
     robot.key("v")
     robot.key("]")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=6)
-    peak = robot.editor.session.replay.masks.thickness.read.get().max()
+    peak = robot.editor.session.replay.masks.thickness.get().max()
     robot.key("s")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=10)
-    assert robot.editor.session.replay.masks.thickness.read.get().max() < peak
+    assert robot.editor.session.replay.masks.thickness.get().max() < peak
 
 
 def test_restore_brings_the_picture_back(robot: Robot) -> None:
@@ -690,6 +690,21 @@ def test_the_browser_chooses_where(robot: Robot, tmp_path: Path) -> None:
     assert not robot.editor.dialogs
 
 
+def test_a_folder_that_is_not_there_is_told_in_the_browser(robot: Robot) -> None:
+    robot.key("ctrl+o")
+    robot.frame(count=2)
+    browser = robot.editor.dialogs[-1]
+    assert isinstance(browser, Browser)
+    robot.click(browser.rect.x + 200, browser.rect.y + 72)
+    robot.key("ctrl+a")
+    robot.type("/nonesuch")
+    robot.frame(count=2)
+    robot.key("enter")
+    robot.frame(count=2)
+    assert browser.problem == "There is no /nonesuch."
+    assert robot.editor.dialogs == [browser]
+
+
 @pytest.mark.parametrize("helper", ["absent", "failing", "working"])
 def test_without_a_system_s_file_dialog_there_is_ours(
     robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, helper: str
@@ -910,7 +925,9 @@ def test_every_action_can_be_done_at_any_time(robot: Robot, name: str) -> None:
 @pytest.mark.parametrize("tool", [tool.name for tool in TOOLS])
 def test_the_strip_chooses_tools(robot: Robot, tool: str) -> None:
     ends = ("pinch", "bloat", "smooth", "restore")
-    y = robot.editor.layout.strip.y + 8.0
+    strip = robot.editor.layout.strip
+    assert strip is not None
+    y = strip.y + 8.0
     for other in TOOLS:
         if other.name == tool:
             break

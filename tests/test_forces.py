@@ -113,6 +113,17 @@ def test_a_push_has_its_strength_at_the_point(falloff: str, pictures: Pictures) 
         assert at_centres(push.faces(grid, pictures))[100, 150] == pytest.approx([1.2, 1.6], rel=2e-3)
 
 
+@pytest.mark.parametrize("keys", EVERY[:5])
+def test_a_local_force_is_a_motion_of_what_is_under_it(keys: dict[str, Any], pictures: Pictures) -> None:
+    whole, half, none = (force(**{**keys, "local": part}) for part in (1.0, 0.5, 0.0))
+    bare = force(**{**keys, **({"divergence_free": False} if keys["kind"] == "point" else {})}).faces(WIDE, pictures)
+    assert whole.faces(WIDE, pictures) is None
+    assert none.motion(WIDE, pictures) is None
+    np.testing.assert_array_equal(whole.motion(WIDE, pictures), bare)
+    np.testing.assert_allclose(2 * half.motion(WIDE, pictures), bare, atol=1e-30)
+    np.testing.assert_allclose(2 * half.faces(WIDE, pictures), none.faces(WIDE, pictures), atol=1e-30)
+
+
 def test_a_gaussian_push_is_the_known_formula(pictures: Pictures) -> None:
     grid = Grid(256, 256)
     push = np.array([0.6, -0.8])

@@ -12,8 +12,12 @@ from app.pictures import Picture
 from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
+from solver.brush.brush import Brush
+from solver.brush.tip import Tip
+from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import MOST_ALONG, SMALLEST_GRID, Grid
+from solver.params import FluidParams, Walls
 
 SIZES = [(1500, 1000), (451, 300), (300, 451), (601, 599), (97, 1000), (4000, 9), (8, 4000), (12, 12)]
 
@@ -41,6 +45,62 @@ def test_what_is_no_picture_is_refused():
     for extent in ((1.0, 0.0), (0.5, 0.5), (1.0, 2.0)):
         with pytest.raises(ValueError, match="the longer must be 1"):
             Grid(8, 8, extent)
+
+
+def test_a_window_of_a_grid_is_its_part(device: Device):
+    """A brush in a window draws what it draws in the whole."""
+    whole = Grid(64, 48)
+    window = Grid(24, 20, (24 / 64, 20 / 64), (16 / 64, 8 / 64), whole.picture)
+    part = (slice(8, 28), slice(16, 40))
+    for one, other in zip(whole.u_faces(), window.u_faces(), strict=True):
+        np.testing.assert_allclose(other, one[part], atol=1e-12)
+    assert whole.is_whole
+    assert not window.is_whole
+    assert whole.at_edge == (True, True, True, True)
+    assert window.at_edge == (False, False, False, False)
+    assert Grid(24, 20, (24 / 64, 20 / 64), (40 / 64, 28 / 64), whole.picture).at_edge == (False, True, False, True)
+    with pytest.raises(ValueError, match="not within"):
+        Grid(24, 20, (24 / 64, 20 / 64), (41 / 64, 0.0), whole.picture)
+    tip, drawn = Tip((0.4, 0.3), (0.45, 0.33), 0.08, 0.2), []
+    for grid in (whole, window):
+        fluid, brush = Fluid(device, grid), Brush(device)
+        brush.push(fluid, tip, 0.1)
+        brush.twirl(fluid, tip, 2.0)
+        drawn.append(fluid.impulse.field.get())
+        brush.release()
+        fluid.release()
+    assert np.abs(drawn[1]).max() > 0.1
+    np.testing.assert_allclose(drawn[1], drawn[0][part], atol=2e-6 * np.abs(drawn[1]).max())
+
+
+@pytest.mark.parametrize("viscosity", [1e-4, 0.01])
+@pytest.mark.parametrize("left", [0, 60], ids=["at the picture's edge", "within it"])
+def test_the_flow_in_a_window_is_that_of_the_whole(device: Device, left: int, viscosity: float):
+    """Its sides stick, the picture's edge lets glide: a push in the middle of the window, and one beside that edge."""
+    whole = Grid(200, 160)
+    window = Grid(96, 96, (96 / 200, 96 / 200), (left / 200, 32 / 200), whole.picture)
+    assert Walls.of("free", window).sticky == (left > 0, True, True, True)
+    x, y = (6 if left == 0 else left + 48) / 200, 80 / 200
+    flows, brush = [], Brush(device)
+    for grid in (whole, window):
+        fluid = Fluid(device, grid, FluidParams(Walls.of("free", grid)))
+        fluid.set_viscosity(viscosity)
+        for tick in range(6):
+            start = x + 0.002 * tick, y + 0.004 * tick
+            brush.push(fluid, Tip(start, (start[0] + 0.002, start[1] + 0.004), 0.04), 1 / 60)
+            fluid.step(1 / 60)
+        flows.append(fluid.velocity.read.get())
+        fluid.release()
+    brush.release()
+    part = flows[0][32:128, left : left + 96]
+    largest = np.abs(part).max()
+    assert largest > 0.05
+    near = slice(24, 72), slice(0, 48) if left == 0 else slice(24, 72)
+    assert np.abs(flows[1][near] - part[near]).max() < 0.02 * largest
+    # At the picture's own edge it glides as it does there, and at the sides it stands.
+    assert np.abs(flows[1][:2, :, 0]).max() < 0.01 * largest
+    if left == 0:
+        assert np.abs(flows[1][24:72, 0, 1]).max() > 0.1 * largest
 
 
 @pytest.mark.parametrize("size", [(331, 200), (200, 337)], ids=str)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -400,9 +401,69 @@ def test_messages_of_the_window_name_no_options_of_the_command_line(robot: Robot
     robot.drop(tmp_path / "strip.png")
     robot.drop(tmp_path / "forward.exr")
     narrow, forward = (message.text for message in robot.editor.messages.shown)
+    assert narrow.startswith("strip.png is ")
     assert "too narrow for any grid" in narrow
     assert "tells where each point goes" in forward
     assert "--" not in narrow + forward
+
+
+def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs[-1]
+    assert isinstance(dialog, ExportDialog)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 268)
+    robot.key("end")
+    robot.type("2")
+    robot.frame(count=2)
+    assert dialog.name.endswith("2")
+    robot.key("escape")
+    robot.frame(count=2)
+    assert robot.editor.dialogs == [dialog]
+    ctrl_click(robot, dialog.rect.x + 250, dialog.rect.y + 146)
+    robot.frame(count=2)
+    robot.key("escape")
+    robot.frame(count=2)
+    assert robot.editor.dialogs == [dialog]
+    robot.key("escape")
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+
+
+def test_the_first_hint_does_not_come_back_after_a_kill(device: Device, tmp_path: Path) -> None:
+    file = tmp_path / "preferences.json"
+    robot = Robot(device, small_project(tmp_path), preferences=Preferences(auto_quality=False, path=file))
+    try:
+        robot.drag((0.3, 0.4), (0.4, 0.4))
+        assert json.loads(file.read_text())["hint"] is False
+    finally:
+        robot.close()
+
+
+def test_what_cannot_be_opened_asks_nothing_about_unsaved_work(robot: Robot, tmp_path: Path) -> None:
+    (tmp_path / "junk.png").write_bytes(b"no picture")
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot.drop(tmp_path / "junk.png")
+    robot.frame(count=2)
+    assert not robot.editor.dialogs
+    (message,) = robot.editor.messages.shown
+    assert "junk.png" in message.text
+
+
+@pytest.mark.parametrize("grid", [48, 96, 160, 1024])
+def test_the_grid_of_the_work_is_chosen_in_the_inspector(robot: Robot, grid: int) -> None:
+    session = robot.editor.session
+    robot.editor.state.sections |= {"quality": True, "view": False, "fluid": False}
+    robot.frame(count=3)
+    fluid = session.recipe.fluid.model_copy(update={"grid": grid})
+    session.preview(fluid=fluid)
+    robot.frame(count=3)
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    row = robot.pixels()[round(rect.y) + 130 : round(rect.y) + 200, round(rect.x) :].astype(int)
+    pressed = np.array(robot.editor.ui.palette.pressed[:3]) * 255
+    assert (np.abs(row - pressed).max(axis=-1) < 3).sum() > 200
 
 
 # Small windows ------------------------------------------------------------------------------------------------------
@@ -427,6 +488,7 @@ def scaled(robot: Robot, rect: Rect) -> Rect:
 
 def test_every_tool_can_be_clicked_in_a_small_window(small: Robot) -> None:
     strip, scale = small.editor.layout.strip, small.editor.ui.scale
+    assert strip is not None
     chosen = set()
     y = strip.y + 20 * scale
     while y < strip.bottom:
@@ -446,6 +508,10 @@ def test_the_inspector_comes_in_a_small_window(small: Robot) -> None:
     rect = small.editor.layout.inspector
     assert rect is not None
     assert scaled(small, rect).width >= 200
+    # And the picture is seen beside it, and can be painted.
+    assert scaled(small, small.editor.layout.canvas).width >= 120
+    small.drag((0.4, 0.3), (0.6, 0.3))
+    assert len(small.editor.session.recipe.stroke) == 1
     assert rect.right <= small.size[0]
     small.key("tab")
     small.frame()
@@ -453,29 +519,34 @@ def test_the_inspector_comes_in_a_small_window(small: Robot) -> None:
     assert scaled(small, small.editor.layout.canvas).width >= min(wide, 200)
 
 
+BRUSH = {"radius", "hardness", "strength", "local"}  # of a push
+
+
 def test_everything_about_the_brush_can_be_set_in_a_small_window(small: Robot) -> None:
     """What the bar has no room for is behind the button that ends it."""
     scale, width = small.editor.ui.scale, small.size[0]
     changed = set()
     for x in range(60, int(width / scale) - 270, 16):
-        small.editor.state.brush = before = replace(small.editor.state.brush, radius=0.1, hardness=0.5, strength=0.5)
+        small.editor.state.brush = before = replace(
+            small.editor.state.brush, radius=0.1, hardness=0.5, strength=0.5, local=0.5
+        )
         small.click(x * scale, 24 * scale)
         changed |= differing(small, before)
         small.frame(count=2)
         if small.editor._popup_open:
-            for y in range(60, 200, 12):
+            for y in range(60, 240, 12):
                 small.editor.state.brush = before
                 small.click((x + 30) * scale, y * scale)
                 if small.editor._popup_open:
                     changed |= differing(small, before)
             small.key("escape")
             small.frame(count=2)
-    assert changed == {"radius", "hardness", "strength"}
+    assert changed == BRUSH
 
 
 def differing(robot: Robot, before: object) -> set[str]:
     now = robot.editor.state.brush
-    return {name for name in ("radius", "hardness", "strength") if getattr(now, name) != getattr(before, name)}
+    return {name for name in BRUSH if getattr(now, name) != getattr(before, name)}
 
 
 def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> None:

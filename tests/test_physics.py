@@ -7,6 +7,7 @@ import pytest
 
 import reference
 from solver.brush.brush import Brush, Tip
+from solver.brush.push import Push
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -95,6 +96,44 @@ def test_push_is_divergence_free_and_moves_at_the_pointers_speed(device: Device,
         assert (float(u), float(v)) == pytest.approx((0.006 / dt, 0.001 / dt), rel=0.03)
     fluid.release()
     brush.release()
+
+
+def pushed(device: Device, push: Push, kind: type[Fluid | PaperFluid] = Fluid) -> tuple[np.ndarray, np.ndarray]:
+    """What carries the picture, and the fluid, on faces after a step from rest, a cell in the way frozen."""
+    fluid, brush = kind(device, Grid(48, 32)), Brush(device)
+    fluid.set_viscosity(1e-3)
+    fluid.set_solid(np.arange(48 * 32).reshape(32, 48) == 12 * 48 + 30)
+    brush.lead(fluid, push)
+    fluid.step(push.dt, steer=lambda velocity: brush.make_up(fluid, push, velocity))
+    brush.carry(fluid, push)
+    found = fluid.carrier().get(), fluid.faces().get()
+    fluid.step(push.dt)
+    assert fluid.local.is_empty
+    fluid.release()
+    brush.release()
+    return found
+
+
+@pytest.mark.parametrize("kind", [Fluid, PaperFluid])
+def test_a_local_push_moves_what_is_under_it_and_nothing_else(device: Device, kind: type[Fluid | PaperFluid]) -> None:
+    tip = Tip((0.5, 0.3), (0.51, 0.295), radius=0.15)
+    carrier, fluid = pushed(device, Push(tip, 1 / 60, local=1.0), kind)
+    assert not fluid.any()
+    grid = Grid(48, 32)
+    for axis, (x, y) in enumerate((grid.u_faces(), grid.v_faces())):
+        along = np.clip(((x - 0.5) * 0.01 - (y - 0.3) * 0.005) / 1.25e-4, 0, 1)
+        r = np.hypot(x - 0.5 - 0.01 * along, y - 0.3 + 0.005 * along) / 0.15
+        wanted = np.maximum(1 - r**2, 0) ** 3 * (0.01, -0.005)[axis] * 60
+        frozen = (slice(12, 13), slice(30, 32)) if axis == 0 else (slice(12, 14), slice(30, 31))
+        wanted[frozen] = 0.0
+        np.testing.assert_allclose(carrier[..., axis], wanted, atol=1e-5)
+
+
+def test_between_fluid_and_local_a_push_is_a_mixture(device: Device) -> None:
+    tip = Tip((0.5, 0.3), (0.51, 0.295), radius=0.15)
+    flowing, half, local = (pushed(device, Push(tip, 1 / 60, local=part))[0] for part in (0.0, 0.5, 1.0))
+    np.testing.assert_allclose(half, (flowing + local) / 2, atol=1e-3 * np.abs(flowing).max())
+    assert np.abs(flowing - local).max() > 0.1
 
 
 def test_twirl_turns_clockwise_at_its_rate_and_no_faster(device: Device) -> None:

@@ -381,8 +381,9 @@ def test_what_a_png_tells_of_its_colours_stays_and_is_told_where_it_matters(tmp_
     assert with_chunks(path, cICP=bytes([1, 13, 0, 1])) == ""
     said = with_chunks(path, gAMA=light, cHRM=wide)
     assert said == (
-        "a.png: its gamma of 1 (gAMA) and primaries (cHRM) are kept in a PNG alone, and its colours mixed as if sRGB"
+        "a.png: a PNG alone keeps its gamma of 1 (gAMA) and primaries (cHRM), and its colours are mixed as if sRGB"
     )
+    assert "keeps its gamma of 1 (gAMA), and" in with_chunks(path, gAMA=light)
     said = with_chunks(path, cICP=bytes([9, 16, 0, 1]), gAMA=light, cLLI=bytes(8))
     assert said == "a.png: its colours are BT.2020 PQ (cICP), which a PNG keeps, and are mixed as if sRGB"
     picture = read_picture(path)
@@ -394,6 +395,20 @@ def test_what_a_png_tells_of_its_colours_stays_and_is_told_where_it_matters(tmp_
             assert kept.count(chunk) == 1
             assert kept.index(chunk) < kept.index(b"IDAT")
         np.testing.assert_array_equal(with_opencv(tmp_path / "b.png"), given.pixels)
+
+
+def test_what_of_a_png_is_not_kept_is_told(tmp_path: Path):
+    path, time = tmp_path / "a.png", struct.pack(">H5B", 2026, 1, 2, 3, 4, 5)
+    assert (
+        with_chunks(path, sBIT=bytes([5, 6, 5])) == "a.png: what it says of its number of significant bits is not kept"
+    )
+    said = with_chunks(path, bKGD=bytes(6), sBIT=bytes([5, 6, 5]), tIME=time)
+    assert said == "a.png: what it says of its background colour, number of significant bits, date is not kept"
+    Image.fromarray(smooth(3)).save(path)
+    data = path.read_bytes()  # it may come after the pixels
+    chunk = struct.pack(">I", 7) + b"tIME" + time + struct.pack(">I", zlib.crc32(b"tIME" + time))
+    path.write_bytes(data[:-12] + chunk + data[-12:])
+    assert read_picture(path).note == "a.png: what it says of its date is not kept"
 
 
 def test_the_colours_of_an_avif_are_told(tmp_path: Path):

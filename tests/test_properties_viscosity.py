@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
 from properties import viscosity
+from solver.fluid import Fluid
 from solver.gl.device import Device
+from solver.grid import Grid
+from solver.params import FluidParams, Walls
+from solver.scheme import LARGEST_VISCOSITY, LONGEST_STEP
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_viscous_step_is_near_the_direct_solution(device: Device, seed: int) -> None:
     viscosity.check_viscous_step(device, seed)
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_viscous_step_is_the_same_in_the_mirror(device: Device, seed: int) -> None:
+    viscosity.check_viscous_step_in_the_mirror(device, seed)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -26,3 +37,23 @@ def test_every_class_of_mask(device: Device, kind: str, contrast: float, softest
     found, iterations = case.solved(device)
     assert viscosity.error(found, case.exact()) < viscosity.ERROR[contrast]
     assert iterations <= viscosity.ITERATIONS[softest]
+
+
+@pytest.mark.parametrize("size", [(8, 4096), (1023, 8), (9, 17)])
+@pytest.mark.parametrize("slip", ["free", "none"])
+def test_nothing_beside_all_viscosity_and_the_longest_step(
+    device: Device, size: tuple[int, int], slip: Literal["free", "none"]
+) -> None:
+    """The narrowest pictures too; one viscosity, and none beside the largest at random: energy never grows."""
+    (nx, ny), rng = size, np.random.default_rng(0)
+    fluid = Fluid(device, Grid(nx, ny), FluidParams(Walls(slip)))
+    velocity = rng.standard_normal((ny, nx, 2))
+    fluid.set_velocity(velocity)
+    energies = [fluid.motion().kinetic_energy]
+    for amount in (1e-3, np.where(rng.random((ny, nx)) < 0.5, 0.0, LARGEST_VISCOSITY)):
+        fluid.set_viscosity(amount)
+        fluid.diffuse(LONGEST_STEP)
+        energies.append(fluid.motion().kinetic_energy)
+    assert energies[0] >= energies[1] >= 0.999 * energies[2]
+    assert np.isfinite(energies).all()
+    fluid.release()

@@ -8,6 +8,7 @@ import os
 import random
 import subprocess
 import sys
+import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
@@ -80,6 +81,41 @@ class Desk:
 @pytest.fixture
 def desk(tmp_path: Path) -> Desk:
     return Desk(tmp_path / "state" / "journals", small_project(tmp_path))
+
+
+class Late(threading.Event):
+    """An event after each waiting for which something happens before the waiter goes on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.then: list[Callable[[], None]] = []
+
+    def wait(self, timeout: float | None = None) -> bool:
+        heard = super().wait(timeout)
+        while self.then:
+            self.then.pop()()
+        return heard
+
+
+def test_a_stroke_just_after_the_pause_for_the_fluid_is_written_through(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[int] = []
+    desk.push()
+    desk.write()
+    until(desk.journal._handed.is_set)
+    sync = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda file: (sync(file), written.append(file)))
+    late = Late()
+    late.then.append(desk.push)
+    desk.journal._urgent = late
+    recipe = desk.document.recipe
+    desk.document.history.amend(recipe.edited(duration=recipe.duration + 1 / 30))
+    desk.keep()
+    until(lambda: not late.then and desk.journal._handed.is_set() and not desk.journal.is_behind)
+    time.sleep(3 * recovery.PAUSE)
+    assert written
+    desk.die()
 
 
 def found_in(root: Path) -> Found:
@@ -553,6 +589,18 @@ def test_restored_work_is_as_it_was_and_unsaved(
     robot.until(lambda: not robot.editor.recovery.is_busy)
     starter.kill()
     assert found_in(starter.root).work.strokes == 3
+
+
+@pytest.mark.parametrize("is_automatic", [True, False])
+def test_restored_work_has_the_choice_of_its_grid(starter: Starter, tmp_path: Path, is_automatic: bool) -> None:
+    robot = starter.start(tmp_path)
+    robot.editor.session.is_grid_automatic = is_automatic
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    starter.kill()
+    robot = starter.start(tmp_path)
+    answer(robot, "Restore")
+    assert robot.editor.session.is_grid_automatic is is_automatic
 
 
 @pytest.mark.usefixtures("before")

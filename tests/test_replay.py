@@ -14,7 +14,9 @@ from app.recipe import Recipe
 from app.replay import Replay
 from app.sampling import Pictures
 from app.strokes import Stroke
+from solver.fluid import Fluid
 from solver.gl.device import Device
+from solver.grid import Grid
 from solver.resample.sampler import Sampler
 
 RECIPE = Recipe.parse("""
@@ -30,6 +32,10 @@ strength = 2
 [[stroke]]
 tool = "push"
 samples = [[3, 0.3, 0.3, 1], [12, 0.5, 0.4, 1]]
+[[stroke]]
+tool = "push"
+local = 0.8
+samples = [[4, 0.6, 0.6, 1], [9, 0.5, 0.7, 1]]
 [[stroke]]
 tool = "freeze"
 samples = [[5, 0.8, 0.8, 1], [8, 0.85, 0.8, 1]]
@@ -214,16 +220,35 @@ def test_a_frozen_pixel_is_the_same_in_every_later_frame(device: Device) -> None
     recipe = RECIPE.edited(stroke=(*RECIPE.stroke, freeze))
     replay, sampler = Replay(device, recipe, pictures(), budget=0), Sampler(device)
     source = replay.pictures.source.pixels
-    row, column = (2 * np.mgrid[0:60, 0:80] + 1) * replay.grid.nx // 160
-    before, cells = source, np.zeros((replay.grid.ny, replay.grid.nx), bool)
+    before, frozen = source, np.zeros(source.shape[:2], bool)
+    finer = replay.masks.canvas.nx // source.shape[1]
     kept = 0
     for _ in range(LAST):
         replay.advance()
         now = sampler.apply(replay.warp, source)
-        stays = cells[row, column]
-        np.testing.assert_array_equal(now[stays], before[stays])
-        kept += np.count_nonzero((now != source).any(axis=-1) & stays)
-        before, cells = now, replay.masks.frozen.read.get() >= 0.5
+        np.testing.assert_array_equal(now[frozen], before[frozen])
+        kept += np.count_nonzero((now != source).any(axis=-1) & frozen)
+        if replay.masks.frozen_field:
+            texels = replay.masks.frozen_field.get() >= 128
+            frozen = texels.reshape(60, finer, 80, finer).all(axis=(1, 3))
+        before = now
     assert kept > 1000, "what had moved before it was frozen"
     sampler.release()
     replay.release()
+
+
+def test_a_window_has_the_viscosity_that_the_whole_picture_has_there(device: Device) -> None:
+    text = 'version = 1\npicture = "a.png"\nduration = 1.0\n[fluid]\ngrid = 64\n'
+    layers = '[[viscosity]]\nkind = "picture"\nrange = [1e-3, 1.0]\n[[viscosity]]\nkind = "path"\nscale = 2.0\n'
+    recipe = Recipe.parse(text + layers + "points = [[0.3, 0.4], [0.6, 0.5]]\n")
+    replay = Replay(device, recipe, pictures(), budget=0)
+    whole = replay.grid.refined(3)
+    window = Grid(60, 45, (60 / 192, 45 / 192), (48 / 192, 30 / 192), whole.picture)
+    fluids = Fluid(device, whole), Fluid(device, window)
+    for fluid in fluids:
+        replay.masks.apply(fluid)
+    wanted, found = (fluid.viscosity.get() for fluid in fluids)
+    np.testing.assert_array_equal(found, wanted[30:75, 48:108])
+    assert found.max() > 100 * found.min()
+    for thing in (*fluids, replay):
+        thing.release()

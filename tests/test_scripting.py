@@ -7,13 +7,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import reference
-from solver import Brush, Device, Fluid, FluidParams, Grid, PaperFluid, Tip, Walls, WarpMap
+from solver import Brush, Density, Device, Fluid, FluidParams, Grid, PaperFluid, Tip, Walls, WarpMap
 
 SECTION = (Path(__file__).parent.parent / "README.md").read_text("utf-8").split("## Scripting")[1].split("\n## ")[0]
 BLOCKS = re.findall(r"```python\n(.*?)```", SECTION, re.DOTALL)
@@ -65,6 +65,32 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
     "a source beyond all measure": (
         lambda fluid: (fluid.add_source(fluid.device.upload(np.full((12, 20), 1e30))), fluid.step(0.1)),
         "beyond",
+    ),
+    "a force of one array": (lambda fluid: fluid.step(0.1, lambda x, y, t: x), "two components"),
+    "a complex force": (lambda fluid: fluid.step(0.1, np.full((12, 20, 2), 1j)), "real"),
+    "a velocity of nothing": (lambda fluid: fluid.set_velocity(np.full((12, 20, 2), None)), "real"),
+    "solids of words": (lambda fluid: fluid.set_solid(np.full((12, 20), "ice")), "true or false"),
+    "a source of another grid": (lambda fluid: fluid.add_source(fluid.device.upload(np.ones((5, 20)))), "source"),
+    "a source of two components": (lambda fluid: fluid.add_source(fluid.device.upload(np.ones((12, 20, 2)))), "source"),
+    "sticky walls": (lambda fluid: Walls(cast(Any, "sticky")), "slip"),
+    "walls of no speed": (lambda fluid: Walls("none", (np.nan, 0.0, 0.0, 0.0)), "speeds"),
+    "walls beyond all measure": (lambda fluid: Walls("none", (0.0, 0.0, np.inf, 0.0)), "speeds"),
+    "two walls": (lambda fluid: Walls("none", cast(Any, (1.0, 0.0))), "speeds"),
+    "a drag that drives": (lambda fluid: FluidParams(drag=-100.0), "drag"),
+    "a drag of NaN": (lambda fluid: FluidParams(drag=np.nan), "drag"),
+    "no cycle": (lambda fluid: FluidParams(pressure_cycles=0), "cycles"),
+    "half a sweep": (lambda fluid: FluidParams(sweeps=cast(Any, 1.5)), "sweeps"),
+    "half a cell": (lambda fluid: Grid(cast(Any, 20.5), 12), "whole"),
+    "a picture of NaN": (lambda fluid: Grid(20, 12, (1.0, np.nan)), "picture"),
+    "no picture": (lambda fluid: Grid.for_picture(0, 5, 64), "picture"),
+    "solids of another grid for a map": (
+        lambda fluid: WarpMap(fluid.device, Grid(12, 12)).hold(fluid.solid),
+        "solid",
+    ),
+    "an endless diffusion of a density": (lambda fluid: Density(fluid.device, np.ones((12, 20)), np.inf), "diffusion"),
+    "a source of another density": (
+        lambda fluid: Density(fluid.device, np.ones((12, 20)), 0.0, np.ones((5, 5))),
+        "shape",
     ),
     "a transposed velocity": (lambda fluid: fluid.set_velocity(np.zeros((20, 12, 2))), "shape"),
     "a row as viscosity": (lambda fluid: fluid.set_viscosity(np.ones((1, 20))), "shape"),

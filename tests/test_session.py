@@ -21,7 +21,7 @@ from app.strokes import Stroke
 from app.tools import TOOL, TOOLS, BrushSettings, Press
 from editing import small_project
 from solver.gl.device import Device
-from solver.warp.map import MapStatistics
+from solver.warp.distortion import MapStatistics
 
 PAINTING = [tool for tool in TOOLS if tool.gesture is not None]
 

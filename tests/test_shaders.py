@@ -67,7 +67,7 @@ def test_the_reference_compiler_finds_what_drivers_overlook(monkeypatch: pytest.
     source = "out vec4 c;\nvoid main() { int i = 0; c = vec4(i) * texture(u_nowhere, vec2(0.5)); }\n"
     monkeypatch.setattr("solver.gl.program.read_shader", lambda path: source if path == "wrong.frag" else real(path))
     programs = Programs()
-    programs.add("step/add_force.frag", {})
+    programs.add("step/add_impulse.frag", {})
     assert not programs.complaints()
     programs.add("wrong.frag", {})
     complaint, *_ = programs.complaints()

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from typing import Any
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
 import reference
 from solver.fluid import Fluid
@@ -17,40 +15,34 @@ from solver.grid import Grid
 from solver.params import FluidParams, Walls
 
 SIZES = [(8, 8), (33, 17), (64, 48), (31, 64)]
-WALLS = [(False, (0.0, 0.0, 0.0, 0.0)), (True, (0.3, -0.2, 1.0, 0.5))]
+SPEED = (0.3, -0.2, 1.0, 0.5)
+WALLS = [Walls(), Walls("none", SPEED), Walls("free", SPEED, (True, False, False, True))]
 
 
 def relative(got: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.abs(got - wanted).max() / np.abs(wanted).max())
 
 
-def wall_inputs(no_slip: bool, speed: tuple[float, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
-    return ({"NO_SLIP": 1}, {"wall_speed": speed}) if no_slip else ({}, {})
-
-
-@pytest.mark.parametrize(("no_slip", "speed"), WALLS, ids=["free-slip", "moving no-slip"])
+@pytest.mark.parametrize("walls", WALLS, ids=["free-slip", "moving no-slip", "either"])
 @pytest.mark.parametrize(("nx", "ny"), SIZES)
 @pytest.mark.parametrize("courant", [0.4, 3.0])
-def test_trace_and_advect(
-    device: Device, nx: int, ny: int, no_slip: bool, speed: tuple[float, float, float, float], courant: float
-) -> None:
+def test_trace_and_advect(device: Device, nx: int, ny: int, walls: Walls, courant: float) -> None:
     faces = reference.smooth_velocity(nx, ny, seed=nx, cells=5 if courant < 1 else 20)
     carried = reference.smooth_velocity(nx, ny, seed=nx + 1)
     force = reference.smooth_velocity(nx, ny, seed=nx + 2)
-    velocity, back = device.upload(faces), device.field((nx, ny), 2)
-    defines, inputs = wall_inputs(no_slip, speed)
-    trace = device.pass_("step/trace.frag", **defines)
-    trace(back, velocity=velocity, cells_a_speed=(courant, courant), **inputs)
-    traced = reference.trace(faces, courant, no_slip=no_slip, speed=speed)
-    assert relative(back.get(), traced) < 1e-4
-    fluid = Fluid(device, Grid(nx, ny), FluidParams(walls=Walls("none" if no_slip else "free", speed), drag=0.5))
+    fluid = Fluid(device, Grid(nx, ny), FluidParams(walls=walls, drag=0.5))
+    faces[:, 0, 0] = faces[0, :, 1] = 0.0
     fluid.set_velocity(faces)
+    traced = reference.trace(faces, courant, no_slip=walls.no_slip, speed=walls.speed)
+    assert relative(fluid.trace(courant * fluid.grid.h).get(), traced) < 1e-4
     fluid._carried.read.set(carried)
     dt = courant * fluid.grid.h
     departing = fluid._add_force([(device.upload(force), 0.3)], dt)
     fluid._viscosity_solver.unpack(fluid._advect(departing, dt), fluid.velocity.read)
     after = fluid.velocity.read.get()
-    wanted = reference.advect(faces, courant, 0.3 * force - carried, no_slip=no_slip, speed=speed) * np.exp(-0.5 * dt)
+    wanted = reference.advect(faces, courant, 0.3 * force - carried, no_slip=walls.no_slip, speed=walls.speed) * np.exp(
+        -0.5 * dt
+    )
     assert relative(after, wanted) < 1e-4
     assert (after[:, 0, 0] == 0).all()
     assert (after[0, :, 1] == 0).all()
@@ -62,26 +54,6 @@ def test_add_force_and_source(device: Device) -> None:
     velocity, force = device.upload(faces), device.upload(faces[::-1].copy())
     device.pass_("step/add_impulse.frag")(velocity, add=True, force=force, impulse=0.25)
     np.testing.assert_allclose(velocity.get(), faces + np.float32(0.25) * faces[::-1], rtol=1e-6)
-
-
-def test_masks_compose(device: Device) -> None:
-    from solver.brush.masks import LEAST_VISCOSITY, Masks
-
-    grid = Grid(12, 9)
-    rng = np.random.default_rng(5)
-    base, frozen = rng.uniform(0, 1, (9, 12)), (rng.uniform(0, 1, (9, 12)) > 0.98).astype(float)
-    base[0] = 0
-    masks, fluid = Masks(device, grid), Fluid(device, grid)
-    masks.set_base(base, frozen)
-    thickness = rng.uniform(-2, 4, (9, 12)) * (rng.uniform(0, 1, (9, 12)) > 0.5)
-    painted = rng.uniform(-1, 0.52, (9, 12))
-    masks.thickness.read.set(thickness)
-    masks.frozen.read.set(painted)
-    masks.apply(fluid)
-    wanted = np.where(thickness == 0, base, np.maximum(base, LEAST_VISCOSITY) * 10**thickness)
-    np.testing.assert_allclose(fluid.viscosity.get(), wanted, rtol=1e-5)
-    around = ndimage.binary_dilation(frozen + painted >= 0.5, np.ones((5, 5)))
-    np.testing.assert_array_equal(fluid.solid.get() > 127, around)
 
 
 @pytest.mark.parametrize(("nx", "ny"), SIZES)

@@ -15,7 +15,7 @@ def play(name: str, *touches: Touch, opposite: bool = False, last: tuple[float, 
     """What a tool makes of touches and a release."""
     tool = TOOL[name]
     assert tool.gesture is not None
-    gesture = tool.gesture(Press(BrushSettings(0.1, 0.2, 0.8), opposite, EXTENT, DT, last), touches[0])
+    gesture = tool.gesture(Press(BrushSettings(0.1, 0.2, 0.8, local=0.3), opposite, EXTENT, DT, last), touches[0])
     next(gesture)
     for touch in touches[1:]:
         gesture.send(touch)
@@ -32,6 +32,7 @@ def test_every_sample_is_kept() -> None:
     assert stroke is not None
     assert stroke.samples == tuple(touch[:4] for touch in touches)
     assert (stroke.tool, stroke.radius, stroke.hardness, stroke.strength) == ("push", 0.1, 0.2, 0.8)
+    assert stroke.local == 0.3
 
 
 @pytest.mark.parametrize(

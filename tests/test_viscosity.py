@@ -54,7 +54,7 @@ class Step:
             self.dt,
             self.h,
             solid=self.solid,
-            no_slip=self.walls.slip == "none",
+            no_slip=self.walls.no_slip,
             speed=self.walls.speed,
         )
 
@@ -123,6 +123,8 @@ def mask(kind: str, ny: int, nx: int) -> np.ndarray:
         (64, 48, Walls("none", (0.3, -0.2, 1.0, 0.5)), False),
         (53, 37, Walls(), True),
         (40, 61, Walls("none", (0.3, -0.2, 1.0, 0.5)), True),
+        (48, 48, Walls(sticky=(True, True, False, True)), False),
+        (40, 61, Walls("free", (0.3, -0.2, 1.0, 0.5), (True, False, True, False)), True),
     ],
 )
 def test_converges_to_the_direct_solution(device: Device, nx: int, ny: int, walls: Walls, with_solid: bool) -> None:
@@ -174,6 +176,18 @@ def test_uniform_viscosity_as_solved_live(device: Device, k: float) -> None:
         assert error(found, wanted) < 0.01
         # Where little changes, little may be wrong, or it adds up from step to step.
         assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted - faces) + 1e-6 * np.linalg.norm(faces)
+
+
+@pytest.mark.parametrize("k", [0.01, 4.0, 300.0, 1e4])
+@pytest.mark.parametrize("sticky", [(True, True, True, True), (False, True, True, True), (False, False, True, False)])
+def test_uniform_viscosity_in_a_window_as_solved_live(
+    device: Device, sticky: tuple[bool, bool, bool, bool], k: float
+) -> None:
+    """Sides of a window that stick, beside the picture's that glide: no sines solve it, and it is off by up to 3 %."""
+    size = 96, 96
+    step = Step(device, np.full(size, k / 96**-2), dt=96.0**-4, walls=Walls(sticky=sticky))
+    for faces in (push(*size), vortices(*size)):
+        assert error(step(faces), step.exact(faces)) < 0.031
 
 
 @pytest.mark.parametrize("size", [(8, 8), (16, 16), (9, 17), (17, 9)])
@@ -325,7 +339,7 @@ def test_strokes_over_a_stiff_disc_end_where_exact_steps_would(device: Device) -
             force = device.upload(np.stack(stroke, axis=-1).astype(np.float32))
             if exactly and step == 1:
                 solver = fluid._viscosity_solver
-                solver.plan = dataclasses.replace(solver.plan, iterations=30, tolerance=0.0, sweeps=(2, 2))
+                solver.plan = dataclasses.replace(solver.plan, iterations=30, tolerance=0.0, sweeps=2)
             fluid.step(dt, [(force, 0.03)] if step < 25 else [])
             warp.follow(fluid, dt)
             force.release()
@@ -397,3 +411,5 @@ def test_fluid_at_rest_stays_so_at_no_iteration(device: Device) -> None:
     assert not step(np.zeros((40, 60, 2), np.float32)).any()
     assert step.solver.conjugate_gradients.iterations == 0
     assert step(vortices(40, 60)).any()
+    assert not step(np.zeros((40, 60, 2), np.float32)).any()
+    assert not any(field.get().any() for field in step.solver.state())

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.gl.device import Device
-from solver.params import Walls
+from solver.params import NoSlip
 from solver.viscosity.clusters import ClusterMatrix, connected
 from solver.viscosity.multigrid import Multigrid
 
@@ -36,7 +36,7 @@ def test_coarse_operators_are_galerkin_products(device: Device, aspect: float) -
     viscosity, solid = (10 ** rng.uniform(-2, 4, (ny, nx))).astype(np.float32), np.zeros((ny, nx), bool)
     fields = device.upload(viscosity), device.upload(solid.astype(np.uint8))
     multigrid = Multigrid(device, size, (1 / nx, aspect / nx))
-    multigrid.set_coefficients(*fields, viscosity, solid, 1 / nx**2, Walls())
+    multigrid.set_coefficients(*fields, viscosity, solid, 1 / nx**2, NoSlip(*5 * [False]))
     strains = [
         level.coefficients().matrix() - np.eye(8 * level.texels[0] * level.texels[1]) for level in multigrid.levels
     ]

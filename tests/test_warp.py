@@ -14,6 +14,7 @@ from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
 from solver.resample.sampler import Sampler
+from solver.warp.accumulated import map_size
 from solver.warp.map import WarpMap
 
 
@@ -47,7 +48,7 @@ def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) 
     rng = np.random.default_rng(4)
     grid = Grid(*size)
     near, base = smooth(rng, size, 0.1), smooth(rng, (2 * size[0], 2 * size[1]), 0.3)
-    warp = WarpMap(device, grid)
+    warp = WarpMap(device, grid, (2 * size[0], 2 * size[1]))
     warp.set(base)
     warp._submap.read.set(near)
     warp._steps = 1
@@ -57,7 +58,7 @@ def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) 
         )
     before = warp.read()
     warp.remap()
-    assert difference(warp.read((2 * size[0], 2 * size[1])), warp._accumulated.read.get()) < 1e-5
+    assert difference(warp.read((2 * size[0], 2 * size[1])), warp._accumulated.now.get()) < 1e-5
     assert difference(warp.read(), before) < 0.1
 
 
@@ -127,40 +128,94 @@ def test_rest_is_the_identity_exactly(device: Device) -> None:
     assert warp.statistics().det_min == warp.statistics().det_max == 1.0
 
 
-def test_saved_state_goes_on_bit_for_bit(device: Device) -> None:
-    grid = Grid(24, 24)
+@pytest.mark.parametrize("at", [5, 9, 13, 21, 24])
+def test_saved_state_goes_on_bit_for_bit(device: Device, at: int) -> None:
+    """From anywhere between two remaps, and where one is half done; also off the GPU, into another map."""
+    grid = Grid(48, 48)
     velocity = device.upload(vortex_faces(grid, 0.0))
 
     def go(warp: WarpMap, steps: int) -> None:
         for _ in range(steps):
-            warp.advance(velocity, 0.05)
+            warp.advance(velocity, 0.02)
 
-    warp = WarpMap(device, grid)
-    go(warp, 21)
+    warp = WarpMap(device, grid, (700, 700))
+    go(warp, at)
     state = warp.save()
+    assert ("pending" in state.fields) == (at >= 8), "remaps begin at steps 8, 16 and 24"
     go(warp, 30)
     straight = warp.read()
     warp.restore(state)
     go(warp, 30)
     np.testing.assert_array_equal(warp.read(), straight)
-    assert state.nbytes == 24 * 24 * 8 * 5
-    state.release()
+    other = WarpMap(device, grid, (700, 700))
+    other.advance(velocity, 0.3)
+    template = other.save()
+    resumed = template.with_arrays(device, state.arrays())
+    other.restore(resumed)
+    go(other, 30)
+    np.testing.assert_array_equal(other.read(), straight)
+    for made in (state, template, resumed):
+        made.release()
+    for made in (warp, other):
+        made.release()
+
+
+def test_looking_changes_nothing(device: Device) -> None:
+    """Whoever reads the map, in whatever way and between whatever steps, it goes on to the same bits."""
+    grid = Grid(48, 48)
+    velocity = device.upload(vortex_faces(grid, 0.0))
+    found = []
+    for looked in (False, True):
+        warp = WarpMap(device, grid, (700, 700))
+        for _ in range(29):
+            warp.advance(velocity, 0.02)
+            if looked:
+                warp.read((50, 50)), warp.composed(), warp.statistics(), warp.at(np.array([[0.3, 0.4]]))
+                warp.save().release()
+        found.append(warp.read())
+        warp.release()
+    np.testing.assert_array_equal(*found)
+
+
+def test_a_remap_touches_only_what_has_moved(device: Device) -> None:
+    """In a window, and saves share the rest; what is moved and what is not meet without a seam."""
+    whole = Grid(96, 96)
+    warp = WarpMap(device, whole, (1024, 1024))
+    warp.set(smooth(np.random.default_rng(1), (64, 64), 0.05))
+    first = warp.save()
+    warp.move_to(window(whole.refined(2), 60, 60, 48, 48))
+    before = warp.read((1024, 1024))
+    flow = swirl((84 / 192, 84 / 192), 20 / 192)
+    for _ in range(24):
+        warp.advance_prescribed(flow, 0.1)
+    second = warp.save()
+    shared = {*first.tiles["accumulated map"].textures} & {*second.tiles["accumulated map"].textures}
+    assert len(shared) == 16 - 4, "the window lies in four of the tiles"
+    warp.remap()
+    after = warp.read((1024, 1024))
+    outside = np.ones((1024, 1024), bool)
+    outside[320:576, 320:576] = False
+    np.testing.assert_array_equal(after[outside], before[outside])
+    assert np.abs(after - before).max() > 0.05
+    first.release()
+    second.release()
 
 
 def test_statistics_of_linear_maps(device: Device) -> None:
     grid = Grid(32, 16)
     x, y = grid.centres()
-    warp = WarpMap(device, grid)
+    warp = WarpMap(device, grid, (64, 32))
     warp.set(np.stack([0.2 * x, -0.5 * y], axis=-1))
     found = warp.statistics()
     assert found.det_min == pytest.approx(0.6, abs=1e-4)
     assert found.det_max == pytest.approx(0.6, abs=1e-4)
     assert found.folds == 0
+    x, y = grid.refined(2).centres()
     displacement = np.hypot(0.2 * x, 0.5 * y)
     assert found.displacement_max == pytest.approx(displacement.max(), rel=1e-4)
     assert found.displacement_mean == pytest.approx(displacement.mean(), rel=1e-4)
     warp.set(np.stack([-2.0 * x, 0 * y], axis=-1))
-    assert warp.statistics().folds == 32 * 16
+    assert warp.statistics().folds == warp.statistics().places == 64 * 32
     assert warp.statistics().det_error == pytest.approx(2.0, abs=1e-3)
 
 
@@ -230,6 +285,7 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
     rng = np.random.default_rng(9)
     warp, sampler = WarpMap(device, grid), Sampler(device)
     masks, fluid = Masks(device, grid), Fluid(device, grid)
+    masks.set_base(1e-4)
     picture = rng.integers(0, 256, (193, 301, 3), np.uint8)
     row, column = np.mgrid[0:193, 0:301]
     row, column = row * grid.ny // 193, column * grid.nx // 301
@@ -238,9 +294,9 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
     fluid.set_velocity(smooth(rng, grid.size, 0.3))
     for share in (0.005, 0.03, 0.0, 0.02):
         frozen = rng.random((grid.ny, grid.nx)) < share
-        masks.set_base(1e-4, frozen)
+        masks.set_frozen(frozen)
         masks.apply(fluid)
-        warp.hold(fluid.solid)
+        warp.hold(device.upload(frozen.astype(np.uint8) * 255))
         fluid.step(0.02)
         flow = fluid.faces().get()
         before = warp.read((301, 193)), sampler.apply(warp, picture), warp.at(points)
@@ -265,10 +321,11 @@ def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> N
     found = []
     for held in (False, True):
         masks, fluid, warp = Masks(device, grid), Fluid(device, grid), WarpMap(device, grid)
-        masks.set_base(1e-2, disc)
+        masks.set_base(1e-2)
+        masks.set_frozen(disc)
         masks.apply(fluid)
         if held:
-            warp.hold(fluid.solid)
+            warp.hold(device.upload(disc.astype(np.uint8) * 255))
         fluid.set_velocity(0.3 * vortex_faces(grid, 0.0))
         for _ in range(20):
             fluid.step(1 / 60)
@@ -281,3 +338,93 @@ def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> N
     away = ~np.asarray(ndimage.binary_dilation(disc, np.ones((3, 3)), iterations=4), bool)
     assert np.abs(held_map - free_map)[away].max() < 0.02 * grid.h
     assert not held_map[disc].any()
+
+
+def window(whole: Grid, left: int, top: int, nx: int, ny: int) -> Grid:
+    """Some cells of a grid."""
+    hx, hy = whole.spacing
+    return Grid(nx, ny, (nx * hx, ny * hy), (left * hx, top * hy), whole.picture)
+
+
+def swirl(centre: tuple[float, float], radius: float):
+    """A flow that comes to rest `radius` from a centre, and is at rest beyond."""
+
+    def velocity(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        right, down = x - centre[0], y - centre[1]
+        turn = 4 * np.clip(1 - (right**2 + down**2) / radius**2, 0, None) ** 4
+        return -turn * down, turn * right
+
+    return velocity
+
+
+def test_a_window_carries_what_the_whole_picture_carries(device: Device) -> None:
+    """What moves within a window only, on the same cells; and outside it nothing."""
+    whole = Grid(96, 64)
+    part = window(whole, 20, 8, 40, 48)
+    flow = swirl((40 * whole.h, 32 * whole.h), 15 * whole.h)
+    maps = [WarpMap(device, grid, (384, 256)) for grid in (whole, part)]
+    for warp in maps:
+        for step in range(70):
+            warp.advance_prescribed(flow, 0.05, step * 0.05)
+    all_of_it, some = (warp.read((384, 256)) for warp in maps)
+    assert np.abs(all_of_it).max() > 5 * whole.h
+    assert np.abs(some - all_of_it).max() < 2e-3 * whole.h
+    assert np.abs(maps[1].at(np.array([[0.4, 0.3]])) - maps[0].at(np.array([[0.4, 0.3]]))).max() < 2e-3 * whole.h
+    outside = np.ones((256, 384), bool)
+    outside[32:224, 80:240] = False
+    assert not some[outside].any()
+
+
+def test_moving_to_another_grid_keeps_the_map(device: Device) -> None:
+    """Two swirls that overlap, each in a window of cells of its own, against float64; the map goes through both."""
+    whole = Grid(64, 48)
+    fine = whole.refined(2)
+    flows = [swirl((0.4, 0.35), 0.22), swirl((0.6, 0.4), 0.25)]
+    grids = [window(fine, 20, 10, 62, 70), window(whole, 20, 6, 40, 40)]
+    warp = WarpMap(device, whole, (512, 384))
+    for flow, grid in zip(flows, grids, strict=True):
+        before = warp.read((100, 75))
+        warp.move_to(grid)
+        np.testing.assert_allclose(warp.read((100, 75)), before, atol=1e-5)
+        for step in range(30):
+            warp.advance_prescribed(flow, 0.02, step * 0.02)
+    warp.move_to(whole)
+    x, y = whole.refined(2).centres()
+    places = x, y
+    for flow in reversed(flows):  # back in time
+        places = reference.follow(flow, *places, 0.6, 0.0, 100)
+    found = warp.read((128, 96))
+    assert np.hypot(x + found[..., 0] - places[0], y + found[..., 1] - places[1]).max() < 0.05 * whole.h
+    assert warp.statistics().folds == 0
+    with pytest.raises(ValueError, match="picture"):
+        warp.move_to(Grid(20, 20))
+
+
+def test_restoring_under_a_brush_reaches_through_a_window(device: Device) -> None:
+    whole = Grid(64, 48)
+    warp = WarpMap(device, whole)
+    warp.set(smooth(np.random.default_rng(6), whole.size, 0.03))
+    warp.move_to(window(whole, 30, 10, 24, 24))
+    warp.advance_prescribed(swirl((0.65, 0.34), 0.15), 0.02)
+    before = warp.read()
+    warp.restore_under((0.5, 0.34), 0.2, hardness=0.9, amount=1.0)
+    x, y = whole.centres()
+    far = np.hypot(x - 0.5, y - 0.34)
+    assert np.abs(before[far < 0.15]).max() > 1e-3
+    assert np.abs(warp.read()[far < 0.15]).max() < 1e-6
+    np.testing.assert_allclose(warp.read()[far > 0.25], before[far > 0.25], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("picture", "cells", "wanted"),
+    [
+        ((1536, 1024), 192, (1536, 1024)),
+        ((12000, 9000), 256, (6000, 4500)),
+        ((300, 200), 192, (900, 600)),
+        ((5000, 1), 256, (20000, 32)),
+    ],
+)
+def test_the_map_is_as_fine_as_the_picture(picture: tuple[int, int], cells: int, wanted: tuple[int, int]) -> None:
+    assert map_size(Grid.for_picture(*picture, cells), picture, 32768) == wanted
+    smaller = map_size(Grid.for_picture(*picture, cells), picture, 4096)
+    assert max(smaller) <= 4096

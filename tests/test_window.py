@@ -262,6 +262,42 @@ def test_a_killed_editor_gives_the_work_back(desk: Desk, tmp_path: Path) -> None
     desk.until_gone()
 
 
+def close_minimised(desk: Desk) -> None:
+    """Minimise the window, as a window manager does, and press its close button in the list of windows."""
+    from Xlib import X, display
+    from Xlib.protocol import event
+
+    screen = display.Display(desk.env["DISPLAY"])
+    window = screen.create_resource_object("window", int(desk.window))
+    state, protocols, close = map(screen.intern_atom, ("WM_STATE", "WM_PROTOCOLS", "WM_DELETE_WINDOW"))
+    window.change_property(state, state, 32, [3, 0])  # iconic
+    window.unmap()
+    screen.sync()
+    time.sleep(0.5)
+    window.send_event(
+        event.ClientMessage(window=window, client_type=protocols, data=(32, [close, X.CurrentTime, 0, 0, 0]))
+    )
+    screen.sync()
+
+
+def test_a_minimised_window_is_closed_at_once(desk: Desk, tmp_path: Path) -> None:
+    write_picture(tmp_path / "pattern.png", pattern())
+    desk.open(tmp_path / "pattern.png")
+    close_minimised(desk)
+    desk.until_gone()
+
+
+def test_a_minimised_window_with_unsaved_work_comes_back_to_ask(desk: Desk, tmp_path: Path) -> None:
+    write_picture(tmp_path / "pattern.png", pattern())
+    desk.open(tmp_path / "pattern.png")
+    desk.drag((400, 400), (520, 400))
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
+    close_minimised(desk)
+    desk.until(lambda: bool(desk._find()), "the window")
+    assert desk.editor is not None
+    assert desk.editor.poll() is None
+
+
 def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
     env = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = subprocess.run(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.errors import shown
 from app.ui import icons
 from app.ui.dialogs import Dialog
 from app.ui.theme import packed
@@ -52,7 +53,7 @@ class Browser(Dialog):
     def go(self, folder: Path) -> None:
         """Show another folder."""
         self.folder, self.typed = folder, str(folder)
-        self._selected, self._problem = None, ""
+        self._selected, self._problem, self.problem = None, "", ""
         try:
             inside = [Path(entry.path) for entry in os.scandir(folder) if not entry.name.startswith(".")]
         except OSError as error:
@@ -73,6 +74,8 @@ class Browser(Dialog):
                 self.go(typed)
             elif os.path.exists(typed) or self.writes:
                 return not self._take(typed)
+            else:
+                self.problem = shown(f"There is no {typed}.")
         foot = ui.px(88 if self.writes else 48)
         imgui.begin_child("files", ImVec2(0, -foot))
         going: Path | None = None

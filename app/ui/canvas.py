@@ -13,6 +13,7 @@ from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.grid import Grid
 
 LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
@@ -90,6 +91,7 @@ class Canvas:
             "origin": (rect.x * density, rect.y * density),
             "step": (1 / (rect.width * density), 1 / (rect.height * density)),
             "extent": session.extent,
+            "window": _window_of(session.replay.fluid.grid),
             "target_height": float(height),
         }
         if state.before or state.split is not None:
@@ -107,7 +109,9 @@ class Canvas:
         before = target.viewport
         target.viewport = _from_below(seen, height)
         draw = self.device.pass_("view/canvas.frag", **defines)
-        draw.draw_into(target, ("displacement", "viscosity", "solid", "velocity", "force", "room"), **inputs)
+        draw.draw_into(
+            target, ("displacement", "viscosity", "thickness", "frozen", "velocity", "force", "room"), **inputs
+        )
         target.viewport = before
 
     def release(self) -> None:
@@ -148,7 +152,7 @@ class Canvas:
         """The displacement to show."""
         if session.is_rebuilding and self._kept is not None:
             return self._kept
-        displacement = session.replay.warp.composed(1 if session.is_moving else None)
+        displacement = session.replay.warp.composed(session.replay.grid.size if session.is_moving else None)
         if not session.is_moving and session.changes != self._kept_at:
             self._kept_at = session.changes
             if self._kept is None or self._kept.size != displacement.size:
@@ -176,15 +180,20 @@ class Canvas:
         if shown["viscosity"].shown or (painting and state.tool_name in ("thicken", "smooth")):
             defines["VISCOSITY"] = 1
             base = max(session.replay.settings.viscosity, 1e-6)
-            inputs |= {"viscosity": replay.fluid.viscosity, "base": base}
+            inputs |= {"viscosity": replay.masks.base_viscosity, "thickness": replay.masks.thickness, "base": base}
             inputs["viscosity_opacity"] = shown["viscosity"].opacity
         if shown["frozen"].shown or (painting and state.tool_name in ("freeze", "smooth")):
             defines["FROZEN"] = 1
-            inputs |= {"solid": replay.fluid.solid, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
+            inputs |= {"frozen": replay.masks.frozen, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
         if shown["velocity"].shown:
             defines["ARROWS"] = 1
-            inputs |= {"velocity": replay.fluid.faces(), "arrow": ARROW * scale, "speed": 0.4}
+            inputs |= {"velocity": replay.fluid.carrier(), "arrow": ARROW * scale, "speed": 0.4}
             inputs |= {"arrows_opacity": shown["velocity"].opacity, "arrow_colour": (1.0, 1.0, 1.0)}
+
+
+def _window_of(grid: Grid) -> tuple[float, ...]:
+    """Left, top, width and height of a grid, 0-1 of the picture."""
+    return tuple(np.divide((*grid.origin, *grid.extent), grid.picture * 2).tolist())
 
 
 def shown_pixels(picture: Picture, largest: int) -> np.ndarray:

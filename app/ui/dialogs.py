@@ -87,9 +87,11 @@ class Dialog(ABC):
                 ui.wrapped(self.problem, ui.palette.accent, 14)
                 imgui.dummy(ImVec2(0, ui.px(4)))
             self._take_note(imgui.get_window_pos(), imgui.get_window_size(), editor)
+            # A field that is being typed in is left by Escape first.
+            escaped = imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active()
             going_on = self.body(ui, editor) and self._open
             # Only the topmost dialog hears Escape; it may just have opened another one.
-            if imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active() and editor.dialogs[-1] is self:
+            if escaped and editor.dialogs[-1] is self:
                 going_on = False
             if not going_on or editor.dialogs[-1] is not self:
                 imgui.close_current_popup()

@@ -15,6 +15,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import internal
 
 from app.errors import UserError
+from app.presets import Feel
 from app.project import Project
 from app.recovery import Found
 from app.session import Session
@@ -71,7 +72,6 @@ class Editor:
         self.preferences = preferences or Preferences()
         self.state = State(
             inspector=self.preferences.inspector,
-            hint=self.preferences.hint,
             auto_quality=self.preferences.auto_quality,
         )
         self.host = Host(device)
@@ -143,7 +143,7 @@ class Editor:
         self._turn_to(len(self._sessions) - 1)
         if replaced is not None:
             self._close(*replaced)
-        self.quality.opened()
+        self.quality.opened(found)
 
     def undo(self) -> None:
         if self.session.document.history.can_undo:
@@ -367,6 +367,11 @@ class Editor:
         if self.state.tool.directions:
             self.state.opposite[name] = opposite
 
+    def choose_feel(self, feel: Feel) -> None:
+        """Let the fluid feel so from now on, and pushes be as local as is best for it."""
+        self.session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+        self.state.brush = replace(self.state.brush, local=feel.local)
+
     def resize_brush(self, factor: float) -> None:
         brush = self.state.brush
         self.state.brush = replace(brush, radius=min(max(brush.radius * factor, SMALLEST), LARGEST))
@@ -404,6 +409,12 @@ class Editor:
         self.state.inspector = self.preferences.inspector = not self.state.inspector
         self.preferences.save()
 
+    def dismiss_hint(self) -> None:
+        """The first hint has been followed or closed, and does not come again."""
+        if self.preferences.hint:
+            self.preferences.hint = False
+            self.preferences.save()
+
     def toggle_statistics(self) -> None:
         self.state.statistics = not self.state.statistics
         self.device.timings.enabled = self.state.statistics
@@ -437,6 +448,11 @@ class Editor:
         """Leave, after having asked about what is not saved and what is being exported."""
         self.unless_unsaved("quit", self._quit_unless_exporting)
 
+    @property
+    def asks_before_quitting(self) -> bool:
+        """Who leaves now is asked something first."""
+        return bool(self.is_dirty or self.session.is_painting or self.exports.is_running)
+
     def _quit_unless_exporting(self) -> None:
         if self.exports.is_running:
             self._ask(StillExporting(self.exports, self._quit))
@@ -466,7 +482,6 @@ class Editor:
     def release(self) -> None:
         """Free everything."""
         self.exports.cancel()
-        self.preferences.hint = self.state.hint
         self.preferences.save()
         self.recovery.release(discard=self.closed)
         for work in self._sessions:

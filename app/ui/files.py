@@ -85,9 +85,9 @@ class Files:
                 self.open_work(path)
 
     def open_work(self, path: Path) -> None:
-        """Open a picture, a recipe or a project, after asking about unsaved work."""
+        """Open a picture, a recipe or a project; about unsaved work is asked once that has been read."""
         fluid = self._feel()
-        self.editor.unless_unsaved("open something else", lambda: self._open(path, lambda: load_any(path, fluid)))
+        self._open(path, lambda: load_any(path, fluid), leaves=True)
 
     def _feel(self) -> dict[str, Any]:
         """What the person has set of the fluid; a recipe with forces of its own has been set by nobody here."""
@@ -120,11 +120,15 @@ class Files:
         editor.preferences.folder = str(path.parent)
         editor.messages.done(f"The picture now starts from {path.name}. Undo takes it away again.")
 
-    def _open(self, path: Path, load: Callable[[], Project], found: Found | None = None) -> None:
-        """Read a file in the background, and open it then; what was being read before is not wanted any more."""
+    def _open(self, path: Path, load: Callable[[], Project], found: Found | None = None, leaves: bool = False) -> None:
+        """Read a file in the background, and open it then; what was being read before is not wanted any more.
+
+        `leaves`: the work that is open has not to do with it.
+        """
         editor = self.editor
         self.give_up_loading()
-        self._loading = Loading(path, load, editor.canvas.largest, editor.session.document.recipe, found)
+        recipe = None if leaves else editor.session.document.recipe
+        self._loading = Loading(path, load, editor.canvas.largest, recipe, found)
         self._loading.is_done(AT_ONCE)
         self._look_at_loading()
 
@@ -330,7 +334,7 @@ def load_any(path: Path, fluid: dict[str, Any] | None = None) -> Project:
         project = projects.load(path)
     else:
         project = projects.from_picture(path, fresh_recipe(fluid))
-    check_picture(project.picture)
+    check_picture(project.picture, path.name)
     return project
 
 

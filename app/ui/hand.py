@@ -95,7 +95,7 @@ class Hand:
             self.drag = "zoom"
         elif button == LEFT:
             self.drag = "paint"
-            state.hint = False
+            editor.dismiss_hint()
             session, place = editor.session, editor.view.to_picture(self.x, self.y)
             opposite = state.opposite.get(tool.name, False) != self.mods.alt
             press = Press(state.brush, opposite, session.extent, session.dt)

@@ -9,6 +9,7 @@ from app.ui.viewport import Rect
 BAR, STRIP, INSPECTOR, TIMEBAR = 48.0, 48.0, 272.0, 56.0
 # In a window narrower than this the inspector would leave the picture too little; it comes when it is asked for.
 NARROW = 720.0
+LEAST = 120.0  # of the canvas's width beside the inspector; where there is less, the tools make room
 TOOL, BETWEEN, GROUP = 40.0, 4.0, 10.0  # heights in the strip: of a tool, between two, and more between two groups
 
 
@@ -17,7 +18,7 @@ class Layout:
     """The rectangles of the window's parts, in points."""
 
     bar: Rect
-    strip: Rect
+    strip: Rect | None
     inspector: Rect | None
     timebar: Rect
     canvas: Rect
@@ -37,11 +38,13 @@ class Layout:
         middle = max(height - bar - time, 1.0)
         columns = _columns(middle / scale, tools, groups)
         strip = (STRIP + (columns - 1) * (TOOL + BETWEEN)) * scale
+        if inspector and width - strip - INSPECTOR * scale < LEAST * scale:
+            strip = 0.0
         side = min(INSPECTOR * scale, width - strip) if inspector else 0.0
         return cls(
             columns=columns,
             bar=Rect(0, 0, width, bar),
-            strip=Rect(0, bar, strip, middle),
+            strip=Rect(0, bar, strip, middle) if strip else None,
             inspector=Rect(width - side, bar, side, middle) if side else None,
             timebar=Rect(0, height - time, width, time),
             canvas=Rect(strip, bar, max(width - strip - side, 1.0), middle),

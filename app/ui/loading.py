@@ -24,7 +24,7 @@ class Loading:
         path: the file.
         load: reads it; runs in a thread of its own, and knows no GL.
         largest: pixels along a side of the picture as the canvas shows it.
-        recipe: the work as it was when the person asked for the file.
+        recipe: the work that may be left for it without a question; None is none.
         found: what it is that is restored, where it is not just opened.
         project, pixels: what has been read, and the picture as the canvas shows it.
         error: why it could not be read, as a sentence.
@@ -33,7 +33,7 @@ class Loading:
     path: Path
     load: Callable[[], Project]
     largest: int
-    recipe: Recipe
+    recipe: Recipe | None
     found: Found | None = None
     project: Project | None = None
     pixels: np.ndarray | None = None

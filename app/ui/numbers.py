@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 from app.session import Session
-from solver.warp.map import MapStatistics
+from solver.warp.distortion import MapStatistics
 
 EVERY = 0.5  # seconds
 

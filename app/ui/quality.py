@@ -12,6 +12,7 @@ from app.strokes import Stroke
 from app.ui.files import fresh_recipe, settings_of
 
 if TYPE_CHECKING:
+    from app.recovery import Found
     from app.session import Session
     from app.ui.editor import Editor
 
@@ -90,11 +91,12 @@ class Quality:
         self.editor.state.auto_quality = self.editor.session.is_grid_automatic = True
         self._begin()
 
-    def opened(self) -> None:
-        """Something new is open; of an untouched picture, nobody has chosen the grid."""
+    def opened(self, found: Found | None) -> None:
+        """Something new is open; of an untouched picture, nobody has chosen the grid. `found`: what was restored."""
         session = self.editor.session
         recipe = session.recipe
-        session.is_grid_automatic = recipe.edited(picture=None) == fresh_recipe(settings_of(recipe.fluid))
+        fresh = recipe.edited(picture=None) == fresh_recipe(settings_of(recipe.fluid))
+        session.is_grid_automatic = fresh if found is None else found.work.is_grid_automatic
         self._begin()
 
     def _begin(self) -> None:
@@ -135,7 +137,7 @@ class Quality:
             self._spent.append([])
         start = time.perf_counter()
         self._trial.advance()
-        self._trial.warp.composed(1)
+        self._trial.warp.composed(self._trial.grid.size)
         finish()
         self._spent[-1].append((time.perf_counter() - start) * 1e3)
         if len(self._spent[-1]) < TICKS:

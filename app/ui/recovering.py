@@ -62,7 +62,7 @@ class Recovery:
         journal = self._journals.get(session)
         if journal is None:
             return
-        journal.keep(session.project, session.document)
+        journal.keep(session.project, session.document, session.is_grid_automatic)
         if journal.trouble is not None and not self._has_warned:
             self._has_warned = True
             self.editor.messages.warn(journal.trouble)

@@ -45,7 +45,6 @@ class State:
         sections: which of its sections are open.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
-        hint: the first hint is still shown.
         statistics: numbers are shown over the canvas.
         auto_quality: the grid follows the machine.
     """
@@ -59,7 +58,6 @@ class State:
     sections: dict[str, bool] = field(default_factory=dict)
     before: bool = False
     split: float | None = None
-    hint: bool = True
     statistics: bool = False
     auto_quality: bool = True
 

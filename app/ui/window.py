@@ -114,9 +114,13 @@ class Window:
         while not editor.closed:
             self._wait(editor)
             if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
-                # What has happened waits too.
-                glfw.wait_events_timeout(0.1)
-                continue
+                if any(isinstance(event, CloseWish) for event in self.events):
+                    if editor.asks_before_quitting:
+                        glfw.restore_window(self.handle)
+                elif not any(dialog.is_busy for dialog in editor.dialogs):
+                    # What has happened waits too.
+                    glfw.wait_events_timeout(0.1)
+                    continue
             events, self.events = self.events, []
             now = time.perf_counter()
             dt, last = now - last, now

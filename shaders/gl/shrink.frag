@@ -3,22 +3,24 @@
 // else the largest.
 // reads: 64
 uniform sampler2D u_field;
-uniform int u_side;
+uniform float u_side;
 layout(location = 0) out vec4 out_value;
 
 void main() {
-    ivec2 corner = u_side * ivec2(gl_FragCoord.xy), end = min(corner + u_side, textureSize(u_field, 0));
+    vec2 size = vec2(textureSize(u_field, 0)), texel = 1.0 / size;
+    vec2 first = u_side * floor(gl_FragCoord.xy) + 0.5, end = min(first + u_side - 0.5, size);
 #ifdef SUM
     out_value = vec4(0.0);
 #else
-    out_value = texelFetch(u_field, corner, 0);
+    out_value = texture(u_field, first * texel);
 #endif
-    for (int y = corner.y; y < end.y; ++y)
-        for (int x = corner.x; x < end.x; ++x) {
+    for (float y = first.y; y < end.y; ++y)
+        for (float x = first.x; x < end.x; ++x) {
+            vec4 value = texture(u_field, vec2(x, y) * texel);
 #ifdef SUM
-            out_value += texelFetch(u_field, ivec2(x, y), 0);
+            out_value += value;
 #else
-            out_value = max(out_value, texelFetch(u_field, ivec2(x, y), 0));
+            out_value = max(out_value, value);
 #endif
         }
 }

@@ -10,8 +10,8 @@ vec2 mac_velocity(sampler2D velocity, vec2 p) {
     vec2 cu = floor(qu), cv = floor(qv), fu = qu - cu, fv = qv - cv;
     float add_u, add_v;
     vec2 ux = wall_normal(vec2(1.0 - fu.x, fu.x), cu.x, size.x);
-    vec2 uy = wall_tangential(vec2(1.0 - fu.y, fu.y), cu.y, size.y, u_wall_speed.zw, add_u);
-    vec2 vx = wall_tangential(vec2(1.0 - fv.x, fv.x), cv.x, size.x, u_wall_speed.xy, add_v);
+    vec2 uy = wall_tangential(vec2(1.0 - fu.y, fu.y), cu.y, size.y, u_wall_image.zw, u_wall_speed.zw, add_u);
+    vec2 vx = wall_tangential(vec2(1.0 - fv.x, fv.x), cv.x, size.x, u_wall_image.xy, u_wall_speed.xy, add_v);
     vec2 vy = wall_normal(vec2(1.0 - fv.y, fv.y), cv.y, size.y);
     vec4 tu = vec4(cu + 0.5, cu + 1.5) * texel.xyxy, tv = vec4(cv + 0.5, cv + 1.5) * texel.xyxy;
     vec4 u = vec4(texture(velocity, tu.xy).r, texture(velocity, tu.zy).r,
@@ -36,4 +36,9 @@ vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
     vec2 edge = vec2(textureSize(velocity, 0));
     vec2 middle = clamp(p - 0.5 * cells_a_speed * here, vec2(0.0), edge);
     return clamp(p - cells_a_speed * mac_velocity(velocity, middle), vec2(0.0), edge);
+}
+
+// The same from the centre of the cell at p, as how far it is: x_d - x, in cells. 11 reads.
+vec2 mac_trace(sampler2D velocity, vec2 p, vec2 cells_a_speed) {
+    return mac_backtrace(velocity, p, mac_centre(velocity, p), cells_a_speed) - p;
 }

@@ -7,6 +7,5 @@ uniform vec2 u_cells_a_speed;
 layout(location = 0) out vec2 out_displacement;
 
 void main() {
-    vec2 p = gl_FragCoord.xy;
-    out_displacement = mac_backtrace(u_velocity, p, mac_centre(u_velocity, p), u_cells_a_speed) - p;
+    out_displacement = mac_trace(u_velocity, gl_FragCoord.xy, u_cells_a_speed);
 }

@@ -5,11 +5,13 @@
 // 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
 // square of the checkerboard, pixels.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
-// GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY, FROZEN: tint of decades of
-// viscosity over u_base, hatch. ARROWS: velocity on MAC faces, lengths / s, of which u_speed fills an arrow.
+// GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY: tint of decades over
+// u_base, u_viscosity of the recipe's and u_thickness painted. FROZEN: hatch where u_frozen is 1/2 or more. ARROWS: velocity
+// on MAC faces, lengths / s, of which u_speed fills an arrow.
 // FORCES: u_force on MAC faces, 1 at its strongest, as arrows of u_force_colour; where u_room swells or shrinks, a tint.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
 // reads: 2, and up to 8 with overlays
+#include "lib/decades.glsl"
 #ifndef EDGES
 #define EDGES 2
 #endif
@@ -18,6 +20,7 @@ uniform sampler2D u_displacement;
 uniform vec2 u_origin;
 uniform vec2 u_step;
 uniform vec2 u_extent;
+uniform vec4 u_window; // where the flow is solved: left, top, width and height, 0-1 of the picture
 #ifdef SPLIT
 uniform float u_split;
 #endif
@@ -34,11 +37,12 @@ uniform float u_pixel;
 #endif
 #ifdef VISCOSITY
 uniform sampler2D u_viscosity;
+uniform sampler2D u_thickness;
 uniform float u_base;
 uniform float u_viscosity_opacity;
 #endif
 #ifdef FROZEN
-uniform sampler2D u_solid;
+uniform sampler2D u_frozen;
 uniform float u_frozen_opacity;
 uniform float u_hatch;
 #endif
@@ -88,10 +92,11 @@ float arrow(vec2 p, vec2 v, float soft) {
     return 1.0 - smoothstep(-soft, soft, min(shaft, tip));
 }
 
-// `seen` with arrows over it, one in every square of `side` pixels, along `field`, of which `most` fills an arrow.
-vec3 with_arrows(vec3 seen, vec2 pixel, sampler2D field, float most, float side, vec3 colour, float opacity) {
+// `seen` with arrows over it, one in every square of `side` pixels, along `field`, which lies over `window`, of which
+// `most` fills an arrow.
+vec3 with_arrows(vec3 seen, vec2 pixel, sampler2D field, vec4 window, float most, float side, vec3 colour, float opacity) {
     vec2 tile = (floor(pixel / side) + 0.5) * side;
-    vec2 middle = tile * u_step;
+    vec2 middle = (tile * u_step - window.xy) / window.zw;
     if (inside(middle) < 0.5) return seen;
     vec2 v = texture(field, middle).rg / most;
     float size = length(v);
@@ -124,12 +129,15 @@ void main() {
     vec3 seen = colour.rgb;
     if (warped) {
 #ifdef VISCOSITY
-        float decades = log(max(texture(u_viscosity, x).r, 1e-9) / u_base) * 0.4342945;
-        vec3 tint = decades > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
-        seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(decades) * 0.28, 0.0, 0.75));
+        vec2 cell = (x - u_window.xy) / u_window.zw;
+        float thicker = inside(cell) * log(max(texture(u_viscosity, cell).r, 1e-6) / u_base) * 0.4342945
+                      + decades(texture(u_thickness, x).r);
+        vec3 tint = thicker > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
+        seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(thicker) * 0.28, 0.0, 0.75));
 #endif
 #ifdef FROZEN
-        float frozen = smoothstep(0.3, 0.7, texture(u_solid, x).r);
+        // One pixel wide at the edge, whether the mask's texels are smaller or larger than that.
+        float inside = texture(u_frozen, x).r - 0.5, frozen = clamp(inside / max(fwidth(inside), 1e-3) + 0.5, 0.0, 1.0);
         float stripe = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / u_hatch) - 0.5) * 2.0;
         vec3 ice = mix(vec3(0.0, 0.45, 0.70), vec3(0.80, 0.93, 1.0), smoothstep(0.60, 0.75, stripe));
         seen = mix(seen, ice, u_frozen_opacity * frozen * 0.72);
@@ -149,10 +157,11 @@ void main() {
         float room = texture(u_room, x).r;
         vec3 swelling = room > 0.0 ? vec3(0.90, 0.62, 0.0) : vec3(0.34, 0.71, 0.91);
         seen = mix(seen, swelling, u_forces_opacity * 0.9 * sqrt(min(abs(room), 1.0)));
-        seen = with_arrows(seen, pixel, u_force, 1.0, u_force_arrow, u_force_colour, u_forces_opacity);
+        const vec4 all = vec4(0.0, 0.0, 1.0, 1.0);
+        seen = with_arrows(seen, pixel, u_force, all, 1.0, u_force_arrow, u_force_colour, u_forces_opacity);
 #endif
 #ifdef ARROWS
-        seen = with_arrows(seen, pixel, u_velocity, u_speed, u_arrow, u_arrow_colour, u_arrows_opacity);
+        seen = with_arrows(seen, pixel, u_velocity, u_window, u_speed, u_arrow, u_arrow_colour, u_arrows_opacity);
 #endif
     }
     out_colour = vec4(seen, 1.0);

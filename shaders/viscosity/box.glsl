@@ -1,5 +1,5 @@
 // Which faces are open in a box without solids, texel by texel as in operator.glsl.
-uniform vec2 u_box; // its cells
+#include "viscosity/sides.glsl"
 
 vec2 own_texel() { return floor(gl_FragCoord.xy) - 1.0; }
 // Columns and rows of a texel's cells.

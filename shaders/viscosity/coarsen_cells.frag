@@ -1,9 +1,10 @@
 // Coarsen: K of e_xx and e_yy on the next coarser level, S' K S / 16 (see operator.py). A fine row counts 3/4 to the coarse
-// row it lies in and 1/4 to the nearest other one; where one of the two does not move the other counts whole. Of e_yy that
+// row it lies in and 1/4 to the nearest other one; where one of the two does not move, and is glided along, the other counts whole. Of e_yy that
 // holds for the columns.
 // u_xx0 ... u_yy2: of the finer level, as in stress.frag, on the finest u_xx0 only, with u_aspect; u_open: of the coarse one.
 // reads: 64
 #include "viscosity/openness.glsl"
+#include "viscosity/sides.glsl"
 #include "viscosity/fine_level.glsl"
 uniform sampler2D u_xx0;
 uniform sampler2D u_xx1;
@@ -36,14 +37,11 @@ void read_live(bool turned) {
     ivec2 size = textureSize(u_xx0, 0) - 2, texel = ivec2(own_texel()); // a coarse cell for each texel
     for (int q = 0; q < 4; ++q) {
         ivec2 at = texel + turn(ivec2(0, q - 1), turned), next = at + turn(ivec2(1, 0), turned);
-#ifdef NO_SLIP
-        vec4 moves = vec4(1.0);
-#else
         vec4 here = turn(turned ? open_v(vec2(at)) : open_u(vec2(at)), turned);
         vec4 there = turn(turned ? open_v(vec2(next)) : open_u(vec2(next)), turned);
-        vec4 moves = max(here, vec4(here.y, there.x, here.w, there.z));
-#endif
         ivec2 first = 2 * turn(at, turned), end = turn(size, turned);
+        vec4 glide = glides(vec4(first.yy, first.yy + 1), turned ? u_box.x : u_box.y, turned ? u_no_slip.xy : u_no_slip.zw);
+        vec4 moves = max(max(here, vec4(here.y, there.x, here.w, there.z)), 1.0 - glide);
         moves *= float(first.y >= 0) * vec4(lessThan(ivec4(first.yy, first.yy + 1), end.yyyy));
         live[2 * q] = moves.xy;
         live[2 * q + 1] = moves.zw;

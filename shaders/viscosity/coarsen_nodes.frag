@@ -3,6 +3,7 @@
 // A coupling is the sum over the pairs of fine nodes around its two coarse ones, either way round.
 // reads: 78
 #include "viscosity/openness.glsl"
+#include "viscosity/sides.glsl"
 #include "viscosity/fine_level.glsl"
 uniform sampler2D u_node0;
 uniform sampler2D u_node1;
@@ -33,13 +34,12 @@ vec4 square(int row, int column) {
     return at(row, column) + at(row, column + 1) + at(row + 1, column) + at(row + 1, column + 1);
 }
 
-#ifndef NO_SLIP
-// Whether all four faces at a texel's nodes move: a free-slip wall has no shear.
+// Whether all four faces at a texel's nodes move, or the fluid sticks there: a free-slip wall has no shear.
 vec4 moving(vec2 texel) {
     vec4 u = open_u(texel), above = open_u(texel - vec2(0.0, 1.0)), v = open_v(texel), left = open_v(texel - vec2(1.0, 0.0));
-    return u * vec4(above.zw, u.xy) * v * vec4(left.y, v.x, left.w, v.z);
+    vec4 held = sticks(2.0 * texel.x + vec4(0.0, 1.0, 0.0, 1.0), 2.0 * texel.y + vec4(0.0, 0.0, 1.0, 1.0));
+    return max(u * vec4(above.zw, u.xy) * v * vec4(left.y, v.x, left.w, v.z), held);
 }
-#endif
 
 void main() {
     read(u_node0);
@@ -69,7 +69,6 @@ void main() {
     n2 += 0.25 * square(0, 0);
     n4 += 0.25 * square(0, -1);
 #endif
-#ifndef NO_SLIP
     vec2 texel = own_texel(), x = vec2(1.0, 0.0), y = vec2(0.0, 1.0);
     vec4 here = moving(texel), right = moving(texel + x), below = moving(texel + y), corner = moving(texel + x + y);
     vec4 before = moving(texel - x + y), left = moving(texel - x);
@@ -78,7 +77,6 @@ void main() {
     n2 *= here * vec4(here.zw, below.xy);
     n3 *= here * vec4(here.w, right.z, below.y, corner.x);
     n4 *= here * vec4(left.w, here.z, before.y, below.x);
-#endif
     out_node0 = n0 / 16.0;
     out_node1 = n1 / 16.0;
     out_node2 = n2 / 16.0;

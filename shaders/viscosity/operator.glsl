@@ -6,6 +6,7 @@
 // COARSE: K couples neighbouring strains; stress.frag has multiplied, and its stresses K B v are read here.
 // Else, on the finest level, K of each cell and node is in textures.
 uniform vec2 u_shear;           // (s_y, s_x): (1, 1) where cells are square
+#include "viscosity/sides.glsl"
 #ifdef UNIFORM
 #include "viscosity/box.glsl"
 uniform float u_stiffness;      // dt mu / (hx hy)
@@ -29,32 +30,30 @@ struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_belo
 
 #ifdef UNIFORM
 // K of the nodes in a column (or row) over that of the inner ones: see `coefficients` in operator.py.
-vec4 at_walls(vec4 place, float far) {
-#ifdef NO_SLIP
-    const float wall = 2.0;
-#else
-    const float wall = 0.0;
-#endif
-    return mix(vec4(1.0), vec4(wall), vec4(equal(place, vec4(0.0))) + vec4(equal(place, vec4(far))));
+vec4 at_walls(vec4 place, float far, vec2 no_slip) {
+    return mix(mix(vec4(1.0), vec4(2.0 * no_slip.x), vec4(equal(place, vec4(0.0)))), vec4(2.0 * no_slip.y),
+               vec4(equal(place, vec4(far))));
 }
+vec4 at_walls_x(vec4 place) { return at_walls(place, u_box.x, u_no_slip.xy); }
+vec4 at_walls_y(vec4 place) { return at_walls(place, u_box.y, u_no_slip.zw); }
 
 Stiffness read_stiffness(vec2 at) {
     vec4 i = columns(own_texel()), j = rows(own_texel());
-    vec4 x = at_walls(i, u_box.x), y = at_walls(j, u_box.y);
+    vec4 x = at_walls_x(i), y = at_walls_y(j);
     Stiffness k;
     k.open_u = open_u(own_texel());
     k.open_v = open_v(own_texel());
     k.left = k.here_x = vec4(2.0 * u_stiffness * u_shear.y * u_shear.y);
     k.above = k.here_y = vec4(2.0 * u_stiffness * u_shear.x * u_shear.x);
     k.node = u_stiffness * x * y;
-    k.node_right = u_stiffness * at_walls(i + 1.0, u_box.x) * y;
-    k.node_below = u_stiffness * x * at_walls(j + 1.0, u_box.y);
+    k.node_right = u_stiffness * at_walls_x(i + 1.0) * y;
+    k.node_below = u_stiffness * x * at_walls_y(j + 1.0);
     return k;
 }
 
 Faces inverse_diagonal(vec2 at) {
     vec4 i = columns(own_texel()), j = rows(own_texel());
-    vec4 x = at_walls(i, u_box.x) + at_walls(i + 1.0, u_box.x), y = at_walls(j, u_box.y) + at_walls(j + 1.0, u_box.y);
+    vec4 x = at_walls_x(i) + at_walls_x(i + 1.0), y = at_walls_y(j) + at_walls_y(j + 1.0);
     vec2 s = u_stiffness * u_shear * u_shear;
     return Faces(open_u(own_texel()) / (1.0 + 4.0 * s.y + s.x * y), open_v(own_texel()) / (1.0 + 4.0 * s.x + s.y * x));
 }

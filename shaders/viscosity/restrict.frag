@@ -4,9 +4,7 @@
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a fixed neighbour.
 // With START a second pair of outputs, the first damped Jacobi sweep on it from rest: u_weight D^-1 times it.
-// With WEIGHED that of v* and, as a second pair, of the right-hand side b it was of, u_rhs_u, u_rhs_v; and texel by
-// texel the scalar products b . b and b . A v*, by which scaling.frag tells which part of v* to keep.
-// reads: 29, and 53 when WEIGHED
+// reads: 29
 uniform sampler2D u_u;
 uniform sampler2D u_v;
 #include "viscosity/operator.glsl"
@@ -15,13 +13,6 @@ uniform float u_weight;
 in vec2 v_uv;
 layout(location = 2) out vec4 out_start_u;
 layout(location = 3) out vec4 out_start_v;
-#endif
-#ifdef WEIGHED
-uniform sampler2D u_rhs_u;
-uniform sampler2D u_rhs_v;
-layout(location = 2) out vec4 out_rhs_u;
-layout(location = 3) out vec4 out_rhs_v;
-layout(location = 4) out vec4 out_products;
 #endif
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -35,15 +26,15 @@ vec4 along(sampler2D f, vec2 p, vec2 step_along, bool is_v) {
     return 0.5 * (vec4(a.y, b.y, a.w, b.w) + vec4(b.y, c.y, b.w, c.w)) + vec4(b.x, c.x, b.z, c.z);
 }
 
-// before, here, after: openness (0 or 1) of the coarse faces of this texel and of those across from it.
-vec4 gather(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, vec4 before, vec4 here, vec4 after) {
+// before, here, after: openness (0 or 1) of the coarse faces of this texel, whose first row is `row`, and of those across
+// from it; `count` rows lie between the sides that are `no_slip` or not.
+vec4 gather(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, vec4 before, vec4 here, vec4 after,
+            float row, float count, vec2 no_slip) {
     vec4 a = along(f, p - step_across, step_along, is_v), b = along(f, p, step_along, is_v);
     vec4 c = along(f, p + step_across, step_along, is_v), d = along(f, p + 2.0 * step_across, step_along, is_v);
-#ifdef NO_SLIP
-    const vec4 alone_before = vec4(0.0), alone_after = vec4(0.0);
-#else
-    vec4 alone_before = 1.0 - vec4(before.zw, here.xy), alone_after = 1.0 - vec4(here.zw, after.xy);
-#endif
+    vec4 rows = row + vec4(0.0, 0.0, 1.0, 1.0);
+    vec4 alone_before = (1.0 - vec4(before.zw, here.xy)) * glides(rows - 1.0, count, no_slip);
+    vec4 alone_after = (1.0 - vec4(here.zw, after.xy)) * glides(rows + 1.0, count, no_slip);
     vec4 sum = (0.25 + 0.75 * alone_before) * vec4(a.zw, b.zw) + (0.75 + 0.25 * alone_before) * vec4(b.xy, c.xy)
              + (0.75 + 0.25 * alone_after) * vec4(b.zw, c.zw) + (0.25 + 0.75 * alone_after) * vec4(c.xy, d.xy);
     return 0.25 * here * sum;
@@ -56,14 +47,8 @@ void main() {
     vec2 p = (2.0 * here + 1.5) * fine_texel, fx = x * fine_texel, fy = y * fine_texel;
     vec4 left = open_v(here - x).xzyw, above = open_u(here - y), open_here_u = open_u(here);
     vec4 open_here_v = open_v(here).xzyw, right = open_v(here + x).xzyw, below = open_u(here + y);
-    out_u = gather(u_u, p, fx, fy, false, above, open_here_u, below);
-    out_v = gather(u_v, p, fy, fx, true, left, open_here_v, right).xzyw;
-#ifdef WEIGHED
-    out_rhs_u = gather(u_rhs_u, p, fx, fy, false, above, open_here_u, below);
-    out_rhs_v = gather(u_rhs_v, p, fy, fx, true, left, open_here_v, right).xzyw;
-    float wanted = dot(out_rhs_u, out_rhs_u) + dot(out_rhs_v, out_rhs_v);
-    out_products = vec4(wanted, wanted - dot(out_rhs_u, out_u) - dot(out_rhs_v, out_v), 0.0, 0.0);
-#endif
+    out_u = gather(u_u, p, fx, fy, false, above, open_here_u, below, 2.0 * here.y, u_box.y, u_no_slip.zw);
+    out_v = gather(u_v, p, fy, fx, true, left, open_here_v, right, 2.0 * here.x, u_box.x, u_no_slip.xy).xzyw;
 #ifdef START
     Faces inverse = inverse_diagonal(v_uv);
     out_start_u = u_weight * inverse.u * out_u;

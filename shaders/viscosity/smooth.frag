@@ -1,5 +1,5 @@
-// Smooth: one damped Jacobi sweep of both components, f + weight D^-1 (b - A f), less `scaling` D^-1 b.
-// u_u, u_v: the iterate f; u_rhs_u, u_rhs_v: the right-hand side b; u_weight: of the sweep (Chebyshev); u_scaling.
+// Smooth: one damped Jacobi sweep of both components, f + weight D^-1 (b - A f).
+// u_u, u_v: the iterate f; u_rhs_u, u_rhs_v: the right-hand side b; u_weight: of the sweep (Chebyshev).
 // reads: 21
 #include "viscosity/operator.glsl"
 uniform sampler2D u_u;
@@ -7,7 +7,6 @@ uniform sampler2D u_v;
 uniform sampler2D u_rhs_u;
 uniform sampler2D u_rhs_v;
 uniform float u_weight;
-uniform float u_scaling;
 in vec2 v_uv;
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -23,7 +22,6 @@ void main() {
 #else
     Faces f, is_open, af = apply_operator(u_u, u_v, v_uv, f, is_open), inverse = inverse_diagonal(v_uv);
 #endif
-    vec4 rhs_u = texture(u_rhs_u, v_uv), rhs_v = texture(u_rhs_v, v_uv);
-    out_u = f.u + inverse.u * (u_weight * (rhs_u - af.u) - u_scaling * rhs_u);
-    out_v = f.v + inverse.v * (u_weight * (rhs_v - af.v) - u_scaling * rhs_v);
+    out_u = f.u + inverse.u * (u_weight * (texture(u_rhs_u, v_uv) - af.u));
+    out_v = f.v + inverse.v * (u_weight * (texture(u_rhs_v, v_uv) - af.v));
 }

@@ -1,7 +1,11 @@
 // Spread motions: every face moves with the part of the coarse space that it belongs to, Z times the motions.
 // u_motions: (a, b, w) by part, the velocity (a - w y, b + w x); part 0 does not move.
-// u_part_u, u_part_v: the part each belongs to; u_shear: (s_y, s_x), see operator.glsl.
+// u_part_u, u_part_v: the part each belongs to; u_shear: (s_y, s_x), see operator.glsl. WIDE: texels of
+// a row of u_motions.
 // reads: 10
+#ifndef WIDE
+#define WIDE 64
+#endif
 uniform sampler2D u_motions;
 uniform sampler2D u_part_u;
 uniform sampler2D u_part_v;
@@ -11,8 +15,8 @@ layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
 
 vec3 motion(float part) {
-    int number = int(part), width = textureSize(u_motions, 0).x;
-    return texelFetch(u_motions, ivec2(number % width, number / width), 0).xyz;
+    int number = int(part);
+    return texelFetch(u_motions, ivec2(number % WIDE, number / WIDE), 0).xyz;
 }
 
 void main() {

@@ -1,22 +1,46 @@
-// Distortion: how the map x + D(x) stretches and folds at every cell, by central differences, one-sided at the edges.
-// u_displacement (D): cell centres, longer sides; u_spacing: distances of the centres, longer sides.
-// largest: (-det J, det J, |D|) with J = I + grad D, to be reduced to the largest of each;
+// Distortion: how the map x + D(x) stretches and folds, by the chain rule: J is the product of the Jacobians of its
+// parts (lib/warp.glsl), each by its own interpolant, so that nothing depends on how far apart the places are.
+// x: see lib/place.glsl.
+// largest: (-det J, det J, |D|), to be reduced to the largest of each;
 // total: (1 where det J <= 0, |D|, |det J - 1|), to be reduced to their sums.
-// reads: 5
-uniform sampler2D u_displacement;
-uniform vec2 u_spacing;
+// reads: 32, and 16 more with PENDING
+#include "lib/warp.glsl"
+#include "lib/place.glsl"
 layout(location = 0) out vec4 out_largest;
 layout(location = 1) out vec4 out_total;
 
-vec2 read(ivec2 place) { return texelFetch(u_displacement, place, 0).rg; }
+// Determinant of 1 + grad S of a submap, as far as it is free to move, at x + moved; S is added to `moved`.
+float stretch_of(sampler2D submap, vec4 window, vec2 x, inout vec2 moved) {
+    vec2 place = x + moved, size = vec2(textureSize(submap, 0)), density = size / window.zw;
+    vec3 at = in_window(window, place);
+    mat2 slope;
+    vec2 more = cubic_displacement(submap, at.xy * size, slope);
+    float free = at.z;
+#ifdef HELD
+    vec2 e = u_picture / vec2(textureSize(u_accumulated, 0)), fading = vec2(0.0);
+    free *= freedom(place);
+    fading.x = (freedom(place + vec2(e.x, 0.0)) - freedom(place - vec2(e.x, 0.0))) / (2.0 * e.x);
+    fading.y = (freedom(place + vec2(0.0, e.y)) - freedom(place - vec2(0.0, e.y))) / (2.0 * e.y);
+    mat2 jacobian = mat2(1.0) + at.z * outerProduct(more, fading);
+#else
+    mat2 jacobian = mat2(1.0);
+#endif
+    jacobian += free * mat2(slope[0] * density.x, slope[1] * density.y);
+    moved = within_picture(x, moved + more * free);
+    return determinant(jacobian);
+}
 
 void main() {
-    ivec2 here = ivec2(gl_FragCoord.xy), last = textureSize(u_displacement, 0) - 1;
-    ivec2 before = max(here - 1, 0), after = min(here + 1, last);
-    vec2 apart = u_spacing * vec2(after - before);
-    vec2 dx = (read(ivec2(after.x, here.y)) - read(ivec2(before.x, here.y))) / apart.x;
-    vec2 dy = (read(ivec2(here.x, after.y)) - read(ivec2(here.x, before.y))) / apart.y;
-    float determinant = (1.0 + dx.x) * (1.0 + dy.y) - dx.y * dy.x, far = length(read(here));
-    out_largest = vec4(-determinant, determinant, far, 0.0);
-    out_total = vec4(determinant <= 0.0 ? 1.0 : 0.0, far, abs(determinant - 1.0), 0.0);
+    vec2 x = fragment_place() * u_picture, size = vec2(textureSize(u_accumulated, 0)), density = size / u_picture;
+    vec2 moved = vec2(0.0);
+    float change = stretch_of(u_submap, u_window, x, moved);
+#ifdef PENDING
+    change *= stretch_of(u_pending, u_pending_window, x, moved);
+#endif
+    mat2 slope;
+    vec2 more = cubic_displacement(u_accumulated, (x + moved) * density, slope);
+    change *= determinant(mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y));
+    float far = length(moved + more);
+    out_largest = vec4(-change, change, far, 0.0);
+    out_total = vec4(change <= 0.0 ? 1.0 : 0.0, far, abs(change - 1.0), 0.0);
 }

@@ -10,9 +10,9 @@ uniform vec2 u_extent;
 layout(location = 0) out vec2 out_displacement;
 
 const int ROUNDS = 7;
-const float FARTHEST = 2.0;  // texels that one round may go
 
 void main() {
+    float farthest = length(u_extent / vec2(textureSize(u_guess, 0))) * 0.70710678;  // that one round may go: as the guess is apart
     vec2 place = fragment_place(), density = vec2(textureSize(u_displacement, 0)) / u_extent;
     vec2 target = place * u_extent, found = texture(u_guess, place).rg, best = found;
     float least = 1e30;
@@ -28,7 +28,7 @@ void main() {
         determinant = determinant < 0.0 ? min(determinant, -1e-4) : max(determinant, 1e-4);
         vec2 back = vec2(jacobian[1].y * rest.x - jacobian[1].x * rest.y,
                          jacobian[0].x * rest.y - jacobian[0].y * rest.x) / determinant;
-        back *= min(1.0, FARTHEST / max(length(back * density), 1e-20));
+        back *= min(1.0, farthest / max(length(back), 1e-20));
         found = clamp(target + found - back, vec2(0.0), u_extent) - target;
     }
     out_displacement = best;

@@ -1,5 +1,4 @@
-// Steepness: |grad D|^2 at the corner in the middle of every block of 2 x 2 cells, by the differences of their means; where
-// a block reaches beyond the edge, the cells outside read as those inside.
+// Steepness: |grad D|^2 at every corner that four cells share, by the differences of their means.
 // u_displacement (D): cell centres, longer sides; u_spacing: distances of the centres, longer sides.
 // reads: 4
 uniform sampler2D u_displacement;
@@ -7,7 +6,7 @@ uniform vec2 u_spacing;
 layout(location = 0) out float out_steepness;
 
 void main() {
-    vec2 texel = 1.0 / vec2(textureSize(u_displacement, 0)), a = (2.0 * gl_FragCoord.xy - 0.5) * texel, b = a + texel;
+    vec2 texel = 1.0 / vec2(textureSize(u_displacement, 0)), a = gl_FragCoord.xy * texel, b = a + texel;
     vec2 upper_left = texture(u_displacement, a).rg, upper_right = texture(u_displacement, vec2(b.x, a.y)).rg;
     vec2 lower_left = texture(u_displacement, vec2(a.x, b.y)).rg, lower_right = texture(u_displacement, b).rg;
     vec2 across = upper_right + lower_right - upper_left - lower_left, down = lower_left + lower_right - upper_left - upper_right;

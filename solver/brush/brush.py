@@ -50,6 +50,16 @@ class Brush:
         attenuation = {"viscosity": fluid.viscosity, "obstruction": self._obstruction}
         self._draw(fluid, motion, velocity, 1.0, attenuation)
 
+    def carry(self, fluid: Scheme, push: Push, warp: WarpMap | None = None) -> None:
+        """Let the local part of a push carry the picture until the fluid's next step; what is thicker, less."""
+        if not push.local:
+            return
+        self._look(fluid, push, fluid.faces(), warp)
+        carry, region = self.device.pass_("brush/carry.frag"), push.tip.region(fluid.grid)
+        inputs = push.tip.inputs(fluid.grid) | {"brush_velocity": push.local_velocity, "viscosity": fluid.viscosity}
+        inputs |= {"motion": self._motion, "slip": self._slip.factor}
+        fluid.local.add(lambda motion: carry(motion, add=True, region=region, **inputs))
+
     def push(self, fluid: Scheme, tip: Tip, dt: float, strength: float = 1.0) -> None:
         """Carry the fluid under the tip along; see `Push`."""
         self.lead(fluid, Push(tip, dt, strength))
@@ -71,14 +81,14 @@ class Brush:
 
     def _look(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None) -> None:
         """Find how the fluid moves at the brush, and how firmly a push holds the picture."""
-        (hx, hy), tip = fluid.grid.spacing, motion.tip
+        (hx, hy), (left, top), tip = fluid.grid.spacing, fluid.grid.origin, motion.tip
         probe = self.device.pass_("brush/probe.frag")
         probe(
             self._motion,
             velocity=velocity,
             impulse=fluid.impulse.field,
             viscosity=fluid.viscosity,
-            at=(tip.end[0] / hx, tip.end[1] / hy),
+            at=((tip.end[0] - left) / hx, (tip.end[1] - top) / hy),
             reach=tuple(max(0.25 * tip.radius / h, 0.5) for h in (hx, hy)),
             spacing=(hx, hy),
         )

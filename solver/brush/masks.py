@@ -1,100 +1,265 @@
-"""Painted masks: how thick the fluid is and where it is frozen, over what the recipe sets."""
+"""Masks on a canvas of their own: how thick the fluid is and where it is frozen, painted as finely as the picture."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import ceil, floor
 from typing import Any
 
+import moderngl
 import numpy as np
 
 from solver.brush.tip import Tip
 from solver.gl.device import Device
-from solver.gl.field import DoubleField, Field
+from solver.gl.field import Field, FieldPool
+from solver.gl.passes import Blend, Region
+from solver.gl.tiled import TILE, Kind, SavedTiles, TiledField
 from solver.grid import Grid
 from solver.scheme import LARGEST_VISCOSITY, Scheme, State, check_finite
 
-# Decades that painting may thin or thicken the fluid by, and the viscosity it starts from where there is none.
-THINNEST, THICKEST = -3.0, 5.0
-LEAST_VISCOSITY = 1e-6
+# Thickness is kept in 16 bits: so many steps a decade and the step that is zero leave room for 3 decades that painting
+# may thin by and 5 that it may thicken by; `lib/decades.glsl` has them too.
+STEPS, ZERO, MOST = 8192, 24576, 65535
+BLANK = {"thickness": ZERO / MOST, "frozen": 0.0}
+LEAST_VISCOSITY = 1e-6  # that painting starts from where there is none
+SMOOTHED = 1 / 8  # radii over which `smooth` takes means
+
+Base = float | np.ndarray | Callable[[Grid], np.ndarray | float]
 
 
 class Masks:
-    """Thickness (decades of viscosity) and frozenness painted by hand, and the base they are painted over.
+    """Thickness (decades of viscosity) and frozenness painted by hand, over what the recipe sets.
+
+    Nothing is kept of a mask that nothing has been painted on.
 
     Args:
         device: where they live.
-        grid: of the fluid they are for.
+        canvas: the texels they are painted on, over the whole picture; see `map_size`.
     """
 
-    def __init__(self, device: Device, grid: Grid) -> None:
+    def __init__(self, device: Device, canvas: Grid) -> None:
         self.device = device
-        self.grid = grid
-        self.base_viscosity = device.field(grid.size, 1, "base viscosity")
-        self.base_frozen = device.field(grid.size, 1, "base frozen")
-        self.thickness = device.double_field(grid.size, 1, "painted thickness")
-        self.frozen = device.double_field(grid.size, 1, "painted frozen")
+        self.canvas = canvas
+        self._kinds = {
+            "thickness": Kind(canvas.size, 1, "nu2", TILE),
+            "frozen": Kind(canvas.size, 1, "f1", TILE),
+        }
+        self._painted: dict[str, TiledField] = {}
+        self._nothing: dict[str, Field] = {
+            name: TiledField(device, (1, 1), 1, f"no {name}", kind.dtype, blank=BLANK[name])
+            for name, kind in self._kinds.items()
+        }
+        self._frozen_before: SavedTiles | None = None  # what is frozen by the recipe
+        self._base: Base = 0.0
+        self._cells = FieldPool(device, "masks")
+        # The fluid that was told last, if it need not be told everything, and the texels of a mask changed since.
+        self._applied_to: tuple[Scheme, Grid] | None = None
+        self._changed: dict[str, Region] = {}
 
-    def set_base(self, viscosity: np.ndarray | float, frozen: np.ndarray | None = None) -> None:
-        """Set what is painted over: viscosity in lengths^2 / s, and frozen cells, each (ny, nx)."""
-        shape = (self.grid.ny, self.grid.nx)
-        self.base_viscosity.set(np.broadcast_to(np.asarray(viscosity, np.float32), shape))
-        self.base_frozen.set(np.zeros(shape, np.float32) if frozen is None else np.asarray(frozen, np.float32))
+    # -- what is painted over ---------------------------------------------------------------------------------------
+
+    def set_base(self, viscosity: Base) -> None:
+        """Set the viscosity that is painted over, lengths^2 / s: of all cells, (ny, nx), or a function of the grid."""
+        self._base = viscosity
+        self._applied_to = None
+
+    def set_frozen(self, frozen: np.ndarray | None) -> None:
+        """Set what is frozen by the recipe, (h, w) true or false on the canvas; paint on it is taken off."""
+        if self._frozen_before is not None:
+            self._frozen_before.release()
+            self._frozen_before = None
+        self._clear("frozen")
+        if frozen is not None and frozen.any():
+            self._field("frozen").set(np.where(frozen, 255, 0).astype(np.uint8))
+            self._frozen_before = self._field("frozen").save()
+        self._applied_to = None
+
+    # -- painting ---------------------------------------------------------------------------------------------------
 
     def thicken(self, tip: Tip, decades: float) -> None:
         """Thicken by `decades` at the tip's centre; negative thins."""
         check_finite("a thickening", decades)
-        self._paint(self.thickness, tip, more=decades, limits=(THINNEST, THICKEST))
+        amount = min(abs(decades) * STEPS / MOST, 1.0)
+        self._paint("thickness", tip, "brush/thicken.frag", "add" if decades > 0 else "subtract", amount=amount)
 
     def freeze(self, tip: Tip, amount: float) -> None:
-        """Freeze by `amount` (0-1); negative thaws."""
+        """Freeze by `amount` (0-1) as far as the tip reaches; negative thaws. From 1/2 on a place is frozen."""
         check_finite("a freezing", amount)
-        self._paint(self.frozen, tip, mix=min(abs(amount), 1.0), towards=1.0 if amount > 0 else -1.0)
+        towards, amount = float(amount > 0), min(abs(amount), 1.0)
+        self._paint("frozen", tip, "brush/freeze.frag", "mix", towards=towards, amount=amount)
 
     def smooth(self, tip: Tip, strength: float) -> None:
         """Smooth both masks under the tip."""
         check_finite("a smoothing", strength)
-        for mask in (self.thickness, self.frozen):
-            inputs = tip.inputs(self.grid)
-            self.device.pass_("brush/smooth.frag")(mask.write, mask=mask.read, strength=strength, **inputs)
-            mask.swap()
+        left, top, width, height = self._region(tip)
+        if not (width and height):
+            return
+        side = max(3, round(SMOOTHED * tip.radius / self.canvas.h))
+        size = -(-width // side), -(-height // side)
+        blocks = {"corner": (float(left), float(top)), "side": float(side)}
+        means = self.device.field(size, 1, "means of a mask")
+        means.texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        for name, mask in self._painted.items():
+            self.device.pass_("brush/coarsen.frag")(means, mask=mask, **blocks)
+            self._paint(name, tip, "brush/smooth.frag", "mix", means=means, strength=min(abs(strength), 1.0), **blocks)
+        means.release()
 
     def clear(self) -> None:
         """Take all paint off."""
-        self.thickness.read.clear()
-        self.frozen.read.clear()
+        self._clear("thickness")
+        if self._frozen_before is None:
+            self._clear("frozen")
+        else:
+            self._field("frozen").restore(self._frozen_before)
+        self._applied_to = None
+
+    # -- what the fluid takes of them -------------------------------------------------------------------------------
 
     def apply(self, fluid: Scheme) -> None:
-        """Give the fluid its viscosity and solid cells; the next step takes them up.
+        """Give a fluid, on the whole picture or a window, its viscosity and solid cells; the next step takes them up.
 
-        Solid are the frozen cells and those within two of them, so that with `WarpMap.hold` no bit of a picture changes
-        in a frozen cell.
+        They are averages over the cells, worked out where a mask has changed since it was told last. Solid are the
+        cells with something frozen in them and those within two of them: there the map, which holds what is frozen to
+        the bit (`WarpMap.hold`), goes over into what flows. Were only cells solid of which half is frozen, the fluid
+        would glide along the edge, and the map tear there.
         """
-        self.device.pass_("step/compose_masks.frag")(
-            (fluid.viscosity, fluid.solid),
-            base_viscosity=self.base_viscosity,
-            base_frozen=self.base_frozen,
-            thickness=self.thickness.read,
-            frozen=self.frozen.read,
-            least=LEAST_VISCOSITY,
-            most=LARGEST_VISCOSITY,
-        )
+        grid = fluid.grid
+        base = self._cells.get("base viscosity", grid.size, 1)
+        if self._applied_to != (fluid, grid):
+            viscosity = self._base(grid) if callable(self._base) else self._base
+            base.set(np.broadcast_to(np.asarray(viscosity, np.float32), (grid.ny, grid.nx)))
+            fluid.viscosity.copy_from(base)
+            fluid.solid.clear()
+            self._changed = dict.fromkeys(self._painted, (0, 0, *self.canvas.size))
+        elif not self._changed:
+            return
+        cells: dict[str, Any] = {
+            "origin": tuple(a / b for a, b in zip(grid.origin, grid.picture, strict=True)),
+            "cell": tuple(a / b for a, b in zip(grid.spacing, grid.picture, strict=True)),
+        }
+        if changed := self._changed.get("thickness"):
+            self.device.pass_("step/average_thickness.frag")(
+                fluid.viscosity,
+                region=self._cells_over(changed, grid),
+                base_viscosity=base,
+                thickness=self.thickness,
+                least=LEAST_VISCOSITY,
+                most=LARGEST_VISCOSITY,
+                **cells,
+            )
+        if changed := self._changed.get("frozen"):
+            frozen = self._cells.get("frozen", grid.size, 1, "f1")
+            x, y, width, height = region = self._cells_over(changed, grid)
+            self.device.pass_("step/average_frozen.frag")(
+                frozen, region=region, frozen=self.frozen, enough=1e-3, **cells
+            )
+            widened = (x - 2, y - 2, width + 4, height + 4)
+            self.device.pass_("step/widen_solid.frag")(fluid.solid, region=widened, frozen=frozen)
+        self._applied_to = fluid, grid
+        self._changed.clear()
         fluid.masks_changed()
 
+    def forget_fluid(self) -> None:
+        """Tell the fluid everything next time: it lies elsewhere now, or is another one."""
+        self._applied_to = None
+
+    @property
+    def base_viscosity(self) -> Field:
+        """What is painted over, on the cells of the fluid that was told last, lengths^2 / s."""
+        return self._cells["base viscosity"]
+
+    @property
+    def thickness(self) -> Field:
+        """Painted thickness on the canvas (see `lib/decades.glsl`), or one texel if there is none."""
+        return self._painted.get("thickness", self._nothing["thickness"])
+
+    @property
+    def frozen(self) -> Field:
+        """What is frozen on the canvas, from 1/2 on, or one texel of nothing."""
+        return self._painted.get("frozen", self._nothing["frozen"])
+
+    @property
+    def frozen_field(self) -> Field | None:
+        """What is frozen on the canvas, from 1/2 on; None if nothing ever was."""
+        return self._painted.get("frozen")
+
+    # -- their state ------------------------------------------------------------------------------------------------
+
     def save(self) -> State:
-        """A copy of the painted fields, on the GPU, which the caller releases."""
-        return State.of(self.device, self._live())
+        """A copy of this moment, on the GPU, which the caller releases; it shares what did not change."""
+        tiles = {
+            name: self._painted[name].save() if name in self._painted else SavedTiles.nothing(kind, BLANK[name])
+            for name, kind in self._kinds.items()
+        }
+        return State({}, {}, tiles)
 
     def restore(self, state: State) -> None:
-        """Go back to a saved state; call `apply` after it."""
-        state.write_to(self._live())
+        """Go back to a saved state; call `apply` after it.
 
-    def _live(self) -> dict[str, Field]:
-        return {"thickness": self.thickness.read, "frozen": self.frozen.read}
+        Raises:
+            ValueError: if it is of another canvas.
+        """
+        if {name: saved.kind for name, saved in state.tiles.items()} != self._kinds:
+            raise ValueError("the state is of another canvas")
+        for name, saved in state.tiles.items():
+            if name in self._painted or not saved.is_blank:
+                for region in self._field(name).restore(saved):
+                    self._has_changed(name, region)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return sum(field.nbytes for field in (*self._painted.values(), *self._cells.fields))
 
     def release(self) -> None:
-        for item in (self.base_viscosity, self.base_frozen, self.thickness, self.frozen):
-            item.release()
+        """Free the textures."""
+        if self._frozen_before is not None:
+            self._frozen_before.release()
+        for thing in (*self._painted.values(), *self._nothing.values(), self._cells):
+            thing.release()
+        self._painted.clear()
 
-    def _paint(self, mask: DoubleField, tip: Tip, **inputs: Any) -> None:
-        inputs = {"more": 0.0, "mix": 0.0, "towards": 0.0, "limits": (-1.0, 1.0), **inputs, **tip.inputs(self.grid)}
-        self.device.pass_("brush/paint.frag")(mask.write, mask=mask.read, **inputs)
-        mask.swap()
+    # -- its parts --------------------------------------------------------------------------------------------------
+
+    def _field(self, name: str) -> TiledField:
+        """The field of a mask, made when it is wanted first."""
+        if name not in self._painted:
+            kind = self._kinds[name]
+            self._painted[name] = TiledField(
+                self.device, kind.size, kind.components, f"painted {name}", kind.dtype, kind.tile, BLANK[name]
+            )
+            self._applied_to = None
+        return self._painted[name]
+
+    def _clear(self, name: str) -> None:
+        if name in self._painted:
+            self._painted[name].clear()
+
+    def _paint(self, name: str, tip: Tip, shader: str, blend: Blend, **inputs: Any) -> None:
+        region = self._region(tip)
+        if region[2] and region[3]:
+            inputs |= tip.inputs(self.canvas)
+            self.device.pass_(shader)(self._field(name), blend=blend, region=region, **inputs)
+            self._has_changed(name, region)
+
+    def _region(self, tip: Tip) -> Region:
+        """The texels of the canvas that a tip touches."""
+        x, y, width, height = tip.region(self.canvas)
+        left, top = max(x, 0), max(y, 0)
+        right, bottom = min(x + width, self.canvas.nx), min(y + height, self.canvas.ny)
+        return left, top, max(right - left, 0), max(bottom - top, 0)
+
+    def _has_changed(self, name: str, region: Region) -> None:
+        x, y, width, height = region
+        if name in self._changed:
+            left, top, wide, high = self._changed[name]
+            x, right, y, bottom = min(x, left), max(x + width, left + wide), min(y, top), max(y + height, top + high)
+            width, height = right - x, bottom - y
+        self._changed[name] = x, y, width, height
+
+    def _cells_over(self, region: Region, grid: Grid) -> Region:
+        """The cells over texels of the canvas."""
+        sides = zip(region[:2], region[2:], self.canvas.spacing, grid.origin, grid.spacing, strict=True)
+        ends = [((first * texel - start) / h, ((first + n) * texel - start) / h) for first, n, texel, start, h in sides]
+        (left, right), (top, bottom) = ((floor(a), ceil(b)) for a, b in ends)
+        return left, top, right - left, bottom - top

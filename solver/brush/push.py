@@ -80,6 +80,8 @@ class Push:
     Attributes:
         slip: the part of its own speed that the tip gives to the fluid; see `slip_factor`.
         strain_limit: the part of the most strain at which it slips; see `strain_limit`.
+        local: the part of its motion, 0-1, that carries what is under the tip and nothing else: the fluid does not feel
+            it, and nothing flows back beside the brush; see `Brush.carry`.
 
     Raises:
         ValueError: if a number is not finite, or the tip is faster than the solvers can follow.
@@ -90,12 +92,15 @@ class Push:
     strength: float = 1.0
     slip: float = 1.0
     strain_limit: float = 1.0
+    local: float = 0.0
 
     def __post_init__(self) -> None:
         if not check_step(self.dt) > 0:
             raise ValueError("a push takes some time")
         for name in ("strength", "slip", "strain_limit"):
             check_finite(f"a push's {name}", getattr(self, name))
+        if not 0 <= self.local <= 1:
+            raise ValueError("the local part of a push must be from 0 to 1")
         for speed in self.velocity:
             check_finite("a push's speed", speed)
 
@@ -105,14 +110,22 @@ class Push:
 
     @property
     def velocity(self) -> Point:
-        """What it gives to the fluid: against the drag at the whole speed, and no stronger than along it."""
+        """What it gives: against the drag at the whole speed, and no stronger than along it."""
         (x0, y0), (x1, y1) = self.tip.start, self.tip.end
         speed = (self.slip if self.strength > 0 else -self.slip) / self.dt
         return (x1 - x0) * speed, (y1 - y0) * speed
 
+    @property
+    def local_velocity(self) -> Point:
+        """What of it carries the picture and not the fluid."""
+        u, v = self.velocity
+        amount = self.local * abs(self.strength)
+        return amount * u, amount * v
+
     def inputs(self) -> dict[str, Any]:
+        u, v = self.velocity
         return {
-            "brush_velocity": self.velocity,
+            "brush_velocity": ((1 - self.local) * u, (1 - self.local) * v),
             "strength": abs(self.strength),
             "hardness": HARDEST * min(max(self.tip.hardness, 0.0), 1.0),
         }

@@ -45,9 +45,10 @@ class Tip:
             raise ValueError("a brush's hardness must be a number from 0 to 1")
 
     def inputs(self, grid: Grid) -> dict[str, Any]:
-        """The uniforms of `lib/brush.glsl`."""
+        """The uniforms of `lib/brush.glsl`, from the corner of the grid."""
+        left, top = grid.origin
         return {
-            "segment": (*self.start, *self.end),
+            "segment": (self.start[0] - left, self.start[1] - top, self.end[0] - left, self.end[1] - top),
             "radius": self.radius,
             "hardness": min(max(self.hardness, 0.0), 1.0),
             "spacing": grid.spacing,
@@ -55,7 +56,8 @@ class Tip:
 
     def region(self, grid: Grid) -> Region:
         """The cells it touches, with one to spare."""
-        ends = [(min(a, b), max(a, b), h) for a, b, h in zip(self.start, self.end, grid.spacing, strict=True)]
+        sides = zip(self.start, self.end, grid.origin, grid.spacing, strict=True)
+        ends = [(min(a, b) - first, max(a, b) - first, h) for a, b, first, h in sides]
         low = [math.floor((least - self.radius) / h) - 1 for least, _, h in ends]
         high = [math.ceil((most + self.radius) / h) + 2 for _, most, h in ends]
         return low[0], low[1], high[0] - low[0], high[1] - low[1]

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from solver.gl.device import Device
 
-_NUMPY = {"f1": np.uint8, "nu2": np.uint16, "u4": np.uint32, "f2": np.float16, "f4": np.float32}
+DTYPES = {"f1": np.uint8, "nu2": np.uint16, "u4": np.uint32, "f2": np.float16, "f4": np.float32}
 
 
 class FieldError(ValueError):
@@ -64,12 +64,13 @@ class Field:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return self.size[0] * self.size[1] * self.components * _NUMPY[self.dtype]().itemsize
+        return self.size[0] * self.size[1] * self.components * DTYPES[self.dtype]().itemsize
 
     def clear(self, *values: float) -> None:
         """Fill with `values`, by default zero."""
         red, green, blue, alpha = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
         self.framebuffer.clear(red, green, blue, alpha)
+        self.drawn()
 
     def set(self, array: np.ndarray) -> None:
         """Write an array of shape (height, width) or (height, width, components), row 0 on top.
@@ -81,10 +82,11 @@ class Field:
         shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
         if array.shape != shape and array.shape != (*shape, 1):
             raise FieldError(f"{self.label}: an array of shape {array.shape} was given, {shape} is wanted")
-        data = array.astype(_NUMPY[self.dtype], copy=False)
+        data = array.astype(DTYPES[self.dtype], copy=False)
         if self.dtype in ("f2", "f4") and not np.isfinite(data).all():
             raise FieldError(f"{self.label}: the array holds a value that is not finite")
         self.texture.write(np.ascontiguousarray(data).tobytes())
+        self.drawn()
 
     def get(self, region: tuple[int, int, int, int] | None = None) -> np.ndarray:
         """Read back as an array of shape (height, width) or (height, width, components), row 0 on top.
@@ -94,7 +96,7 @@ class Field:
         """
         x, y, width, height = region or (0, 0, *self.size)
         shape = (height, width) if self.components == 1 else (height, width, self.components)
-        array = np.empty(shape, _NUMPY[self.dtype])
+        array = np.empty(shape, DTYPES[self.dtype])
         viewport = x, y, width, height
         self.framebuffer.read_into(array, viewport, self.components, dtype=self.dtype, alignment=1)
         return array
@@ -102,6 +104,9 @@ class Field:
     def copy_from(self, other: Field) -> None:
         """Take over the texels of `other`, which has the same size and components."""
         self.device.ctx.copy_framebuffer(self.framebuffer, other.framebuffer)
+
+    def drawn(self, region: tuple[int, int, int, int] | None = None) -> None:
+        """Hear that something was drawn into it, or into (x, y, width, height) of it."""
 
     def release(self) -> None:
         """Free the texture; the field can no longer be used."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import moderngl
 
@@ -17,6 +17,7 @@ GL_SAMPLERS = 0x8B5E, 0x8DD2  # sampler2D, usampler2D
 
 Target = Field | Sequence[Field]
 Region = tuple[int, int, int, int]
+Blend = Literal["add", "subtract", "mix"]
 
 
 class Pass:
@@ -55,6 +56,7 @@ class Pass:
         target: Target,
         *,
         add: bool = False,
+        blend: Blend | None = None,
         region: Region | list[Region] | None = None,
         vertices: int = 3,
         **inputs: object,
@@ -63,7 +65,9 @@ class Pass:
 
         Args:
             target: a field, or several fields of one size.
-            add: add to what the target holds (float blending) instead of replacing it.
+            add: the same as `blend="add"`.
+            blend: what is done with what the target holds instead of replacing it: this is added to it, taken from it,
+                or takes its place by the part that is its alpha. Fields of 8 and 16 bits stay within 0-1.
             region: (x, y, width, height) in texels, or several of them, to draw only there; clipped to the target.
             vertices: of the triangles, where the pass has a vertex shader of its own.
             inputs: the shader's uniforms without their `u_`.
@@ -75,16 +79,24 @@ class Pass:
         if not regions:
             return
         ctx = self.device.ctx
-        if add:
+        blend = "add" if add else blend
+        if blend:
             ctx.enable_only(moderngl.BLEND)
-            ctx.blend_func = moderngl.ONE, moderngl.ONE
+            factors = (
+                (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA) if blend == "mix" else (moderngl.ONE, moderngl.ONE)
+            )
+            ctx.blend_func = factors
+            equation = moderngl.FUNC_REVERSE_SUBTRACT if blend == "subtract" else moderngl.FUNC_ADD
+            ctx.blend_equation = equation  # pyright: ignore[reportAttributeAccessIssue]
         for x, y, width, height in regions:
             if region is not None:
                 framebuffer.scissor = (x, y, width, height)
             framebuffer.use()
             self._vertices.render(moderngl.TRIANGLES, vertices=vertices)
             self.device.timings.count(width * height, self.reads)
-        if add:
+            for field in fields:
+                field.drawn((x, y, width, height))
+        if blend:
             ctx.enable_only(moderngl.NOTHING)
         if region is not None:
             framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]

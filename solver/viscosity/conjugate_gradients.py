@@ -30,7 +30,6 @@ class ConjugateGradients:
         names = "solution", "residual", "direction", "A p"
         self._x, self._r, self._p, self._ap = (DoublePackedFaces(device, ringed, f"viscous {name}") for name in names)
         self._az = PackedFaces(device, ringed, "viscous A z")
-        self._rest = PackedFaces(device, ringed, "viscous rest")
         self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
         self._change_product = device.field(ringed, 1, "viscous product of the change")
@@ -48,33 +47,48 @@ class ConjugateGradients:
     ) -> PackedFaces:
         """The solution, from the best first guess in the plane of `v_star` and the last step's `change`.
 
-        Ends when less than the part `tolerance`^2 of the energy is left, or after so many at most. What is left is the
-        rest of the geometric series of what iterations bring, and taken for no less than what the last has brought.
-        `precondition(r)` returns about A^-1 r.
+        `change` becomes what this step has made of `v_star`. Ends when less than the part `tolerance`^2 of the energy
+        is left, or after so many iterations at most. What is left is the rest of the geometric series of what
+        iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r.
         """
-        found, curvature = self._galerkin_initial_guess(v_star, change, rhs)
+        found, of_v_star = self._galerkin_initial_guess(v_star, change, rhs)
         self.iterations = 0
-        if rhs is v_star and not curvature:
-            return v_star  # at rest
-        before = inf
-        for self.iterations in range(1, most + 1):
+        if rhs is v_star and not of_v_star:  # at rest
+            for field in change.fields:
+                field.clear()
+            return v_star
+        x = self._p.read  # The guess is a step from rest, along itself.
+        curvature, before = found, inf
+        while True:
+            self.iterations += 1
             z = precondition(self._r.read)
             rz, z_az, z_ap = self._apply_operator(z)
             alpha, beta, curvature = cg_coefficients(rz, z_az, z_ap, curvature)
-            if not alpha:
-                break
-            self._update(z, self._az, alpha, beta)
             gained = alpha**2 * curvature
             found += gained
-            if max(gained, _series(gained, before)) <= tolerance**2 * found:
+            left = max(gained, _series(gained, before))
+            if not alpha or self.iterations == most or left <= tolerance**2 * found:
                 break
             before = gained
-        return self._x.read
+            self._update(x, z, alpha, beta)
+            x = self._x.read
+        p = self._p.read
+        self.device.pass_("viscosity/finish.frag")(
+            (*self._x.write.fields, *change.fields),
+            region=self.level.region,
+            alpha=alpha,
+            beta=beta,
+            **x.inputs("x_"),
+            **(z if alpha else p).inputs("z_"),  # what has been spoiled may be no number
+            **p.inputs("p_"),
+            **v_star.inputs(),
+        )
+        return self._x.write
 
     def _galerkin_initial_guess(
         self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces
     ) -> tuple[float, float]:
-        """Leave in x the a v* + b d of least energy, d being the `change`; that energy, and p . A p for p = x / a."""
+        """Leave in p the a v* + c d of least energy, d the `change`; A p, and b - A p in r; p . A p and v* . A v*."""
         draw = self.device.pass_("viscosity/galerkin_guess.frag", **self.level.defines)
         draw(
             (*self._az.fields, *self._ap.read.fields, self._products, self._change_product),
@@ -90,13 +104,22 @@ class ConjugateGradients:
         a = bv / vav if vav > 0.0 else 0.0
         conjugate = vad / vav if vav > 0.0 else 0.0
         left = dad - conjugate * vad
-        b = (bd - conjugate * bv) / left if left > 1e-5 * dad else 0.0
-        a -= conjugate * b
-        if not (isfinite(a) and isfinite(b)) or a == 0.0:
-            a, b = 0.0, 0.0
-        self._update(v_star, self._az, a, b / a if a else 0.0, x=self._rest, r=rhs, p=change)
-        energy = a * bv + b * bd
-        return energy, energy / a**2 if a else vav
+        c = (bd - conjugate * bv) / left if left > 1e-5 * dad else 0.0
+        a -= conjugate * c
+        if not (isfinite(a) and isfinite(c)) or a == 0.0:
+            a, c = 0.0, 0.0
+        self.device.pass_("viscosity/begin.frag")(
+            (*self._p.read.fields, *self._ap.write.fields, *self._r.read.fields),
+            region=self.level.region,
+            parts=(a, c),
+            **v_star.inputs(),
+            **change.inputs("change_"),
+            **self._az.inputs("af_"),
+            **self._ap.read.inputs("ad_"),
+            **rhs.inputs("rhs_"),
+        )
+        self._ap.swap()
+        return a * bv + c * bd, vav
 
     def _apply_operator(self, z: PackedFaces) -> tuple[float, float, float]:
         """A z, and r . z, z . A z, z . A p."""
@@ -112,29 +135,20 @@ class ConjugateGradients:
         rz, z_az, z_ap, _ = (float(value) for value in self._sum(self._products))
         return rz, z_az, z_ap
 
-    def _update(
-        self,
-        z: PackedFaces,
-        az: PackedFaces,
-        alpha: float,
-        beta: float,
-        x: PackedFaces | None = None,
-        r: PackedFaces | None = None,
-        p: PackedFaces | None = None,
-    ) -> None:
-        """p = z + beta p, A p likewise, x + alpha p, r - alpha A p; in place of x, r and p others may be given."""
+    def _update(self, x: PackedFaces, z: PackedFaces, alpha: float, beta: float) -> None:
+        """p = z + beta p, A p likewise, x + alpha p, r - alpha A p."""
         pairs = self._x, self._r, self._p, self._ap
         self.device.pass_("viscosity/update.frag")(
             [field for pair in pairs for field in pair.write.fields],
             region=self.level.region,
             alpha=alpha,
             beta=beta,
-            **(x or self._x.read).inputs("x_"),
-            **(r or self._r.read).inputs("r_"),
-            **(p or self._p.read).inputs("p_"),
+            **x.inputs("x_"),
+            **self._r.read.inputs("r_"),
+            **self._p.read.inputs("p_"),
             **self._ap.read.inputs("ap_"),
             **z.inputs("z_"),
-            **az.inputs("az_"),
+            **self._az.inputs("az_"),
         )
         for pair in pairs:
             pair.swap()
@@ -142,7 +156,7 @@ class ConjugateGradients:
     @property
     def _pairs(self) -> list[PackedFaces]:
         doubles = self._x, self._r, self._p, self._ap
-        return [side for pair in doubles for side in (pair.read, pair.write)] + [self._az, self._rest]
+        return [side for pair in doubles for side in (pair.read, pair.write)] + [self._az]
 
     @property
     def nbytes(self) -> int:

@@ -220,7 +220,7 @@ class Deflation:
         gather(loads, region=(0, 0, WIDE, -(-count // WIDE)), tiles=tiles, **residual.inputs(), **part_of)
         found = space.solve(loads.get().reshape(-1, 4)[:count, :3].astype(np.float64))
         motions.set(self._rows_of(found))
-        spread = self.device.pass_("viscosity/spread_motions.frag")
+        spread = self.device.pass_("viscosity/spread_motions.frag", WIDE=WIDE)
         spread(target.fields, add=add, region=self.level.region, motions=motions, **part_of)
 
     def _rows_of(self, values: np.ndarray) -> np.ndarray:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.packing import PackedFaces
-from solver.params import Walls
+from solver.params import NoSlip
 from solver.viscosity.changed import Box, changed
 from solver.viscosity.operator import Coefficients, Level, inverse_matrix
 from solver.viscosity.plan import Plan
@@ -37,11 +37,11 @@ class TakenUp(NamedTuple):
     """What the coefficients in the textures were made from.
 
     Attributes:
-        basis: (time step, whether walls hold the fluid, depth of the last level): with others nothing can be kept.
+        basis: (time step, where the fluid sticks, depth of the last level): with others nothing can be kept.
         viscosity, solid: of the cells.
     """
 
-    basis: tuple[float, bool, int]
+    basis: tuple[float, NoSlip, int]
     viscosity: np.ndarray
     solid: np.ndarray
 
@@ -77,32 +77,34 @@ class Multigrid:
         self._taken_up: TakenUp | None = None
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
-        self.largest = 0.0  # kappa
+        self._largest = 0.0  # kappa
 
     # -- what is solved ---------------------------------------------------------------------------------------------
 
-    def set_uniform(self, viscosity: float, dt: float, walls: Walls) -> None:
+    def set_uniform(self, viscosity: float, dt: float, no_slip: NoSlip) -> None:
         """Take up one viscosity, lengths^2 / s, in a box without solids."""
         self._taken_up = None
-        self.largest, slip = viscosity * self._scale(dt), _slip(walls)
+        self._largest = viscosity * self._scale(dt)
         for level in self.levels:
-            level.set_uniform(self.largest / 4.0**level.depth, slip)
-        self.has_transform = not slip
+            level.set_uniform(self._largest / 4.0**level.depth, no_slip)
+        self.has_transform = not any(no_slip)
         last = self.last
         if not self.has_transform and last is self.levels[-1]:
-            uniform = Coefficients.uniform(last.operator["stiffness"], last.box, last.texels, last.shear)
+            stiffness = last.operator["stiffness"]
+            uniform = Coefficients.uniform(stiffness, last.box, last.texels, last.shear, no_slip)
             self._inverse.set(inverse_matrix(uniform))
 
     def set_coefficients(
-        self, viscosity: Field, solid: Field, amount: np.ndarray, is_solid: np.ndarray, dt: float, walls: Walls
+        self, viscosity: Field, solid: Field, amount: np.ndarray, is_solid: np.ndarray, dt: float, no_slip: NoSlip
     ) -> None:
         """Take up the `viscosity` of the cells, lengths^2 / s, and the `solid` ones, also as arrays (ny, nx).
 
-        What is made again is what has changed: a dab of a brush changes few cells.
+        What is made again is what has changed: a dab of a brush changes few cells. Where the field holds more than the
+        largest `amount`, it counts as that.
         """
-        slip, self.has_transform = _slip(walls), False
-        self.largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
-        taken_up, basis = self._taken_up, (dt, bool(slip), self.last.depth)
+        self.has_transform = False
+        self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
+        taken_up, basis = self._taken_up, (dt, no_slip, self.last.depth)
         self._taken_up = TakenUp(basis, amount, is_solid)
         box: Box | None = Box(0, amount.shape[0], 0, amount.shape[1])
         is_new = not taken_up or taken_up.basis != basis or not np.array_equal(taken_up.solid, is_solid)
@@ -110,10 +112,10 @@ class Multigrid:
             box = changed(taken_up.viscosity, amount)
             if box is None:
                 return
-        self.finest.set_masks(viscosity, solid, self._scale(dt), slip, box)
+        self.finest.set_masks(viscosity, solid, self._scale(dt), float(amount.max()), no_slip, box)
         for finer, level in pairwise(self.levels[: self.last.depth + 1]):
             box = box.coarser
-            level.coarsen(finer, slip, box, is_new)
+            level.coarsen(finer, no_slip, box, is_new)
         if self.last is self.levels[-1]:
             self._inverse.set(inverse_matrix(self.last.coefficients()))
 
@@ -133,84 +135,60 @@ class Multigrid:
     @property
     def last(self) -> Level:
         """The coarsest level that is visited."""
-        return self.levels[min(self.plan.levels, self.direct_level.depth)]
+        return self.finest if self.plan.method == "smooth" else self.direct_level
 
     # -- cycles -----------------------------------------------------------------------------------------------------
 
     def precondition(self, rhs: PackedFaces, start: bool) -> PackedFaces:
         """About A^-1 rhs, by one cycle from rest, or from what the finest level's iterate holds if it is to `start`."""
-        self.cycle(self.finest, rhs, begun=0 if start else self.begin(self.finest, rhs))
+        self.cycle(self.finest, rhs, begun=0 if start else self._begin(self.finest, rhs))
         return self.finest.faces.read
 
-    def cycle(self, level: Level, rhs: PackedFaces, begun: int, two_grid: bool = False, scaling: float = 0.0) -> None:
-        """One multigrid cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`.
-
-        A two-grid cycle goes one level down only. Of D^-1 rhs so much as `scaling` is taken away at the end.
-        """
+    def cycle(self, level: Level, rhs: PackedFaces, begun: int) -> None:
+        """One multigrid cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`."""
         if level is self.direct_level:
             self.direct_solve(rhs)
-            if scaling:
-                self._start(level, rhs, level.faces.read, -scaling, add=True)
             return
         weights = self.weights(level)
-        if level is self.last:
-            self.smooth(level, rhs, weights[begun:], scaling=scaling)
-            return
         self.smooth(level, rhs, weights[begun:])
-        self._coarse_correction(level, rhs, two_grid)
-        self.smooth(level, rhs, weights[::-1], scaling=scaling)
+        self._coarse_correction(level, rhs)
+        self.smooth(level, rhs, weights[::-1])
 
-    def _coarse_correction(self, level: Level, rhs: PackedFaces, two_grid: bool) -> None:
+    def _coarse_correction(self, level: Level, rhs: PackedFaces) -> None:
         # The write side is free until the correction is added.
         self.residual(level, level.faces.read, rhs, level.faces.write)
         coarser = self.levels[level.depth + 1]
-        if two_grid:
-            first, *others = self.weights(coarser, is_last=True)
-            self.restrict(level.faces.write, coarser, first)
-            self.smooth(coarser, coarser.rhs, others)
-        else:
-            first = self.first_weight(coarser)
-            self.restrict(level.faces.write, coarser, first)
-            self.cycle(coarser, coarser.rhs, begun=1 if first else 0)
+        self.cycle(coarser, coarser.rhs, begun=self._restrict(level.faces.write, coarser))
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines)
-        prolong(
-            level.faces.write.fields,
-            region=level.region,
-            **coarser.faces.read.inputs("coarse_"),
-            **level.faces.read.inputs(),
-            **level.operator,
-        )
+        prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"),
+                **level.faces.read.inputs(), **level.bounds)  # fmt: skip
         level.faces.swap()
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
-    def weights(self, level: Level, count: int = 0, is_last: bool = False) -> list[float]:
-        """Chebyshev weights of the smoothing sweeps; `is_last`: no coarser level follows."""
-        is_last = is_last or level is self.last
-        count = count or self.plan.sweeps[0 if level.depth == 0 else 1]
+    def weights(self, level: Level) -> list[float]:
+        """Chebyshev weights of the smoothing sweeps."""
+        count = self.plan.sweeps
         if self.plan.method == "cg":
-            largest = LARGEST_EIGENVALUE[min(level.depth, 1)]
+            largest = LARGEST_EIGENVALUE[1 if level.stencil else 0]
             return chebyshev_weights(largest / SMOOTHED[count], largest, count)
-        # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient, D is
-        # 1 + 6 k, and the coarser level takes over about where |q|^2 is 1.
-        k = self.largest / 4.0**level.depth
-        taken_over = 0.0 if is_last else 1.0
-        return chebyshev_weights((1.0 + taken_over * k) / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), count)
+        # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient; D is
+        # 1 + 6 k, and no coarser level takes over.
+        k = self._largest
+        return chebyshev_weights(1.0 / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), count)
 
     def smooth(
-        self, level: Level, rhs: PackedFaces, weights: list[float], start: PackedFaces | None = None,
-        scaling: float = 0.0,
+        self, level: Level, rhs: PackedFaces, weights: list[float], start: PackedFaces | None = None
     ) -> None:  # fmt: skip
-        """One sweep for each weight, on from the level's iterate or from `start`; see `cycle` for `scaling`."""
+        """One sweep for each weight, on from the level's iterate or from `start`."""
         smooth = self.device.pass_("viscosity/smooth.frag", **level.defines)
-        for number, weight in enumerate(weights, 1):
+        for weight in weights:
             iterate = start or level.faces.read
             self._stress(level, iterate)
             smooth(
                 level.faces.write.fields,
                 region=level.region,
                 weight=weight,
-                scaling=scaling if number == len(weights) else 0.0,
                 **iterate.inputs(),
                 **rhs.inputs("rhs_"),
                 **level.operator,
@@ -242,33 +220,27 @@ class Multigrid:
             stress = self.device.pass_("viscosity/stress.frag")
             stress(level.stress, region=(x, y, width + 1, height + 1), **faces.inputs(), **level.stencil)
 
-    def begin(self, level: Level, rhs: PackedFaces) -> int:
+    def _begin(self, level: Level, rhs: PackedFaces) -> int:
         """The first sweep from rest, where there is one; how many were made."""
         if level is self.direct_level:
             return 0
-        self._start(level, rhs, level.faces.write, self.weights(level)[0])
+        start = self.device.pass_("viscosity/start.frag", **level.defines)
+        start(level.faces.write.fields, region=level.region, weight=self.weights(level)[0], **rhs.inputs("rhs_"),
+              **level.operator)  # fmt: skip
         level.faces.swap()
         return 1
 
-    def _start(self, level: Level, rhs: PackedFaces, target: PackedFaces, weight: float, add: bool = False) -> None:
-        start = self.device.pass_("viscosity/start.frag", **level.defines)
-        start(target.fields, add=add, region=level.region, weight=weight, **rhs.inputs("rhs_"), **level.operator)
-
-    def first_weight(self, level: Level) -> float:
-        """Of the sweep that a cycle begins with, from rest; 0 where the level is solved directly instead."""
-        return 0.0 if level is self.direct_level else self.weights(level)[0]
-
-    def restrict(self, residual: PackedFaces, coarser: Level, weight: float) -> int:
-        """The residual as rhs of the coarser level; with a `weight` the first sweep on it too, from rest."""
-        if not weight:
+    def _restrict(self, residual: PackedFaces, coarser: Level) -> int:
+        """The residual as rhs of the coarser level, and the first sweep on it if it has any; how many were made."""
+        if coarser is self.direct_level:
             restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
-            restrict(coarser.rhs.fields, region=coarser.region, **residual.inputs(), **coarser.open)
+            restrict(coarser.rhs.fields, region=coarser.region, **residual.inputs(), **coarser.bounds)
             return 0
         restrict = self.device.pass_("viscosity/restrict.frag", START=1, **coarser.defines)
         restrict(
             coarser.rhs.fields + coarser.faces.write.fields,
             region=coarser.region,
-            weight=weight,
+            weight=self.weights(coarser)[0],
             **residual.inputs(),
             **coarser.operator,
         )
@@ -284,7 +256,3 @@ class Multigrid:
         """Free the textures."""
         for item in (*self.levels, self._inverse, self._transform):
             item.release()
-
-
-def _slip(walls: Walls) -> dict[str, Any]:
-    return {"NO_SLIP": 1} if walls.slip == "none" else {}

@@ -17,6 +17,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.packing import DoublePackedFaces, PackedFaces, packed, unpacked
+from solver.params import NoSlip
 from solver.viscosity.changed import Box
 
 # Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 64 unknowns. BLAS inverts 128 in
@@ -54,14 +55,20 @@ class Coefficients:
 
     @classmethod
     def uniform(
-        cls, stiffness: float, box: tuple[int, int], texels: tuple[int, int], shear: tuple[float, float]
+        cls,
+        stiffness: float,
+        box: tuple[int, int],
+        texels: tuple[int, int],
+        shear: tuple[float, float],
+        no_slip: NoSlip,
     ) -> Coefficients:
-        """Those of one viscosity, dt mu / (hx hy), in a no-slip box of (columns, rows) without solids."""
+        """Those of one viscosity, dt mu / (hx hy), in a box of (columns, rows) without solids."""
         (width, height), (columns, rows), (s_y, s_x) = box, texels, shear
         across, down = np.arange(2 * columns + 1), np.arange(2 * rows + 1)[:, None]
         fluid = ((across < width) & (down < height))[:-1, :-1]
-        at_wall = (across == 0) | (across == width) | (down == 0) | (down == height)
-        nodes = (1.0 + at_wall) * ((across <= width) & (down <= height))
+        nodes = 1.0 * ((across <= width) & (down <= height))
+        for side, sticks in zip((across == 0, across == width, down == 0, down == height), no_slip, strict=False):
+            nodes[np.broadcast_to(side, nodes.shape)] *= 2.0 * sticks
         return cls(
             {(0, 0): 2.0 * s_x**2 * stiffness * fluid},
             {(0, 0): 2.0 * s_y**2 * stiffness * fluid},
@@ -130,32 +137,35 @@ class Level:
         self.stress = [device.field(ringed, 4, f"{label} stress {name}") for name in ("xx", "yy", "xy") if depth]
         self.rhs = PackedFaces(device, ringed, f"{label} right-hand side")
         self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
-        # Without solids, what walls leave of a grid whose last column or row is only half in it.
-        self.box = finest[0] >> depth, finest[1] >> depth
-        # What passes read of it: the operator, which faces are open, and what stress.frag multiplies with.
+        # Without solids, what walls leave of a grid whose last column or row is only half in it, at least a channel.
+        self.box = max(finest[0] >> depth, 1), max(finest[1] >> depth, 1)
+        # What passes read: the operator, what stress.frag multiplies with, open faces, and where the fluid sticks.
         self.operator: dict[str, Any] = {}
         self.stencil: dict[str, Any] = {}
         self.open: dict[str, Any] = {}
+        self.walls: dict[str, Any] = {}
         self.defines: dict[str, Any] = {}
 
-    def set_masks(self, viscosity: Field, solid: Field, scale: float, slip: dict[str, Any], box: Box) -> None:
+    def set_masks(self, viscosity: Field, solid: Field, scale: float, most: float, no_slip: NoSlip, box: Box) -> None:
         """Take the operator of the finest level from the cells' viscosity and solid cells, where a box of them changed.
 
         Args:
             viscosity: lengths^2 / s.
             solid: above 0 in solid cells.
             scale: dt / (hx hy), s / length^2.
-            slip: the define of the walls.
+            most: what more viscosity counts as.
+            no_slip: where the fluid sticks.
             box: those that have changed.
         """
-        draw = self.device.pass_("viscosity/coefficients.frag", **slip)
+        self.defines = self._take_walls(no_slip)
+        draw = self.device.pass_("viscosity/coefficients.frag", **self.defines)
         names = "cells", "nodes", "inverse_u", "inverse_v", "open"
         draw([self.packed[name] for name in names], region=self._around(box), viscosity=viscosity, solid=solid,
-             scale=scale, shear=self.shear)  # fmt: skip
-        self.operator = {**self.packed, "shear": self.shear, "aspect": self.aspect}
-        self.open, self.defines, self.stencil = {"open": self.packed["open"]}, slip, {}
+             scale=scale, most=most, shear=self.shear, **self.walls)  # fmt: skip
+        self.operator = {**self.packed, "shear": self.shear, "aspect": self.aspect, **self.walls}
+        self.open, self.stencil = {"open": self.packed["open"]}, {}
 
-    def coarsen(self, finer: Level, slip: dict[str, Any], box: Box, is_open_new: bool) -> None:
+    def coarsen(self, finer: Level, no_slip: NoSlip, box: Box, is_open_new: bool) -> None:
         """Take the Galerkin operator of the `finer` level, where a box of cells has changed, and maybe what is open."""
         packed, region = self.packed, self._around(box)
         if is_open_new:
@@ -163,7 +173,7 @@ class Level:
                 packed["open"], region=self.region, open=finer.packed["open"]
             )
         inputs: dict[str, Any] = {**finer.packed, "open": packed["open"]}
-        defines = slip
+        slip = defines = self._take_walls(no_slip)
         if not finer.depth:
             inputs |= {"xx0": finer.packed["cells"], "node0": finer.packed["nodes"], "aspect": self.aspect}
             defines = {"FINE_IS_FINEST": 1, **slip}
@@ -171,7 +181,7 @@ class Level:
             draw = self.device.pass_(f"viscosity/coarsen_{kind}.frag", **defines)
             wanted = *names, "open", *(("aspect",) if kind == "cells" else ())
             read = {name: inputs[name] for name in wanted if name in inputs}
-            draw([packed[name] for name in names], region=region, **read)
+            draw([packed[name] for name in names], region=region, **read, **self.walls)
         draw = self.device.pass_("viscosity/inverse_diagonal.frag")
         read: dict[str, Any] = {name: packed[name] for name in ("xx0", "yy0", "node0", "node1", "node2", "open")}
         draw((packed["inverse_u"], packed["inverse_v"]), region=region, shear=self.shear, **read)
@@ -179,7 +189,7 @@ class Level:
         self.stencil = {name: packed[name] for name in CELLS + NODES} | {"shear": self.shear}
         stress = dict(zip(("stress_xx", "stress_yy", "stress_xy"), self.stress, strict=True))
         self.operator = {name: packed[name] for name in ("inverse_u", "inverse_v", "open")} | stress
-        self.operator["shear"] = self.shear
+        self.operator |= {"shear": self.shear, **self.walls}
 
     def _around(self, box: Box) -> Region:
         """The texels with faces that feel a strain in a box of cells; nodes on the far walls lie in the ring itself."""
@@ -206,11 +216,24 @@ class Level:
         )
         return Coefficients(xx, yy, nodes, open_u, open_v, self.shear)
 
-    def set_uniform(self, stiffness: float, slip: dict[str, Any]) -> None:
+    def set_uniform(self, stiffness: float, no_slip: NoSlip) -> None:
         """Take the operator of one viscosity in a box without solids, dt mu / (hx hy) of this level."""
+        self.defines = {"UNIFORM": 1, **self._take_walls(no_slip)}
         self.open, self.stencil = {"box": self.box}, {}
-        self.operator = {"stiffness": stiffness, "shear": self.shear, **self.open}
-        self.defines = {"UNIFORM": 1, **slip}
+        self.operator = {"stiffness": stiffness, "shear": self.shear, **self.walls}
+
+    def _take_walls(self, no_slip: NoSlip) -> dict[str, Any]:
+        """Take up where the fluid sticks; the define of that."""
+        self.walls = {"box": self.box}
+        if not any(no_slip):
+            return {}
+        self.walls |= {"no_slip": tuple(map(float, no_slip[:4])), "solids_no_slip": float(no_slip.solids)}
+        return {"NO_SLIP": 1}
+
+    @property
+    def bounds(self) -> dict[str, Any]:
+        """What a pass reads that asks which faces are open, and where the fluid sticks."""
+        return {**self.open, **self.walls}
 
     @property
     def is_coarsest(self) -> bool:

@@ -8,13 +8,16 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
-from solver.packing import DoublePackedFaces, PackedFaces, Packing
+from solver.packing import PackedFaces, Packing
 from solver.params import Walls
 from solver.viscosity.conjugate_gradients import ConjugateGradients
 from solver.viscosity.deflation import Deflation
-from solver.viscosity.full_multigrid import FullMultigrid
 from solver.viscosity.multigrid import Multigrid
 from solver.viscosity.plan import Plan, plan_for
+
+# Largest dt mu / h^2 that is reckoned with. With more, a float64 loses the mass of a stiff part beside its strains, and
+# a float32 does not tell the flows apart.
+MOST = 1e12
 
 
 class Viscosity:
@@ -32,13 +35,12 @@ class Viscosity:
         self.spacing = spacing or (1.0 / max(size), 1.0 / max(size))
         self._wall_speed: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
         self.multigrid = Multigrid(device, size, self.spacing)
-        self.full_multigrid = FullMultigrid(self.multigrid)
         finest = self.multigrid.finest
         self.conjugate_gradients = ConjugateGradients(device, finest)
         self.deflation = Deflation(device, finest)
         ringed = finest.rhs.u.size
         # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
-        self._change = DoublePackedFaces(device, ringed, "viscous change")
+        self._change = PackedFaces(device, ringed, "viscous change")
         self._dragged = PackedFaces(device, ringed, "viscous right-hand side between moving walls")
 
     @property
@@ -52,18 +54,20 @@ class Viscosity:
 
     def set_coefficients(self, viscosity: Field, solid: Field, dt: float, walls: Walls) -> None:
         """Take up another viscosity (cells, lengths^2 / s), solid cells (1 = solid), time step (s) or walls."""
-        self._wall_speed = walls.speed if walls.slip == "none" else (0.0, 0.0, 0.0, 0.0)
+        self._wall_speed = walls.drag
         hx, hy = self.spacing
+        kappa = dt / (hx * hy)
         frozen, amount = solid.get() > 0, viscosity.get()
+        if kappa * float(amount.max()) > MOST:
+            amount = np.minimum(amount, np.float32(MOST / kappa))
         fluid = amount[~frozen] if frozen.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
-        kappa = dt / (hx * hy)
         self.plan = plan_for(kappa * least, kappa * largest)
         self.deflation.set_stiff(None)
         if least == largest and not frozen.any():
-            self.multigrid.set_uniform(least, dt, walls)
+            self.multigrid.set_uniform(least, dt, walls.no_slip)
         else:
-            self.multigrid.set_coefficients(viscosity, solid, amount, frozen, dt, walls)
+            self.multigrid.set_coefficients(viscosity, solid, amount, frozen, dt, walls.no_slip)
         if self.plan.method != "smooth" and self.multigrid.direct_level is self.multigrid.finest:
             self.plan = Plan("direct")
         elif self.plan.stiff:
@@ -89,15 +93,8 @@ class Viscosity:
         """The solution for `v_star`, packed, in lengths / s; valid until the next solve."""
         v_star, rhs, finest = self.v_star, self._right_hand_side(), self.multigrid.finest
         if self.plan.method == "cg":
-            change = self._change.read
             plan, solve = self.plan, self.conjugate_gradients.solve
-            solution = solve(v_star, change, rhs, self._precondition, plan.tolerance, plan.iterations)
-            draw = self.device.pass_("viscosity/change.frag")
-            draw(self._change.write.fields, region=finest.region, **solution.inputs("x_"), **v_star.inputs())
-            self._change.swap()
-            return solution
-        if self.plan.method == "fmg":
-            return self.full_multigrid.correct(v_star, rhs)
+            return solve(v_star, self._change, rhs, self._precondition, plan.tolerance, plan.iterations)
         if self.plan.method == "direct":
             self.multigrid.direct_solve(rhs)
         else:
@@ -137,7 +134,7 @@ class Viscosity:
 
     def state(self) -> tuple[Field, Field]:
         """The fields that a later step depends on."""
-        return self._change.read.fields
+        return self._change.fields
 
     def forget(self) -> None:
         """Expect no change: the velocity is a new one."""
@@ -146,7 +143,8 @@ class Viscosity:
 
     def residual_norm(self, after: Field) -> float:
         """|v* - A v| / |v*| for a velocity v on MAC faces; waits for the GPU."""
-        finest, rhs, left = self.multigrid.finest, self._right_hand_side(), self._change.write
+        finest, rhs = self.multigrid.finest, self._right_hand_side()
+        left = finest.faces.write
         self._pack(after, finest.faces.read)
         self.multigrid.residual(finest, finest.faces.read, rhs, left)
         wanted, found = (
@@ -156,13 +154,13 @@ class Viscosity:
         return found / wanted if wanted else 0.0
 
     @property
-    def _parts(self) -> tuple[Multigrid | FullMultigrid | ConjugateGradients | Deflation, ...]:
-        return self.multigrid, self.full_multigrid, self.conjugate_gradients, self.deflation
+    def _parts(self) -> tuple[Multigrid | ConjugateGradients | Deflation, ...]:
+        return self.multigrid, self.conjugate_gradients, self.deflation
 
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        pairs = self._change.read, self._change.write, self._dragged
+        pairs = self._change, self._dragged
         fields = [field for pair in pairs for field in pair.fields]
         return sum(item.nbytes for item in (*fields, *self._parts))
 

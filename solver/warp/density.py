@@ -7,7 +7,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.scheme import State
+from solver.scheme import LARGEST_VISCOSITY, State, check_shape, check_step
 
 DIFFUSION_SWEEPS = 20
 
@@ -20,13 +20,20 @@ class Density:
         values: what it starts as, (h, w) or (h, w, c), c <= 4; its size need not be the fluid's, its extent is.
         kappa: diffusion rate, lengths^2 / s.
         source: what is added, per second, shaped as `values`.
+
+    Raises:
+        ValueError: for values of another shape, or a kappa that is negative or beyond all measure.
     """
 
     def __init__(
         self, device: Device, values: np.ndarray, kappa: float = 0.0, source: np.ndarray | None = None
     ) -> None:
         self.device = device
+        if not 0 <= kappa <= LARGEST_VISCOSITY:
+            raise ValueError(f"a diffusion of {kappa} was asked for; it must be from 0 to {LARGEST_VISCOSITY:g}")
         self.kappa = kappa
+        if source is not None:
+            check_shape("a source of density", source, values.shape)
         height, width, self._components = values.shape if values.ndim == 3 else (*values.shape, 1)
         self._values = device.double_field((width, height), 4, "density")
         self._before = device.field((width, height), 4, "density before diffusion")
@@ -35,13 +42,14 @@ class Density:
 
     def advance(self, faces: Field, grid: Grid, dt: float) -> None:
         """Move by the velocity on `faces` of the fluid's `grid` for `dt` seconds, diffuse, and add the source."""
+        dt = check_step(dt)
         with self.device.stage("density"):
             hx, hy = grid.spacing
             advect = self.device.pass_("warp/density/advect.frag")
             advect(self._values.write, density=self._values.read, velocity=faces, cells_a_speed=(dt / hx, dt / hy))
             self._values.swap()
             if self.kappa > 0:
-                self._diffuse(dt)
+                self._diffuse(dt, grid)
             if self._source is not None:
                 self.device.pass_("warp/density/add_source.frag")(
                     self._values.read, add=True, source=self._source, dt=dt
@@ -74,9 +82,9 @@ class Density:
             if item is not None:
                 item.release()
 
-    def _diffuse(self, dt: float) -> None:
+    def _diffuse(self, dt: float, grid: Grid) -> None:
         self._before.copy_from(self._values.read)
-        k = dt * self.kappa * max(self._before.size) ** 2
+        k = [dt * self.kappa * (count / side) ** 2 for count, side in zip(self._before.size, grid.extent, strict=True)]
         sweep = self.device.pass_("warp/density/diffuse.frag")
         for _ in range(DIFFUSION_SWEEPS):
             sweep(self._values.write, density=self._values.read, before=self._before, k=k)

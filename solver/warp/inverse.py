@@ -11,6 +11,8 @@ from solver.gl.points import draw_at
 if TYPE_CHECKING:
     from solver.warp.map import WarpMap
 
+MOST_ALONG = 1024  # texels along a side of the first guess
+
 
 class ForwardMap:
     """The inverse of a warp map: y -> y + F(y) gives, for a point of the original, its place in the result.
@@ -22,16 +24,16 @@ class ForwardMap:
 
     def __init__(self, warp: WarpMap) -> None:
         self._warp = warp
-        self._guess = warp.device.field(warp.grid.size, 2, "forward map, guess")
+        self._guess = warp.device.field(_bounded(warp.size), 2, "forward map, guess")
         self._guessed = -1
 
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
-        """The displacement F at the pixel centres of a picture of `size`, by default the grid's.
+        """The displacement F at the pixel centres of a picture of `size`, by default the map's `coarse_size`.
 
         Returns:
             float32 (height, width, 2), longer sides.
         """
-        field = self._warp.device.field(size or self._warp.grid.size, 2, "forward map, to read")
+        field = self._warp.device.field(size or self._warp.coarse_size, 2, "forward map, to read")
         invert = self._warp.device.pass_("warp/invert.frag")
         invert(field, **self._inputs(), origin=(0.0, 0.0), step=field.texel)
         displacement = field.get()
@@ -55,8 +57,14 @@ class ForwardMap:
         warp = self._warp
         if self._guessed != warp.version:
             self._guess.clear()
-            cells = (warp.grid.nx + 1) * (warp.grid.ny + 1)
+            cells = (self._guess.width + 1) * (self._guess.height + 1)
             scatter = warp.device.pass_("warp/scatter.frag")
-            scatter(self._guess, vertices=6 * cells, displacement=warp.composed(1), extent=warp.extent)
+            scatter(self._guess, vertices=6 * cells, displacement=warp.composed(self._guess.size), extent=warp.extent)
             self._guessed = warp.version
         return {"displacement": warp.composed(exact=True), "guess": self._guess, "extent": warp.extent}
+
+
+def _bounded(size: tuple[int, int]) -> tuple[int, int]:
+    """A size divided by four, or by what brings it down to `MOST_ALONG`."""
+    over = max(4.0, max(size) / MOST_ALONG)
+    return max(8, round(size[0] / over)), max(8, round(size[1] / over))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,14 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
 from solver.gl.points import draw_at
-from solver.gl.reduction import Reduction
 from solver.grid import Grid
 from solver.scheme import State, check_field, check_step, on_faces
+from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
+from solver.warp.distortion import MapStatistics, distortion
+from solver.warp.frozen import Frozen, saved_of
 from solver.warp.inverse import ForwardMap
+from solver.warp.state import MapState, grid_in, kind_values, values_of
+from solver.warp.submap import Submap, window_of
 
 if TYPE_CHECKING:
     from solver.fluid import Fluid
@@ -23,98 +27,91 @@ if TYPE_CHECKING:
 Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
 CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last remap
-STEEPEST = 1.0  # largest |grad D| that the cubic carries well
-
-
-@dataclass(frozen=True)
-class MapStatistics:
-    """How a map distorts, by central differences at the simulation's cell centres.
-
-    Attributes:
-        det_min, det_max: of the Jacobian of x + D(x): how many times larger an area it is looked up in.
-        folds: cells where it is zero or negative.
-        det_error: mean of |det - 1|.
-        displacement_max, displacement_mean: |D|, longer sides.
-    """
-
-    det_min: float
-    det_max: float
-    folds: int
-    det_error: float
-    displacement_max: float
-    displacement_mean: float
+MOST_PLACES = 2**21  # at which its distortion is looked at
+REMAP_STEPS = CHECK_EVERY  # steps over which a remap is spread; the next one cannot begin before they are over
 
 
 class WarpMap:
     """The map x -> x + D(x) from the result to the original, carried along by a fluid without blurring.
 
-    Two levels (the characteristic mapping method): a submap of what has moved lately, on the simulation's grid, and the
-    accumulated map A, on a finer one, which takes the submap S in (a remap) before that is bent so far that
-    interpolating it every step would show. D(x) = S(x) + A(x + S(x)); longer sides, RG32F at cell centres.
-    Every place x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set` had looked.
+    Two levels (the characteristic mapping method): a submap of what has moved lately, on the simulation's grid, which
+    may be a window of the picture, and the accumulated map A of the whole picture, which takes the submap S in (a
+    remap) before that is bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0
+    outside the window; longer sides, RG32F at the centres of cells and texels. Only tiles of A that have moved are made
+    anew, some in each of `REMAP_STEPS` steps; until all are there, the submap that they take in, *pending*, stands
+    between S and A. Every place x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set`
+    had looked. Looking at the map changes nothing of it.
 
     Args:
         device: the device.
         grid: the simulation's grid.
-        scale: texels of the accumulated map along a cell.
+        size: (width, height) of the accumulated map in texels, as of `map_size`; by default `LEAST_TEXELS` a cell.
         remap_every: most steps between two remaps.
+
+    Attributes:
+        grid: of the submap.
+        extent: (width, height) of the picture, the longer of them 1.
+        version: counts the changes, for those who keep what they made of the map.
     """
 
-    def __init__(self, device: Device, grid: Grid, scale: int = 2, remap_every: int = 64) -> None:
+    def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None, remap_every: int = 64) -> None:
         self.device = device
-        self.grid = grid
-        self.scale = scale
+        self.extent = grid.picture
         self.remap_every = remap_every
-        fine = grid.nx * scale, grid.ny * scale
-        self._submap = device.double_field(grid.size, 2, "submap")
-        self._accumulated = device.double_field(fine, 2, "accumulated map")
-        self._trace = device.field(grid.size, 2, "warp map, trace")
-        self._largest = device.field(grid.size, 4, "warp map, largest distortion")
-        self._total = device.field(grid.size, 4, "warp map, total distortion")
-        half = -(-grid.nx // 2), -(-grid.ny // 2)
-        self._steepness = device.field(half, 1, "warp map, steepness")
-        self._find_steepest = Reduction(device, half, 1, "max")
-        self._find_largest = Reduction(device, grid.size, 4, "max")
-        self._find_total = Reduction(device, grid.size, 4, "sum")
-        self._scratch = self._trace, self._steepness, self._largest, self._total
-        self._reductions = self._find_steepest, self._find_largest, self._find_total
-        self._held: Field | None = None
-        self._held_cells: np.ndarray | None = None  # what it holds; None if no cell
-        self._composed: dict[tuple[int, bool], Field] = {}
-        self._fresh: set[tuple[int, bool]] = set()  # of these, what holds the present map
+        self._submap = Submap(device, grid)
+        across, down = self.coarse_size
+        self.size = size or (LEAST_TEXELS * across, LEAST_TEXELS * down)
+        self._accumulated = AccumulatedMap(device, self.size, self.extent)
+        self._pending: Field | None = None
+        self._pending_grid = grid
+        self._remapping = 0  # steps that the pending submap has been taken in for
+        self._frozen = Frozen(device, self.size)
+        self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
+        self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last remap
-        self._limits = self._picture = (0.0, 0.0, *grid.extent)  # of the places looked up: left, top, right, bottom
-        self.version = 0  # counts the changes, for those who keep what they made of the map
+        self._limits = self._picture = (0.0, 0.0, *self.extent)  # of the places looked up: left, top, right, bottom
+        self.version = 0
+
+    @property
+    def grid(self) -> Grid:
+        return self._submap.grid
 
     # -- moving it --------------------------------------------------------------------------------------------------
 
     def follow(self, fluid: Fluid, dt: float) -> None:
         """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
-        self.advance_traced(fluid.trace(check_step(dt)))
+        check_field("a velocity", fluid.faces(), self.grid)
+        if tracing := fluid.begin_trace(check_step(dt)):
+            self._submap.advance_tracing(tracing.target, tracing.defines, tracing.inputs)
+            self._advanced()
+        else:
+            self.advance_traced(fluid.trace(dt))
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
         check_field("a velocity", velocity, self.grid)
         hx, hy = self.grid.spacing
         dt = check_step(dt)
-        self.device.pass_("step/trace.frag")(self._trace, velocity=velocity, cells_a_speed=(dt / hx, dt / hy))
-        self.advance_traced(self._trace)
+        trace = self._submap.trace
+        self.device.pass_("step/trace.frag")(trace, velocity=velocity, cells_a_speed=(dt / hx, dt / hy))
+        self.advance_traced(trace)
 
     def advance_traced(self, trace: Field) -> None:
         """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
         check_field("a trace", trace, self.grid)
-        advance = self.device.pass_("warp/advance.frag")
-        advance(self._submap.write, displacement=self._submap.read, trace=trace, spacing=self.grid.spacing)
-        self._submap.swap()
+        self._submap.advance(trace)
         self._advanced()
 
     def _advanced(self) -> None:
-        """Count a step, and remap if it is time to."""
+        """A step was made: remap as far as it is time to."""
         self._steps += 1
         self._changed()
+        if self._pending is not None:
+            self._remapping += 1
+            self._take_in(self._remapping / REMAP_STEPS)
         # The look waits for the GPU, so not at every step; at fixed steps, so that a replay remaps at the same ones.
-        if self._steps >= self.remap_every or (self._steps % CHECK_EVERY == 0 and self._is_steep()):
-            self.remap()
+        if self._steps >= self.remap_every or (self._steps % CHECK_EVERY == 0 and self._submap.is_steep):
+            self._begin_remap()
 
     def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
         """Carry the map from `time` to `time + dt` by a velocity that is given.
@@ -122,7 +119,7 @@ class WarpMap:
         Args:
             velocity: a function (x, y, t) -> (u, v) on float64 arrays, lengths per second, followed back by a
                 fourth-order Runge-Kutta step of its own exact values; or an array (ny, nx, 2) on the MAC grid.
-                What would come from beyond the picture's edge comes from the edge.
+                What would come from beyond the grid's edge comes from the edge.
             dt: the step.
             time: where it begins, for the function.
 
@@ -137,62 +134,89 @@ class WarpMap:
             return
         x, y = self.grid.centres()
         back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
-        width, height = self.grid.extent
-        back = np.stack([np.clip(back_x, 0, width) - x, np.clip(back_y, 0, height) - y], axis=-1)
-        self._trace.set(back / self.grid.spacing)
-        self.advance_traced(self._trace)
+        left, top, width, height = window_of(self.grid)
+        back = np.stack([np.clip(back_x, left, left + width) - x, np.clip(back_y, top, top + height) - y], axis=-1)
+        self._submap.trace.set(back / self.grid.spacing)
+        self.advance_traced(self._submap.trace)
 
     def remap(self) -> None:
-        """Let the accumulated map take in what has moved lately; the whole map stays what it was."""
-        if self._steps:
-            self._compose(self._accumulated.write)
-            self._accumulated.swap()
-            self._submap.read.clear()
-            self._steps = 0
+        """Let the accumulated map take in all that has moved, at once; the whole map stays what it was."""
+        self._begin_remap()
+        self._take_in(1.0)
 
-    def hold(self, solid: Field) -> None:
-        """From now on, change nothing inside solids: in the solid cells whose eight neighbours are solid as well.
+    def move_to(self, grid: Grid) -> None:
+        """Go on with a submap on another grid of the same picture; the map stays what it was.
 
-        The outermost solid cells let the map go over into what moves. Looking a picture up reaches into the next cell,
-        so that pixels whose cells lie two inside a solid stay as they are to the bit, moved before or not.
+        Raises:
+            ValueError: if it is a grid of another picture.
         """
-        cells = _inside(solid.get() > 0)
-        given = cells if cells.any() else None
-        if not _same(given, self._held_cells):
+        if grid == self.grid:
+            return
+        if grid.picture != self.extent:
+            raise ValueError(f"a map of a picture of {self.extent} cannot go on in one of {grid.picture}")
+        self._begin_remap()
+        if self._frozen.near is not None:
+            self._take_in(1.0)  # it fades over the cells of its own grid
+        self._submap.release()
+        self._submap = Submap(self.device, grid)
+        self._frozen.fade_over(self._cell)
+        self._steps = 0
+        self._changed()
+
+    def hold(self, frozen: Field | None) -> None:
+        """From now on, change nothing where a mask over the whole picture, of any size, is 1.
+
+        Nor within a texel of the accumulated map around it, or three where the mask has other texels: what is looked up
+        on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or not.
+        Over one cell from there the map goes over into what flows.
+        """
+        saved = None if frozen is None else saved_of(frozen)
+        if self._frozen.differs(saved):
             self.remap()
-            self._set_held(given)
+            self._frozen.restore(saved, self._cell)
             self._changed()
+        if saved is not None:
+            saved.release()
 
     def restore_under(
         self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0
     ) -> None:
-        """Let the map go back to the identity under a round brush, but in held cells.
+        """Let the map go back to the identity under a round brush, but where it is frozen.
 
         Args:
             center, radius: longer sides.
             hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
             amount: 0-1, the part of the displacement that is taken away at the centre.
         """
-        for pair in (self._submap, self._accumulated):
-            self.device.pass_("warp/restore.frag", **self._held_defines())(
-                pair.write,
-                displacement=pair.read,
-                extent=self.grid.extent,
-                center=center,
-                radius=radius,
-                hardness=min(hardness, 0.99),
-                amount=amount,
-                **self._held_inputs(),
+        self._take_in(1.0)
+        restore = self.device.pass_("warp/restore.frag", **self._held_defines())
+        inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
+        if self._frozen.near is not None:
+            inputs |= {"near": self._frozen.near, "picture": self.extent}
+        submap, accumulated = self._submap, self._accumulated
+        restore(submap.write, displacement=submap.read, window=window_of(self.grid), **inputs)
+        submap.swap()
+        sides = zip(center, self.size, self.extent, strict=True)
+        (left, right), (top, bottom) = (
+            (max(math.floor((at - radius) / side * n), 0), min(math.ceil((at + radius) / side * n), n))
+            for at, n, side in sides
+        )
+        if right > left and bottom > top:
+            accumulated.change(
+                (left, top, right - left, bottom - top),
+                lambda target, regions: restore(
+                    target, region=regions, displacement=accumulated.now, window=self._picture, **inputs
+                ),
             )
-            pair.swap()
         self._changed()
 
     # -- its state --------------------------------------------------------------------------------------------------
 
     def reset(self) -> None:
         """Back to the identity."""
+        self._drop_pending()
         self._submap.read.clear()
-        self._accumulated.read.clear()
+        self._accumulated.clear()
         self._steps = 0
         self._limits = self._picture
         self._changed()
@@ -215,7 +239,8 @@ class WarpMap:
                 f"a map of {columns} x {rows} was given for a picture of {width:.4g} x {height:.4g}: is it transposed?"
             )
         self.reset()
-        self._resample(given, self._accumulated.read, (0.0, 0.0), self._accumulated.read.texel)
+        resample = self.device.pass_("warp/resample.frag")
+        self._accumulated.set(lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel))
         given.release()
         x, y = (np.arange(columns) + 0.5) / columns * width, (np.arange(rows) + 0.5) / rows * height
         across, down = x + displacement[..., 0], y[:, None] + displacement[..., 1]
@@ -223,81 +248,93 @@ class WarpMap:
         lowest, highest = np.minimum(0, [across.min(), down.min()]), [across.max(), down.max()]
         self._limits = (*lowest.tolist(), *np.maximum(self.extent, highest).tolist())
 
-    def save(self) -> State:
-        """A copy of this moment, on the GPU, which the caller releases."""
-        values = {"steps": self._steps, "limits": self._limits, "held": self._held_cells}
-        return State.of(self.device, self._live(), **values)
+    def save(self) -> MapState:
+        """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
+        fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
+        values: dict[str, Any] = {"steps": self._steps, "limits": self._limits, "grid": values_of(self.grid)}
+        if self._pending is not None:
+            fields["pending"] = self._pending
+            values |= {"remapping": self._remapping, "pending grid": values_of(self._pending_grid)}
+        state = MapState.of(self.device, fields, **values)
+        if self._frozen.saved is not None:
+            state.tiles["frozen"] = self._frozen.saved.held()
+            state.values["frozen kind"] = kind_values(self._frozen.saved.kind)
+        return state
 
     def restore(self, state: State) -> None:
-        """Go back to a saved state, exactly.
+        """Go back to a saved state, exactly, and to the grid that it was on.
 
         Raises:
-            ValueError: if it is of another grid.
+            ValueError: if it is of another picture.
         """
-        state.write_to(self._live())
+        grid = grid_in(state.values, "grid")
+        tiles = state.tiles.get("accumulated map")
+        if grid.picture != self.extent or tiles is None or tiles.kind != self._accumulated.now.kind:
+            raise ValueError("the state is of another picture")
+        self._accumulated.restore(tiles)
+        if grid != self.grid:
+            self._submap.release()
+            self._submap = Submap(self.device, grid)
+        self._submap.read.copy_from(state.fields["submap"])
         self._steps = int(state.values["steps"])
         left, top, right, bottom = state.values["limits"].tolist()
         self._limits = left, top, right, bottom
-        held = state.values.get("held")
-        if not _same(held, self._held_cells):
-            self._set_held(held)
+        self._frozen.restore(state.tiles.get("frozen"), self._cell)
+        self._drop_pending()
+        if (pending := state.fields.get("pending")) is not None:
+            self._pending = self.device.field(pending.size, 2, "pending submap")
+            self._pending.copy_from(pending)
+            self._pending_grid = grid_in(state.values, "pending grid")
+            self._remapping = int(state.values["remapping"])
+            self._accumulated.begin(self._pending.get(), self._pending_grid)
         self._changed()
-
-    def _live(self) -> dict[str, Field]:
-        return {"submap": self._submap.read, "accumulated map": self._accumulated.read}
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """(width, height) of the domain, the longer of them 1."""
-        return self.grid.extent
 
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory, as long as nothing is read at other sizes."""
-        own = [
-            self._submap.read,
-            self._submap.write,
-            self._accumulated.read,
-            self._accumulated.write,
-            *self._composed.values(),
-        ]
-        return sum(thing.nbytes for thing in (*own, *self._scratch, *self._reductions))
+        parts = [self._submap, self._accumulated, self._frozen, *self._composed.values()]
+        return sum(part.nbytes for part in parts) + (0 if self._pending is None else self._pending.nbytes)
 
     def release(self) -> None:
         """Free the textures."""
-        self._set_held(None)
-        for thing in (self._submap, self._accumulated, *self._composed.values(), *self._scratch, *self._reductions):
+        self._drop_pending()
+        for thing in (self._submap, self._accumulated, self._frozen, *self._composed.values()):
             thing.release()
         if "forward" in self.__dict__:
             self.forward.release()
 
     # -- reading it -------------------------------------------------------------------------------------------------
 
-    def composed(self, scale: int | None = None, exact: bool = False) -> Field:
-        """The whole map's displacement on `scale` texels a cell, by default the accumulated map's.
+    def composed(self, size: tuple[int, int] | None = None, exact: bool = False) -> Field:
+        """The whole map's displacement on `size` texels (width, height), by default the accumulated map's.
 
         Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, so is the
         accumulated map for it.
         """
-        scale = scale or self.scale
-        if scale == self.scale and self._steps == 0:
-            return self._accumulated.read
-        key = scale, exact
+        size = size or self.size
+        if size == self.size and self._steps == 0 and self._pending is None:
+            return self._accumulated.now
+        key = size, exact
         if key not in self._composed:
-            size = self.grid.nx * scale, self.grid.ny * scale
-            self._composed[key] = self.device.field(size, 2, f"warp map at {scale}")
+            self._composed[key] = self.device.field(size, 2, f"warp map at {size[0]} x {size[1]}")
         if key not in self._fresh:
             self._compose(self._composed[key], **({} if exact else {"CUBIC": 1}))
             self._fresh.add(key)
         return self._composed[key]
 
+    @property
+    def coarse_size(self) -> tuple[int, int]:
+        """(width, height) in texels as large as the grid's cells, with the whole picture."""
+        across, down = (side / step for side, step in zip(self.extent, self.grid.spacing, strict=True))
+        return round(across), round(down)
+
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
-        """The displacement at the pixel centres of a picture of `size` (width, height), by default the grid's.
+        """The displacement at the pixel centres of a picture of `size` (width, height), by default `coarse_size`.
 
         Returns:
             float32 (height, width, 2), longer sides.
         """
-        field = self.device.field(size or self.grid.size, 2, "warp map, to read")
+        field = self.device.field(size or self.coarse_size, 2, "warp map, to read")
         self._compose(field)
         displacement = field.get()
         field.release()
@@ -305,14 +342,12 @@ class WarpMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
-        return draw_at(
-            self.device, points, self.grid.extent, "warp/compose.frag", self._held_defines(), **self._parts()
-        )
+        return draw_at(self.device, points, self.extent, "warp/compose.frag", self._defines(), **self._parts())
 
     def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:
-        """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the domain."""
+        """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the picture."""
         origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
-        compose = self.device.pass_("warp/compose.frag", **self._held_defines())
+        compose = self.device.pass_("warp/compose.frag", **self._defines())
         compose(target, **self._parts(), origin=origin, step=step)
 
     @cached_property
@@ -320,70 +355,82 @@ class WarpMap:
         """The inverse: where points of the original go."""
         return ForwardMap(self)
 
-    def statistics(self) -> MapStatistics:
-        """How the whole map distorts; waits for the GPU."""
-        targets = self._largest, self._total
-        self.device.pass_("warp/distortion.frag")(targets, displacement=self.composed(1), spacing=self.grid.spacing)
-        largest, total = self._find_largest(self._largest).tolist(), self._find_total(self._total).tolist()
-        cells = self.grid.nx * self.grid.ny
-        return MapStatistics(
-            det_min=-largest[0],
-            det_max=largest[1],
-            folds=int(total[0]),
-            det_error=total[2] / cells,
-            displacement_max=largest[2],
-            displacement_mean=total[1] / cells,
-        )
+    def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
+        """How the whole map distorts, looked at on a lattice of `size`; waits for the GPU.
+
+        By default that has a place for each texel of the accumulated map, or for a whole number of them where they
+        would be more than `MOST_PLACES`.
+        """
+        if size is None:
+            width, height = self.size
+            apart = math.ceil(math.sqrt(width * height / MOST_PLACES))
+            size = -(-width // apart), -(-height // apart)
+        return distortion(self.device, size, self._chain_defines(), self._parts())
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
+    def _begin_remap(self) -> None:
+        """Let what has moved stand by to be taken in, and begin with a submap of nothing."""
+        if not self._steps:
+            return
+        self._take_in(1.0)
+        self._steps = 0
+        if self._accumulated.begin(self._submap.read.get(), self.grid):
+            self._pending, self._pending_grid = self._submap.replace(), self.grid
+            self._remapping = 0
+
+    def _take_in(self, part: float) -> None:
+        """Come to a `part`, 0-1, of what the pending submap wants."""
+        if self._pending is None:
+            return
+        inputs = self._inputs() | {"submap": self._pending, "window": window_of(self._pending_grid)}
+        fine = {"CUBIC": 1} if self._accumulated.is_fine(self._pending_grid) else {}
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **self._held_defines())
+        self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
+        if part >= 1:
+            self._drop_pending()
+
+    def _drop_pending(self) -> None:
+        if self._pending is not None:
+            self._pending.release()
+        self._pending = None
+
     def _compose(self, target: Field, **defines: object) -> None:
-        compose = self.device.pass_("warp/compose.frag", **self._held_defines(), **defines)
+        compose = self.device.pass_("warp/compose.frag", **self._defines() | defines)
         compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
 
-    def _parts(self) -> dict[str, Any]:
-        """What `compose.frag` puts together."""
-        maps = {"submap": self._submap.read, "accumulated": self._accumulated.read}
-        return {**maps, "extent": self.grid.extent, "limits": self._limits, **self._held_inputs()}
+    def _defines(self) -> dict[str, object]:
+        """How the whole map is put together."""
+        fine: dict[str, object] = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
+        return fine | self._chain_defines()
+
+    def _chain_defines(self) -> dict[str, object]:
+        return self._held_defines() | ({} if self._pending is None else {"PENDING": 1})
 
     def _held_defines(self) -> dict[str, object]:
-        return {"HELD": 1} if self._held else {}
+        return {} if self._frozen.near is None else {"HELD": 1}
 
-    def _held_inputs(self) -> dict[str, Any]:
-        return {"held": self._held} if self._held else {}
+    def _parts(self) -> dict[str, Any]:
+        """What `lib/warp.glsl` puts together."""
+        inputs = self._inputs() | {"submap": self._submap.read, "window": window_of(self.grid)}
+        if self._pending is not None:
+            inputs |= {"pending": self._pending, "pending_window": window_of(self._pending_grid)}
+        return inputs
 
-    def _set_held(self, cells: np.ndarray | None) -> None:
-        if self._held is not None:
-            self._held.release()
-        self._held = None if cells is None else self.device.upload(cells.astype(np.uint8) * 255, "held cells")
-        self._held_cells = cells
+    def _inputs(self) -> dict[str, Any]:
+        """The same but for the submaps."""
+        inputs = {"accumulated": self._accumulated.now, "picture": self.extent, "limits": self._limits}
+        return inputs if self._frozen.near is None else inputs | {"near": self._frozen.near}
 
-    def _is_steep(self) -> bool:
-        """True if the map is bent too far since the last remap; waits for the GPU."""
-        self.device.pass_("warp/steepness.frag")(
-            self._steepness, displacement=self._submap.read, spacing=self.grid.spacing
-        )
-        return self._find_steepest(self._steepness)[0] > STEEPEST**2
-
-    def _resample(self, source: Field, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
-        self.device.pass_("warp/resample.frag")(target, displacement=source, origin=origin, step=step)
+    @property
+    def _cell(self) -> tuple[float, float]:
+        """Texels of the accumulated map along a cell."""
+        (across, down), (hx, hy), (width, height) = self.size, self.grid.spacing, self.extent
+        return across * hx / width, down * hy / height
 
     def _changed(self) -> None:
         self.version += 1
         self._fresh.clear()
-
-
-def _inside(cells: np.ndarray) -> np.ndarray:
-    """The cells whose eight neighbours are chosen too; beyond the edge it goes on as at the edge."""
-    for axis in (0, 1):
-        padded = np.pad(cells, [(1, 1) if axis == k else (0, 0) for k in (0, 1)], mode="edge")
-        n = cells.shape[axis]
-        cells = np.all([np.take(padded, range(shift, shift + n), axis) for shift in (0, 1, 2)], axis=0)
-    return cells
-
-
-def _same(a: np.ndarray | None, b: np.ndarray | None) -> bool:
-    return (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
 
 
 def _runge_kutta(

@@ -5,6 +5,7 @@ Each `check_<name>(device, seed)` asserts, and gives figures that tell how near 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -73,13 +74,17 @@ def check_energy_of_unforced_flow(device: Device, seed: int, steps: int = 400) -
 
 
 def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[str, float]:
-    """Random forces, brushes, masks, walls and steps: finite, no more than was put in, no place off the picture."""
+    """Random forces, brushes, masks, walls and steps: finite, no more than was put in, no place off the picture.
+
+    What is bounded is the norm over all faces, and with it every face. Face by face nothing better holds: projection
+    and advection keep norms, not maxima, and gather at one face what was put in at many. How far is a figure only.
+    """
     rng = np.random.default_rng(seed)
     grid = Grid(*SIZES[rng.integers(len(SIZES))])
     width, height = grid.extent
     fluid, warp, brush, masks = Fluid(device, grid), WarpMap(device, grid), Brush(device), Masks(device, grid)
-    put_in, strength = 0.0, 10 ** rng.uniform(-2, 3)
-    worst = 0.0
+    put_in, fastest_put_in, strength = 0.0, 0.0, 10 ** rng.uniform(-2, 3)
+    worst, fastest = 0.0, 0.0
 
     def tip() -> Tip:
         start = rng.uniform(-0.1, 1.1, 2) * grid.extent
@@ -87,17 +92,22 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
         return Tip(tuple(start), tuple(end), 10 ** rng.uniform(-2, -0.3), rng.uniform(0, 1))
 
     def steer(velocity: Field, motion: Motion) -> None:
-        nonlocal put_in
         before = velocity.get()
         brush.make_up(fluid, motion, velocity, warp)
-        put_in += float(np.linalg.norm(velocity.get() - before))
+        note(velocity.get() - before)
+
+    def note(added: np.ndarray) -> None:
+        nonlocal put_in, fastest_put_in
+        put_in += float(np.linalg.norm(added))
+        fastest_put_in += float(np.abs(added).max())
 
     masks.set_base(0.0)
     for step in range(steps):
         if step % 100 == 0:
             fluid.params = FluidParams(Walls(rng.choice(["free", "none"])), drag=rng.choice([0.0, 1.0]))
             thick = 10 ** rng.uniform(-6, 3) if rng.random() < 0.7 else 0.0
-            masks.set_base(thick * 10 ** rng.uniform(-3, 3, (grid.ny, grid.nx)), random_solid(rng, grid))
+            masks.set_base(thick * 10 ** rng.uniform(-3, 3, (grid.ny, grid.nx)))
+            masks.set_frozen(random_solid(rng, grid))
             masks.apply(fluid)
             warp.hold(fluid.solid)
             dt = 10 ** rng.uniform(-4, 1)
@@ -109,15 +119,15 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
         forces, motion = [], None
         if rng.random() < 0.3:
             forces.append(strength * random_faces(rng, grid) / dt)
-            put_in += dt * float(np.linalg.norm(forces[0]))
+            note(dt * forces[0])
         if rng.random() < 0.3:
             motion = Push(tip(), dt, rng.normal()) if rng.random() < 0.5 else Twirl(tip(), strength * rng.normal())
             brush.lead(fluid, motion, gain_compensation(motion.tip.radius, dt, fluid.params.drag, thick), warp)
-            put_in += float(np.linalg.norm(fluid.impulse.field.get()))
+            note(fluid.impulse.field.get())
         if rng.random() < 0.05:
             brush.expand(fluid, tip(), rng.normal() / dt)
             # The flow that makes room: |grad phi| <= |lap phi| L / pi, and L is 1 or, round solids, less than 3.
-            put_in += float(np.linalg.norm(fluid.source.field.get()))
+            note(fluid.source.field.get())
         fluid.step(dt, forces, partial(steer, motion=motion) if motion and rng.random() < 0.5 else None)
         warp.follow(fluid, dt)
         if step % 50 == 49:
@@ -125,6 +135,7 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
             assert np.isfinite(speed)
             assert speed <= 1.001 * put_in + 1e-6
             worst = max(worst, speed / max(put_in, 1e-9))
+            fastest = max(fastest, float(np.abs(fluid.velocity.read.get()).max()) / max(fastest_put_in, 1e-9))
             displacement = warp.read()
             x, y = grid.centres()
             places = np.stack([x, y], axis=-1) + displacement
@@ -133,7 +144,7 @@ def check_anything_goes(device: Device, seed: int, steps: int = 2000) -> dict[st
             assert (places < np.array([width, height]) + 1e-5).all()
     for item in (fluid, warp, brush, masks):
         item.release()
-    return {"speed": worst}
+    return {"norm": worst, "largest face of the largest put in": fastest}
 
 
 def check_brush_to_and_fro(device: Device, seed: int, seconds: float = 60.0) -> dict[str, float]:
@@ -188,6 +199,18 @@ def turned_cells(cells: np.ndarray, turn: str) -> np.ndarray:
     return cells[::-1] if "y" in turn else cells
 
 
+def turned_walls(walls: Walls, turn: str) -> Walls:
+    """The same of the sides that the fluid sticks to."""
+    left, right, top, bottom = walls.sticky
+    if "t" in turn:
+        left, right, top, bottom = top, bottom, left, right
+    if "x" in turn:
+        left, right = right, left
+    if "y" in turn:
+        top, bottom = bottom, top
+    return replace(walls, sticky=(left, right, top, bottom))
+
+
 def turned_map(displacement: np.ndarray, turn: str) -> np.ndarray:
     """The same of a vector at cells."""
     u, v = displacement[..., 0], displacement[..., 1]
@@ -200,9 +223,9 @@ def turned_map(displacement: np.ndarray, turn: str) -> np.ndarray:
 def check_symmetry(device: Device, seed: int, masked: bool = False) -> dict[str, float]:
     """Mirrored, turned and transposed set-ups give mirrored, turned and transposed maps, brushes and all."""
     rng = np.random.default_rng(seed)
-    grid = Grid(*((32, 32), (40, 24), (26, 34))[rng.integers(3)])
+    grid = Grid(*((32, 32), (40, 24), (26, 34), (25, 33), (33, 24), (27, 27))[rng.integers(6)])
     dt, ticks = 1 / 60, 60
-    walls = Walls(rng.choice(["free", "none"]))
+    walls = Walls(rng.choice(["free", "none"]), sticky=tuple((rng.random(4) < 0.5).tolist()))
     start = random_faces(rng, grid)
     for axis in (0, 1):  # none of it through the walls
         start[:, 0, 0] = start[0, :, 1] = 0.0
@@ -228,7 +251,11 @@ def check_symmetry(device: Device, seed: int, masked: bool = False) -> dict[str,
 
     def warped(turn: str) -> np.ndarray:
         other = Grid(grid.ny, grid.nx) if "t" in turn else grid
-        fluid, warp, brush = Fluid(device, other, FluidParams(walls)), WarpMap(device, other), Brush(device)
+        fluid, warp, brush = (
+            Fluid(device, other, FluidParams(turned_walls(walls, turn))),
+            WarpMap(device, other),
+            Brush(device),
+        )
         fluid.set_viscosity(turned_cells(viscosity, turn))
         fluid.set_solid(turned_cells(solid, turn))
         fluid.set_velocity(turned(start, turn))

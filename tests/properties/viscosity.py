@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 import reference
+from properties.fluid import TURNS, turned, turned_cells, turned_walls
 from solver.gl.device import Device
 from solver.params import Walls
 from solver.viscosity.solve import Viscosity
@@ -94,6 +95,13 @@ def eddies(rng: Rng, nx: int, ny: int) -> np.ndarray:
     return (faces / np.abs(faces).max()).astype(np.float32)
 
 
+def random_walls(rng: Rng) -> Walls:
+    """Free-slip, no-slip, or sides of either kind."""
+    kind = rng.integers(3)
+    left, right, top, bottom = rng.random(4) < 0.5
+    return (Walls(), Walls("none"), Walls(sticky=(left, right, top, bottom)))[kind]
+
+
 @dataclass
 class Case:
     """A step of random input; dt / h^2 is one, and so mu is kappa."""
@@ -107,13 +115,13 @@ class Case:
     def random(
         cls, kind: str, size: tuple[int, int], contrast: float, softest: float, rng: Rng, plain: bool = True
     ) -> Case:
-        """A mask of the kind; unless `plain`, between no-slip walls and with a solid disc half of the times each."""
+        """A mask of the kind; unless `plain`, between random walls, and half of the times with a solid disc."""
         nx, ny = size
         viscosity = (softest * contrast ** CLASSES[kind](rng, nx, ny)).astype(np.float32)
         faces = eddies(rng, nx, ny)
         solid, walls = np.zeros((ny, nx), bool), Walls()
         if not plain and rng.random() < 0.5:
-            walls = Walls("none")
+            walls = random_walls(rng)
         if not plain and rng.random() < 0.5:
             y, x = np.mgrid[:ny, :nx]
             solid = np.hypot(x - rng.uniform(0, nx), y - rng.uniform(0, ny)) < rng.uniform(0.03, 0.2) * max(nx, ny)
@@ -136,8 +144,14 @@ class Case:
             item.release()
         return found, solver.conjugate_gradients.iterations
 
+    def turned(self, turn: str) -> Case:
+        """The same in the mirror, or transposed; see `TURNS`."""
+        faces = turned(self.faces, turn).astype(np.float32)
+        walls, solid = turned_walls(self.walls, turn), turned_cells(self.solid, turn)
+        return Case(turned_cells(self.viscosity, turn), faces, walls, solid)
+
     def exact(self) -> np.ndarray:
-        no_slip = self.walls.slip == "none"
+        no_slip = self.walls.no_slip
         return reference.viscous_step(
             self.faces, self.viscosity.astype(np.float64), 1.0, 1.0, solid=self.solid, no_slip=no_slip
         )
@@ -163,6 +177,26 @@ def check_viscous_step(device: Device, seed: int) -> dict[str, float]:
     return {"error": left, "doing nothing": nothing, "iterations": iterations}
 
 
+def check_viscous_step_in_the_mirror(device: Device, seed: int) -> dict[str, float]:
+    """One viscosity or a mask, on odd and even grids of any aspect: near the direct solution, also mirrored."""
+    rng = np.random.default_rng(seed)
+    nx, ny = (round(10 ** rng.uniform(0.91, 2.1)) for _ in "xy")
+    if rng.random() < 0.6:
+        kind, contrast, softest = "one viscosity", 1e2, float(10 ** rng.uniform(-2, 6))
+        walls, solid = Walls(rng.choice(["free", "none"])), np.zeros((ny, nx), bool)
+        case = Case(np.full((ny, nx), softest, np.float32), eddies(rng, nx, ny), walls, solid)
+    else:
+        kind, contrast, softest = str(rng.choice(list(CLASSES))), float(rng.choice([1e2, 1e5])), 1.0
+        case = Case.random(kind, (nx, ny), contrast, softest, rng, plain=False)
+    found, _ = case.solved(device)
+    left, size = error(found, case.exact()), float(np.linalg.norm(found))
+    off = max(float(np.linalg.norm(case.turned(t).solved(device)[0] - turned(found, t))) / size for t in TURNS)
+    told = f"seed {seed}: {kind}, {nx} x {ny}, {case.walls.slip}, contrast {contrast:g}, kappa {softest:g}"
+    assert left < ERROR[contrast], f"{told}: {left:.4f} left"
+    assert off < 2 * ERROR[contrast], f"{told}: {off:.4f} off in the mirror"
+    return {"error": left, "off in the mirror": off}
+
+
 def check_viscous_step_is_stable(device: Device, seed: int) -> dict[str, float]:
     """Any viscosity, cell by cell, any grid, any walls and solids, any velocity: energy never grows."""
     rng = np.random.default_rng(seed)
@@ -173,7 +207,7 @@ def check_viscous_step_is_stable(device: Device, seed: int) -> dict[str, float]:
     faces[solid] = faces[:, 0, 0] = faces[0, :, 1] = 0.0
     faces[:, 1:, 0][solid[:, :-1]] = 0.0
     faces[1:, :, 1][solid[:-1]] = 0.0
-    case = Case(viscosity.astype(np.float32), faces, Walls("none" if rng.random() < 0.5 else "free"), solid)
+    case = Case(viscosity.astype(np.float32), faces, random_walls(rng), solid)
     found, iterations = case.solved(device)
     growth = float(np.linalg.norm(found) / max(np.linalg.norm(faces), 1e-30))
     assert growth <= 1.001, f"seed {seed}: {nx} x {ny}, growth {growth:.4f}"
@@ -201,7 +235,7 @@ def check_changed_viscous_mask(device: Device, seed: int) -> dict[str, float]:
     nx, ny = size = int(rng.integers(7, 150)), int(rng.integers(7, 150))
     x, y = np.arange(nx) + 0.5, np.arange(ny)[:, None] + 0.5
     thick, solid = np.zeros((ny, nx)), np.zeros((ny, nx), bool)
-    slip, contrast, dt = "free", 1e5, 1.0 / max(size) ** 2
+    walls, contrast, dt = Walls(), 1e5, 1.0 / max(size) ** 2
     solver = Viscosity(device, size)
     parts = 0
     for _ in range(14):
@@ -214,15 +248,15 @@ def check_changed_viscous_mask(device: Device, seed: int) -> dict[str, float]:
             case "solid":
                 solid = solid ^ near
             case "walls":
-                slip = "none" if slip == "free" else "free"
+                walls = random_walls(rng)
             case "step":
                 dt *= 1.5
             case "contrast":
                 contrast = rng.choice([2.0, 1e2, 1e5])
         fields = device.upload(contrast**thick), device.upload(solid.astype(np.uint8) * np.uint8(255))
-        solver.set_coefficients(*fields, dt, Walls(slip))
+        solver.set_coefficients(*fields, dt, walls)
         fresh = Viscosity(device, size)
-        fresh.set_coefficients(*fields, dt, Walls(slip))
+        fresh.set_coefficients(*fields, dt, walls)
         assert solver.plan == fresh.plan, f"seed {seed}"
         # Also where the masks before were never solved with, and nothing was asked for.
         if rng.random() < 0.7:

@@ -45,6 +45,8 @@ SETTINGS = (
             "} makes it harder. A soft brush bends the picture gently."),
     Setting("strength", "Strength", "Strength", 0.05, 1.0, ";",
             "' makes it stronger. Full strength moves the picture with the pointer."),
+    Setting("local", "Local", "Local", 0.0, 1.0, "",
+            "At 0 % the picture flows back beside the brush, as a fluid does. At 100 % only what is under it moves."),
 )  # fmt: skip
 DEFAULTS = BrushSettings()
 RIGHT = 4 * 32 + 3 * 4 + 17 + 96 + 8  # points, of what is at the right end of the bar
@@ -86,8 +88,10 @@ def _title(ui: Ui, editor: Editor, room: float) -> None:
 def _brush(ui: Ui, editor: Editor, room: float) -> None:
     """What can be set about the brush, up to `room`; for the rest there is a button."""
     across = 148 if imgui.get_window_width() > ui.px(1080) else 112
+    own = editor.state.tool.own
+    settings = [setting for setting in SETTINGS if setting.name in ("radius", "hardness", "strength", *own)]
     parts: list[tuple[float, Callable[[float], None]]] = [
-        (ui.px(across), lambda width, setting=setting: _slider(ui, editor, setting, width)) for setting in SETTINGS
+        (ui.px(across), lambda width, setting=setting: _slider(ui, editor, setting, width)) for setting in settings
     ]
     if editor.state.tool.directions:
         width = ui.segmented_width(editor.state.tool.directions)
@@ -101,7 +105,7 @@ def _brush(ui: Ui, editor: Editor, room: float) -> None:
             return
         imgui.set_cursor_pos_y(ui.px(10))
         draw(across)
-        gap = ui.px(16 if number == 0 and len(parts) > len(SETTINGS) else 8)
+        gap = ui.px(16 if number == 0 and len(parts) > len(settings) else 8)
     if imgui.get_window_width() > ui.px(1180) and editor.layout.inspector is None:
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(10))
@@ -152,8 +156,7 @@ def feels(ui: Ui, editor: Editor, name: str, width: float = 0.0) -> None:
     now = next((number for number, feel in enumerate(FEELS) if feel.fits(fluid)), -1)
     chosen = ui.segmented(name, [feel.name for feel in FEELS], now, width)
     if chosen != now:
-        feel = FEELS[chosen]
-        session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+        editor.choose_feel(FEELS[chosen])
 
 
 def _right(ui: Ui, editor: Editor) -> None:

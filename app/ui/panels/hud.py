@@ -36,7 +36,7 @@ def draw(ui: Ui, editor: Editor) -> None:
     lines.pop_clip_rect()
     if canvas.width > ui.px(ZOOM):
         _zoom(ui, editor)
-    if editor.state.hint and canvas.width > ui.px(HINT):
+    if editor.preferences.hint and canvas.width > ui.px(HINT):
         _hint(ui, editor)
     if editor.state.statistics:
         _statistics(ui, editor)
@@ -45,11 +45,14 @@ def draw(ui: Ui, editor: Editor) -> None:
 
 
 def _ring(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
-    """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard."""
+    """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard.
+
+    What is frozen is so as far as the brush reaches, however hard it is.
+    """
     hand, brush = editor.hand, editor.state.brush
     x, y = hand._start if hand.drag == "brush" else (hand.x, hand.y)
     reach = brush.radius * editor.view.longer
-    core = 0.9 * brush.hardness
+    core = 1.0 if editor.state.tool_name == "freeze" else 0.9 * brush.hardness
     # Where the brush is half as strong as in its middle: (1 - q^2)^3 = 1/2, between the core and the reach.
     half = reach * (core + 0.4542 * (1 - core))
     middle, count = ImVec2(x, y), max(32, min(int(reach), 96))
@@ -189,7 +192,7 @@ def _hint(ui: Ui, editor: Editor) -> None:
         imgui.same_line(0, ui.px(6))
         imgui.set_cursor_pos_y(top)
         if ui.icon_button("no hint", "close", size=24, icon_size=12):
-            editor.state.hint = False
+            editor.dismiss_hint()
 
 
 def _statistics(ui: Ui, editor: Editor) -> None:
@@ -207,8 +210,9 @@ def _statistics(ui: Ui, editor: Editor) -> None:
         if stats.map is not None:
             ui.dim(f"det J  {stats.map.det_min:.2f} to {stats.map.det_max:.2f}    folds {stats.map.folds}")
             ui.dim(f"Divergence  {stats.divergence:.1e} / s")
-        grid = session.replay.grid
-        ui.dim(f"Grid {grid.nx} x {grid.ny}    tick {session.tick}")
+        grid, window = session.replay.fluid.grid, session.replay.window
+        part = f" of {window.detail} around the brush" if window else ""
+        ui.dim(f"Grid {grid.nx} x {grid.ny}{part}    tick {session.tick}")
 
 
 def _catching_up(ui: Ui, editor: Editor) -> None:

@@ -52,8 +52,7 @@ def _fluid(ui: Ui, editor: Editor) -> None:
     now = next((feel for feel in FEELS if feel.fits(fluid)), None)
     chosen = ui.segmented("feel", [feel.name for feel in FEELS], FEELS.index(now) if now else -1, -1)
     if chosen >= 0 and FEELS[chosen] is not now:
-        feel = FEELS[chosen]
-        session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
+        editor.choose_feel(FEELS[chosen])
     ui.dim(f"{now.line}." if now else "Your own mixture.")
     viscosity = max(fluid.viscosity, 1e-5)
     slid = ui.slider(
@@ -100,14 +99,16 @@ def _quality(ui: Ui, editor: Editor) -> None:
     grid = session.recipe.fluid.grid
     ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits; grid of {grid}")
     automatic = editor.quality.is_on
-    index = 0 if automatic else 1 + GRIDS.index(grid) if grid in GRIDS else -1
-    chosen = ui.segmented("grid", ["Auto", *(str(cells) for cells in GRIDS)], index, -1)
+    # What saved work or a recipe is simulated on may be none of those that are offered.
+    grids = GRIDS if automatic else sorted({*GRIDS, grid})
+    index = 0 if automatic else 1 + grids.index(grid)
+    chosen = ui.segmented("grid", ["Auto", *(str(cells) for cells in grids)], index, -1)
     more = "More is finer and slower. Auto is as many as this machine can paint on. What is seen is what is exported."
     ui.tooltip("Cells along the longer side", more=more)
     if chosen == 0 and not automatic:
         editor.quality.turn_on()
     elif chosen > 0 and chosen != index:
-        session.set_grid(GRIDS[chosen - 1], f"Grid of {GRIDS[chosen - 1]}")
+        session.set_grid(grids[chosen - 1], f"Grid of {grids[chosen - 1]}")
     if session.recipe.map is not None:
         ui.dim(f"Starts from the map {PurePath(session.recipe.map).name}")
         if ui.button("Start from the picture", width=-1, height=30):

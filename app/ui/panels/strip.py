@@ -19,9 +19,11 @@ GROUP_ENDS = ("bloat", "smooth", "restore")
 
 def draw(ui: Ui, editor: Editor) -> None:
     """One button for each tool."""
-    columns = editor.layout.columns
+    rect, columns = editor.layout.strip, editor.layout.columns
+    if rect is None:
+        return
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(BETWEEN), ui.px(BETWEEN)))
-    with ui.panel("tools", editor.layout.strip, (4, 8)):
+    with ui.panel("tools", rect, (4, 8)):
         for number, tool in enumerate(TOOLS):
             if number % columns:
                 imgui.same_line()

@@ -1,0 +1,16 @@
+// Freeze or thaw: the value that a mask goes towards, and in alpha by which part, drawn with blending: as far as the
+// brush's radius alike, whatever its hardness, since a place can only be frozen or not. At the edge a texel goes by the
+// part that is covered.
+// u_towards: 1 freezes, 0 thaws; u_amount: 0-1.
+// reads: 0
+#include "lib/brush.glsl"
+uniform float u_towards;
+uniform float u_amount;
+uniform vec2 u_spacing;
+layout(location = 0) out vec4 out_frozen;
+
+void main() {
+    vec2 x = gl_FragCoord.xy * u_spacing;
+    float inside = (u_radius - distance(x, brush_nearest(x))) / max(u_spacing.x, u_spacing.y);
+    out_frozen = vec4(vec3(u_towards), u_amount * clamp(inside + 0.5, 0.0, 1.0));
+}

@@ -1,0 +1,227 @@
+"""A large field of which a copy costs no more than what was drawn into it since the last one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.gl.field import DTYPES, Field
+from solver.gl.passes import Region
+
+TILE = 256  # texels along a tile
+
+
+class Kind(NamedTuple):
+    """What a save must have in common with a field to be taken back.
+
+    Attributes:
+        size, components, dtype: of the field.
+        tile: texels along a tile.
+    """
+
+    size: tuple[int, int]
+    components: int
+    dtype: str
+    tile: int
+
+    @property
+    def rows_and_columns(self) -> tuple[int, int]:
+        """How many tiles there are down and across."""
+        return -(-self.size[1] // self.tile), -(-self.size[0] // self.tile)
+
+    @property
+    def regions(self) -> list[Region]:
+        """The tiles by rows."""
+        (width, height), side = self.size, self.tile
+        return [
+            (x, y, min(side, width - x), min(side, height - y))
+            for y in range(0, height, side)
+            for x in range(0, width, side)
+        ]
+
+
+@dataclass
+class _Tile:
+    """A copy of one tile, shared by all that hold it; `field` is None for a blank one."""
+
+    field: Field | None
+    holders: int = 0
+
+    def release(self) -> None:
+        self.holders -= 1
+        if self.holders == 0 and self.field is not None:
+            self.field.release()
+
+
+@dataclass(frozen=True)
+class SavedTiles:
+    """What a `TiledField` held at a moment; whoever has it releases it.
+
+    Attributes:
+        kind: of the field.
+        tiles: its tiles, (rows, columns), each shared with other saves where nothing was drawn in between.
+        blank: what all components of a blank tile are.
+    """
+
+    kind: Kind
+    tiles: np.ndarray
+    blank: float = 0.0
+
+    @classmethod
+    def nothing(cls, kind: Kind, blank: float = 0.0) -> SavedTiles:
+        """What a field of this kind holds before anything is drawn into it."""
+        return _held(cls(kind, np.full(kind.rows_and_columns, _Tile(None)), blank))
+
+    @property
+    def is_blank(self) -> bool:
+        """True if nothing has been drawn into any tile."""
+        return all(tile.field is None for tile in self.tiles.flat)
+
+    @property
+    def textures(self) -> list[Field]:
+        """The textures that it holds, alone or with others."""
+        return [tile.field for tile in self.tiles.flat if tile.field is not None]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them."""
+        places, texels = list[int](), list[np.ndarray]()
+        dtype = np.dtype(DTYPES[self.kind.dtype])
+        blank = round(self.blank * np.iinfo(dtype).max) if dtype.kind == "u" else self.blank
+        bits = np.array([blank], dtype).view(f"u{dtype.itemsize}")
+        for place, tile in enumerate(self.tiles.flat):
+            if tile.field is not None:
+                values = tile.field.get().ravel()
+                if (values.view(bits.dtype) != bits).any():
+                    places.append(place)
+                    texels.append(values)
+        return {"places": np.array(places, np.int32), "texels": np.concatenate([np.zeros(0, dtype), *texels])}
+
+    def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> SavedTiles:
+        """A new one of the same kind, holding what `arrays()` gave.
+
+        Raises:
+            ValueError: if that is of something else.
+        """
+        kind, regions = self.kind, self.kind.regions
+        places, texels = arrays.get("places"), arrays.get("texels")
+        if places is None or texels is None or texels.dtype != DTYPES[kind.dtype]:
+            raise ValueError("tiles are missing, or of another kind")
+        if places.ndim != 1 or ((places < 0) | (places >= len(regions))).any() or (np.diff(places) <= 0).any():
+            raise ValueError("tiles lie outside the field")
+        shapes = [(regions[place][3], regions[place][2], kind.components) for place in places]
+        ends = np.cumsum([np.prod(shape) for shape in shapes], dtype=int)
+        if texels.shape != (ends[-1] if len(ends) else 0,):
+            raise ValueError("tiles are of another size")
+        tiles = np.full(self.tiles.shape, _Tile(None))
+        for place, shape, values in zip(places, shapes, np.split(texels, ends[:-1]), strict=False):
+            tiles.flat[place] = _Tile(device.upload(values.reshape(shape), "saved tile", kind.dtype))
+        return _held(SavedTiles(kind, tiles, self.blank))
+
+    def held(self) -> SavedTiles:
+        """The same once more, to be released by whoever has it."""
+        return _held(self)
+
+    def release(self) -> None:
+        """Free the textures that no other save holds."""
+        for tile in self.tiles.flat:
+            tile.release()
+
+
+class TiledField(Field):
+    """A field of which saves share the tiles that were not drawn into in between.
+
+    Every pass that draws into it, `set`, `clear` and `copy_from` are noticed; who draws in another way calls `drawn`.
+
+    Args:
+        blank: what all its components are at first, and where `clear` is not told another value.
+        tile: texels along a tile; the other arguments are those of `Field`.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        size: tuple[int, int],
+        components: int,
+        label: str,
+        dtype: str = "f4",
+        tile: int = TILE,
+        blank: float = 0.0,
+    ) -> None:
+        self.kind = Kind(size, components, dtype, tile)
+        self.tile = tile
+        self.blank = blank
+        # What each tile was last saved as or restored from; None where something was drawn since.
+        self._same = np.full(self.kind.rows_and_columns, None, object)
+        super().__init__(device, size, components, label, dtype)
+
+    def drawn(self, region: Region | None = None) -> None:
+        if region is None:
+            self._same[...] = None
+            return
+        x, y, width, height = region
+        side = self.kind.tile
+        self._same[y // side : -(-(y + height) // side), x // side : -(-(x + width) // side)] = None
+
+    def clear(self, *values: float) -> None:
+        super().clear(*(values or self._blank_values))
+        if not values:
+            self._same[...] = _Tile(None)
+
+    def save(self) -> SavedTiles:
+        """A copy of this moment, sharing with earlier ones what is the same."""
+        for place, (x, y, width, height) in enumerate(self.kind.regions):
+            same: _Tile | None = self._same.flat[place]
+            if same is None or (same.field is not None and same.holders == 0):
+                copy = Field(self.device, (width, height), self.components, f"{self.label}, saved tile", self.dtype)
+                self.device.pass_("gl/copy.frag")(copy, field=self, offset=(x, y))
+                self._same.flat[place] = _Tile(copy)
+        return _held(SavedTiles(self.kind, self._same.copy(), self.blank))
+
+    def restore(self, saved: SavedTiles) -> list[Region]:
+        """Go back to what was saved, exactly; the regions that were another.
+
+        Raises:
+            ValueError: if it was saved of another field.
+        """
+        if (saved.kind, saved.blank) != (self.kind, self.blank):
+            raise ValueError(f"{self.label}: what was saved is of another size or kind")
+        changed = list[Region]()
+        for place, region in enumerate(self.kind.regions):
+            tile, same = saved.tiles.flat[place], self._same.flat[place]
+            if tile is same or (same is not None and tile.field is None and same.field is None):
+                continue
+            if tile.field is None:
+                self.framebuffer.clear(*self._blank_values, viewport=region)
+            else:
+                self._copy(tile.field, region, (-region[0], -region[1]))
+            self._same.flat[place] = tile
+            changed.append(region)
+        return changed
+
+    def copy_from(self, other: Field, region: Region | None = None) -> None:
+        """Take over the texels of `other`, of the same size and components, or those in (x, y, width, height)."""
+        self._copy(other, region, (0, 0))
+
+    def take(self, other: TiledField, tiles: Iterable[Region]) -> None:
+        """Take over whole tiles of a field of the same kind, and share what they were saved as."""
+        for region in tiles:
+            self._copy(other, region, (0, 0))
+            place = region[1] // self.tile, region[0] // self.tile
+            self._same[place] = other._same[place]
+
+    @property
+    def _blank_values(self) -> tuple[float, float, float, float]:
+        return self.blank, self.blank, self.blank, self.blank
+
+    def _copy(self, other: Field, region: Region | None, offset: tuple[int, int]) -> None:
+        self.device.pass_("gl/copy.frag")(self, region=region, field=other, offset=offset)
+
+
+def _held(saved: SavedTiles) -> SavedTiles:
+    for tile in saved.tiles.flat:
+        tile.holders += 1
+    return saved

@@ -1,0 +1,156 @@
+"""The accumulated map: what has moved up to the last remap, as fine as the picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Region
+from solver.gl.tiled import TILE, SavedTiles, TiledField
+from solver.grid import Grid
+
+LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
+MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
+REACH = 3  # cells that the cubic reaches to one side, at most
+NOWHERE = 1e-4  # texels that what has moved less has not moved
+
+
+def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, int]:
+    """Texels of the accumulated map of a picture, (width, height).
+
+    The picture's own pixels, or one for a whole number of them where that would be more than `MOST_TEXELS` or `largest`
+    along a side; whole numbers to a pixel where a cell of the grid would have fewer than `LEAST_TEXELS`, as far as that
+    is not too many.
+    """
+    width, height = picture
+    shrunk = max(math.ceil(math.sqrt(width * height / MOST_TEXELS)), math.ceil(max(width, height) / largest))
+    if shrunk > 1:
+        return math.ceil(width / shrunk), math.ceil(height / shrunk)
+    wanted = [LEAST_TEXELS * side / step for side, step in zip(grid.picture, grid.spacing, strict=True)]
+    across, down = (math.ceil(texels / pixels) for texels, pixels in zip(wanted, picture, strict=True))
+    while across * width * down * height > MOST_TEXELS or max(across * width, down * height) > largest:
+        if across == down == 1:
+            break
+        across, down = max(1, across - 1), max(1, down - 1)
+    return across * width, down * height
+
+
+class AccumulatedMap:
+    """A displacement of the whole picture, RG32F, longer sides, made anew tile by tile where something has moved.
+
+    Args:
+        device: the device.
+        size: (width, height) in texels.
+        extent: (width, height) of the picture, longer sides.
+
+    Attributes:
+        now: the displacement. What is drawn anew is drawn into another field, which takes its place once it is whole.
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
+        self.size = size
+        self.extent = extent
+        self.now = TiledField(device, size, 2, "accumulated map")
+        self._next = TiledField(device, size, 2, "accumulated map, anew")
+        self._tiles = tiles_of(size)
+        self._stale = set[Region]()  # tiles in which `_next` holds something older than `now`
+        self._moved: list[Region] = []  # tiles to be drawn anew
+        self._copied: list[Region] = []  # tiles to be copied
+        self._done = 0  # of both
+
+    def is_fine(self, grid: Grid) -> bool:
+        """True if it has `LEAST_TEXELS` texels along a cell of a grid."""
+        texels = (n * step / side for n, step, side in zip(self.size, grid.spacing, self.extent, strict=True))
+        return min(texels) > LEAST_TEXELS - 1e-6
+
+    def begin(self, submap: np.ndarray, grid: Grid) -> bool:
+        """Plan to draw all tiles anew in which a submap (ny, nx, 2) on a grid moves anything; True if there are any."""
+        self.forget()
+        least = NOWHERE * self.extent[0] / self.size[0]
+        counts = np.pad((np.abs(submap) > least).any(axis=-1).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+        for tile in self._tiles:
+            left, right = self._cells(tile, grid, 0)
+            top, bottom = self._cells(tile, grid, 1)
+            if counts[bottom, right] - counts[top, right] - counts[bottom, left] + counts[top, left]:
+                self._moved.append(tile)
+        self._copied = sorted(self._stale.difference(self._moved))
+        return bool(self._moved)
+
+    def _cells(self, tile: Region, grid: Grid, axis: int) -> tuple[int, int]:
+        """The first cell along an axis that a tile is interpolated from, and the one after the last."""
+        texel = self.extent[axis] / self.size[axis]
+        start, end = tile[axis] * texel, (tile[axis] + tile[axis + 2]) * texel
+        origin, step, count = grid.origin[axis], grid.spacing[axis], grid.size[axis]
+        first, last = math.floor((start - origin) / step) - REACH, math.ceil((end - origin) / step) + REACH
+        return min(max(first, 0), count), min(max(last, 0), count)
+
+    def draw(self, part: float, draw: Callable[[Field, list[Region]], None]) -> None:
+        """Come to a `part` of what is planned, 0-1: `draw` draws regions anew, out of `now`, into another field."""
+        before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
+        if anew := self._moved[before:until]:
+            draw(self._next, anew)
+        count = len(self._moved)
+        self._next.take(self.now, self._copied[max(before - count, 0) : max(until - count, 0)])
+        self._done = max(before, until)
+        if part >= 1:
+            self.now, self._next = self._next, self.now
+            self._stale = set(self._moved)
+            self._moved, self._copied, self._done = [], [], 0
+
+    def forget(self) -> None:
+        """Leave what is planned undone."""
+        self._stale.update(self._moved[: self._done])
+        self._moved, self._copied, self._done = [], [], 0
+
+    def change(self, region: Region, draw: Callable[[Field, list[Region]], None]) -> None:
+        """Draw a region anew at once; nothing may be planned."""
+        draw(self._next, [region])
+        self.now.copy_from(self._next, region)
+        self._stale.update(tile for tile in self._tiles if overlap(tile, region))
+
+    def set(self, draw: Callable[[Field], None]) -> None:
+        """Draw all of it; what was planned is forgotten."""
+        self.forget()
+        draw(self.now)
+        self._stale = set(self._tiles)
+
+    def restore(self, saved: SavedTiles) -> None:
+        """Go back to what `now.save()` gave; what was planned is forgotten."""
+        self.forget()
+        self._stale.update(self.now.restore(saved))
+
+    def clear(self) -> None:
+        """The identity; what was planned is forgotten."""
+        self.forget()
+        for field in (self.now, self._next):
+            field.clear()
+        self._stale.clear()
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        return self.now.nbytes + self._next.nbytes
+
+    def release(self) -> None:
+        """Free the textures."""
+        self.now.release()
+        self._next.release()
+
+
+def overlap(a: Region, b: Region) -> bool:
+    """True if two regions have something in common."""
+    return all(a[k] < b[k] + b[k + 2] and b[k] < a[k] + a[k + 2] for k in (0, 1))
+
+
+def tiles_of(size: tuple[int, int]) -> list[Region]:
+    """The tiles of a field of `size` by rows."""
+    width, height = size
+    return [
+        (x, y, min(TILE, width - x), min(TILE, height - y))
+        for y in range(0, height, TILE)
+        for x in range(0, width, TILE)
+    ]

@@ -1,0 +1,73 @@
+"""The submap: what has moved lately, on the fluid's grid."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from solver.gl.device import Device
+from solver.gl.field import DoubleField, Field
+from solver.gl.reduction import Reduction
+from solver.grid import Grid
+
+STEEPEST = 1.0  # largest |grad S| that the cubic carries well
+
+
+class Submap(DoubleField):
+    """A displacement S on the cells of a grid, RG32F, longer sides; outside the grid's window nothing moves.
+
+    Args:
+        device: the device.
+        grid: the cells.
+
+    Attributes:
+        trace: how far back the fluid came from, in cells, for who has no trace of his own.
+    """
+
+    def __init__(self, device: Device, grid: Grid) -> None:
+        super().__init__(device, grid.size, 2, "submap")
+        self.device = device
+        self.grid = grid
+        self.trace = device.field(grid.size, 2, "submap, trace")
+        corners = grid.nx - 1, grid.ny - 1
+        self._steepness = device.field(corners, 1, "submap, steepness")
+        self._find_steepest = Reduction(device, corners, 1, "max")
+
+    def advance(self, trace: Field) -> None:
+        """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
+        advance = self.device.pass_("warp/advance.frag")
+        advance(self.write, displacement=self.read, trace=trace, spacing=self.grid.spacing)
+        self.swap()
+
+    def advance_tracing(self, trace: Field, defines: dict[str, Any], inputs: dict[str, Any]) -> None:
+        """Carry it one step and draw `trace`, the fluid's own, beside it: the defines and inputs of `trace.frag`."""
+        advance = self.device.pass_("warp/advance.frag", TRACE=1, **defines)
+        advance((self.write, trace), displacement=self.read, spacing=self.grid.spacing, **inputs)
+        self.swap()
+
+    def replace(self) -> Field:
+        """What has moved, handed over; it begins anew with nothing."""
+        given, self.read = self.read, self.device.field(self.grid.size, 2, "submap")
+        return given
+
+    @property
+    def is_steep(self) -> bool:
+        """True if it is bent too far for its interpolation; waits for the GPU."""
+        find = self.device.pass_("warp/steepness.frag")
+        find(self._steepness, displacement=self.read, spacing=self.grid.spacing)
+        return self._find_steepest(self._steepness)[0] > STEEPEST**2
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of texture memory."""
+        parts = self.read, self.write, self.trace, self._steepness, self._find_steepest
+        return sum(part.nbytes for part in parts)
+
+    def release(self) -> None:
+        super().release()
+        for part in (self.trace, self._steepness, self._find_steepest):
+            part.release()
+
+
+def window_of(grid: Grid) -> tuple[float, float, float, float]:
+    """Left, top, width and height of what a grid covers, longer sides."""
+    return *grid.origin, *grid.extent

@@ -1,0 +1,223 @@
+"""Painted masks on a canvas of their own: what is painted, and what of it the fluid takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from solver.brush.masks import LEAST_VISCOSITY, MOST, STEPS, ZERO, Masks
+from solver.brush.tip import Tip
+from solver.fluid import Fluid
+from solver.gl.device import Device
+from solver.grid import Grid
+
+CANVAS = Grid(600, 400)
+GRID = Grid(24, 16)
+
+
+@pytest.fixture
+def masks(device: Device) -> Iterator[Masks]:
+    masks = Masks(device, CANVAS)
+    masks.set_base(0.03)
+    yield masks
+    masks.release()
+
+
+def decades(masks: Masks) -> np.ndarray:
+    return (masks.thickness.get().astype(float) - ZERO) / STEPS
+
+
+def told(masks: Masks, device: Device, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    fluid = Fluid(device, grid)
+    masks.apply(fluid)
+    found = fluid.viscosity.get(), fluid.solid.get() > 127
+    fluid.release()
+    return found
+
+
+def covered(values: np.ndarray, canvas: Grid, grid: Grid) -> np.ndarray:
+    """Means of texels over the cells by the part of each that they cover, in float64."""
+    for axis in (0, 1):
+        n = values.shape[axis]
+        start, h, cells = grid.origin[1 - axis], grid.spacing[1 - axis], grid.size[1 - axis]
+        edges = (start + h * np.arange(cells + 1)) / canvas.spacing[1 - axis]
+        low, high = edges[:-1, None], edges[1:, None]
+        parts = (np.minimum(high, np.arange(n) + 1) - np.maximum(low, np.arange(n))).clip(0)
+        values = np.moveaxis(np.tensordot(parts / parts.sum(axis=1, keepdims=True), values, (1, axis)), 0, axis)
+    return values
+
+
+def test_nothing_is_kept_of_masks_that_are_not_painted(device: Device, masks: Masks) -> None:
+    viscosity, solid = told(masks, device, GRID)
+    assert (viscosity == np.float32(0.03)).all()
+    assert not solid.any()
+    assert masks.nbytes < 10 * GRID.nx * GRID.ny
+    assert masks.frozen_field is None
+    masks.thicken(Tip((-1, -1), (-1, -1), 0.5), 1)
+    masks.smooth(Tip((0.5, 0.3), (0.5, 0.3), 0.5), 1)
+    assert masks.nbytes < 10 * GRID.nx * GRID.ny
+
+
+@pytest.mark.parametrize("hardness", [0.0, 1.0])
+def test_the_ring_is_what_is_frozen(hardness: float, device: Device, masks: Masks) -> None:
+    """To half a texel, and however long the brush stays."""
+    x, y = CANVAS.centres()
+    far = np.hypot(np.clip(x, 0.4, 0.5) - x, 0.3 - y)
+    tip = Tip((0.4, 0.3), (0.5, 0.3), 0.1, hardness)
+    for _ in range(60):
+        masks.freeze(tip, 0.7)
+        frozen = masks.frozen.get() >= 128
+        assert frozen[far < 0.1 - 0.55 * CANVAS.h].all()
+        assert not frozen[far > 0.1 + 0.55 * CANVAS.h].any()
+    masks.freeze(Tip((0.4, 0.3), (0.4, 0.3), 0.05), -1)
+    thawed = frozen & ~(masks.frozen.get() >= 128)
+    assert thawed.sum() * CANVAS.h**2 == pytest.approx(np.pi * 0.05**2, rel=0.01)
+
+
+def test_a_weak_brush_freezes_in_time(masks: Masks) -> None:
+    tip = Tip((0.5, 0.3), (0.5, 0.3), 0.05)
+    for _ in range(5):
+        masks.freeze(tip, 0.1)
+    assert not (masks.frozen.get() >= 128).any()
+    for _ in range(5):
+        masks.freeze(tip, 0.1)
+    assert (masks.frozen.get() >= 128).any()
+
+
+def test_thickness_is_painted_with_the_brush_s_falloff_within_its_limits(masks: Masks) -> None:
+    x, y = CANVAS.centres()
+    q = np.minimum(np.hypot(x - 0.5, y - 0.3) / 0.1, 1)
+    tip = Tip((0.5, 0.3), (0.5, 0.3), 0.1)
+    masks.thicken(tip, 0.5)
+    masks.thicken(tip, -0.2)
+    np.testing.assert_allclose(decades(masks), 0.3 * (1 - q**2) ** 3, atol=1.5 / STEPS)
+    tip = Tip((0.5, 0.3), (0.5, 0.3), 0.1, 1.0)
+    masks.thicken(tip, 100)
+    assert decades(masks).max() == (MOST - ZERO) / STEPS
+    masks.thicken(tip, -100)
+    assert decades(masks).min() == -3
+
+
+GRIDS = {
+    "whole": Grid(60, 40),
+    "no multiple": Grid(47, 31, CANVAS.extent),
+    "window": Grid(20, 12, (0.23, 0.11), (0.31, 0.42), CANVAS.extent),
+    "finer than the canvas": Grid(60, 40, (0.05, 0.03), (0.4, 0.2), CANVAS.extent),
+}
+
+
+@pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
+def test_a_cell_takes_the_mean_of_its_decades(grid: Grid, device: Device, masks: Masks) -> None:
+    rng = np.random.default_rng(5)
+    base = 10 ** rng.uniform(-4, 0, (grid.ny, grid.nx))
+    base[0] = 0.0
+    masks.set_base(base)
+    for _ in range(12):
+        place = tuple(rng.uniform(0, 1, 2) * CANVAS.extent)
+        masks.thicken(Tip(place, place, rng.uniform(0.005, 0.1), 1.0), rng.uniform(-2, 4))
+    viscosity, _ = told(masks, device, grid)
+    thickness, painted = (covered(a, CANVAS, grid) for a in (decades(masks), decades(masks) != 0))
+    wanted = np.where(painted > 0, np.maximum(base, LEAST_VISCOSITY) * 10**thickness, base)
+    sure = (painted > 1e-3) | (painted == 0)  # float32 may miss a sliver of a texel
+    np.testing.assert_allclose(viscosity[sure], wanted[sure], rtol=2e-3)
+
+
+def test_of_many_texels_a_cell_some_stand_for_all(device: Device) -> None:
+    """Means of 8 x 8 to 15 x 15 places of a cell: an edge is found to a 16th of a cell, soft brushes better."""
+    canvas, grid = Grid(2310, 1540), Grid(60, 40)
+    masks = Masks(device, canvas)
+    masks.set_base(1.0)
+    masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.15, 1.0), 4)
+    masks.thicken(Tip((0.3, 0.4), (0.6, 0.2), 0.1, 0.0), -2)
+    viscosity, _ = told(masks, device, grid)
+    off = np.abs(np.log10(viscosity) - covered(decades(masks), canvas, grid))
+    assert off.max() < 4 / 16
+    assert off.mean() < 0.002
+    masks.release()
+
+
+@pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
+def test_cells_are_solid_up_to_two_from_what_is_frozen(grid: Grid, device: Device, masks: Masks) -> None:
+    masks.freeze(Tip((0.4, 0.3), (0.4, 0.3), 0.1), 1)
+    _, solid = told(masks, device, grid)
+    frozen = covered((masks.frozen.get() >= 128).astype(float), CANVAS, grid)
+    surely, perhaps = (
+        np.asarray(ndimage.binary_dilation(frozen > least, np.ones((5, 5))), bool) for least in (2e-3, 0)
+    )
+    assert solid[surely].all()
+    assert not solid[~perhaps].any()
+
+
+def test_what_is_painted_bit_by_bit_is_what_is_painted_at_once(device: Device, masks: Masks) -> None:
+    """Only cells under what has changed are averaged again; the rest holds what it held."""
+    fluid = Fluid(device, Grid(37, 25, CANVAS.extent))
+    rng = np.random.default_rng(7)
+    masks.apply(fluid)
+    kept = masks.save()
+    for step in range(40):
+        start, end = rng.uniform(-0.1, 1.1, (2, 2)) * CANVAS.extent
+        tip = Tip(tuple(start), tuple(0.7 * start + 0.3 * end), 10 ** rng.uniform(-2.5, -1), rng.uniform())
+        masks.thicken(tip, rng.uniform(-1, 1))
+        masks.freeze(tip, rng.uniform(-1, 1))
+        masks.smooth(tip, rng.uniform())
+        if step == 25:
+            masks.restore(kept)
+        masks.apply(fluid)
+        viscosity, solid = told(masks, device, fluid.grid)
+        masks.apply(fluid)
+        np.testing.assert_array_equal(fluid.viscosity.get(), viscosity)
+        np.testing.assert_array_equal(fluid.solid.get() > 127, solid)
+    kept.release()
+    fluid.release()
+
+
+def test_a_recipe_s_frozen_parts_can_be_thawed_and_come_back(device: Device, masks: Masks) -> None:
+    frozen = np.zeros((CANVAS.ny, CANVAS.nx), bool)
+    frozen[:, :200] = True
+    masks.set_frozen(frozen)
+    masks.freeze(Tip((0.2, 0.3), (0.2, 0.3), 0.1), -1)
+    masks.freeze(Tip((0.8, 0.3), (0.8, 0.3), 0.1), 1)
+    now = masks.frozen.get() >= 128
+    assert not now[180, 120]
+    assert now[180, 480]
+    masks.clear()
+    np.testing.assert_array_equal(masks.frozen.get() >= 128, frozen)
+
+
+def test_smoothing_takes_a_mask_to_the_means_around(masks: Masks) -> None:
+    tip = Tip((0.5, 0.3), (0.5, 0.3), 0.2)
+    masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.1, 1.0), 2)
+    before = decades(masks)
+    for _ in range(60):
+        masks.smooth(tip, 0.5)
+    after = decades(masks)
+    assert after.max() < 1.8
+    assert np.abs(np.diff(after, axis=1)).max() < 0.5 * np.abs(np.diff(before, axis=1)).max()
+    assert after.min() == 0
+
+
+def test_states_go_back_to_the_bit_and_through_arrays(device: Device, masks: Masks) -> None:
+    empty = masks.save()
+    masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.1), 2)
+    masks.freeze(Tip((0.2, 0.3), (0.2, 0.3), 0.1), 1)
+    saved = masks.save()
+    wanted = told(masks, device, GRID)
+    masks.restore(empty)
+    viscosity, solid = told(masks, device, GRID)
+    assert (viscosity == np.float32(0.03)).all()
+    assert not solid.any()
+    other = Masks(device, CANVAS)
+    other.set_base(0.03)
+    nothing = other.save()
+    given = nothing.with_arrays(device, saved.arrays())
+    for mine, state in ((masks, saved), (other, given)):
+        mine.restore(state)
+        np.testing.assert_array_equal(told(mine, device, GRID), wanted)
+    elsewhere = Masks(device, Grid(300, 200))
+    with pytest.raises(ValueError, match="another canvas"):
+        elsewhere.restore(saved)
+    for thing in (empty, saved, nothing, given, other, elsewhere):
+        thing.release()

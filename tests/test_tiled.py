@@ -1,0 +1,152 @@
+"""Fields of which saves share what is the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from app.checkpoints import Checkpoint, Checkpoints, Moment
+from app.recipe import Recipe
+from solver.gl.device import Device
+from solver.gl.tiled import TiledField
+from solver.scheme import State
+
+SIZE = 100, 70
+SIDE = 32
+WHOLE = 100 * 70 * 8
+
+
+@pytest.fixture
+def tiled(device: Device) -> Iterator[TiledField]:
+    field = TiledField(device, SIZE, 2, "tiled", tile=SIDE)
+    yield field
+    field.release()
+
+
+def noise(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(SIZE[1], SIZE[0], 2)).astype(np.float32)
+
+
+def nbytes(*saves: object) -> int:
+    textures = {texture for saved in saves for texture in saved.textures}  # type: ignore[attr-defined]
+    return sum(texture.nbytes for texture in textures)
+
+
+def draw(device: Device, tiled: TiledField, seed: int, region: tuple[int, int, int, int]) -> None:
+    source = device.upload(noise(seed))
+    tiled.copy_from(source, region)
+    source.release()
+
+
+def test_a_field_that_nothing_was_drawn_into_costs_nothing_to_keep(tiled: TiledField) -> None:
+    saved = tiled.save()
+    assert nbytes(saved) == 0
+    assert saved.arrays()["places"].size == 0
+    tiled.set(noise(1))
+    tiled.restore(saved)
+    assert not tiled.get().any()
+    saved.release()
+
+
+def test_saves_share_what_was_not_drawn_into(device: Device, tiled: TiledField) -> None:
+    tiled.set(noise(1))
+    first = tiled.save()
+    assert nbytes(first) == WHOLE
+    draw(device, tiled, 2, (30, 10, 4, 5))  # across two tiles
+    between = tiled.get()
+    second = tiled.save()
+    assert nbytes(first, second) == WHOLE + 2 * SIDE * SIDE * 8
+    third = tiled.save()
+    assert nbytes(first, second, third) == nbytes(first, second)
+    assert (between[10:15, 30:34] == noise(2)[10:15, 30:34]).all()
+    assert (tiled.get() == between).all()
+    for saved, values in ((first, noise(1)), (third, between), (second, between), (first, noise(1))):
+        tiled.restore(saved)
+        assert tiled.get().tobytes() == values.tobytes()
+    for saved in (first, second, third):
+        saved.release()
+
+
+def test_a_restore_touches_only_what_differs(device: Device, tiled: TiledField) -> None:
+    tiled.set(noise(1))
+    first = tiled.save()
+    draw(device, tiled, 2, (99, 69, 1, 1))
+    assert tiled.restore(first) == [(96, 64, 4, 6)]
+    assert tiled.restore(first) == []
+    tiled.clear()
+    assert len(tiled.restore(first)) == 12
+    assert (tiled.get() == noise(1)).all()
+    first.release()
+
+
+def test_what_no_save_holds_any_more_is_copied_anew(device: Device, tiled: TiledField) -> None:
+    tiled.set(noise(1))
+    tiled.save().release()
+    again = tiled.save()
+    tiled.clear()
+    tiled.restore(again)
+    assert (tiled.get() == noise(1)).all()
+    again.release()
+
+
+@pytest.mark.parametrize("dtype", ["f1", "f2", "f4"])
+def test_arrays_bring_it_back_to_the_bit(dtype: str, device: Device) -> None:
+    field, other = (TiledField(device, SIZE, 1, "tiled", dtype, SIDE) for _ in range(2))
+    values = np.zeros((SIZE[1], SIZE[0]), field.get().dtype)
+    values[:, 40:] = 60 * noise(3)[:, 40:, 0].clip(0, 4) if dtype == "f1" else noise(3)[:, 40:, 0]
+    values[5, 50] = -0.0
+    field.set(values)
+    saved = State.of(device, {"mask": field}, steps=3)
+    arrays = saved.arrays()
+    assert arrays["mask/places"].tolist() == [1, 2, 3, 5, 6, 7, 9, 10, 11]
+    blank = State.of(device, {"mask": other})
+    given = blank.with_arrays(device, arrays)
+    given.write_to({"mask": other})
+    assert other.get().tobytes() == values.tobytes()
+    assert given.values["steps"] == 3
+    for thing in (saved, blank, given, field, other):
+        thing.release()
+
+
+@pytest.mark.parametrize("damage", ["places", "texels", "missing"])
+def test_arrays_of_something_else_are_refused(damage: str, device: Device, tiled: TiledField) -> None:
+    tiled.set(noise(1))
+    saved = State.of(device, {"map": tiled})
+    arrays = saved.arrays()
+    if damage == "missing":
+        del arrays["map/texels"]
+    elif damage == "places":
+        arrays["map/places"] = arrays["map/places"] + 1
+    else:
+        arrays["map/texels"] = arrays["map/texels"][:-1]
+    with pytest.raises(ValueError, match="tiles"):
+        saved.with_arrays(device, arrays)
+    saved.release()
+
+
+def test_a_save_of_another_field_is_refused(device: Device, tiled: TiledField) -> None:
+    other = TiledField(device, (SIZE[1], SIZE[0]), 2, "other", tile=SIDE)
+    saved = other.save()
+    with pytest.raises(ValueError, match="another size"):
+        tiled.restore(saved)
+    with pytest.raises(ValueError, match="another grid"):
+        State({}, {}, {"map": saved}).write_to({"map": tiled})
+    for thing in (saved, other):
+        thing.release()
+
+
+def test_checkpoints_count_once_what_they_share(device: Device, tiled: TiledField) -> None:
+    kept, recipe = Checkpoints(WHOLE + 3 * SIDE * SIDE * 8), Recipe.model_validate({"version": 1, "picture": "a.png"})
+    tiled.set(noise(1))
+    for tick in range(4):
+        draw(device, tiled, tick, (0, 0, 1, 1))
+        kept.add(Checkpoint(recipe, tick, Moment({"map": State.of(device, {"map": tiled})})))
+    assert len(kept) == 4
+    assert kept.nbytes == WHOLE + 3 * SIDE * SIDE * 8
+    draw(device, tiled, 9, (0, 0, 1, 1))
+    kept.add(Checkpoint(recipe, 4, Moment({"map": State.of(device, {"map": tiled})})))
+    assert len(kept) == 4
+    kept.clear()
+    assert kept.nbytes == 0

@@ -1,0 +1,210 @@
+"""Which window a stroke's flow is solved in, and that it makes no difference there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.pictures import Picture
+from app.presets import HONEY, PUTTY, WATER, Feel
+from app.recipe import FluidSettings, Recipe
+from app.replay import Replay
+from app.sampling import Pictures
+from app.strokes import Dab, Stroke
+from app.tools import path_length
+from app.windows import CELLS, Window, detail_for
+from solver.gl.device import Device
+from solver.grid import Grid
+
+WHOLE = Grid.for_picture(6000, 4000, 256)
+
+
+def stroke(radius: float = 0.01, tool: str = "push", detail: int = 1365) -> Stroke:
+    return Stroke.model_validate({"tool": tool, "radius": radius, "detail": detail, "samples": ((0, 0.5, 0.5, 1.0),)})
+
+
+def at(*points: float) -> tuple[Dab, ...]:
+    return (Dab(*points, 1.0),)
+
+
+@pytest.mark.parametrize("feel", [PUTTY, HONEY])
+@pytest.mark.parametrize("radius", [0.0003, 0.001, 0.004, 0.01, 0.02, 0.031])
+def test_a_small_brush_has_12_to_16_cells_a_radius(feel: Feel, radius: float):
+    recipe = Recipe(fluid=FluidSettings(viscosity=feel.viscosity, drag=feel.drag))
+    detail = detail_for(radius, recipe, recipe.fluid)
+    assert 12 - 1e-2 <= detail * radius <= 16 + 1e-2
+
+
+def test_what_acts_on_the_whole_picture_has_no_window():
+    recipe = Recipe(fluid=FluidSettings(viscosity=HONEY.viscosity, drag=HONEY.drag))
+    assert detail_for(0.08, recipe, recipe.fluid) == 0  # 20 cells of the grid already
+    thin = FluidSettings(viscosity=1e-6)
+    assert detail_for(0.01, recipe, thin) == 0  # flows on and on
+    assert detail_for(0.01, recipe, FluidSettings(viscosity=WATER.viscosity)) > 0
+    for other in ({"mode": "density"}, {"fluid": FluidSettings(solver="paper")}):
+        assert detail_for(0.01, recipe.edited(**other), recipe.fluid) == 0
+
+
+def test_a_window_stays_while_the_brush_has_room_and_is_dragged_along_by_whole_cells():
+    window = Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5))], 0, None, WHOLE)
+    assert window is not None
+    grid = window.grid_in(WHOLE)
+    assert grid.size == (CELLS, CELLS)
+    x, y = grid.centres()
+    assert abs(x.mean() - 0.5) < 2 * grid.h
+    assert abs(y.mean() - 0.5 * 2 / 3) < 2 * grid.h
+    assert Window.of([(stroke(), at(0.5, 0.5, 0.51, 0.5))], 0, window, WHOLE) == window
+    moved, place = window, 0.5
+    seen = set()
+    while place < 0.99:
+        moved = Window.of([(stroke(), at(place, 0.5, place + 0.01, 0.5))], 0, moved, WHOLE)
+        assert moved is not None
+        assert moved.row == window.row
+        seen.add(moved.column)
+        place += 0.01
+        left, _, width, _ = (*moved.grid_in(WHOLE).origin, *moved.grid_in(WHOLE).extent)
+        assert left <= place - 0.04
+        assert place + 0.04 <= left + width or moved.grid_in(WHOLE).at_edge[1]
+    assert 5 < len(seen) < 20
+    # At the picture's edge the window ends with it.
+    assert moved.grid_in(WHOLE).at_edge == (False, True, False, False)
+
+
+def test_what_no_window_holds_has_a_coarser_one_or_the_whole_picture():
+    wide = Window.of([(stroke(), at(0.4, 0.5, 0.5, 0.5))], 0, None, WHOLE)
+    assert wide is not None
+    assert 256 < wide.detail < 1365
+    assert Window.of([(stroke(), at(0.0, 0.5, 1.0, 0.5))], 0, None, WHOLE) is None
+    assert (
+        Window.of([(stroke(), at(0.5, 0.5, 0.5, 0.5)), (stroke(detail=0), at(0.5, 0.5, 0.5, 0.5))], 0, None, WHOLE)
+        is None
+    )
+    far = [(stroke(), at(0.1, 0.5, 0.1, 0.5)), (stroke(), at(0.9, 0.5, 0.9, 0.5))]
+    assert Window.of(far, 0, None, WHOLE) is None
+
+
+@pytest.mark.parametrize("size", [(6000, 4000), (5000, 1), (8, 4000), (12, 12), (601, 599)])
+@pytest.mark.parametrize("place", [(0.5, 0.5), (-9.0, 10.0), (1.0, 0.0), (0.001, 0.999)])
+def test_a_window_lies_in_any_picture(size: tuple[int, int], place: tuple[float, float]):
+    whole = Grid.for_picture(*size, 64)
+    for detail in (1, 100, 1365, 65536):
+        window = Window.of([(stroke(detail=detail), at(*place, *place))], 0, None, whole)
+        if window is not None:
+            window.grid_in(whole)  # which a grid beyond the picture refuses
+            assert max(window.grid_in(whole).size) <= CELLS
+            assert window.detail <= detail
+
+
+# -- replayed ---------------------------------------------------------------------------------------------------------
+
+SIZE = 900, 600
+
+
+def replayed(device: Device, recipe: Recipe, budget: int = 0) -> Replay:
+    return Replay(device, recipe, Pictures(Picture(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))), budget)
+
+
+def painted(*strokes: Stroke, feel: Feel = PUTTY, cells: int = 64, ticks: int = 60) -> Recipe:
+    fluid = FluidSettings(grid=cells, viscosity=feel.viscosity, drag=feel.drag)
+    return Recipe(fluid=fluid, stroke=strokes, duration=ticks / 60)
+
+
+def a_stroke(rng: np.random.Generator, first: int = 0, tool: str = "push", detail: int | None = None) -> Stroke:
+    """A winding stroke of 8 to 20 ticks away from the picture's edges, in a window unless another detail is given."""
+    radius = float(rng.uniform(0.025, 0.045))
+    count = int(rng.integers(8, 21))
+    turns = np.cumsum(rng.normal(0, 0.3, count)) + rng.uniform(0, 6.28)
+    way = radius * rng.uniform(0.1, 0.4) * np.stack([np.cos(turns), 1.5 * np.sin(turns)])
+    x, y = rng.uniform(0.35, 0.65, (2, 1)) + np.cumsum(way, axis=1)
+    samples = tuple((first + k, float(x[k]), float(y[k]), 1.0) for k in range(count))
+    recipe = painted()
+    fine = detail_for(radius, recipe, recipe.fluid) if detail is None else detail
+    return Stroke.model_validate({"tool": tool, "radius": radius, "detail": fine, "samples": samples})
+
+
+def length(stroke: Stroke) -> float:
+    return path_length(stroke, (1.0, SIZE[1] / SIZE[0]))
+
+
+@pytest.mark.parametrize("feel", [PUTTY, HONEY], ids=["putty", "honey"])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_stroke_in_a_window_ends_as_on_the_whole_picture(device: Device, feel: Feel, seed: int):
+    """On cells of the same size everywhere, the map differs by no more than a hundredth of the stroke's way."""
+    stroke = a_stroke(np.random.default_rng(seed))
+    maps = []
+    for recipe in (
+        painted(stroke, feel=feel),
+        painted(stroke.model_copy(update={"detail": 0}), feel=feel, cells=stroke.detail),
+    ):
+        replay = replayed(device, recipe)
+        replay.seek(recipe.ticks)
+        assert (replay.window is None) == (recipe.stroke[0].detail == 0)
+        maps.append(replay.warp.read(SIZE).astype(np.float64))
+        replay.release()
+    assert np.abs(maps[0]).max() > 0.1 * length(stroke)
+    assert np.abs(maps[0] - maps[1]).max() < 0.01 * length(stroke)
+
+
+@pytest.mark.parametrize("feel", [PUTTY, HONEY], ids=["putty", "honey"])
+def test_nothing_moves_at_the_sides_of_a_window(device: Device, feel: Feel):
+    """A dab of two radii: below a twentieth of a pixel of a picture of 6000, all along them."""
+    stroke = Stroke(tool="push", radius=0.01, detail=1365, samples=((0, 0.5, 0.5, 1.0), (8, 0.52, 0.5, 1.0)))
+    recipe = painted(stroke, feel=feel)
+    replay = replayed(device, recipe)
+    for tick in (5, 20, recipe.ticks):
+        replay.seek(tick)
+        grid = replay.fluid.grid
+        assert not grid.is_whole
+        x, y = grid.centres()
+        rim = np.concatenate([np.stack([x[k], y[k]], axis=-1) for k in (0, -1)]
+                             + [np.stack([x[:, k], y[:, k]], axis=-1) for k in (0, -1)])  # fmt: skip
+        assert np.abs(replay.warp.at(rim.astype(np.float32))).max() * 6000 < 0.05
+    replay.release()
+
+
+def test_a_replay_in_windows_gives_the_same_bytes_by_any_path(device: Device):
+    """Strokes of several sizes and one on the whole picture: seeks, checkpoints, other strokes and snapshots."""
+    rng = np.random.default_rng(5)
+    strokes = [a_stroke(rng, first, tool) for first, tool in ((0, "push"), (22, "twirl"), (66, "bloat"))]
+    long = Stroke(
+        tool="push", radius=0.03, detail=strokes[0].detail, samples=((44, 0.2, 0.3, 1.0), (64, 0.8, 0.7, 1.0))
+    )
+    thick = a_stroke(rng, 10, "thicken", 0)
+    whole = Stroke(tool="push", radius=0.15, samples=((88, 0.3, 0.5, 1.0), (96, 0.5, 0.5, 1.0)))
+    recipe = painted(strokes[0], thick, strokes[1], long, strokes[2], whole, feel=HONEY, ticks=100)
+    plain = replayed(device, recipe)
+    wanted, windows = {}, set()
+    for tick in range(recipe.ticks + 1):
+        plain.seek(tick)
+        windows.add(plain.window)
+        if tick % 9 == 0:
+            wanted[tick] = plain.snapshot()
+    assert None in windows
+    assert len(windows) > 5
+    replay = replayed(device, recipe, 2**28)
+    for tick in (99, 27, 54, 9, 90, 63, 18, 81, 99):
+        replay.seek(tick)
+        same(replay.snapshot(), wanted[tick])
+    # Undone and done again, with the playhead where it was.
+    replay.use(recipe.edited(stroke=recipe.stroke[:2]))
+    replay.use(recipe)
+    same(replay.snapshot(), wanted[99])
+    for start, end in ((54, 63), (9, 99), (90, 99)):
+        other = replayed(device, recipe)
+        other.resume(start, wanted[start])
+        other.seek(end)
+        same(other.snapshot(), wanted[end])
+        other.release()
+    # One that is of no window changes nothing.
+    before = replay.snapshot()
+    with pytest.raises(ValueError, match="window"):
+        replay.resume(54, wanted[54] | {"settings/window": np.array([455, 10**6, 0])})
+    same(replay.snapshot(), before)
+    for item in (plain, replay):
+        item.release()
+
+
+def same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> None:
+    assert found.keys() == wanted.keys()
+    for name, array in wanted.items():
+        np.testing.assert_array_equal(found[name], array, name)
