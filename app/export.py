@@ -298,10 +298,8 @@ class _Export:
 
     def _note_losses(self) -> None:
         """What the user should know of the last warp, and of what the output cannot hold."""
-        folded = self.replay.warp.statistics().folds if self.recipe.mode == "coordinates" else 0
-        if folded:
-            cells = self.replay.grid.nx * self.replay.grid.ny
-            self.pictures.notice(f"the warp folds over itself in {folded} of {cells} cells of the grid")
+        if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
+            self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
         output, clip = self.job.output, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture)):
             self.pictures.notice(said)

@@ -197,6 +197,7 @@ class Replay:
         before = self._save()
         try:
             self._look_at(_window(snapshot.get("settings/window", np.zeros(0))))
+            self.warp.move_to(self.fluid.grid)
             now = self._save()
             try:
                 then = now.with_arrays(self.device, snapshot)
@@ -316,8 +317,10 @@ class Replay:
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
+                    self._set_parameters()  # also of a fluid that has just been restored
                     flow = self.fluid.flow_on(self._cells_of(window))
                     self._look_at(window)
+                    self.warp.move_to(self.fluid.grid)
                     self._set_parameters()
                     self._apply_masks()
                     self.fluid.go_on_with(flow)
@@ -327,7 +330,7 @@ class Replay:
         return self.grid if window is None else window.grid_in(self.grid)
 
     def _look_at(self, window: Window | None) -> None:
-        """Go on in another window, with a fluid at rest that no masks have been applied to; the map stays as it was."""
+        """Go on in another window, with a fluid at rest that no masks have been applied to; not yet with the map."""
         if window == self.window:
             return
         grid, self.window = self._cells_of(window), window
@@ -343,7 +346,6 @@ class Replay:
         if isinstance(self.fluid, Fluid):
             self.fluid.lay_on(grid)
         self.masks.forget_fluid()
-        self.warp.move_to(grid)
 
     def _use_viscosity(self, base: float) -> None:
         """Let the masks be painted over the recipe's layers on another base."""

@@ -434,7 +434,7 @@ def test_a_fold_is_told(folder: Path):
     ran = fluidwarp(folder, "render", "b.toml", "-o", "z.png")
     first, second = ran.stderr.splitlines()
     assert first == "fluidwarp: m.npy folds over itself in 96 of its pixels"
-    assert re.fullmatch(r"fluidwarp: the warp folds over itself in \d+ of 768 cells of the grid", second)
+    assert re.fullmatch(r"fluidwarp: the warp folds over itself in \d+ of \d+ places", second)
     ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy")
     assert ran.stderr == ""
     ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy", "--invert")

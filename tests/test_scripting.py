@@ -83,10 +83,6 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
     "half a cell": (lambda fluid: Grid(cast(Any, 20.5), 12), "whole"),
     "a picture of NaN": (lambda fluid: Grid(20, 12, (1.0, np.nan)), "picture"),
     "no picture": (lambda fluid: Grid.for_picture(0, 5, 64), "picture"),
-    "solids of another grid for a map": (
-        lambda fluid: WarpMap(fluid.device, Grid(12, 12)).hold(fluid.solid),
-        "solid",
-    ),
     "an endless diffusion of a density": (lambda fluid: Density(fluid.device, np.ones((12, 20)), np.inf), "diffusion"),
     "a source of another density": (
         lambda fluid: Density(fluid.device, np.ones((12, 20)), 0.0, np.ones((5, 5))),

@@ -12,7 +12,7 @@ from app.ui.state import State
 from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport
 from solver.gl.device import Device
-from solver.gl.field import Field
+from solver.gl.field import Field, FieldPool
 from solver.grid import Grid
 
 LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
@@ -22,6 +22,10 @@ FORCE_ARROW = 32.0
 FORCE_COLOUR = (1.0, 0.87, 0.2)
 RESTING = 0.5  # how strong a force is shown while it does not act
 GRID_LINES = 24.0
+MOVING = 4  # pixels of the screen to one for which the warp is found while things move: nobody sees the difference
+KEPT = 1024  # texels along the warp that is kept while it is made again
+
+WHOLE = 0.0, 0.0, 1.0, 1.0
 
 Pixels = tuple[int, int, int, int]
 """Left, top, right, bottom."""
@@ -47,6 +51,8 @@ class Canvas:
         self._texture.repeat_x = self._texture.repeat_y = False
         self._texture.build_mipmaps()
         self._still = device.field((1, 1), 2, "no displacement")
+        self._fields = FieldPool(device, "canvas")
+        self._drawn: object = None  # what the displacement was found for
         # The warp as it was last seen at rest, shown while it is made again on another grid.
         self._kept: Field | None = None
         self._kept_at = -1
@@ -77,17 +83,17 @@ class Canvas:
         if visible is None:
             return
         replay = session.replay
-        texture, displacement = self._texture, self._still
+        texture, displacement, shown = self._texture, self._still, WHOLE
         if replay.density is not None:
             texture = replay.density.values.texture
         elif not state.before:
-            # The fine map is dearer than the rest of the frame; while things move, nobody sees the difference.
-            displacement = self._seen(session)
+            displacement, shown = self._seen(session, viewport, seen)
         self._filter(viewport)
         defines: dict[str, object] = {"EDGES": EDGES[session.recipe.edges]}
         inputs: dict[str, object] = {
             "picture": texture,
             "displacement": displacement,
+            "shown": shown,
             "origin": (rect.x * density, rect.y * density),
             "step": (1 / (rect.width * density), 1 / (rect.height * density)),
             "extent": session.extent,
@@ -117,6 +123,7 @@ class Canvas:
     def release(self) -> None:
         self._texture.release()
         self._still.release()
+        self._fields.release()
         if self._kept is not None:
             self._kept.release()
         self._release_forces()
@@ -148,19 +155,32 @@ class Canvas:
         self._force_fields, self._forces_of = fields, key
         return fields
 
-    def _seen(self, session: Session) -> Field:
-        """The displacement to show."""
+    def _seen(self, session: Session, viewport: Viewport, seen: Pixels) -> tuple[Field, tuple[float, ...]]:
+        """The displacement to show, and where it lies: left, top, width and height, 0-1 of the picture.
+
+        Found for the pixels of the screen only, so that it costs the same at any zoom and on any picture.
+        """
+        warp = session.replay.warp
         if session.is_rebuilding and self._kept is not None:
-            return self._kept
-        displacement = session.replay.warp.composed(session.replay.grid.size if session.is_moving else None)
+            return self._kept, WHOLE
         if not session.is_moving and session.changes != self._kept_at:
             self._kept_at = session.changes
-            if self._kept is None or self._kept.size != displacement.size:
-                if self._kept is not None:
-                    self._kept.release()
-                self._kept = self.device.field(displacement.size, 2, "warp last seen")
-            self._kept.copy_from(displacement)
-        return displacement
+            if self._kept is None:
+                size = [max(1, round(KEPT * side / max(self.size))) for side in self.size]
+                self._kept = self.device.field((size[0], size[1]), 2, "warp last seen")
+            warp.draw(self._kept, (0.0, 0.0), self._kept.texel)
+        apart = MOVING if session.is_moving else 1
+        (left, top, right, bottom), rect, density = seen, viewport.rect, viewport.density
+        # One more on every side, to be interpolated between.
+        size = -(-(right - left) // apart) + 2, -(-(bottom - top) // apart) + 2
+        origin = (left - rect.x * density) / apart - 1, (top - rect.y * density) / apart - 1
+        step = apart / (rect.width * density), apart / (rect.height * density)
+        shown = origin[0] * step[0], origin[1] * step[1], size[0] * step[0], size[1] * step[1]
+        field = self._fields.get("displacement", size, 2)
+        if (drawn := (warp, warp.version, size, shown)) != self._drawn:
+            warp.draw(field, origin, step)
+            self._drawn = drawn
+        return field, shown
 
     def _filter(self, viewport: Viewport) -> None:
         zoom = viewport.scale * viewport.density / self._shrunk

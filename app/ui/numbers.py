@@ -39,5 +39,5 @@ class Numbers:
             if steps > 0 and taken:
                 stages = {name: spent / steps for name, spent in taken.items()}
             self._last, self._seen = now, session.changes
-            self._stats = Stats(stages, session.replay.warp.statistics(), session.divergence())
+            self._stats = Stats(stages, session.replay.warp.statistics(session.replay.grid.size), session.divergence())
         return self._stats

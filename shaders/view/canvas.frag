@@ -1,7 +1,7 @@
 // Canvas: what lies under a pixel of the screen: the picture through the warp map, on a checkerboard, with its overlays.
 //   colour(x) = picture(x + D(x)),  x = (pixel - u_origin) u_step  in 0-1 of the picture
-// u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering; u_extent: width and height in longer
-// sides. EDGES: beyond the picture it is 0 transparent, 1 black, 2 as at its edge (the sampler clamps), 3 mirrored,
+// u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering, over u_shown: left, top, width and
+// height, 0-1 of the picture; u_extent: width and height in longer sides. EDGES: beyond the picture it is 0 transparent, 1 black, 2 as at its edge (the sampler clamps), 3 mirrored,
 // 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
 // square of the checkerboard, pixels.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
@@ -19,6 +19,7 @@ uniform sampler2D u_picture;
 uniform sampler2D u_displacement;
 uniform vec2 u_origin;
 uniform vec2 u_step;
+uniform vec4 u_shown;
 uniform vec2 u_extent;
 uniform vec4 u_window; // where the flow is solved: left, top, width and height, 0-1 of the picture
 #ifdef SPLIT
@@ -118,7 +119,7 @@ void main() {
     const bool warped = true;
 #endif
     vec2 place = x;
-    if (warped) place += texture(u_displacement, x).rg / u_extent;
+    if (warped) place += texture(u_displacement, (x - u_shown.xy) / u_shown.zw).rg / u_extent;
     vec4 colour = look_up(place);
 #ifdef CHECKER
     if (colour.a < 0.999) {

@@ -344,6 +344,11 @@ class WarpMap:
         """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
         return draw_at(self.device, points, self.extent, "warp/compose.frag", self._defines(), **self._parts())
 
+    def draw(self, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
+        """Draw the displacement at (fragment + origin) step, 0-1 of the picture, to be looked at between its texels."""
+        compose = self.device.pass_("warp/compose.frag", **self._defines() | {"CUBIC": 1})
+        compose(target, **self._parts(), origin=origin, step=step)
+
     def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:
         """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the picture."""
         origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
