@@ -301,7 +301,7 @@ class Replay:
     def _set_parameters(self) -> None:
         settings = self.settings
         slip = "free" if settings.walls == "free-slip" else "none"
-        params = FluidParams(walls=Walls.of(slip, self.fluid.grid), drag=settings.drag, sweeps=settings.sweeps)
+        params = FluidParams(walls=Walls.of(slip, self.fluid.grid.at_edge), drag=settings.drag, sweeps=settings.sweeps)
         if params != self.fluid.params:
             self.fluid.params = params
         if settings.viscosity != self._viscosity_in_force:

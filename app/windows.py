@@ -14,7 +14,6 @@ from typing import NamedTuple, Self
 
 from app.recipe import FluidSettings, Recipe
 from app.strokes import FINEST_DETAIL, Dab, Stroke
-from solver.brush.push import SQUARED_WAVENUMBER
 from solver.grid import SMALLEST_GRID, Grid
 
 CELLS = 192  # along a side of a window; its levels divide it by two down to three
@@ -25,8 +24,10 @@ LEAST_PER_RADIUS, STEP = 12.0, 4 / 3
 FINER = 1.5
 # Radii around the brush that a window's own sides keep away from it; and how far ahead it is laid when dragged along.
 ROOM, AHEAD = 4.0, 1.0
-# Seconds in which a brush's own flow fades to a third: one that flows longer soon reaches beyond any window.
-LONGEST_FLOW = 1.0
+# Seconds in which what flows in a window fades to a third, at most: where it went on longer, its sides would be felt.
+# The slowest flow between sticking sides of length a fades at 52.3 mu / a^2 (the buckling mode of a clamped plate).
+LONGEST_FLOW = 0.2
+SLOWEST = 52.3 / 14.0**2  # of a window of 14 radii, times mu / radius^2
 
 FLOWING = ("push", "curve", "twirl", "bloat", "pinch")
 """The tools that move the fluid."""
@@ -42,7 +43,7 @@ def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
     """
     if not may_have_windows(recipe):
         return 0
-    fading = settings.drag + SQUARED_WAVENUMBER * settings.viscosity / radius**2
+    fading = settings.drag + SLOWEST * settings.viscosity / radius**2
     if fading * LONGEST_FLOW < 1.0:
         return 0
     steps = ceil(log(LEAST_PER_RADIUS / radius / CELLS) / log(STEP) - 1e-9)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Literal, NamedTuple
-
-if TYPE_CHECKING:
-    from solver.grid import Grid
+from typing import Literal, NamedTuple
 
 
 class NoSlip(NamedTuple):
@@ -44,9 +41,9 @@ class Walls:
     sticky: tuple[bool, bool, bool, bool] = (False, False, False, False)
 
     @classmethod
-    def of(cls, slip: Literal["free", "none"], grid: Grid) -> Walls:
-        """Those of a grid: this `slip` at the edges of the picture, and all other sides stick."""
-        left, right, top, bottom = grid.at_edge
+    def of(cls, slip: Literal["free", "none"], at_edge: tuple[bool, bool, bool, bool]) -> Walls:
+        """Those of a grid: this `slip` at the picture's edges (see `Grid.at_edge`), and all other sides stick."""
+        left, right, top, bottom = at_edge
         return cls(slip, sticky=(not left, not right, not top, not bottom))
 
     @property

@@ -79,11 +79,11 @@ def test_the_flow_in_a_window_is_that_of_the_whole(device: Device, left: int, vi
     """Its sides stick, the picture's edge lets glide: a push in the middle of the window, and one beside that edge."""
     whole = Grid(200, 160)
     window = Grid(96, 96, (96 / 200, 96 / 200), (left / 200, 32 / 200), whole.picture)
-    assert Walls.of("free", window).sticky == (left > 0, True, True, True)
+    assert Walls.of("free", window.at_edge).sticky == (left > 0, True, True, True)
     x, y = (6 if left == 0 else left + 48) / 200, 80 / 200
     flows, brush = [], Brush(device)
     for grid in (whole, window):
-        fluid = Fluid(device, grid, FluidParams(Walls.of("free", grid)))
+        fluid = Fluid(device, grid, FluidParams(Walls.of("free", grid.at_edge)))
         fluid.set_viscosity(viscosity)
         for tick in range(6):
             start = x + 0.002 * tick, y + 0.004 * tick

@@ -22,7 +22,7 @@ MAY_IMPORT = {
 SOLVER = {
     "gl": set[str](),
     "grid": set[str](),
-    "params": {"grid"},
+    "params": set[str](),
     "packing": {"gl"},
     "pressure": {"gl", "packing"},
     "viscosity": {"gl", "packing", "params"},

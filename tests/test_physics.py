@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from solver.gl.device import Device
 from solver.grid import Grid
 from solver.paper import PaperFluid
 from solver.params import FluidParams, Walls
+from solver.warp.map import WarpMap
 
 PI = np.pi
 
@@ -127,6 +130,20 @@ def test_a_local_push_moves_what_is_under_it_and_nothing_else(device: Device, ki
         frozen = (slice(12, 13), slice(30, 32)) if axis == 0 else (slice(12, 14), slice(30, 31))
         wanted[frozen] = 0.0
         np.testing.assert_allclose(carrier[..., axis], wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize("inwards", [True, False])
+def test_a_local_push_at_the_edge_does_not_fold(device: Device, inwards: bool) -> None:
+    fluid, warp, brush = Fluid(device, Grid(48, 32)), WarpMap(device, Grid(48, 32)), Brush(device)
+    places = np.linspace(0.0, 0.4, 21)[:: 1 if inwards else -1]
+    for start, end in pairwise(places.tolist()):
+        fluid.step(1 / 60)
+        brush.carry(fluid, Push(Tip((start, 0.3), (end, 0.3), radius=0.25), 1 / 60, local=1.0))
+        warp.follow(fluid, 1 / 60)
+    assert warp.statistics().displacement_max > 0.1
+    assert warp.statistics().det_min > 0
+    for thing in (fluid, warp, brush):
+        thing.release()
 
 
 def test_between_fluid_and_local_a_push_is_a_mixture(device: Device) -> None:

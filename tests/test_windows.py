@@ -23,8 +23,8 @@ def stroke(radius: float = 0.01, tool: str = "push", detail: int = 1365) -> Stro
     return Stroke.model_validate({"tool": tool, "radius": radius, "detail": detail, "samples": ((0, 0.5, 0.5, 1.0),)})
 
 
-def at(*points: float) -> tuple[Dab, ...]:
-    return (Dab(*points, 1.0),)
+def at(x0: float, y0: float, x1: float, y1: float) -> tuple[Dab, ...]:
+    return (Dab(x0, y0, x1, y1, 1.0),)
 
 
 @pytest.mark.parametrize("feel", [PUTTY, HONEY])

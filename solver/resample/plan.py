@@ -208,6 +208,9 @@ def plan_for(warp: WarpMap | GivenMap, picture: np.ndarray, size: tuple[int, int
     if shaped.shape[2] > 4:
         raise SamplingError(f"a picture of {shaped.shape[2]} channels cannot be looked up, 1 to 4 can")
     size = size or (picture.shape[1], picture.shape[0])
-    field = warp.composed()
-    slack = 0.5 * picture.shape[1] / field.width if isinstance(warp, WarpMap) else 0.01
+    if isinstance(warp, WarpMap):
+        field = warp.composed(warp.size_for((picture.shape[1], picture.shape[0]), size))
+        slack = 0.5 * picture.shape[1] / field.width
+    else:
+        field, slack = warp.composed(), 0.01
     return Plan(field, warp.extent, slack, (warp, warp.version), shaped, size, how)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
 CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last remap
-MOST_PLACES = 2**21  # at which its distortion is looked at
+MOST_PLACES = 2**19  # at which its distortion is looked at
 REMAP_STEPS = CHECK_EVERY  # steps over which a remap is spread; the next one cannot begin before they are over
 
 
@@ -321,6 +321,16 @@ class WarpMap:
             self._compose(self._composed[key], **({} if exact else {"CUBIC": 1}))
             self._fresh.add(key)
         return self._composed[key]
+
+    def size_for(self, picture: tuple[int, int], result: tuple[int, int]) -> tuple[int, int]:
+        """Texels to compose for a result of a picture, both in pixels: not finer than either needs.
+
+        The accumulated map's, or one for a whole number of them: as many as the result has pixels, or else the picture,
+        or two a cell.
+        """
+        sides = zip(self.size, result, picture, self.coarse_size, strict=True)
+        times = max(1, min(own // min(wanted, max(given, 2 * cells)) for own, wanted, given, cells in sides))
+        return -(-self.size[0] // times), -(-self.size[1] // times)
 
     @property
     def coarse_size(self) -> tuple[int, int]:
