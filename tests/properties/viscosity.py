@@ -224,7 +224,9 @@ def textures(solver: Viscosity) -> dict[str, np.ndarray]:
         found["inverse"] = solver.multigrid._inverse.get()
     space = solver.deflation.space
     if space is not None:
-        found |= {field.label: field.get() for field in (*solver.deflation._part_of, solver.deflation._tables[0])}
+        found |= {field.label: field.get() for field in solver.deflation._part_of}
+        # A table that more parts once needed stays as long.
+        found["tiles"] = solver.deflation._tables[0].get().reshape(-1, 4)[: space.parts.count + 1]
         found["motions"] = space.solve(np.random.default_rng(0).normal(size=(space.parts.count + 1, 3)))
     return found
 
