@@ -395,3 +395,21 @@ def test_what_was_solved_before_does_not_matter(device: Device) -> None:
         solver.release()
     for other in found[1:]:
         np.testing.assert_array_equal(other, found[0])
+
+
+@pytest.mark.parametrize("softest", [1.0, 30.0])
+def test_cell_by_cell_noise_is_solved_until_little_is_left(device: Device, softest: float) -> None:
+    """Each iteration brings four fifths of the one before or more: that says too little of what is left."""
+    size = 96, 96
+    step = Step(device, softest * 1e5 ** np.random.default_rng(0).random(size))
+    faces = vortices(*size)
+    assert error(step(faces), step.exact(faces)) < 0.05
+
+
+def test_fluid_at_rest_stays_so_at_no_iteration(device: Device) -> None:
+    step = Step(device, 1e5 ** mask("disc", 40, 60))
+    assert not step(np.zeros((40, 60, 2), np.float32)).any()
+    assert step.solver.conjugate_gradients.iterations == 0
+    assert step(vortices(40, 60)).any()
+    assert not step(np.zeros((40, 60, 2), np.float32)).any()
+    assert not any(field.get().any() for field in step.solver.state())

@@ -8,6 +8,18 @@ const vec4 u_no_slip = vec4(0.0);
 const float u_solids_no_slip = 0.0;
 #endif
 
+// 1 where the fluid sticks to a wall that meets nodes in these columns and rows: the side that they lie on, or solid cells.
+vec4 sticks(vec4 column, vec4 row) {
+#ifdef NO_SLIP
+    vec4 found = mix(vec4(u_solids_no_slip), vec4(u_no_slip.x), vec4(lessThanEqual(column, vec4(0.0))));
+    found = mix(found, vec4(u_no_slip.y), vec4(greaterThanEqual(column, vec4(u_box.x))));
+    found = mix(found, vec4(u_no_slip.z), vec4(lessThanEqual(row, vec4(0.0))));
+    return mix(found, vec4(u_no_slip.w), vec4(greaterThanEqual(row, vec4(u_box.y))));
+#else
+    return vec4(0.0);
+#endif
+}
+
 // 1 where closed faces in these columns (or rows) are glided along; `far` of them lie between the sides (near, far).
 vec4 glides(vec4 place, float far, vec2 no_slip) {
 #ifdef NO_SLIP

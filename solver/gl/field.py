@@ -88,11 +88,17 @@ class Field:
         self.texture.write(np.ascontiguousarray(data).tobytes())
         self.drawn()
 
-    def get(self) -> np.ndarray:
-        """Read back as an array of shape (height, width) or (height, width, components), row 0 on top."""
-        shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
+    def get(self, region: tuple[int, int, int, int] | None = None) -> np.ndarray:
+        """Read back as an array of shape (height, width) or (height, width, components), row 0 on top.
+
+        Args:
+            region: (x, y, width, height) in texels of what is wanted; by default all.
+        """
+        x, y, width, height = region or (0, 0, *self.size)
+        shape = (height, width) if self.components == 1 else (height, width, self.components)
         array = np.empty(shape, DTYPES[self.dtype])
-        self.framebuffer.read_into(array, components=self.components, dtype=self.dtype, alignment=1)
+        viewport = x, y, width, height
+        self.framebuffer.read_into(array, viewport, self.components, dtype=self.dtype, alignment=1)
         return array
 
     def copy_from(self, other: Field) -> None:

@@ -6,10 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Coarse cells on each side of a changed one whose couplings change too: they are made of those of the four fine rows
-# around each, every coupling kept where it begins.
-REACH = 1
-
 
 class Box(NamedTuple):
     """Cells of a level: rows from `top` to before `bottom`, columns from `left` to before `right`."""
@@ -20,43 +16,10 @@ class Box(NamedTuple):
     right: int
 
     @property
-    def cells(self) -> tuple[slice, slice]:
-        return slice(self.top, self.bottom), slice(self.left, self.right)
-
-    @property
-    def nodes(self) -> tuple[slice, slice]:
-        """The corners of the cells."""
-        return slice(self.top, self.bottom + 1), slice(self.left, self.right + 1)
-
-    @property
-    def finer(self) -> Box:
-        """The same place on the next finer level."""
-        return Box(*(2 * edge for edge in self))
-
-    @property
-    def texels(self) -> Box:
-        """The same place in texels of 2 x 2 cells."""
-        return Box(*(edge // 2 for edge in self))
-
-    def grown(self, by: int, shape: tuple[int, ...]) -> Box:
-        """So many cells more on all sides, and out to whole texels of 2 x 2, within an even (rows, columns)."""
-        bottom, right = (min(-(-(end + by) // 2) * 2, length) for end, length in zip(self[1::2], shape, strict=True))
-        top, left = (max((start - by) // 2 * 2, 0) for start in self[::2])
-        return Box(top, bottom, left, right)
-
-    def coarser(self, shape: tuple[int, ...]) -> Box:
-        """The cells of the next coarser level, (rows, columns), that change with these."""
-        bottom, right = (min(-(-end // 2) + REACH, length) for end, length in zip(self[1::2], shape, strict=True))
-        top, left = (max(start // 2 - REACH, 0) for start in self[::2])
-        return Box(top, bottom, left, right)
-
-    def within(self, outer: Box) -> Box:
-        """The same place counted from the first cell of `outer`."""
-        return Box(self.top - outer.top, self.bottom - outer.top, self.left - outer.left, self.right - outer.left)
-
-
-def whole(shape: tuple[int, ...]) -> Box:
-    return Box(0, shape[0], 0, shape[1])
+    def coarser(self) -> Box:
+        """The cells of the next coarser level that change with these: one is made of the four fine rows around it."""
+        (top, left), (bottom, right) = self[::2], self[1::2]
+        return Box(top // 2 - 1, -(-bottom // 2) + 1, left // 2 - 1, -(-right // 2) + 1)
 
 
 def changed(before: np.ndarray, after: np.ndarray) -> Box | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
+from math import inf, isfinite
 
 from solver.gl.device import Device
 from solver.gl.field import Field
@@ -47,12 +47,18 @@ class ConjugateGradients:
     ) -> PackedFaces:
         """The solution, from the best first guess in the plane of `v_star` and the last step's `change`.
 
-        `change` becomes what this step has made of `v_star`. Ends with an iteration that brings less than the part
-        `tolerance`^2 of the energy, or after so many at most. `precondition(r)` returns about A^-1 r.
+        `change` becomes what this step has made of `v_star`. Ends when less than the part `tolerance`^2 of the energy
+        is left, or after so many iterations at most. What is left is the rest of the geometric series of what
+        iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r.
         """
-        found = curvature = self._galerkin_initial_guess(v_star, change, rhs)
-        x = self._p.read  # The guess is a step from rest, along itself.
+        found, of_v_star = self._galerkin_initial_guess(v_star, change, rhs)
         self.iterations = 0
+        if rhs is v_star and not of_v_star:  # at rest
+            for field in change.fields:
+                field.clear()
+            return v_star
+        x = self._p.read  # The guess is a step from rest, along itself.
+        curvature, before = found, inf
         while True:
             self.iterations += 1
             z = precondition(self._r.read)
@@ -60,8 +66,10 @@ class ConjugateGradients:
             alpha, beta, curvature = cg_coefficients(rz, z_az, z_ap, curvature)
             gained = alpha**2 * curvature
             found += gained
-            if not alpha or self.iterations == most or gained <= tolerance**2 * found:
+            left = max(gained, _series(gained, before))
+            if not alpha or self.iterations == most or left <= tolerance**2 * found:
                 break
+            before = gained
             self._update(x, z, alpha, beta)
             x = self._x.read
         p = self._p.read
@@ -77,8 +85,10 @@ class ConjugateGradients:
         )
         return self._x.write
 
-    def _galerkin_initial_guess(self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces) -> float:
-        """Leave in p the a v* + c d of least energy, d the `change`; A p, and b - A p in r; that energy, p . A p."""
+    def _galerkin_initial_guess(
+        self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces
+    ) -> tuple[float, float]:
+        """Leave in p the a v* + c d of least energy, d the `change`; A p, and b - A p in r; p . A p and v* . A v*."""
         draw = self.device.pass_("viscosity/galerkin_guess.frag", **self.level.defines)
         draw(
             (*self._az.fields, *self._ap.read.fields, self._products, self._change_product),
@@ -109,7 +119,7 @@ class ConjugateGradients:
             **rhs.inputs("rhs_"),
         )
         self._ap.swap()
-        return a * bv + c * bd
+        return a * bv + c * bd, vav
 
     def _apply_operator(self, z: PackedFaces) -> tuple[float, float, float]:
         """A z, and r . z, z . A z, z . A p."""
@@ -159,6 +169,11 @@ class ConjugateGradients:
         """Free the textures."""
         for item in (*self._pairs, self._products, self._change_product, self._sum, self._change_sum):
             item.release()
+
+
+def _series(last: float, before: float) -> float:
+    """The rest of the geometric series that two terms belong to."""
+    return last**2 / (before - last) if before > last else inf
 
 
 def cg_coefficients(rz: float, z_az: float, z_ap: float, p_ap: float) -> tuple[float, float, float]:

@@ -9,8 +9,7 @@ of which only couplings within a cluster are kept, that is of parts which someth
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import combinations, pairwise, product
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,111 +17,33 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.packing import PackedFaces, framed, packed
+from solver.viscosity.changed import Box, changed
 from solver.viscosity.clusters import ClusterMatrix, connected
-from solver.viscosity.operator import Coefficients
+from solver.viscosity.operator import Coefficients, Level
+from solver.viscosity.parts import Parts, find_parts
 
-BROAD = 5  # cells across a core, at least
 # Tiles along the longer side, of 8 cells at least: finer ones bend better and leave more unknowns.
 TILES = 32
 SMALLEST_TILE = 8
 WIDE = 64  # texels of a row of the parts' textures
 
 
-@dataclass(frozen=True)
-class Parts:
-    """Cores and runs, numbered from 1: cores, runs of u, runs of v.
-
-    Attributes:
-        of_u, of_v: the part of each face, 0 for none, (rows, columns).
-        cores, runs_of_u: how many of each kind there are.
-        tile: (column, row) of each part's tile, of part 0 too.
-        side: cells along a tile.
-    """
-
-    of_u: np.ndarray
-    of_v: np.ndarray
-    cores: int
-    runs_of_u: int
-    tile: np.ndarray
-    side: int
-
-    @property
-    def count(self) -> int:
-        return len(self.tile) - 1
-
-
-def find_parts(stiff: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: int) -> Parts:
-    """The cores and runs of the `stiff` cells, (rows, columns), in tiles of `side` cells."""
-    inside = _opened(stiff)
-    core = _numbered(inside, side)
-    cores = int(core.max(initial=0))
-    # What is few, the parts' faces, is worked on in lists: a mask of bytes costs little, an array of numbers much.
-    # The first column of u and the first row of v are walls, so that a cell lies behind each open face.
-    touch_u = open_u & (inside | framed(inside, (0, 0), (1, 0))[:, :-1])
-    touch_v = open_v & (inside | framed(inside, (1, 0), (0, 0))[:-1])
-    of_u, of_v = np.zeros(stiff.shape, np.int32), np.zeros(stiff.shape, np.int32)
-    for of_face, touch, back in ((of_u, touch_u, 1), (of_v, touch_v, stiff.shape[1])):
-        at = np.flatnonzero(touch)
-        of_face.ravel()[at] = np.maximum(core.ravel()[at], core.ravel()[at - back])
-    free = stiff & ~inside
-    on_u, runs_u = _runs(free, open_u & ~touch_u, side)
-    on_v, runs_v = _runs(np.ascontiguousarray(free.T), np.ascontiguousarray((open_v & ~touch_v).T), side)
-    runs_of_u, runs_of_v = int(runs_u.max(initial=0)), int(runs_v.max(initial=0))
-    of_u[on_u] = cores + runs_u
-    of_v.T[on_v] = cores + runs_of_u + runs_v
-    tile = np.zeros((cores + runs_of_u + runs_of_v + 1, 2), int)
-    for parts, on in ((core, inside), (of_u, on_u), (of_v, on_v.T)):
-        row, column = np.nonzero(on)
-        tile[parts[row, column]] = np.stack([column, row], axis=1) // side
-    return Parts(of_u, of_v, cores, runs_of_u, tile, side)
-
-
-def _opened(stiff: np.ndarray) -> np.ndarray:
-    """The union of all squares of `BROAD` cells in the stiff ones; walls count as stiff."""
-    for _ in ("down the rows", "then, turned over, across"):
-        full, count = np.pad(stiff, ((BROAD - 1, BROAD - 1), (0, 0)), constant_values=True), len(stiff) + BROAD - 1
-        whole = np.logical_and.reduce([full[start : start + count] for start in range(BROAD)])
-        stiff = np.logical_or.reduce([whole[start : start + len(stiff)] for start in range(BROAD)]).T
-    return stiff
-
-
-def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
-    """The pieces of a mask within tiles, numbered from 1 on, 0 outside.
-
-    Two cells side by side belong together if a node that both touch has all four cells inside; else they are a hinge.
-    """
-    count = int(np.count_nonzero(inside))
-    number: np.ndarray = np.zeros(inside.shape, int)
-    number[inside] = np.arange(count)
-    around = framed(inside, (1, 1), (1, 1))
-    whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
-    links = []
-    for turned, nodes in ((number, whole), (number.T, whole.T)):
-        together = (nodes[:-1, 1:-1] | nodes[1:, 1:-1]) & (np.arange(1, turned.shape[1]) % side != 0)
-        links.append((turned[:, :-1][together], turned[:, 1:][together]))
-    one, other = (np.concatenate(ends) for ends in zip(*links, strict=True))
-    root = connected(count, one, other)
-    number[inside] = np.cumsum(root == np.arange(count))[root]
-    return number
-
-
-def _runs(free: np.ndarray, faces: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which faces lie along the rows of `free` cells, and of these their run, from 1 on; a tile's edge ends a run."""
-    touching = faces & (free | framed(free, (0, 0), (1, 0))[:, :-1])
-    on = np.zeros_like(touching)
-    on[:, 1:] = touching[:, 1:] & touching[:, :-1] & free[:, :-1] & (np.arange(1, free.shape[1]) % side != 0)
-    return touching, np.cumsum(~on[touching])
-
-
 class CoarseSpace:
-    """The parts' motions as unknowns: three of a core (across, down, turn), one of a run."""
+    """The parts' motions as unknowns: three of a core (across, down, turn), one of a run.
 
-    def __init__(self, parts: Parts, level: Coefficients, threshold: float) -> None:
+    Args:
+        parts: whose.
+        level: K around them, of the same cells.
+        threshold: kappa above which strains connect parts.
+        first: (column, row) of the first of these cells.
+    """
+
+    def __init__(self, parts: Parts, level: Coefficients, threshold: float, first: tuple[int, int]) -> None:
         self.parts = parts
         s_y, s_x = level.shear
         rows, columns = parts.of_u.shape
         # Arms of a turn, u = -turn y, v = turn x, without strain where cells are not square too.
-        self._y, self._x = (np.arange(rows) + 0.5) / s_y, (np.arange(columns) + 0.5) / s_x
+        self._y, self._x = (np.arange(rows) + first[1] + 0.5) / s_y, (np.arange(columns) + first[0] + 0.5) / s_x
         # Of the faces that belong to parts: the part, and the place across the way they move.
         (row, column), (row_v, column_v) = np.nonzero(parts.of_u), np.nonzero(parts.of_v)
         faces_u, faces_v = (parts.of_u[row, column], self._y[row]), (parts.of_v[row_v, column_v], self._x[column_v])
@@ -138,8 +59,8 @@ class CoarseSpace:
         strains = self._strains(level)
         cluster = self._clusters(strains, threshold)
         along = 0 if columns >= rows else 1
-        self._matrix = ClusterMatrix(cluster[self.part], parts.tile[self.part, along])
-        self._matrix.factor(*self._entries(strains, cluster, faces_u, faces_v))
+        strip = parts.tile[self.part, along]
+        self._matrix = ClusterMatrix(cluster[self.part], strip, *self._entries(strains, faces_u, faces_v))
 
     def _strains(self, level: Coefficients) -> list[Any]:
         """Of each kind of strain that some part feels: K, and of its faces (part, sign, arm, whether it is of v)."""
@@ -149,8 +70,8 @@ class CoarseSpace:
         x, y = np.pad(self._x, 1), np.pad(self._y, 1)
         # K and, of each face, where the framed faces begin (row, column), its sign and whether it is of v.
         kinds = (
-            (level.xx[0], ((1, 2, 1.0, 0), (1, 1, -1.0, 0))),
-            (level.yy[0], ((2, 1, 1.0, 1), (1, 1, -1.0, 1))),
+            (level.xx[0, 0], ((1, 2, 1.0, 0), (1, 1, -1.0, 0))),
+            (level.yy[0, 0], ((2, 1, 1.0, 1), (1, 1, -1.0, 1))),
             (level.nodes[0, 0], ((1, 1, s_y, 0), (0, 1, -s_y, 0), (1, 1, s_x, 1), (1, 0, -s_x, 1))),
         )
         found = []
@@ -182,63 +103,40 @@ class CoarseSpace:
                 both = (parts[0] > 0) & (parts[3] > 0) & (parts[0] != parts[3])
                 one.append(parts[0][both])
                 other.append(parts[3][both])
-        return connected(self.parts.count + 1, np.concatenate(one), np.concatenate(other))
+        return connected(np.arange(self.parts.count + 1), np.concatenate(one), np.concatenate(other))
 
     def _entries(
-        self, strains: list[Any], cluster: np.ndarray, *faces_of: tuple[np.ndarray, np.ndarray]
+        self, strains: list[Any], *faces_of: tuple[np.ndarray, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Entries (row, column, value) within the clusters, of which Z' A Z is the sum and its transpose."""
-        count, cores = self.parts.count + 1, self.parts.cores
-        # Of each part by itself, its mass and what it strains around it: the upper triangle over its three motions.
-        own = {pair: np.zeros(count) for pair in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))}
-        for of_v, (part, at) in enumerate(faces_of):
-            faces = np.bincount(part, minlength=count)
-            own[of_v, of_v][: cores + 1] += faces[: cores + 1]
-            own[0, 0][cores + 1 :] += faces[cores + 1 :]
-            own[2, 2] += np.bincount(part, (at - self.centres[part, 1 - of_v]) ** 2, count)
+        """Entries (row, column, value), of which Z' A Z is the sum and its transpose."""
+        count, cores, first = self.parts.count + 1, self.parts.cores, self._first
+        is_core = np.arange(count) <= cores
         rows, columns, values = [], [], []
-        for stiffness, faces in strains:
-            # How a strain feels the three motions of each part it touches, at the first of the faces that belong to it.
-            felt = [self._felt(*face) for face in faces]
-            parts = [face[0] for face in faces]
-            is_first = [part > 0 for part in parts]
-            for earlier, later in combinations(range(len(parts)), 2):
-                same = is_first[later] & is_first[earlier] & (parts[later] == parts[earlier])
-                felt[earlier] += same * felt[later]
-                is_first[later] = is_first[later] & ~same
-            for number, part in enumerate(parts):
-                at = np.nonzero(is_first[number])[0]
-                one, motion, k = part[at], felt[number][:, at], stiffness[at]
-                own[0, 0] += np.bincount(one, k * motion[0] * motion[0], count)
-                of_core = one <= cores
-                one, motion, k = one[of_core], motion[:, of_core], k[of_core]
-                for first, second in list(own)[1:]:
-                    own[first, second] += np.bincount(one, k * motion[first] * motion[second], count)
-                for later in range(number + 1, len(parts)):
-                    both = is_first[number] & is_first[later] & (cluster[part] == cluster[parts[later]])
-                    at = np.nonzero(both)[0]
-                    one, other = part[at], parts[later][at]
-                    # All have a first motion, cores two more.
-                    anywhere = np.arange(len(at)), np.nonzero(other <= cores)[0]
-                    in_core = np.nonzero(one <= cores)[0], np.nonzero((one <= cores) & (other <= cores))[0]
-                    for first, second in product(range(3), range(3)):
-                        there = (in_core if first else anywhere)[second > 0]
-                        strain = at[there]
-                        rows.append(self._first[one[there]] + first)
-                        columns.append(self._first[other[there]] + second)
-                        values.append(stiffness[strain] * felt[number][first, strain] * felt[later][second, strain])
-        for (first, second), sums in own.items():
-            number = np.arange(1, count if second == 0 else cores + 1)
-            rows.append(self._first[number] + first)
-            columns.append(self._first[number] + second)
-            values.append((0.5 if first == second else 1.0) * sums[number])
-        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
-    def _felt(self, part: np.ndarray, sign: float, arm: np.ndarray, of_v: int) -> np.ndarray:
-        """A face's share in a strain as its part moves across, down and turns; a run's one motion is the first."""
-        is_core = part <= self.parts.cores
-        across = np.where(is_core, 1.0 - of_v, 1.0)
-        return sign * np.stack([across, is_core * float(of_v), is_core * arm])
+        def add(one: np.ndarray, other: np.ndarray, value: np.ndarray) -> None:
+            there = np.flatnonzero(value)
+            rows.append(one.ravel()[there])
+            columns.append(other.ravel()[there])
+            values.append(value.ravel()[there])
+
+        # Masses: the identity.
+        for of_v, (part, at) in enumerate(faces_of):
+            arm = at - self.centres[part, 1 - of_v]
+            faces = np.bincount(part, minlength=count)
+            add(first + of_v * is_core, first + of_v * is_core, 0.5 * faces)
+            add(first + 2, first + 2, 0.5 * np.bincount(part, arm**2, count) * is_core)
+        for stiffness, faces in strains:
+            # The unknowns that move a face, two of a core's three or a run's one, and what strain they make.
+            unknown, felt = [], []
+            for part, sign, arm, of_v in faces:
+                core, start = is_core[part], first[part]
+                unknown += [start + of_v * core, start + 2]
+                felt += [sign * (part > 0), sign * core * (part > 0) * arm]
+            one, other = np.triu_indices(len(felt))
+            unknown, felt = np.stack(unknown), np.stack(felt)
+            half = np.where(one == other, 0.5, 1.0)[:, None]
+            add(unknown[one], unknown[other], half * stiffness * felt[one] * felt[other])
+        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """What the loads (across, down, torque) of all parts move: (a, b, turn), u = a - turn y, v = b + turn x."""
@@ -258,54 +156,72 @@ class Deflation:
 
     Args:
         device: where it lives.
-        texels: (width, height) of the packed faces, without their ring.
+        level: the finest.
     """
 
-    def __init__(self, device: Device, texels: tuple[int, int]) -> None:
+    def __init__(self, device: Device, level: Level) -> None:
         self.device = device
-        self.region = (1, 1, *texels)
-        self.side = max(SMALLEST_TILE, 2 * -(-max(texels) // TILES))
-        ringed = texels[0] + 2, texels[1] + 2
+        self.level = level
+        self.side = max(SMALLEST_TILE, 2 * -(-max(level.texels) // TILES))
+        ringed = level.rhs.u.size
         self._part_of = tuple(device.field(ringed, 4, f"deflated part of {name}") for name in "uv")
         self._tables: list[Field] = []
-        self._shear = (1.0, 1.0)
-        self.space: CoarseSpace | None = None
+        self._stiff: np.ndarray | None = None
+        self._threshold = 0.0
+        self._space: CoarseSpace | None = None
 
-    def clear(self) -> None:
-        """Nothing is stiff."""
-        self.space = None
+    def set_stiff(self, stiff: np.ndarray | None, threshold: float = 0.0) -> None:
+        """Take up which cells are stiff, (ny, nx), None if none are: those with kappa above a `threshold`."""
+        self._stiff, self._threshold, self._space = stiff, threshold, None
 
-    def find(self, stiffness: np.ndarray, level: Coefficients, threshold: float) -> None:
-        """Take up dt mu / (hx hy) of the cells, (rows, columns), and the finest level; stiff is above `threshold`."""
-        parts = find_parts(stiffness > threshold, level.open_u, level.open_v, self.side)
-        self.space = None
+    @property
+    def space(self) -> CoarseSpace | None:
+        """The coarse space, None if there are no parts; made when it is first asked for: fluid at rest needs none."""
+        if self._stiff is not None:
+            box, self._stiff, stiff = changed(np.zeros_like(self._stiff), self._stiff), None, self._stiff
+            if box:
+                self._find(stiff, box)
+        return self._space
+
+    def _find(self, stiff: np.ndarray, box: Box) -> None:
+        """Find the parts of the stiff cells, all of which are in a box."""
+        # Whole tiles, and on each side one cell more that is not stiff.
+        top, left = (max(start - 1, 0) // self.side * self.side for start in box[::2])
+        width, height = ((end + 2 - first) // 2 for end, first in ((box.right, left), (box.bottom, top)))
+        columns, rows = min(width, self.level.texels[0] - left // 2), min(height, self.level.texels[1] - top // 2)
+        region = 1 + left // 2, 1 + top // 2, columns, rows
+        part = stiff[top : top + 2 * rows, left : left + 2 * columns]
+        part = framed(part, (0, 2 * rows - part.shape[0]), (0, 2 * columns - part.shape[1]))
+        level = self.level.coefficients(region)
+        parts = find_parts(part, level.open_u, level.open_v, self.side)
         if not parts.count:
             return
-        self.space = CoarseSpace(parts, level, threshold)
-        self._shear = level.shear
-        for field, part in zip(self._part_of, (parts.of_u, parts.of_v), strict=True):
-            field.set(packed(framed(part, (2, 2), (2, 2))))
+        self._space = CoarseSpace(parts, level, self._threshold, (left, top))
+        for field, part_of in zip(self._part_of, (parts.of_u, parts.of_v), strict=True):
+            field.clear()
+            field.texture.write(packed(part_of.astype(np.float32)).tobytes(), region)
         height = -(-(parts.count + 1) // WIDE)
         if not self._tables or self._tables[0].height < height:
             for table in self._tables:
                 table.release()
             names = "tiles", "loads", "motions"
             self._tables = [self.device.field((WIDE, height), 4, f"deflated {name}") for name in names]
-        about = np.concatenate([1 + parts.tile * (parts.side // 2), self.space.centres], axis=1)
-        self._tables[0].set(self._rows_of(about))
+        tiles = parts.tile * (self.side // 2) + region[:2]
+        self._tables[0].set(self._rows_of(np.concatenate([tiles, self._space.centres], axis=1)))
 
     def correct(self, residual: PackedFaces, target: PackedFaces, add: bool = False) -> None:
         """Draw Z E^-1 Z' times the residual, or add it; waits for the GPU."""
-        assert self.space is not None
+        space = self.space
+        assert space is not None
         tiles, loads, motions = self._tables
-        part_of = {"part_u": self._part_of[0], "part_v": self._part_of[1], "shear": self._shear}
-        count = self.space.parts.count + 1
+        part_of = {"part_u": self._part_of[0], "part_v": self._part_of[1], "shear": self.level.shear}
+        count = space.parts.count + 1
         gather = self.device.pass_("viscosity/gather_loads.frag", SIDE=self.side // 2 + 1)
         gather(loads, region=(0, 0, WIDE, -(-count // WIDE)), tiles=tiles, **residual.inputs(), **part_of)
-        found = self.space.solve(loads.get().reshape(-1, 4)[:count, :3].astype(np.float64))
+        found = space.solve(loads.get().reshape(-1, 4)[:count, :3].astype(np.float64))
         motions.set(self._rows_of(found))
         spread = self.device.pass_("viscosity/spread_motions.frag", WIDE=WIDE)
-        spread(target.fields, add=add, region=self.region, motions=motions, **part_of)
+        spread(target.fields, add=add, region=self.level.region, motions=motions, **part_of)
 
     def _rows_of(self, values: np.ndarray) -> np.ndarray:
         table = self._tables[0]

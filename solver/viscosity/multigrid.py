@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.field import Field
 from solver.packing import PackedFaces
 from solver.params import NoSlip
 from solver.viscosity.changed import Box, changed
-from solver.viscosity.operator import (
-    Coefficients,
-    Level,
-    change_coarse,
-    change_finest,
-    coarsened,
-    coefficients,
-    inverse_matrix,
-)
+from solver.viscosity.operator import Coefficients, Level, inverse_matrix
 from solver.viscosity.plan import Plan
 from solver.viscosity.transform import SineCosineTransform
 
@@ -39,20 +33,17 @@ def chebyshev_weights(least: float, largest: float, count: int) -> list[float]:
     return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
 
 
-@dataclass(frozen=True)
-class TakenUp:
-    """What the coefficients in the textures were made from, and these.
+class TakenUp(NamedTuple):
+    """What the coefficients in the textures were made from.
 
     Attributes:
         basis: (time step, where the fluid sticks, depth of the last level): with others nothing can be kept.
         viscosity, solid: of the cells.
-        levels: the coefficients, the finest first.
     """
 
     basis: tuple[float, NoSlip, int]
     viscosity: np.ndarray
     solid: np.ndarray
-    levels: list[Coefficients]
 
 
 class Multigrid:
@@ -72,9 +63,10 @@ class Multigrid:
         self.spacing = spacing
         self.plan = Plan()
         self.levels: list[Level] = []
-        finest = size
+        finest, (hx, hy) = size, spacing
+        shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
         while not self.levels or not self.levels[-1].is_coarsest:
-            self.levels.append(Level(device, size, len(self.levels), finest))
+            self.levels.append(Level(device, size, len(self.levels), finest, shear))
             size = -(-size[0] // 2), -(-size[1] // 2)
         # Between free-slip walls one viscosity is solved directly on a much finer level than any other.
         first = 0 if math.prod(self.levels[0].texels) <= SMALL_GRID else 1
@@ -92,55 +84,44 @@ class Multigrid:
     def set_uniform(self, viscosity: float, dt: float, no_slip: NoSlip) -> None:
         """Take up one viscosity, lengths^2 / s, in a box without solids."""
         self._taken_up = None
-        hx, hy = self.spacing
-        self._largest = dt * viscosity / (hx * hy)
-        shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
+        self._largest = viscosity * self._scale(dt)
         for level in self.levels:
-            level.set_uniform(self._largest / 4.0**level.depth, shear, no_slip)
+            level.set_uniform(self._largest / 4.0**level.depth, no_slip)
         self.has_transform = not any(no_slip)
-        if not self.has_transform and self.last is self.levels[-1]:
-            columns, rows = (2 * count for count in self.last.texels)
-            (across, down), scale = self.last.box, 2.0**self.last.depth
-            outside = (np.arange(columns) >= across) | (np.arange(rows)[:, None] >= down)
-            everywhere, spacing = np.full((rows, columns), viscosity), (hx * scale, hy * scale)
-            self._inverse.set(inverse_matrix(coefficients(everywhere, outside, dt, spacing, no_slip, self.last.box)))
+        last = self.last
+        if not self.has_transform and last is self.levels[-1]:
+            stiffness = last.operator["stiffness"]
+            uniform = Coefficients.uniform(stiffness, last.box, last.texels, last.shear, no_slip)
+            self._inverse.set(inverse_matrix(uniform))
 
-    def set_coefficients(self, viscosity: np.ndarray, solid: np.ndarray, dt: float, no_slip: NoSlip) -> Coefficients:
-        """Take up the viscosity of the cells, lengths^2 / s, and the solid ones, (ny, nx) both; those of the finest.
+    def set_coefficients(
+        self, viscosity: Field, solid: Field, amount: np.ndarray, is_solid: np.ndarray, dt: float, no_slip: NoSlip
+    ) -> None:
+        """Take up the `viscosity` of the cells, lengths^2 / s, and the `solid` ones, also as arrays (ny, nx).
 
-        What is made again is what has changed: a dab of a brush changes few cells.
+        What is made again is what has changed: a dab of a brush changes few cells. Where the field holds more than the
+        largest `amount`, it counts as that.
         """
         self.has_transform = False
-        self._largest = dt * float(viscosity[~solid].max(initial=0.0)) / (self.spacing[0] * self.spacing[1])
-        taken_up, self._taken_up = self._taken_up, None
-        basis = dt, no_slip, self.last.depth
-        if taken_up and taken_up.basis == basis and np.array_equal(taken_up.solid, solid):
-            levels = taken_up.levels
-            self._change(levels, changed(taken_up.viscosity, viscosity), viscosity, solid, dt, no_slip)
-        else:
-            levels = [coefficients(viscosity, solid, dt, self.spacing, no_slip)]
-            while len(levels) <= self.last.depth:
-                levels.append(coarsened(levels[-1], no_slip, self.levels[len(levels)].box))
-            for grid, level in zip(self.levels, levels, strict=False):
-                grid.set_coefficients(level, no_slip)
+        self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
+        taken_up, basis = self._taken_up, (dt, no_slip, self.last.depth)
+        self._taken_up = TakenUp(basis, amount, is_solid)
+        box: Box | None = Box(0, amount.shape[0], 0, amount.shape[1])
+        is_new = not taken_up or taken_up.basis != basis or not np.array_equal(taken_up.solid, is_solid)
+        if taken_up and not is_new:
+            box = changed(taken_up.viscosity, amount)
+            if box is None:
+                return
+        self.finest.set_masks(viscosity, solid, self._scale(dt), float(amount.max()), no_slip, box)
+        for finer, level in pairwise(self.levels[: self.last.depth + 1]):
+            box = box.coarser
+            level.coarsen(finer, no_slip, box, is_new)
         if self.last is self.levels[-1]:
-            self._inverse.set(inverse_matrix(levels[-1]))
-        self._taken_up = TakenUp(basis, viscosity, solid, levels)
-        return levels[0]
+            self._inverse.set(inverse_matrix(self.last.coefficients()))
 
-    def _change(
-        self, levels: list[Coefficients], box: Box | None, viscosity: np.ndarray, solid: np.ndarray, dt: float,
-        no_slip: NoSlip,
-    ) -> None:  # fmt: skip
-        """Make the coefficients of all levels those of another viscosity, which differs in a box of cells."""
-        if box is None:
-            return
-        change_finest(levels[0], box, viscosity, solid, dt, self.spacing, no_slip)
-        self.finest.set_coefficients(levels[0], no_slip, box)
-        for grid, level, fine in zip(self.levels[1:], levels[1:], levels, strict=False):
-            box = box.coarser(level.open_u.shape)
-            change_coarse(level, box, fine, no_slip, grid.box)
-            grid.set_coefficients(level, no_slip, box)
+    def _scale(self, dt: float) -> float:
+        """kappa of a viscosity of one."""
+        return dt / (self.spacing[0] * self.spacing[1])
 
     @property
     def finest(self) -> Level:
@@ -180,7 +161,7 @@ class Multigrid:
         self.cycle(coarser, coarser.rhs, begun=self._restrict(level.faces.write, coarser))
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines)
         prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"),
-                **level.faces.read.inputs(), **level.open)  # fmt: skip
+                **level.faces.read.inputs(), **level.bounds)  # fmt: skip
         level.faces.swap()
 
     # -- its parts --------------------------------------------------------------------------------------------------

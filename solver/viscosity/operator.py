@@ -9,28 +9,29 @@ stencil of couplings between strains of one kind. The identity is lumped. See RE
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.packing import DoublePackedFaces, PackedFaces, framed, packed
+from solver.packing import DoublePackedFaces, PackedFaces, packed, unpacked
 from solver.params import NoSlip
-from solver.viscosity.changed import Box, whole
+from solver.viscosity.changed import Box
 
 # Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 64 unknowns. BLAS inverts 128 in
 # threads, which wait longer than they work.
 COARSEST = 8
 # Couplings of a strain with the next ones, (rows, columns) further; those backwards follow by symmetry.
-CELL_STENCIL = (0, 1, 2)
-NODE_STENCIL = ((0, 0), (0, 1), (1, 0), (1, 1), (1, -1))
-# So that a cell of no viscosity is still told from no fluid.
-LEAST = 1e-20
-# Cells around a box that its K, in the cells and at their corners, is made from: on the finest level, and coarse ones.
-FINE_HALO = 2
-COARSE_HALO = 3
+ROW_STENCIL = (0, 0), (1, 0), (2, 0)
+COLUMN_STENCIL = (0, 0), (0, 1), (0, 2)
+NODE_STENCIL = (0, 0), (0, 1), (1, 0), (1, 1), (1, -1)
+# The textures of these.
+CELLS = tuple(f"{kind}{number}" for kind in ("xx", "yy") for number in range(3))
+NODES = tuple(f"node{number}" for number in range(5))
+
+Stencil = dict[tuple[int, int], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -38,252 +39,73 @@ class Coefficients:
     """One level's K, cell by cell; `rows x columns` are even, cells beyond the grid hold no fluid.
 
     Attributes:
-        xx: couplings of e_xx with e_xx 0, 1, 2 rows further, each (rows, columns).
-        yy: couplings of e_yy with e_yy 0, 1, 2 columns further.
+        xx: couplings of e_xx by `ROW_STENCIL`, each (rows, columns); on the finest level the first only.
+        yy: couplings of e_yy by `COLUMN_STENCIL`.
         nodes: couplings of shears by `NODE_STENCIL`, each (rows + 1, columns + 1).
         open_u, open_v: which faces move, (rows, columns).
         shear: (s_y, s_x), weights of du and dv in the shear: (1, 1) where cells are square.
     """
 
-    xx: tuple[np.ndarray, ...]
-    yy: tuple[np.ndarray, ...]
-    nodes: dict[tuple[int, int], np.ndarray]
+    xx: Stencil
+    yy: Stencil
+    nodes: Stencil
     open_u: np.ndarray
     open_v: np.ndarray
     shear: tuple[float, float]
 
-    def part(self, box: Box) -> Coefficients:
-        """K in a box only."""
-        return Coefficients(
-            tuple(k[box.cells] for k in self.xx),
-            tuple(k[box.cells] for k in self.yy),
-            {offset: k[box.nodes] for offset, k in self.nodes.items()},
-            self.open_u[box.cells],
-            self.open_v[box.cells],
-            self.shear,
+    @classmethod
+    def uniform(
+        cls,
+        stiffness: float,
+        box: tuple[int, int],
+        texels: tuple[int, int],
+        shear: tuple[float, float],
+        no_slip: NoSlip,
+    ) -> Coefficients:
+        """Those of one viscosity, dt mu / (hx hy), in a box of (columns, rows) without solids."""
+        (width, height), (columns, rows), (s_y, s_x) = box, texels, shear
+        across, down = np.arange(2 * columns + 1), np.arange(2 * rows + 1)[:, None]
+        fluid = ((across < width) & (down < height))[:-1, :-1]
+        nodes = 1.0 * ((across <= width) & (down <= height))
+        for side, sticks in zip((across == 0, across == width, down == 0, down == height), no_slip, strict=False):
+            nodes[np.broadcast_to(side, nodes.shape)] *= 2.0 * sticks
+        return cls(
+            {(0, 0): 2.0 * s_x**2 * stiffness * fluid},
+            {(0, 0): 2.0 * s_y**2 * stiffness * fluid},
+            {(0, 0): stiffness * nodes},
+            fluid & (across[:-1] > 0),
+            fluid & (down[:-1] > 0),
+            shear,
         )
-
-    def put(self, box: Box, part: Coefficients, window: Box) -> None:
-        """Take over K in a box from a `part` that was made for a larger `window`; open faces stay."""
-        inner = box.within(window)
-        for mine, other in zip(self.xx + self.yy, part.xx + part.yy, strict=True):
-            mine[box.cells] = other[inner.cells]
-        for offset, k in self.nodes.items():
-            k[box.nodes] = part.nodes[offset][inner.nodes]
-
-    def diagonal(self) -> tuple[np.ndarray, np.ndarray]:
-        """The diagonal of A for u and for v."""
-        (s_y, s_x), n = self.shear, self.nodes
-        u = 1.0 + self.xx[0] + _behind(self.xx[0], 1) + s_y**2 * (n[0, 0][:-1, :-1] + n[0, 0][1:, :-1])
-        v = 1.0 + self.yy[0] + _behind(self.yy[0], 0) + s_x**2 * (n[0, 0][:-1, :-1] + n[0, 0][:-1, 1:])
-        if (1, 0) in n:
-            u -= 2.0 * s_y**2 * n[1, 0][:-1, :-1]
-            v -= 2.0 * s_x**2 * n[0, 1][:-1, :-1]
-        return u, v
 
     def matrix(self) -> np.ndarray:
         """A as a dense matrix over all u, row after row, and then all v; the identity for fixed faces."""
         rows, columns = self.open_u.shape
-        count = rows * columns
+        count = 2 * rows * columns
         moving = np.concatenate([self.open_u.ravel(), self.open_v.ravel()])
-        faces = np.diag(moving.astype(float)).reshape(-1, 2, rows, columns)
-        u, v = (np.pad(faces[:, axis], ((0, 0), (1, 1), (1, 1))) for axis in (0, 1))
+        faces = np.diag(moving.astype(float)).reshape(count, 2, rows, columns)
+        # The strains of each face by itself.
+        u, v = np.zeros((2, count, rows + 2, columns + 2))
+        u[:, 1:-1, 1:-1], v[:, 1:-1, 1:-1] = faces[:, 0], faces[:, 1]
         s_y, s_x = self.shear
-        strains = (
-            (_dense(dict(zip(((0, 0), (1, 0), (2, 0)), self.xx, strict=False))), np.diff(u, axis=2)[:, 1:-1, 1:]),
-            (_dense(dict(zip(((0, 0), (0, 1), (0, 2)), self.yy, strict=False))), np.diff(v, axis=1)[:, 1:, 1:-1]),
-            (_dense(self.nodes), s_y * np.diff(u, axis=1)[:, :, 1:] + s_x * np.diff(v, axis=2)[:, 1:, :]),
+        shears = s_y * (u[:, 1:, 1:] - u[:, :-1, 1:]) + s_x * (v[:, 1:, 1:] - v[:, 1:, :-1])
+        kinds = (
+            (self.xx, u[:, 1:-1, 2:] - u[:, 1:-1, 1:-1]),
+            (self.yy, v[:, 2:, 1:-1] - v[:, 1:-1, 1:-1]),
+            (self.nodes, shears),
         )
-        matrix = np.eye(2 * count)
-        for stiffness, strain in strains:
-            flat = strain.reshape(2 * count, -1)
-            matrix += flat @ stiffness @ flat.T
+        matrix = np.eye(count)
+        for stencil, strain in kinds:
+            height, width = strain.shape[1:]
+            stress = np.zeros_like(strain)
+            for (down, right), k in stencil.items():
+                here = slice(0, height - down), slice(max(-right, 0), width - max(right, 0))
+                there = slice(down, height), slice(max(right, 0), width + min(right, 0))
+                stress[:, *here] += k[here] * strain[:, *there]
+                if down or right:
+                    stress[:, *there] += k[here] * strain[:, *here]
+            matrix += strain.reshape(count, -1) @ stress.reshape(count, -1).T
         return matrix
-
-
-def coefficients(
-    viscosity: np.ndarray,
-    solid: np.ndarray,
-    dt: float,
-    spacing: tuple[float, float],
-    no_slip: NoSlip,
-    box: tuple[int, int] | None = None,
-) -> Coefficients:
-    """K on the finest level from the viscosity of the cells, lengths^2 / s, (ny, nx), and the solid ones.
-
-    `box`: (nx, ny) of the cells between the walls, if they are not all.
-
-    mu at a node is the harmonic mean of the fluid cells that meet there. A wall node's shear is nil at free-slip walls;
-    at no-slip ones a face beyond it stands still at the node, half a cell away, which doubles K; at a convex corner the
-    resting face is a whole cell away, and K stays.
-    """
-    (rows, columns), ring = viscosity.shape, ((1, 1), (1, 1))
-    even = (0, rows % 2), (0, columns % 2)
-    fluid = framed(~solid, *even)
-    amount = np.maximum(framed(viscosity.astype(np.float64) * dt, *even), LEAST) * fluid
-    wet = framed(fluid, *ring)
-    resistance = framed(np.divide(1.0, amount, out=np.zeros_like(amount), where=fluid), *ring)
-    meeting = _corners(wet.astype(np.float64))
-    node = np.divide(meeting, _corners(resistance), out=np.zeros_like(meeting), where=meeting > 0)
-    open_u, open_v = wet[:, 1:] & wet[:, :-1], wet[1:] & wet[:-1]
-    moving = open_u[1:].astype(int) + open_u[:-1] + open_v[:, 1:] + open_v[:, :-1]
-    sticks = _where_it_sticks(no_slip, node.shape, box or (columns, rows))
-    node *= np.where(sticks, np.where(moving < 2, 2.0, 1.0), moving == 4)
-    hx, hy = spacing
-    return Coefficients(
-        (2.0 / hx**2 * amount,),
-        (2.0 / hy**2 * amount,),
-        {(0, 0): node / (hx * hy)},
-        open_u[1:-1, :-1],
-        open_v[:-1, 1:-1],
-        (float(np.sqrt(hx / hy)), float(np.sqrt(hy / hx))),
-    )
-
-
-def coarsened(fine: Coefficients, no_slip: NoSlip, box: tuple[int, int], at: tuple[int, int] = (0, 0)) -> Coefficients:
-    """K of the next coarser level: S' K S / 16; `box`: (nx, ny) of its cells between the walls; `at`: its first one.
-
-    A coarse face is open if all the fine faces beside it are, so a correction never pushes through a wall.
-    """
-    rows, columns = (length // 2 for length in fine.open_u.shape)
-    even = (0, rows % 2), (0, columns % 2)
-    u = fine.open_u[::2] & fine.open_u[1::2]
-    v = fine.open_v[:, ::2] & fine.open_v[:, 1::2]
-    open_u = u[:, ::2] & u[:, 1::2] & _behind(u, 1)[:, ::2]
-    open_v = v[::2] & v[1::2] & _behind(v, 0)[::2]
-    below = np.arange(rows)[:, None] + at[1] >= box[1]
-    behind = np.arange(columns) + at[0] >= box[0]
-    moves_x = (open_u | _ahead(open_u, 1)) | np.where(below, no_slip.bottom, no_slip.solids)
-    moves_y = (open_v | _ahead(open_v, 0)) | np.where(behind, no_slip.right, no_slip.solids)
-    xx = _coarsened_cells([k[:, ::2] + k[:, 1::2] for k in fine.xx], moves_x)
-    yy = [k.T for k in _coarsened_cells([k[::2].T + k[1::2].T for k in fine.yy], moves_y.T)]
-    nodes = _coarsened_nodes(fine.nodes)
-    if not all(no_slip):
-        full_u, full_v = (framed(faces, (1, 1), (1, 1)) for faces in (open_u, open_v))
-        moving = full_u[1:, 1:] & full_u[:-1, 1:] & full_v[1:, 1:] & full_v[1:, :-1]
-        moving |= _where_it_sticks(no_slip, moving.shape, box, at)
-        around = framed(moving, (1, 1), (1, 1))
-        for (down, right), k in nodes.items():
-            k *= moving & around[1 + down :, 1 + right :][: rows + 1, : columns + 1]
-    return Coefficients(
-        tuple(framed(k, *even) for k in xx),
-        tuple(framed(k, *even) for k in yy),
-        {offset: framed(k, *even) for offset, k in nodes.items()},
-        framed(open_u, *even),
-        framed(open_v, *even),
-        fine.shear,
-    )
-
-
-def change_finest(
-    level: Coefficients, box: Box, viscosity: np.ndarray, solid: np.ndarray, dt: float, spacing: tuple[float, float],
-    no_slip: NoSlip,
-) -> None:  # fmt: skip
-    """Make K of the finest `level` that of another viscosity, which differs in a box; bit for bit what all is."""
-    window = box.grown(FINE_HALO, level.open_u.shape)
-    level.put(box, coefficients(viscosity[window.cells], solid[window.cells], dt, spacing, no_slip), window)
-
-
-def change_coarse(level: Coefficients, box: Box, fine: Coefficients, no_slip: NoSlip, between: tuple[int, int]) -> None:
-    """Make K of a coarse `level` that of the `fine` one, which has changed it in a box; bit for bit what all is.
-
-    `between`: (nx, ny) of its cells between the walls.
-    """
-    window = box.grown(COARSE_HALO, level.open_u.shape)
-    level.put(box, coarsened(fine.part(window.finer), no_slip, between, (window.left, window.top)), window)
-
-
-def _where_it_sticks(
-    no_slip: NoSlip, shape: tuple[int, ...], box: tuple[int, int], at: tuple[int, int] = (0, 0)
-) -> np.ndarray:
-    """Whether the fluid sticks to a wall at the nodes of cells from `at` on, `box` of them between the grid's sides."""
-    rows, columns = np.arange(shape[0])[:, None] + at[1], np.arange(shape[1]) + at[0]
-    sticks = np.full(shape, no_slip.solids)
-    sides = columns <= 0, columns >= box[0], rows <= 0, rows >= box[1]
-    for side, holds in zip(sides, no_slip, strict=False):
-        sticks = np.where(side, holds, sticks)
-    return sticks
-
-
-def _behind(values: np.ndarray, axis: int) -> np.ndarray:
-    """The values one place back along an axis, zero at the first."""
-    shifted = np.zeros_like(values)
-    if axis == 0:
-        shifted[1:] = values[:-1]
-    else:
-        shifted[:, 1:] = values[:, :-1]
-    return shifted
-
-
-def _ahead(values: np.ndarray, axis: int) -> np.ndarray:
-    """The values one place further along an axis, zero at the last."""
-    return _behind(values[::-1, ::-1], axis)[::-1, ::-1]
-
-
-def _corners(cells: np.ndarray) -> np.ndarray:
-    """Sums over the four cells that meet at the nodes of cells with a frame around them."""
-    return cells[1:, 1:] + cells[:-1, 1:] + cells[1:, :-1] + cells[:-1, :-1]
-
-
-def _dense(stencil: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
-    """The symmetric matrix of couplings with the places (rows, columns) further."""
-    shape = stencil[0, 0].shape
-    matrix = np.zeros((*shape, *shape))
-    for (down, right), k in stencil.items():
-        for j, i in product(range(shape[0]), range(shape[1])):
-            if j + down < shape[0] and 0 <= i + right < shape[1]:
-                matrix[j, i, j + down, i + right] = matrix[j + down, i + right, j, i] = k[j, i]
-    return matrix.reshape(k.size, k.size)
-
-
-def _coarsened_cells(fine: list[np.ndarray], live: np.ndarray) -> list[np.ndarray]:
-    """S' K S / 16 down the rows: a row counts 3/4 to the coarse row it lies in and 1/4 to the nearest other one.
-
-    Where one of the two does not move (not `live`) the other counts whole.
-    """
-    rows = len(live)
-    above, below = _behind(live, 0), _ahead(live, 0)
-    # Weights of the four rows around a coarse row, by their places from its first one on; none beyond the last.
-    places = ((-1, above, 0.25), (0, above, 0.75), (1, below, 0.75), (2, below, 0.25))
-    weights = {place: framed(np.where(other, part, 1.0), (0, 2), (0, 0)) for place, other, part in places}
-    around = [framed(k, (4, 6), (0, 0)) for k in fine]
-    found = []
-    for apart in CELL_STENCIL:
-        total = np.zeros(live.shape)
-        for place, step in product(weights, range(1 - len(fine), len(fine))):
-            partner = place + step - 2 * apart
-            if partner in weights:
-                first = 4 + place + min(step, 0)
-                stiffness = around[abs(step)][first : first + 2 * rows : 2]
-                total += weights[place][:rows] * weights[partner][apart : apart + rows] * stiffness
-        found.append(total / 16.0)
-    return found
-
-
-def _coarsened_nodes(fine: dict[tuple[int, int], np.ndarray]) -> dict[tuple[int, int], np.ndarray]:
-    """S' K S / 16 at the nodes, S linear both ways: first along the rows, then down the columns."""
-    weights = {-1: 0.5, 0: 1.0, 1: 0.5}
-    rows, columns = (length // 2 + 1 for length in fine[0, 0].shape)
-    whole = {offset: framed(k, (2, 2), (2, 2)) for offset, k in fine.items()}
-    for (down, right), k in list(whole.items()):
-        whole[-down, -right] = np.roll(k, (down, right), (0, 1))
-    across: dict[tuple[int, int], Any] = {}
-    for (down, right), k in whole.items():
-        for place, apart in product(weights, (-1, 0, 1)):
-            partner = place + right - 2 * apart
-            if partner in weights:
-                term = weights[place] * weights[partner] * k[:, 2 + place :: 2][:, :columns]
-                across[down, apart] = across.get((down, apart), 0.0) + term
-    found: dict[tuple[int, int], np.ndarray] = {}
-    for apart_down, apart_right in NODE_STENCIL:
-        total = np.zeros((rows, columns))
-        for (down, right), k in across.items():
-            for place in weights if right == apart_right else ():
-                partner = place + down - 2 * apart_down
-                if partner in weights:
-                    total += weights[place] * weights[partner] * k[2 + place :: 2][:rows]
-        found[apart_down, apart_right] = total / 16.0
-    return found
 
 
 class Level:
@@ -294,21 +116,22 @@ class Level:
         size: (nx, ny) in cells of the level.
         depth: 0 is the finest.
         finest: (nx, ny) of the finest.
+        shear: (s_y, s_x), see `Coefficients`.
     """
 
-    def __init__(self, device: Device, size: tuple[int, int], depth: int, finest: tuple[int, int]) -> None:
+    def __init__(
+        self, device: Device, size: tuple[int, int], depth: int, finest: tuple[int, int], shear: tuple[float, float]
+    ) -> None:
+        self.device = device
+        self.shear = shear
+        self.aspect = shear[0] ** 4  # K of e_yy over that of e_xx, (hx / hy)^2
         self.size = size
         self.depth = depth
         self.texels = -(-size[0] // 2), -(-size[1] // 2)
         self.region: Region = (1, 1, *self.texels)
         ringed = self.texels[0] + 2, self.texels[1] + 2
         label = f"viscous level {depth}"
-        names = ["inverse_u", "inverse_v"]
-        if depth == 0:
-            names += ["cells", "nodes"]
-        else:
-            names += [f"{kind}{apart}" for kind in ("xx", "yy") for apart in CELL_STENCIL]
-            names += [f"node{number}" for number in range(len(NODE_STENCIL))]
+        names = "inverse_u", "inverse_v", *(CELLS + NODES if depth else ("cells", "nodes"))
         self.packed = {name: device.field(ringed, 4, f"{label} {name}") for name in names}
         self.packed["open"] = device.field(ringed, 4, f"{label} open", "f1")
         self.stress = [device.field(ringed, 4, f"{label} stress {name}") for name in ("xx", "yy", "xy") if depth]
@@ -323,70 +146,94 @@ class Level:
         self.walls: dict[str, Any] = {}
         self.defines: dict[str, Any] = {}
 
-    def set_coefficients(self, level: Coefficients, no_slip: NoSlip, box: Box | None = None) -> None:
-        """Take the operator from coefficients of each cell, of which only those in a box are others, if it is given."""
-        box = box or whole(level.open_u.shape)
-        # Faces next to the box feel its strains; one texel more is there to be read only.
-        window = box.grown(1 + 2, level.open_u.shape)
-        self._upload(level.part(window), window)
-        self.open = {"open": self.packed["open"]}
-        names = ("inverse_u", "inverse_v", "open") + (() if self.depth else ("cells", "nodes"))
-        self.operator = {**{name: self.packed[name] for name in names}, "shear": level.shear}
-        self._take_walls({"COARSE": 1} if self.depth else {}, no_slip)
-        if self.depth:
-            self.stencil = {name: field for name, field in self.packed.items() if name not in names}
-            self.stencil["shear"] = level.shear
-            self.operator |= dict(zip(("stress_xx", "stress_yy", "stress_xy"), self.stress, strict=True))
-        else:
-            # K of e_yy over that of e_xx, (hx / hy)^2.
-            self.operator["aspect"] = level.shear[0] ** 4
+    def set_masks(self, viscosity: Field, solid: Field, scale: float, most: float, no_slip: NoSlip, box: Box) -> None:
+        """Take the operator of the finest level from the cells' viscosity and solid cells, where a box of them changed.
 
-    def _upload(self, part: Coefficients, window: Box) -> None:
-        """Write K of a window; its first cells are there to be read only, unless the level begins there."""
-        of_u, of_v = part.diagonal()
-        values = {"inverse_u": part.open_u / of_u, "inverse_v": part.open_v / of_v}
-        node = part.nodes[0, 0]
+        Args:
+            viscosity: lengths^2 / s.
+            solid: above 0 in solid cells.
+            scale: dt / (hx hy), s / length^2.
+            most: what more viscosity counts as.
+            no_slip: where the fluid sticks.
+            box: those that have changed.
+        """
+        self.defines = self._take_walls(no_slip)
+        draw = self.device.pass_("viscosity/coefficients.frag", **self.defines)
+        names = "cells", "nodes", "inverse_u", "inverse_v", "open"
+        draw([self.packed[name] for name in names], region=self._around(box), viscosity=viscosity, solid=solid,
+             scale=scale, most=most, shear=self.shear, **self.walls)  # fmt: skip
+        self.operator = {**self.packed, "shear": self.shear, "aspect": self.aspect, **self.walls}
+        self.open, self.stencil = {"open": self.packed["open"]}, {}
+
+    def coarsen(self, finer: Level, no_slip: NoSlip, box: Box, is_open_new: bool) -> None:
+        """Take the Galerkin operator of the `finer` level, where a box of cells has changed, and maybe what is open."""
+        packed, region = self.packed, self._around(box)
+        if is_open_new:
+            self.device.pass_("viscosity/coarsen_open.frag")(
+                packed["open"], region=self.region, open=finer.packed["open"]
+            )
+        inputs: dict[str, Any] = {**finer.packed, "open": packed["open"]}
+        slip = defines = self._take_walls(no_slip)
+        if not finer.depth:
+            inputs |= {"xx0": finer.packed["cells"], "node0": finer.packed["nodes"], "aspect": self.aspect}
+            defines = {"FINE_IS_FINEST": 1, **slip}
+        for kind, names in (("cells", CELLS), ("nodes", NODES)):
+            draw = self.device.pass_(f"viscosity/coarsen_{kind}.frag", **defines)
+            wanted = *names, "open", *(("aspect",) if kind == "cells" else ())
+            read = {name: inputs[name] for name in wanted if name in inputs}
+            draw([packed[name] for name in names], region=region, **read, **self.walls)
+        draw = self.device.pass_("viscosity/inverse_diagonal.frag")
+        read: dict[str, Any] = {name: packed[name] for name in ("xx0", "yy0", "node0", "node1", "node2", "open")}
+        draw((packed["inverse_u"], packed["inverse_v"]), region=region, shear=self.shear, **read)
+        self.open, self.defines = {"open": packed["open"]}, {"COARSE": 1, **slip}
+        self.stencil = {name: packed[name] for name in CELLS + NODES} | {"shear": self.shear}
+        stress = dict(zip(("stress_xx", "stress_yy", "stress_xy"), self.stress, strict=True))
+        self.operator = {name: packed[name] for name in ("inverse_u", "inverse_v", "open")} | stress
+        self.operator |= {"shear": self.shear, **self.walls}
+
+    def _around(self, box: Box) -> Region:
+        """The texels with faces that feel a strain in a box of cells; nodes on the far walls lie in the ring itself."""
+        top, bottom, left, right = box
+        x, y = max(left - 1, 0) // 2, max(top - 1, 0) // 2
+        return 1 + x, 1 + y, right // 2 + 1 - x, bottom // 2 + 1 - y
+
+    def coefficients(self, region: Region | None = None) -> Coefficients:
+        """K as it is in the textures, in a region of texels or in all; waits for the GPU."""
+        x, y, columns, rows = region or self.region
+
+        def cells(name: str, more: int = 0) -> np.ndarray:
+            texels = self.packed[name].get((x, y, columns + more, rows + more))
+            return unpacked(texels)[: 2 * rows + more, : 2 * columns + more]
+
+        is_open = cells("open")
+        open_u, open_v = is_open % 2 > 0, is_open > 1
         if self.depth == 0:
-            # Signs tell which faces are open where these are read anyway; a node that resists nothing has one too.
-            values["cells"] = np.where(part.open_u, part.xx[0], -part.xx[0])
-            sign = framed(np.where(part.open_v, 2.0, 0.0), (0, 1), (0, 1)) - 1.0
-            sign[-1] = sign[:, -1] = 1.0
-            values["nodes"] = sign * np.maximum(node, 1e-30)
-        else:
-            values |= {f"{kind}{d}": k for kind in ("xx", "yy") for d, k in enumerate(getattr(part, kind))}
-            values |= {f"node{number}": part.nodes[offset] for number, offset in enumerate(NODE_STENCIL)}
-        written: dict[str, np.ndarray] = {name: cells.astype(np.float32) for name, cells in values.items()}
-        written["open"] = (part.open_u + 2 * part.open_v).astype(np.uint8)
-        inside = window.texels
-        left, top = int(inside.left > 0), int(inside.top > 0)
-        # Nodes on the far walls lie in the ring itself.
-        columns = slice(left, inside.right - inside.left + (inside.right == self.texels[0]))
-        rows = slice(top, inside.bottom - inside.top + (inside.bottom == self.texels[1]))
-        at = 1 + inside.left + left, 1 + inside.top + top
-        for name, cells in written.items():
-            height, width = cells.shape
-            texels = packed(framed(cells, (0, 2 - height % 2), (0, 2 - width % 2)))[rows, columns]
-            # Without the check of `set`: K is finite where the viscosity is.
-            viewport = (*at, texels.shape[1], texels.shape[0])
-            self.packed[name].texture.write(np.ascontiguousarray(texels), viewport)
+            xx, node = np.abs(cells("cells")), np.abs(cells("nodes", 1))
+            return Coefficients({(0, 0): xx}, {(0, 0): self.aspect * xx}, {(0, 0): node}, open_u, open_v, self.shear)
+        xx, yy, nodes = (
+            {offset: cells(f"{kind}{number}", more) for number, offset in enumerate(stencil)}
+            for kind, more, stencil in (("xx", 0, ROW_STENCIL), ("yy", 0, COLUMN_STENCIL), ("node", 1, NODE_STENCIL))
+        )
+        return Coefficients(xx, yy, nodes, open_u, open_v, self.shear)
 
-    def set_uniform(self, stiffness: float, shear: tuple[float, float], no_slip: NoSlip) -> None:
+    def set_uniform(self, stiffness: float, no_slip: NoSlip) -> None:
         """Take the operator of one viscosity in a box without solids, dt mu / (hx hy) of this level."""
+        self.defines = {"UNIFORM": 1, **self._take_walls(no_slip)}
         self.open, self.stencil = {"box": self.box}, {}
-        self.operator = {"stiffness": stiffness, "shear": shear, **self.open}
-        self._take_walls({"UNIFORM": 1}, no_slip)
+        self.operator = {"stiffness": stiffness, "shear": self.shear, **self.walls}
 
-    def _take_walls(self, defines: dict[str, Any], no_slip: NoSlip) -> None:
-        self.defines, self.walls = defines, {}
-        if any(no_slip):
-            self.defines = {**defines, "NO_SLIP": 1}
-            self.walls = {"no_slip": tuple(map(float, no_slip[:4])), "solids_no_slip": float(no_slip.solids)}
-            self.operator |= self.walls | {"box": self.box}
+    def _take_walls(self, no_slip: NoSlip) -> dict[str, Any]:
+        """Take up where the fluid sticks; the define of that."""
+        self.walls = {"box": self.box}
+        if not any(no_slip):
+            return {}
+        self.walls |= {"no_slip": tuple(map(float, no_slip[:4])), "solids_no_slip": float(no_slip.solids)}
+        return {"NO_SLIP": 1}
 
     @property
     def bounds(self) -> dict[str, Any]:
         """What a pass reads that asks which faces are open, and where the fluid sticks."""
-        return {**self.open, **self.walls, "box": self.box}
+        return {**self.open, **self.walls}
 
     @property
     def is_coarsest(self) -> bool:

@@ -17,8 +17,8 @@ STIFF_OF_SOFTEST = 4.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
 # fifths. Of one viscosity nothing is read and two sweeps cost a tenth more; a first step then leaves 1 % of its change.
 ONE_SWEEP = 4.0
-# Conjugate gradients end after an iteration that has brought less than this part of the energy, squared; what is left
-# then is less than half of that: below 1 % where the viscosity varies so much at most, and below 5 % beyond.
+# Conjugate gradients end when less than this part of the energy, squared, is left: the error is below 1 % where the
+# viscosity varies so much at most, and below 5 % beyond.
 MODERATE = 300.0
 TOLERANCE = 0.017
 TOLERANCE_STIFF = 0.07, 0.036  # for the softest kappa below and above ONE_SWEEP

@@ -37,7 +37,7 @@ class Viscosity:
         self.multigrid = Multigrid(device, size, self.spacing)
         finest = self.multigrid.finest
         self.conjugate_gradients = ConjugateGradients(device, finest)
-        self.deflation = Deflation(device, finest.texels)
+        self.deflation = Deflation(device, finest)
         ringed = finest.rhs.u.size
         # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
         self._change = PackedFaces(device, ringed, "viscous change")
@@ -63,17 +63,15 @@ class Viscosity:
         fluid = amount[~frozen] if frozen.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         self.plan = plan_for(kappa * least, kappa * largest)
-        self.deflation.clear()
+        self.deflation.set_stiff(None)
         if least == largest and not frozen.any():
             self.multigrid.set_uniform(least, dt, walls.no_slip)
-            coefficients = None
         else:
-            coefficients = self.multigrid.set_coefficients(amount, frozen, dt, walls.no_slip)
+            self.multigrid.set_coefficients(viscosity, solid, amount, frozen, dt, walls.no_slip)
         if self.plan.method != "smooth" and self.multigrid.direct_level is self.multigrid.finest:
             self.plan = Plan("direct")
-        elif coefficients and self.plan.stiff:
-            stiffness = 0.5 * coefficients.xx[0] * hx / hy
-            self.deflation.find(stiffness, coefficients, self.plan.stiff)
+        elif self.plan.stiff:
+            self.deflation.set_stiff(~frozen & (kappa * amount > self.plan.stiff), self.plan.stiff)
 
     @property
     def v_star(self) -> PackedFaces:
@@ -156,13 +154,17 @@ class Viscosity:
         return found / wanted if wanted else 0.0
 
     @property
+    def _parts(self) -> tuple[Multigrid | ConjugateGradients | Deflation, ...]:
+        return self.multigrid, self.conjugate_gradients, self.deflation
+
+    @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
         pairs = self._change, self._dragged
         fields = [field for pair in pairs for field in pair.fields]
-        return sum(item.nbytes for item in (*fields, self.multigrid, self.conjugate_gradients, self.deflation))
+        return sum(item.nbytes for item in (*fields, *self._parts))
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self._change, self._dragged, self.multigrid, self.conjugate_gradients, self.deflation):
+        for item in (self._change, self._dragged, *self._parts):
             item.release()

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 import reference
-from properties.fluid import TURNS, turned, turned_cells
+from properties.fluid import TURNS, turned, turned_cells, turned_walls
 from solver.gl.device import Device
 from solver.params import Walls
 from solver.viscosity.solve import Viscosity
@@ -147,7 +147,8 @@ class Case:
     def turned(self, turn: str) -> Case:
         """The same in the mirror, or transposed; see `TURNS`."""
         faces = turned(self.faces, turn).astype(np.float32)
-        return Case(turned_cells(self.viscosity, turn), faces, self.walls, turned_cells(self.solid, turn))
+        walls, solid = turned_walls(self.walls, turn), turned_cells(self.solid, turn)
+        return Case(turned_cells(self.viscosity, turn), faces, walls, solid)
 
     def exact(self) -> np.ndarray:
         no_slip = self.walls.no_slip
@@ -211,3 +212,62 @@ def check_viscous_step_is_stable(device: Device, seed: int) -> dict[str, float]:
     growth = float(np.linalg.norm(found) / max(np.linalg.norm(faces), 1e-30))
     assert growth <= 1.001, f"seed {seed}: {nx} x {ny}, growth {growth:.4f}"
     return {"growth": growth, "iterations": iterations}
+
+
+def textures(solver: Viscosity) -> dict[str, np.ndarray]:
+    """All that passes read of the coefficients."""
+    if "UNIFORM" in solver.multigrid.finest.defines:
+        return {}  # they follow from the place
+    grids = solver.multigrid.levels[: solver.multigrid.last.depth + 1]
+    found = {field.label: field.get() for grid in grids for field in grid.packed.values()}
+    if solver.multigrid.last is solver.multigrid.levels[-1]:
+        found["inverse"] = solver.multigrid._inverse.get()
+    space = solver.deflation.space
+    if space is not None:
+        found |= {field.label: field.get() for field in solver.deflation._part_of}
+        # A table that more parts once needed stays as long.
+        found["tiles"] = solver.deflation._tables[0].get().reshape(-1, 4)[: space.parts.count + 1]
+        found["motions"] = space.solve(np.random.default_rng(0).normal(size=(space.parts.count + 1, 3)))
+    return found
+
+
+def check_changed_viscous_mask(device: Device, seed: int) -> dict[str, float]:
+    """A mask that changes step by step, in places or as a whole: the very bytes of taking each up afresh."""
+    rng = np.random.default_rng(seed)
+    nx, ny = size = int(rng.integers(7, 150)), int(rng.integers(7, 150))
+    x, y = np.arange(nx) + 0.5, np.arange(ny)[:, None] + 0.5
+    thick, solid = np.zeros((ny, nx)), np.zeros((ny, nx), bool)
+    walls, contrast, dt = Walls(), 1e5, 1.0 / max(size) ** 2
+    solver = Viscosity(device, size)
+    parts = 0
+    for _ in range(14):
+        near = (x - rng.uniform(0, nx)) ** 2 + (y - rng.uniform(0, ny)) ** 2 < rng.uniform(0.7, 9.0) ** 2
+        match rng.choice(["thicken", "thin", "solid", "walls", "step", "same", "contrast"], p=[0.5, *6 * [1 / 12]]):
+            case "thicken":
+                thick = np.where(near, np.minimum(thick + rng.uniform(0, 1), 1.0), thick)
+            case "thin":
+                thick = np.where(near, 0.0, thick)
+            case "solid":
+                solid = solid ^ near
+            case "walls":
+                walls = random_walls(rng)
+            case "step":
+                dt *= 1.5
+            case "contrast":
+                contrast = rng.choice([2.0, 1e2, 1e5])
+        fields = device.upload(contrast**thick), device.upload(solid.astype(np.uint8) * np.uint8(255))
+        solver.set_coefficients(*fields, dt, walls)
+        fresh = Viscosity(device, size)
+        fresh.set_coefficients(*fields, dt, walls)
+        assert solver.plan == fresh.plan, f"seed {seed}"
+        # Also where the masks before were never solved with, and nothing was asked for.
+        if rng.random() < 0.7:
+            found, wanted = textures(solver), textures(fresh)
+            assert found.keys() == wanted.keys(), f"seed {seed}"
+            for name in wanted:
+                assert found[name].tobytes() == wanted[name].tobytes(), f"seed {seed}: {name}"
+            parts = max(parts, fresh.deflation.space.parts.count if fresh.deflation.space else 0)
+        for item in (fresh, *fields):
+            item.release()
+    solver.release()
+    return {"parts": parts}

@@ -1,0 +1,85 @@
+// Coarsen: K of the nodes on the next coarser level, S' K S / 16 (see operator.py), S linear both ways: weights 1/2 1 1/2.
+// u_node0 ... u_node4: of the finer level, as in stress.frag, on the finest u_node0 only; u_open: of the coarse one.
+// A coupling is the sum over the pairs of fine nodes around its two coarse ones, either way round.
+// reads: 78
+#include "viscosity/openness.glsl"
+#include "viscosity/sides.glsl"
+#include "viscosity/fine_level.glsl"
+uniform sampler2D u_node0;
+uniform sampler2D u_node1;
+uniform sampler2D u_node2;
+uniform sampler2D u_node3;
+uniform sampler2D u_node4;
+layout(location = 0) out vec4 out_node0;
+layout(location = 1) out vec4 out_node1;
+layout(location = 2) out vec4 out_node2;
+layout(location = 3) out vec4 out_node3;
+layout(location = 4) out vec4 out_node4;
+
+vec4 around[12]; // texels, row by row, from the one before and above the first coarse node's
+
+void read(sampler2D nodes) {
+    for (int q = 0; q < 12; ++q) around[q] = fine(nodes, fine_texel() + ivec2(q % 4 - 1, q / 4 - 1));
+}
+
+// K of the fine nodes so many rows and columns from the texel's four coarse ones.
+vec4 at(int row, int column) {
+    int first = 4 * ((row + 2) / 2) + (column + 2) / 2, place = 2 * ((row + 2) % 2) + (column + 2) % 2;
+    return vec4(around[first][place], around[first + 1][place], around[first + 4][place], around[first + 5][place]);
+}
+
+vec4 down(int column) { return 0.25 * (at(-1, column) + at(1, column)) + at(0, column); }
+vec4 across(int row) { return 0.25 * (at(row, -1) + at(row, 1)) + at(row, 0); }
+vec4 square(int row, int column) {
+    return at(row, column) + at(row, column + 1) + at(row + 1, column) + at(row + 1, column + 1);
+}
+
+// Whether all four faces at a texel's nodes move, or the fluid sticks there: a free-slip wall has no shear.
+vec4 moving(vec2 texel) {
+    vec4 u = open_u(texel), above = open_u(texel - vec2(0.0, 1.0)), v = open_v(texel), left = open_v(texel - vec2(1.0, 0.0));
+    vec4 held = sticks(2.0 * texel.x + vec4(0.0, 1.0, 0.0, 1.0), 2.0 * texel.y + vec4(0.0, 0.0, 1.0, 1.0));
+    return max(u * vec4(above.zw, u.xy) * v * vec4(left.y, v.x, left.w, v.z), held);
+}
+
+void main() {
+    read(u_node0);
+    vec4 n0 = 0.25 * (down(-1) + down(1)) + down(0), n1 = 0.25 * down(1), n2 = 0.25 * across(1);
+    vec4 n3 = 0.0625 * at(1, 1), n4 = 0.0625 * at(1, -1);
+#ifndef FINE_IS_FINEST
+    read(u_node1);
+    n0 += down(-1) + down(0);
+    n1 += 0.5 * (down(0) + down(1));
+    n2 += 0.25 * (at(1, -1) + at(1, 0));
+    n3 += 0.125 * (at(1, 0) + at(1, 1));
+    n4 += 0.125 * (at(1, -2) + at(1, -1));
+    read(u_node2);
+    n0 += across(-1) + across(0);
+    n1 += 0.25 * (at(-1, 1) + at(0, 1));
+    n2 += 0.5 * (across(0) + across(1));
+    n3 += 0.125 * (at(0, 1) + at(1, 1));
+    n4 += 0.125 * (at(0, -1) + at(1, -1));
+    read(u_node3);
+    n0 += 0.5 * square(-1, -1);
+    n1 += 0.25 * square(-1, 0);
+    n2 += 0.25 * square(0, -1);
+    n3 += 0.25 * square(0, 0);
+    read(u_node4);
+    n0 += 0.5 * square(-1, 0);
+    n1 += 0.25 * square(-1, 1);
+    n2 += 0.25 * square(0, 0);
+    n4 += 0.25 * square(0, -1);
+#endif
+    vec2 texel = own_texel(), x = vec2(1.0, 0.0), y = vec2(0.0, 1.0);
+    vec4 here = moving(texel), right = moving(texel + x), below = moving(texel + y), corner = moving(texel + x + y);
+    vec4 before = moving(texel - x + y), left = moving(texel - x);
+    n0 *= here;
+    n1 *= here * vec4(here.y, right.x, here.w, right.z);
+    n2 *= here * vec4(here.zw, below.xy);
+    n3 *= here * vec4(here.w, right.z, below.y, corner.x);
+    n4 *= here * vec4(left.w, here.z, before.y, below.x);
+    out_node0 = n0 / 16.0;
+    out_node1 = n1 / 16.0;
+    out_node2 = n2 / 16.0;
+    out_node3 = n3 / 16.0;
+    out_node4 = n4 / 16.0;
+}

@@ -1,0 +1,99 @@
+"""Cores and runs: the parts of very viscous fluid that move without strain, see deflation.py."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.packing import framed
+from solver.viscosity.clusters import connected
+
+BROAD = 5  # cells across a core, at least
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Cores and runs, numbered from 1: cores, runs of u, runs of v.
+
+    Attributes:
+        of_u, of_v: the part of each face, 0 for none, (rows, columns).
+        cores, runs_of_u: how many of each kind there are.
+        tile: (column, row) of each part's tile, of part 0 too.
+    """
+
+    of_u: np.ndarray
+    of_v: np.ndarray
+    cores: int
+    runs_of_u: int
+    tile: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return len(self.tile) - 1
+
+
+def find_parts(stiff: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: int) -> Parts:
+    """The cores and runs of the `stiff` cells, (rows, columns), in tiles of `side` cells.
+
+    Where these are a part of the grid, no cell on its edge is stiff but at a wall.
+    """
+    inside = _opened(stiff)
+    core = _numbered(inside, side)
+    cores = int(core.max(initial=0))
+    # What is few, the parts' faces, is worked on in lists: a mask of bytes costs little, an array of numbers much.
+    # The first column of u and the first row of v are walls, so that a cell lies behind each open face.
+    touch_u = open_u & (inside | framed(inside, (0, 0), (1, 0))[:, :-1])
+    touch_v = open_v & (inside | framed(inside, (1, 0), (0, 0))[:-1])
+    of_u, of_v = np.zeros(stiff.shape, np.int32), np.zeros(stiff.shape, np.int32)
+    for of_face, touch, back in ((of_u, touch_u, 1), (of_v, touch_v, stiff.shape[1])):
+        at = np.flatnonzero(touch)
+        of_face.ravel()[at] = np.maximum(core.ravel()[at], core.ravel()[at - back])
+    free = stiff & ~inside
+    on_u, runs_u = _runs(free, open_u & ~touch_u, side)
+    on_v, runs_v = _runs(np.ascontiguousarray(free.T), np.ascontiguousarray((open_v & ~touch_v).T), side)
+    runs_of_u, runs_of_v = int(runs_u.max(initial=0)), int(runs_v.max(initial=0))
+    of_u[on_u] = cores + runs_u
+    of_v.T[on_v] = cores + runs_of_u + runs_v
+    tile = np.zeros((cores + runs_of_u + runs_of_v + 1, 2), int)
+    for parts, on in ((core, inside), (of_u, on_u), (of_v, on_v.T)):
+        row, column = np.nonzero(on)
+        tile[parts[row, column]] = np.stack([column, row], axis=1) // side
+    return Parts(of_u, of_v, cores, runs_of_u, tile)
+
+
+def _opened(stiff: np.ndarray) -> np.ndarray:
+    """The union of all squares of `BROAD` cells in the stiff ones; walls count as stiff."""
+    for _ in ("down the rows", "then, turned over, across"):
+        full, count = np.pad(stiff, ((BROAD - 1, BROAD - 1), (0, 0)), constant_values=True), len(stiff) + BROAD - 1
+        whole = np.logical_and.reduce([full[start : start + count] for start in range(BROAD)])
+        stiff = np.logical_or.reduce([whole[start : start + len(stiff)] for start in range(BROAD)]).T
+    return stiff
+
+
+def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
+    """The pieces of a mask within tiles, numbered from 1 on, 0 outside.
+
+    Two cells side by side belong together if a node that both touch has all four cells inside; else they are a hinge.
+    """
+    count = int(np.count_nonzero(inside))
+    number: np.ndarray = np.zeros(inside.shape, int)
+    number[inside] = np.arange(count)
+    around = framed(inside, (1, 1), (1, 1))
+    whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
+    links = []
+    for turned, nodes in ((number, whole), (number.T, whole.T)):
+        together = (nodes[:-1, 1:-1] | nodes[1:, 1:-1]) & (np.arange(1, turned.shape[1]) % side != 0)
+        links.append((turned[:, :-1][together], turned[:, 1:][together]))
+    one, other = (np.concatenate(ends) for ends in zip(*links, strict=True))
+    root = connected(np.arange(count), one, other)
+    number[inside] = np.cumsum(root == np.arange(count))[root]
+    return number
+
+
+def _runs(free: np.ndarray, faces: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which faces lie along the rows of `free` cells, and of these their run, from 1 on; a tile's edge ends a run."""
+    touching = faces & (free | framed(free, (0, 0), (1, 0))[:, :-1])
+    on = np.zeros_like(touching)
+    on[:, 1:] = touching[:, 1:] & touching[:, :-1] & free[:, :-1] & (np.arange(1, free.shape[1]) % side != 0)
+    return touching, np.cumsum(~on[touching])

@@ -1,0 +1,73 @@
+"""The operator of the viscous step in its parts: Galerkin levels, and direct solves with clusters."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from solver.gl.device import Device
+from solver.params import NoSlip
+from solver.viscosity.clusters import ClusterMatrix, connected
+from solver.viscosity.multigrid import Multigrid
+
+
+def along(count: int) -> np.ndarray:
+    """Interpolation of faces along their normal, 1/2 1 1/2, (fine, coarse); there are walls at both ends."""
+    fine, coarse = np.arange(count)[:, None], 2 * np.arange(count // 2)
+    return np.maximum(1.0 - 0.5 * abs(fine - coarse), 0.0)
+
+
+def across(count: int) -> np.ndarray:
+    """Interpolation of faces across it, 1/4 3/4; beyond a wall lies their image."""
+    weights = np.zeros((count, count // 2))
+    for fine in range(count):
+        weights[fine, fine // 2] += 0.75
+        weights[fine, min(max(fine // 2 + (1 if fine % 2 else -1), 0), count // 2 - 1)] += 0.25
+    return weights
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.3])
+def test_coarse_operators_are_galerkin_products(device: Device, aspect: float) -> None:
+    """(A - I) of a level is P' (A - I) P / 4 of the next finer one: cell by cell random viscosity, free-slip walls."""
+    rng = np.random.default_rng(3)
+    nx, ny = size = 32, 16
+    viscosity, solid = (10 ** rng.uniform(-2, 4, (ny, nx))).astype(np.float32), np.zeros((ny, nx), bool)
+    fields = device.upload(viscosity), device.upload(solid.astype(np.uint8))
+    multigrid = Multigrid(device, size, (1 / nx, aspect / nx))
+    multigrid.set_coefficients(*fields, viscosity, solid, 1 / nx**2, NoSlip(*5 * [False]))
+    strains = [
+        level.coefficients().matrix() - np.eye(8 * level.texels[0] * level.texels[1]) for level in multigrid.levels
+    ]
+    assert len(strains) == 3
+    for fine, coarse in pairwise(strains):
+        u, v = np.kron(across(ny), along(nx)), np.kron(along(ny), across(nx))
+        p = np.block([[u, np.zeros_like(u)], [np.zeros_like(v), v]])
+        open_coarse = coarse.any(axis=0)
+        wanted = (p.T @ fine @ p / 4.0)[open_coarse][:, open_coarse]
+        assert abs(coarse[open_coarse][:, open_coarse] - wanted).max() < 1e-6 * abs(wanted).max()
+        nx, ny = nx // 2, ny // 2
+    multigrid.release()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_clusters_are_solved_directly(seed: int) -> None:
+    """Unknowns in strips of which each meets its neighbours only, as few as one and as many as make several blocks."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 120))
+    strip = 2 + rng.integers(0, rng.integers(1, 8), count)
+    one, other = rng.integers(0, count, (2, rng.integers(0, 2 * count)))
+    near = abs(strip[one] - strip[other]) < 2
+    one, other = one[near], other[near]
+    values = rng.normal(size=len(one))
+    matrix = np.zeros((count, count))
+    np.add.at(matrix, (one, other), values)
+    matrix += matrix.T
+    own = abs(matrix).sum(axis=1) + rng.uniform(0.1, 1.0, count)
+    matrix += np.diag(own)
+    each = np.arange(count)
+    rows, columns = np.append(one, each), np.append(other, each)
+    solver = ClusterMatrix(connected(each, one, other), strip, rows, columns, np.append(values, 0.5 * own))
+    rhs = rng.normal(size=count)
+    assert np.allclose(matrix @ solver.solve(rhs), rhs, atol=1e-9)
