@@ -11,7 +11,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.gl.tiled import TILE, SavedTiles, TiledField
-from solver.warp.accumulated import overlap, tiles_of
+from solver.warp.accumulated import intersection, overlap, tiles_of
 
 
 class Frozen:
@@ -54,21 +54,26 @@ class Frozen:
             size, components, dtype, tile = held.kind
             self._mask = TiledField(self.device, size, components, "frozen", dtype, tile)
             self.near = self.device.field(self.size, 1, "near to what is frozen", "nu2")
+            self._cell = cell
         changed = self._mask.restore(held)
-        self._find(changed if cell == self._cell else [(0, 0, *self._mask.size)], cell)
+        if cell == self._cell:
+            self._find(changed, cell)
+        self.fade_over(cell)
 
     def fade_over(self, cell: tuple[float, float]) -> None:
         """From now on submaps have `cell` texels along their cells."""
-        if self._mask is not None and cell != self._cell:
-            self._find([(0, 0, *self._mask.size)], cell)
+        if self._mask is not None and self.near is not None and self.saved is not None and cell != self._cell:
+            self.near.clear()
+            self._find(self.saved.drawn, cell)
 
     def _find(self, regions: list[Region], cell: tuple[float, float]) -> None:
         """Find `near` anew about regions of the mask."""
         assert self._mask is not None
         assert self.near is not None
         self._cell = cell
-        # Where the map's texels are the mask's they are the pixels too, and hardly anybody looks between them.
-        held = 1 if self._mask.size == self.size else 3
+        # The cubic at the corners of a frozen pixel reaches two texels beyond it, and another where the mask's edges
+        # are not the texels' own.
+        held = 2 if self._mask.size == self.size else 3
         reach = ceil(max(cell)) + held + 1
         across, down = (n / of for n, of in zip(self.size, self._mask.size, strict=True))
         about = [
@@ -83,11 +88,13 @@ class Frozen:
         rows = self.device.field((TILE, TILE + 2 * reach), 1, "frozen, along x")
         draw, along = (self.device.pass_("warp/near.frag", **defines) for defines in ({}, {"ALONG_X": 1}))
         for tile in tiles_of(self.size):
-            if any(overlap(tile, region) for region in about):
-                x, y, *_ = tile
+            if parts := [intersection(tile, region) for region in about if overlap(tile, region)]:
+                x, y = min(part[0] for part in parts), min(part[1] for part in parts)
+                width, height = (max(part[k] + part[k + 2] for part in parts) - (x, y)[k] for k in (0, 1))
                 inputs: dict[str, Any] = {"size": self.size, "reach": float(held)}
-                along(rows, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
-                draw(self.near, region=tile, frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
+                above = (0, 0, width, height + 2 * reach)
+                along(rows, region=above, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
+                draw(self.near, region=(x, y, width, height), frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
         rows.release()
 
     @property
