@@ -82,11 +82,6 @@ class SavedTiles:
         return all(tile.field is None for tile in self.tiles.flat)
 
     @property
-    def drawn(self) -> list[Region]:
-        """The tiles that are not blank."""
-        return [region for tile, region in zip(self.tiles.flat, self.kind.regions, strict=True) if tile.field is not None]
-
-    @property
     def textures(self) -> list[Field]:
         """The textures that it holds, alone or with others."""
         return [tile.field for tile in self.tiles.flat if tile.field is not None]

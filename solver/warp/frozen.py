@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from math import ceil, floor
 from typing import Any
 
@@ -35,38 +36,41 @@ class Frozen:
         self._cell = (0.0, 0.0)
 
     def differs(self, saved: SavedTiles | None) -> bool:
-        """True if it is not what was saved."""
-        if self.saved is None or saved is None:
-            return any(some is not None and not _is_blank(some) for some in (self.saved, saved))
-        return self.saved.kind != saved.kind or not _same(self.saved, saved)
+        """True if another place is frozen in what was saved."""
+        if self.saved and saved and self.saved.kind != saved.kind:
+            return True
+        return any(_changed(self.saved, saved))
 
     def restore(self, saved: SavedTiles | None, cell: tuple[float, float]) -> None:
         """Be what was saved, for submaps with `cell` texels along their cells; the caller may release that."""
-        held = None if saved is None else saved.held()
-        if self.saved is not None:
-            self.saved.release()
-        self.saved = held
-        if held is None or _is_blank(held):
+        before, self.saved = self.saved, None if saved is None else saved.held()
+        if before is not None and (saved is None or saved.kind != before.kind):
+            before.release()
+            before = None
             self._let_go()
-            return
-        if self._mask is None or self._mask.kind != held.kind:
+        if saved is None or not any(_changed(None, saved)):
             self._let_go()
-            size, components, dtype, tile = held.kind
-            self._mask = TiledField(self.device, size, components, "frozen", dtype, tile)
-            self.near = self.device.field(self.size, 1, "near to what is frozen", "nu2")
-            self._cell = cell
-        changed = self._mask.restore(held)
-        if cell == self._cell:
-            self._find(changed, cell)
-        self.fade_over(cell)
+        else:
+            if self._mask is None:
+                size, components, dtype, tile = saved.kind
+                self._mask = TiledField(self.device, size, components, "frozen", dtype, tile)
+            self._mask.restore(saved)
+            if self.near is None:
+                self.near = self.device.field(self.size, 1, "near to what is frozen", "nu2")
+                self._find(_changed(None, saved), cell)
+            else:
+                self._find(_changed(before, saved), self._cell)
+                self.fade_over(cell)
+        if before is not None:
+            before.release()
 
     def fade_over(self, cell: tuple[float, float]) -> None:
         """From now on submaps have `cell` texels along their cells."""
-        if self._mask is not None and self.near is not None and self.saved is not None and cell != self._cell:
+        if self.near is not None and cell != self._cell:
             self.near.clear()
-            self._find(self.saved.drawn, cell)
+            self._find(_changed(None, self.saved), cell)
 
-    def _find(self, regions: list[Region], cell: tuple[float, float]) -> None:
+    def _find(self, regions: Iterable[Region], cell: tuple[float, float]) -> None:
         """Find `near` anew about regions of the mask."""
         assert self._mask is not None
         assert self.near is not None
@@ -94,7 +98,8 @@ class Frozen:
                 inputs: dict[str, Any] = {"size": self.size, "reach": float(held)}
                 above = (0, 0, width, height + 2 * reach)
                 along(rows, region=above, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
-                draw(self.near, region=(x, y, width, height), frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
+                part = x, y, width, height
+                draw(self.near, region=part, frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
         rows.release()
 
     @property
@@ -124,16 +129,21 @@ def saved_of(mask: Field) -> SavedTiles:
     return saved
 
 
-def _is_blank(saved: SavedTiles) -> bool:
-    return not any(texture.get().any() for texture in saved.textures)
+def _changed(before: SavedTiles | None, now: SavedTiles | None) -> Iterator[Region]:
+    """Regions about all that is frozen in one of two saves of a kind and not in the other, each within a tile."""
+    some = now or before
+    if some is None:
+        return
 
+    def frozen(saved: SavedTiles | None, place: int) -> np.ndarray | bool:
+        field = None if saved is None else saved.tiles.flat[place].field
+        return field is not None and field.get() > (127 if saved and saved.kind.dtype == "f1" else 0.5)
 
-def _same(a: SavedTiles, b: SavedTiles) -> bool:
-    """True if two saves hold the same; what they share need not be looked at."""
-
-    def values(saved: SavedTiles, place: int) -> np.ndarray | float:
-        field = saved.tiles.flat[place].field
-        return 0.0 if field is None else field.get()
-
-    places = [place for place in range(a.tiles.size) if a.tiles.flat[place] is not b.tiles.flat[place]]
-    return all(np.all(values(a, place) == values(b, place)) for place in places)
+    for place, (x, y, width, height) in enumerate(some.kind.regions):
+        if before and now and before.tiles.flat[place] is now.tiles.flat[place]:
+            continue
+        changed = np.full((height, width), frozen(before, place)) ^ frozen(now, place)
+        rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
+        if rows.size:
+            left, top = int(columns[0]), int(rows[0])
+            yield x + left, y + top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top

@@ -166,9 +166,9 @@ class WarpMap:
     def hold(self, frozen: Field | None) -> None:
         """From now on, change nothing where a mask over the whole picture, of any size, is 1.
 
-        Nor within two texels of the accumulated map around it, or three where the mask has other texels: what is looked up
-        on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or not.
-        Over one cell from there the map goes over into what flows.
+        Nor within two texels of the accumulated map around it, or three where the mask has other texels: what is looked
+        up on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or
+        not. Over one cell from there the map goes over into what flows.
         """
         saved = None if frozen is None else saved_of(frozen)
         if self._frozen.differs(saved):
