@@ -212,10 +212,11 @@ def test_a_point_is_followed(device: Device):
     replay.release()
 
 
-def test_a_frozen_pixel_is_the_same_in_every_later_frame(device: Device) -> None:
+@pytest.mark.parametrize("radius", [0.08, 0.12])
+def test_a_frozen_pixel_is_the_same_in_every_later_frame(device: Device, radius: float) -> None:
     """Frozen by hand while it flows, after it has moved: not a bit of its colours changes from the next frame on."""
     freeze = Stroke.model_validate(
-        {"tool": "freeze", "samples": ((5, 0.5, 0.45, 1), (8, 0.55, 0.5, 1)), "radius": 0.08}
+        {"tool": "freeze", "samples": ((5, 0.5, 0.45, 1), (8, 0.55, 0.5, 1)), "radius": radius}
     )
     recipe = RECIPE.edited(stroke=(*RECIPE.stroke, freeze))
     replay, sampler = Replay(device, recipe, pictures(), budget=0), Sampler(device)

@@ -12,9 +12,11 @@ from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import FieldError
+from solver.gl.tiled import TiledField
 from solver.grid import Grid
 from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
+from solver.warp.frozen import Frozen
 from solver.warp.map import WarpMap
 
 
@@ -311,6 +313,42 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
                     np.testing.assert_array_equal(now[kept], then[kept])
         assert np.abs(after[0] - before[0]).max() > 1e-3
     assert np.abs(before[0])[frozen[row, column]].max() > 1e-3, "what had moved before it was frozen"
+
+
+@pytest.mark.parametrize("texels", [(700, 530), (350, 265)], ids=["the map's texels", "coarser ones"])
+def test_what_is_near_to_frozen_is_found_anew_where_the_mask_has_changed(
+    device: Device, texels: tuple[int, int]
+) -> None:
+    """Frozen and thawed piece by piece, to nothing and on: the same as found at once, and as a distance transform."""
+    size, rng = (700, 530), np.random.default_rng(4)
+    mask = TiledField(device, texels, 1, "mask", "f1")
+    kept, values = Frozen(device, size), np.zeros(texels[::-1], np.uint8)
+    before = values > 127
+    for step in range(12):
+        x, y = rng.integers(0, texels)
+        values[y : y + 60, x : x + 40] = rng.choice([0, 100, 127, 128, 200])
+        if step == 7:
+            values[:] = 100
+        mask.set(values)
+        saved, fresh, cell = mask.save(), Frozen(device, size), (11.0, 9.5) if step < 10 else (5.0, 6.0)
+        assert kept.differs(saved) == ((values > 127) != before).any()
+        kept.restore(saved, cell)
+        fresh.restore(saved, cell)
+        before = values > 127
+        assert (kept.near is None) == (fresh.near is None) == (not before.any())
+        if kept.near and fresh.near:
+            near = kept.near.get()
+            np.testing.assert_array_equal(near, fresh.near.get())
+            if texels == size:
+                held = np.asarray(ndimage.binary_dilation(before, np.ones((5, 5))), bool)
+                np.testing.assert_array_equal(near == near.max(), held)
+                far = np.asarray(ndimage.distance_transform_edt(~held, (1 / cell[1], 1 / cell[0])))
+                assert not near[far >= 1].any()
+                assert near[far < 0.9].all()
+        fresh.release()
+        saved.release()
+    for thing in (kept, mask):
+        thing.release()
 
 
 def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> None:

@@ -17,7 +17,10 @@ void main() {
         float along = max(n - u_reach, 0.0) / u_cell;
 #ifdef ALONG_X
         vec2 before = (texel - vec2(n, 0.0)) / u_size, after = (texel + vec2(n, 0.0)) / u_size;
-        if (max(texture(u_frozen, before).r, texture(u_frozen, after).r) > 0.5) least = min(least, along);
+        if (max(texture(u_frozen, before).r, texture(u_frozen, after).r) > 0.5) {
+            least = min(least, along);
+            break;
+        }
 #else
         ivec2 here = ivec2(texel), last = textureSize(u_frozen, 0) - 1;
         float before = texelFetch(u_frozen, clamp(here - ivec2(0, n), ivec2(0), last), 0).r;

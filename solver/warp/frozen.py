@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from math import ceil, floor
 from typing import Any
 
@@ -11,7 +12,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.gl.tiled import TILE, SavedTiles, TiledField
-from solver.warp.accumulated import overlap, tiles_of
+from solver.warp.accumulated import intersection, overlap, tiles_of
 
 
 class Frozen:
@@ -35,40 +36,48 @@ class Frozen:
         self._cell = (0.0, 0.0)
 
     def differs(self, saved: SavedTiles | None) -> bool:
-        """True if it is not what was saved."""
-        if self.saved is None or saved is None:
-            return any(some is not None and not _is_blank(some) for some in (self.saved, saved))
-        return self.saved.kind != saved.kind or not _same(self.saved, saved)
+        """True if another place is frozen in what was saved."""
+        if self.saved and saved and self.saved.kind != saved.kind:
+            return True
+        return any(_changed(self.saved, saved))
 
     def restore(self, saved: SavedTiles | None, cell: tuple[float, float]) -> None:
         """Be what was saved, for submaps with `cell` texels along their cells; the caller may release that."""
-        held = None if saved is None else saved.held()
-        if self.saved is not None:
-            self.saved.release()
-        self.saved = held
-        if held is None or _is_blank(held):
+        before, self.saved = self.saved, None if saved is None else saved.held()
+        if before is not None and (saved is None or saved.kind != before.kind):
+            before.release()
+            before = None
             self._let_go()
-            return
-        if self._mask is None or self._mask.kind != held.kind:
+        if saved is None or not any(_changed(None, saved)):
             self._let_go()
-            size, components, dtype, tile = held.kind
-            self._mask = TiledField(self.device, size, components, "frozen", dtype, tile)
-            self.near = self.device.field(self.size, 1, "near to what is frozen", "nu2")
-        changed = self._mask.restore(held)
-        self._find(changed if cell == self._cell else [(0, 0, *self._mask.size)], cell)
+        else:
+            if self._mask is None:
+                size, components, dtype, tile = saved.kind
+                self._mask = TiledField(self.device, size, components, "frozen", dtype, tile)
+            self._mask.restore(saved)
+            if self.near is None:
+                self.near = self.device.field(self.size, 1, "near to what is frozen", "nu2")
+                self._find(_changed(None, saved), cell)
+            else:
+                self._find(_changed(before, saved), self._cell)
+                self.fade_over(cell)
+        if before is not None:
+            before.release()
 
     def fade_over(self, cell: tuple[float, float]) -> None:
         """From now on submaps have `cell` texels along their cells."""
-        if self._mask is not None and cell != self._cell:
-            self._find([(0, 0, *self._mask.size)], cell)
+        if self.near is not None and cell != self._cell:
+            self.near.clear()
+            self._find(_changed(None, self.saved), cell)
 
-    def _find(self, regions: list[Region], cell: tuple[float, float]) -> None:
+    def _find(self, regions: Iterable[Region], cell: tuple[float, float]) -> None:
         """Find `near` anew about regions of the mask."""
         assert self._mask is not None
         assert self.near is not None
         self._cell = cell
-        # Where the map's texels are the mask's they are the pixels too, and hardly anybody looks between them.
-        held = 1 if self._mask.size == self.size else 3
+        # The cubic at the corners of a frozen pixel reaches two texels beyond it, and another where the mask's edges
+        # are not the texels' own.
+        held = 2 if self._mask.size == self.size else 3
         reach = ceil(max(cell)) + held + 1
         across, down = (n / of for n, of in zip(self.size, self._mask.size, strict=True))
         about = [
@@ -83,11 +92,14 @@ class Frozen:
         rows = self.device.field((TILE, TILE + 2 * reach), 1, "frozen, along x")
         draw, along = (self.device.pass_("warp/near.frag", **defines) for defines in ({}, {"ALONG_X": 1}))
         for tile in tiles_of(self.size):
-            if any(overlap(tile, region) for region in about):
-                x, y, *_ = tile
+            if parts := [intersection(tile, region) for region in about if overlap(tile, region)]:
+                x, y = min(part[0] for part in parts), min(part[1] for part in parts)
+                width, height = (max(part[k] + part[k + 2] for part in parts) - (x, y)[k] for k in (0, 1))
                 inputs: dict[str, Any] = {"size": self.size, "reach": float(held)}
-                along(rows, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
-                draw(self.near, region=tile, frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
+                above = (0, 0, width, height + 2 * reach)
+                along(rows, region=above, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
+                part = x, y, width, height
+                draw(self.near, region=part, frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
         rows.release()
 
     @property
@@ -117,16 +129,21 @@ def saved_of(mask: Field) -> SavedTiles:
     return saved
 
 
-def _is_blank(saved: SavedTiles) -> bool:
-    return not any(texture.get().any() for texture in saved.textures)
+def _changed(before: SavedTiles | None, now: SavedTiles | None) -> Iterator[Region]:
+    """Regions about all that is frozen in one of two saves of a kind and not in the other, each within a tile."""
+    some = now or before
+    if some is None:
+        return
 
+    def frozen(saved: SavedTiles | None, place: int) -> np.ndarray | bool:
+        field = None if saved is None else saved.tiles.flat[place].field
+        return field is not None and field.get() > (127 if saved and saved.kind.dtype == "f1" else 0.5)
 
-def _same(a: SavedTiles, b: SavedTiles) -> bool:
-    """True if two saves hold the same; what they share need not be looked at."""
-
-    def values(saved: SavedTiles, place: int) -> np.ndarray | float:
-        field = saved.tiles.flat[place].field
-        return 0.0 if field is None else field.get()
-
-    places = [place for place in range(a.tiles.size) if a.tiles.flat[place] is not b.tiles.flat[place]]
-    return all(np.all(values(a, place) == values(b, place)) for place in places)
+    for place, (x, y, width, height) in enumerate(some.kind.regions):
+        if before and now and before.tiles.flat[place] is now.tiles.flat[place]:
+            continue
+        changed = np.full((height, width), frozen(before, place)) ^ frozen(now, place)
+        rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
+        if rows.size:
+            left, top = int(columns[0]), int(rows[0])
+            yield x + left, y + top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top

@@ -166,9 +166,9 @@ class WarpMap:
     def hold(self, frozen: Field | None) -> None:
         """From now on, change nothing where a mask over the whole picture, of any size, is 1.
 
-        Nor within a texel of the accumulated map around it, or three where the mask has other texels: what is looked up
-        on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or not.
-        Over one cell from there the map goes over into what flows.
+        Nor within two texels of the accumulated map around it, or three where the mask has other texels: what is looked
+        up on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or
+        not. Over one cell from there the map goes over into what flows.
         """
         saved = None if frozen is None else saved_of(frozen)
         if self._frozen.differs(saved):
@@ -326,8 +326,11 @@ class WarpMap:
         """Texels to compose for a result of a picture, both in pixels: not finer than either needs.
 
         The accumulated map's, or one for a whole number of them: as many as the result has pixels, or else the picture,
-        or two a cell.
+        or two a cell. Where something is frozen it is the accumulated map's: what is looked up between coarser texels
+        would reach beyond what is held.
         """
+        if self._frozen.near is not None:
+            return self.size
         sides = zip(self.size, result, picture, self.coarse_size, strict=True)
         times = max(1, min(own // min(wanted, max(given, 2 * cells)) for own, wanted, given, cells in sides))
         return -(-self.size[0] // times), -(-self.size[1] // times)
