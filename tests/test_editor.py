@@ -1127,7 +1127,7 @@ def test_the_time_of_each_stage_is_that_of_one_step(robot: Robot) -> None:
     assert replay.steps == steps + 4
     assert shown.stages == {name: spent / 4 for name, spent in booked.items()}
     assert shown.map is not None
-    assert shown.map.det_min == pytest.approx(replay.warp.statistics().det_min)
+    assert shown.map.det_min == pytest.approx(replay.warp.statistics(replay.grid.size).det_min)
     assert shown.divergence == pytest.approx(float(np.abs(replay.fluid.divergence()).max()))
     robot.key("ctrl+i")
     assert not timings.enabled
