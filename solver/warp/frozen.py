@@ -49,24 +49,38 @@ class Frozen:
         if held is None or _is_blank(held):
             self._let_go()
             return
-        if self._mask is None or self._mask.kind != held.kind:
+        is_new = self._mask is None or self._mask.kind != held.kind
+        if is_new:
             self._let_go()
             size, components, dtype, tile = held.kind
             self._mask = TiledField(self.device, size, components, "frozen", dtype, tile)
             self.near = self.device.field(self.size, 1, "near to what is frozen", "nu2")
+        assert self._mask is not None
         changed = self._mask.restore(held)
-        self._find(changed if cell == self._cell else [(0, 0, *self._mask.size)], cell)
+        if is_new or cell != self._cell:
+            self._find_all(cell)
+        else:
+            self._find(changed)
 
     def fade_over(self, cell: tuple[float, float]) -> None:
         """From now on submaps have `cell` texels along their cells."""
         if self._mask is not None and cell != self._cell:
-            self._find([(0, 0, *self._mask.size)], cell)
+            self._find_all(cell)
 
-    def _find(self, regions: list[Region], cell: tuple[float, float]) -> None:
+    def _find_all(self, cell: tuple[float, float]) -> None:
+        """Find `near` anew for submaps with `cell` texels along their cells."""
+        assert self.saved is not None
+        assert self.near is not None
+        self._cell = cell
+        self.near.clear()
+        tiles = zip(self.saved.tiles.flat, self.saved.kind.regions, strict=True)
+        self._find([region for tile, region in tiles if tile.field is not None])
+
+    def _find(self, regions: list[Region]) -> None:
         """Find `near` anew about regions of the mask."""
         assert self._mask is not None
         assert self.near is not None
-        self._cell = cell
+        cell = self._cell
         # Where the map's texels are the mask's they are the pixels too, and hardly anybody looks between them.
         held = 1 if self._mask.size == self.size else 3
         reach = ceil(max(cell)) + held + 1
