@@ -15,6 +15,7 @@ void main() {
     float least = 1.0;
     for (float n = 0.0; n <= u_cell + u_reach; ++n) {
         float along = max(n - u_reach, 0.0) / u_cell;
+        if (along >= least) break;
 #ifdef ALONG_X
         vec2 before = (texel - vec2(n, 0.0)) / u_size, after = (texel + vec2(n, 0.0)) / u_size;
         if (max(texture(u_frozen, before).r, texture(u_frozen, after).r) > 0.5) least = min(least, along);

@@ -146,6 +146,24 @@ def overlap(a: Region, b: Region) -> bool:
     return all(a[k] < b[k] + b[k + 2] and b[k] < a[k] + a[k + 2] for k in (0, 1))
 
 
+def common(a: Region, b: Region) -> Region:
+    """What two regions that overlap have in common."""
+    left, top, right, bottom = (
+        max(a[0], b[0]),
+        max(a[1], b[1]),
+        min(a[0] + a[2], b[0] + b[2]),
+        min(a[1] + a[3], b[1] + b[3]),
+    )
+    return left, top, right - left, bottom - top
+
+
+def box(regions: list[Region]) -> Region:
+    """The smallest region that holds some, at least one."""
+    left, top = (min(region[k] for region in regions) for k in (0, 1))
+    right, bottom = (max(region[k] + region[k + 2] for region in regions) for k in (0, 1))
+    return left, top, right - left, bottom - top
+
+
 def tiles_of(size: tuple[int, int]) -> list[Region]:
     """The tiles of a field of `size` by rows."""
     width, height = size

@@ -11,7 +11,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.gl.tiled import TILE, SavedTiles, TiledField
-from solver.warp.accumulated import overlap, tiles_of
+from solver.warp.accumulated import box, common, overlap, tiles_of
 
 
 class Frozen:
@@ -97,11 +97,15 @@ class Frozen:
         rows = self.device.field((TILE, TILE + 2 * reach), 1, "frozen, along x")
         draw, along = (self.device.pass_("warp/near.frag", **defines) for defines in ({}, {"ALONG_X": 1}))
         for tile in tiles_of(self.size):
-            if any(overlap(tile, region) for region in about):
-                x, y, *_ = tile
+            parts = [common(tile, region) for region in about if overlap(tile, region)]
+            if parts:
+                x, y, width, height = box(parts)
                 inputs: dict[str, Any] = {"size": self.size, "reach": float(held)}
-                along(rows, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
-                draw(self.near, region=tile, frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
+                beside = (0, 0, width, height + 2 * reach)
+                along(rows, region=beside, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
+                draw(
+                    self.near, region=(x, y, width, height), frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs
+                )
         rows.release()
 
     @property
