@@ -466,3 +466,23 @@ def test_the_map_is_as_fine_as_the_picture(picture: tuple[int, int], cells: int,
     assert map_size(Grid.for_picture(*picture, cells), picture, 32768) == wanted
     smaller = map_size(Grid.for_picture(*picture, cells), picture, 4096)
     assert max(smaller) <= 4096
+
+
+def test_freezing_a_place_of_a_large_picture_looks_only_about_it(device: Device) -> None:
+    """Also where the map goes over into what flows in another width, as it does with a brush of another size."""
+    values = np.zeros((2048, 2048), np.uint8)
+    values[600:620, 800:840] = 255
+    mask = TiledField(device, (2048, 2048), 1, "mask", "f1")
+    mask.clear()
+    mask.copy_from(device.upload(values), (768, 512, 256, 256))
+    saved, frozen = mask.save(), Frozen(device, mask.size)
+    away = [np.maximum(np.abs(np.arange(2048) - middle) - half, 0) for middle, half in ((819.5, 20.5), (609.5, 10.5))]
+    distance = np.hypot(away[0][None, :], away[1][:, None])
+    for wide, find in ((40.0, lambda cell: frozen.restore(saved, cell)), (9.0, frozen.fade_over)):
+        device.timings.take()
+        with device.stage("near"):
+            find((wide, wide))
+        assert frozen.near is not None
+        step = np.clip(1 - distance / wide, 0, 1)
+        np.testing.assert_allclose(frozen.near.get() / 65535, step**2 * (3 - 2 * step), atol=1e-4)
+        assert device.timings.texel_writes["near"] < values.size / 8
