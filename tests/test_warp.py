@@ -476,7 +476,7 @@ def test_freezing_a_place_of_a_large_picture_looks_only_about_it(device: Device)
     mask.clear()
     mask.copy_from(device.upload(values), (768, 512, 256, 256))
     saved, frozen = mask.save(), Frozen(device, mask.size)
-    away = [np.maximum(np.abs(np.arange(2048) - middle) - half, 0) for middle, half in ((819.5, 20.5), (609.5, 10.5))]
+    away = [np.maximum(np.abs(np.arange(2048) - middle) - half, 0) for middle, half in ((819.5, 21.5), (609.5, 11.5))]
     distance = np.hypot(away[0][None, :], away[1][:, None])
     for wide, find in ((40.0, lambda cell: frozen.restore(saved, cell)), (9.0, frozen.fade_over)):
         device.timings.take()
