@@ -172,7 +172,10 @@ def test_looking_changes_nothing(device: Device) -> None:
         for _ in range(29):
             warp.advance(velocity, 0.02)
             if looked:
-                warp.read((50, 50)), warp.composed(), warp.statistics(), warp.at(np.array([[0.3, 0.4]]))
+                warp.read((50, 50))
+                warp.composed()
+                warp.statistics()
+                warp.at(np.array([[0.3, 0.4]]))
                 warp.save().release()
         found.append(warp.read())
         warp.release()
