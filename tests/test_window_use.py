@@ -37,6 +37,10 @@ def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
             other.wait()
 
 
+# What asks nothing of a machine at rest that it does not ask of a busy one.
+busy = pytest.mark.parametrize("desk", [True], indirect=True, ids=["busy"])
+
+
 def still(desk: Desk) -> np.ndarray:
     """What is seen once it does not change any more."""
     before, since = desk.seen(), time.monotonic()
@@ -75,6 +79,7 @@ def test_a_message_goes_by_itself(desk: Desk) -> None:
     assert time.monotonic() - shown < 20
 
 
+@busy
 def test_a_dialog_is_whole_after_the_interface_has_changed_its_size(desk: Desk) -> None:
     desk.key("ctrl+comma")
     before = still(desk)
@@ -88,6 +93,7 @@ def test_a_dialog_is_whole_after_the_interface_has_changed_its_size(desk: Desk) 
     assert not differs(still(desk), seen, 300, 100, 980, 700)
 
 
+@busy
 def test_a_number_is_typed_in_the_unit_that_is_shown(desk: Desk, tmp_path: Path) -> None:
     def strokes(path: Path) -> list[float]:
         return [stroke.radius for stroke in projects.load(path).recipe.stroke]
@@ -105,6 +111,7 @@ def test_a_number_is_typed_in_the_unit_that_is_shown(desk: Desk, tmp_path: Path)
     assert strokes(tmp_path / "work.fluidwarp")[0] == pytest.approx(60 / 2 / 240)
 
 
+@busy
 def test_clicks_beside_the_picture_do_not_paint(desk: Desk, tmp_path: Path) -> None:
     # Tab twice is the inspector and back; the next keys are still the editor's.
     desk.key("Tab")
@@ -128,6 +135,7 @@ def test_clicks_beside_the_picture_do_not_paint(desk: Desk, tmp_path: Path) -> N
     assert desk.title() == "pattern - fluidwarp"
 
 
+@busy
 def test_the_wheel_goes_through_the_history(desk: Desk) -> None:
     for step in range(12):
         desk.drag((300 + 20 * step, 300), (330 + 20 * step, 300))
