@@ -87,7 +87,10 @@ def _work(pipe: Connection, wish: Any) -> None:
     def report(done: int, total: int | None) -> None:
         pipe.send(("part", done / total if total else 0.0))
 
-    job = pipe.recv()
+    try:
+        job = pipe.recv()
+    except EOFError:  # nobody is left who wants it
+        return
     try:
         with Device.headless() as device:
             told = run(device, job, Progress(None, report, wish.is_set, lambda state: pipe.send(("state", state))))

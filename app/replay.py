@@ -270,14 +270,14 @@ class Replay:
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
-        self._follow_strokes()
+        at_work = [(stroke, dabs) for stroke in self.recipe.stroke if (dabs := stroke.at(self.tick))]
+        self._follow([(stroke, dabs) for stroke, dabs in at_work if stroke.tool in FLOWING])
         self._set_parameters()
         painted = False
         self._leading.clear()
         with self.device.stage("brush"):
-            for stroke in self.recipe.stroke:
-                if dabs := stroke.at(self.tick):
-                    painted |= self._draw(stroke, dabs, dt, part)
+            for stroke, dabs in at_work:
+                painted |= self._draw(stroke, dabs, dt, part)
             if painted:
                 self._apply_masks()
         self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
@@ -308,10 +308,8 @@ class Replay:
             self._use_viscosity(settings.viscosity)
             self._apply_masks()
 
-    def _follow_strokes(self) -> None:
+    def _follow(self, at_work: list[tuple[Stroke, tuple[Dab, ...]]]) -> None:
         """Let the flow be solved where the strokes of this tick want it; without any it stays where it is."""
-        at_work = [(stroke, stroke.at(self.tick)) for stroke in self.recipe.stroke if stroke.tool in FLOWING]
-        at_work = [(stroke, dabs) for stroke, dabs in at_work if dabs]
         if at_work and self._has_windows:
             window = Window.of(at_work, self.tick, self.window, self.grid)
             if window != self.window:
