@@ -237,7 +237,7 @@ def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Sessi
     session.settle()
     statistics = session.replay.warp.statistics()
     assert statistics.displacement_max > 0.05
-    assert statistics.folds < 3e-5 * statistics.places, "at the border, where the fluid glides"
+    assert statistics.folds == 0
 
 
 @pytest.mark.parametrize("feel", [HONEY, PUTTY], ids=lambda feel: feel.name)
