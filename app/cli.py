@@ -14,9 +14,9 @@ from app.errors import Cancelled, UserError, shown
 from app.progress import INTERRUPTED
 
 if TYPE_CHECKING:
-    from app.applying import MapSource
-    from app.batch import Task
-    from app.opening import Opened
+    from app.media.opening import Opened
+    from app.work.applying import MapSource
+    from app.work.batch import Task
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
@@ -198,9 +198,9 @@ def render(
 
     Several pictures go into the folder OUT under their own names, or to OUT with {name} in it for the name of each.
     """
-    from app import batch
-    from app.export import MapOutput
-    from app.opening import open_recipe
+    from app.media.opening import open_recipe
+    from app.work import batch
+    from app.work.export import MapOutput
 
     opened = open_recipe(recipe, max_pixels)
     tables = {
@@ -256,8 +256,8 @@ def _part(frames: str | None) -> tuple[int, int | None]:
 
 
 def _render_one(task: Task, opened: Opened) -> None:
-    from app.export import run
     from app.progress import on_terminal
+    from app.work.export import run
     from solver.gl.device import Device
 
     with on_terminal(task.written[0].name, None) as progress:
@@ -272,8 +272,8 @@ def _render_one(task: Task, opened: Opened) -> None:
 
 def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     """Render all, with a line about each that fails."""
-    from app.batch import Outcome, run_batch
     from app.progress import leave, on_terminal
+    from app.work.batch import Outcome, run_batch
 
     def tell(outcome: Outcome) -> None:
         _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices) if said))
@@ -329,10 +329,10 @@ def apply(
     max_pixels: MaxPixels = 400_000_000,
 ) -> None:
     """Warp a picture or a clip by a map that was made before, or elsewhere."""
-    from app.applying import Application
-    from app.batch import Edits
+    from app.model.recipe import Recipe
     from app.progress import on_terminal
-    from app.recipe import Recipe
+    from app.work.applying import Application
+    from app.work.batch import Edits
     from solver.gl.device import Device
 
     asked = Edits.of({"output": {"size": size, "fps": fps, "quality": quality}}, {"edges": edges}).applied(Recipe())
@@ -355,7 +355,7 @@ def apply(
 
 
 def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:
-    from app.applying import MapSource
+    from app.work.applying import MapSource
 
     if kind not in (None, "st", "offsets"):
         raise UserError(f"--kind must be st or offsets, not {kind}")
@@ -383,8 +383,8 @@ def convert(
     max_pixels: MaxPixels = 400_000_000,
 ) -> None:
     """Write a warp map in another format."""
-    from app.applying import converted
     from app.progress import on_terminal
+    from app.work.applying import converted
 
     source = _map_source(map_, kind, grid, overscan, max_pixels)
     with on_terminal(output.name, None) as progress:

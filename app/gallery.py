@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from app.animation import animation_writer
 from app.errors import UserError
-from app.export import displacement
-from app.files import MENDS
-from app.forces import CurveForce, GradientForce, PointForce
-from app.masks import solid
-from app.pictures import Picture, read_picture, srgb_to_linear, to_bits, write_picture
+from app.media.animation import animation_writer
+from app.media.files import MENDS
+from app.media.pictures import Picture, read_picture, srgb_to_linear, to_bits, write_picture
+from app.model.forces import CurveForce, GradientForce, PointForce
+from app.model.masks import solid
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
 from app.progress import Progress
-from app.recipe import Recipe
-from app.replay import Replay
-from app.sampling import Pictures
+from app.work.export import displacement
+from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.grid import Grid
 from solver.resample.plan import GivenMap, Sampling

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
 from app.errors import Cancelled
-from app.files import abandon
+from app.media.files import abandon
 
 # Ctrl+C, a scheduler's, and that the terminal was closed, where the system knows it
 SIGNALS = tuple(number for number in signal.Signals if number.name in ("SIGINT", "SIGTERM", "SIGHUP"))

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.pictures import Picture
-from app.project import Project, from_picture
+from app.media.pictures import Picture
+from app.media.project import Project, from_picture
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
 from app.ui.files import fresh_recipe
@@ -32,7 +32,7 @@ def pattern(width: int = 240, height: int = 180) -> Picture:
 
 def small_project(folder: Path, grid: int = 48) -> Project:
     """The pattern as a new project, on a coarse grid."""
-    from app.pictures import write_picture
+    from app.media.pictures import write_picture
 
     write_picture(folder / "pattern.png", pattern())
     recipe = fresh_recipe()

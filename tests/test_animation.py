@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from app import animation, ffmpeg, files, video
-from app.animation import (
+from app.errors import Cancelled, UserError
+from app.media import animation, ffmpeg, files, video
+from app.media.animation import (
     animation_writer,
     check_animation,
     frame_order,
@@ -26,9 +27,8 @@ from app.animation import (
     order_length,
     reordered,
 )
-from app.errors import Cancelled, UserError
-from app.pictures import Picture, read_picture, to_bits
-from app.video import read_clip
+from app.media.pictures import Picture, read_picture, to_bits
+from app.media.video import read_clip
 
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 
@@ -272,7 +272,7 @@ def test_a_single_frame_and_a_single_pixel(tmp_path: Path):
 MEASURE = """
 import resource, sys
 import numpy as np
-from app.animation import animation_writer
+from app.media.animation import animation_writer
 path, count = sys.argv[1], int(sys.argv[2])
 ramp = np.arange(320, dtype=np.uint8)
 frame = np.stack([np.broadcast_to(ramp, (240, 320)), np.broadcast_to(ramp[:240, None], (240, 320))] * 2, axis=-1)

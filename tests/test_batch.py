@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app import batch, files, states
-from app.batch import Edits, Outcome, Task, perform, run_batch, spread
 from app.errors import Cancelled, UserError
-from app.pictures import Picture, read_picture, write_picture
+from app.media import files
+from app.media.pictures import Picture, read_picture, write_picture
 from app.progress import INTERRUPTED, Progress
-from app.replay import Replay
+from app.work import batch, states
+from app.work.batch import Edits, Outcome, Task, perform, run_batch, spread
+from app.work.replay import Replay
 from solver.gl.device import Device
 
 ROOT = Path(__file__).parent.parent
@@ -145,7 +146,7 @@ def test_one_that_fails_does_not_stop_the_others(folder: Path, jobs: int):
 
 def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Killed as for want of memory: whatever it had is done by another; what kills each of them is told."""
-    serving = "import app.batch, test_batch; app.batch.perform = test_batch.dying; app.batch.serve()"
+    serving = "import app.work.batch, test_batch; app.work.batch.perform = test_batch.dying; app.work.batch.serve()"
     monkeypatch.setattr(batch, "SERVING", serving)
     pictures = [folder / f"p{number}.png" for number in range(4)]
     heard: list[Outcome] = []

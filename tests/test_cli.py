@@ -15,12 +15,12 @@ import pytest
 from PIL import Image
 
 from app import cli, doctor
-from app.export import Job, run
-from app.maps import Displacement, write_map
-from app.pictures import Picture, read_picture, write_picture
+from app.media.maps import Displacement, write_map
+from app.media.pictures import Picture, read_picture, write_picture
+from app.media.project import from_recipe, save
+from app.model.recipe import Recipe
 from app.progress import Progress
-from app.project import from_recipe, save
-from app.recipe import Recipe
+from app.work.export import Job, run
 from solver.gl.device import Device
 
 ROOT = Path(__file__).parent.parent
@@ -137,7 +137,7 @@ def test_an_animation_that_would_begin_after_its_end_is_told(folder: Path):
 
 
 def test_the_loss_of_a_clips_depth_is_told(folder: Path):
-    from app.ffmpeg import executable
+    from app.media.ffmpeg import executable
 
     ten = ["-f", "lavfi", "-i", "testsrc=s=64x48:r=10:d=0.2", "-pix_fmt", "yuv420p10le", "-c:v", "ffv1"]
     subprocess.run([executable(), "-v", "error", *ten, str(folder / "in.mkv")], check=True)
@@ -357,7 +357,7 @@ def test_interrupted_leaves_nothing(folder: Path):
 STUCK = """
 import hashlib, sys
 from pathlib import Path
-from app.files import replacing
+from app.media.files import replacing
 from app.progress import on_terminal
 with on_terminal("stuck", 1), replacing("out.png") as temporary:
     temporary.write_bytes(b"half")
@@ -446,7 +446,7 @@ def test_a_fold_is_told(folder: Path):
 
 
 def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(folder: Path):
-    from app.ffmpeg import executable
+    from app.media.ffmpeg import executable
 
     noise = ["-f", "lavfi", "-i", "nullsrc=s=640x480:r=10:d=6,geq=random(1)*255", "-c:v", "mjpeg", "-q:v", "2"]
     subprocess.run([executable(), "-v", "error", *noise, str(folder / "in.mkv")], check=True)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.pictures import Picture
-from app.recipe import Recipe
-from app.replay import Replay
-from app.sampling import Pictures
-from app.schema import frozen
+from app.media.pictures import Picture
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
+from app.model.schema import frozen
+from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
 

@@ -11,10 +11,10 @@ import pytest
 from PIL import Image
 
 from app import cli
-from app.animation import animation_writer
-from app.maps import Displacement, write_map
-from app.pictures import Picture, write_picture
-from app.project import from_recipe, save
+from app.media.animation import animation_writer
+from app.media.maps import Displacement, write_map
+from app.media.pictures import Picture, write_picture
+from app.media.project import from_recipe, save
 from solver.gl.device import Device
 
 RECIPE = """

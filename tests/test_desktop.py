@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from app.project import SUFFIX
+from app.media.project import SUFFIX
 
 ROOT = Path(__file__).parent.parent
 DESKTOP = ROOT / "assets" / "desktop"
@@ -30,7 +30,8 @@ def start(*words: str) -> subprocess.CompletedProcess[str]:
 def test_the_application_is_the_command_line_and_the_python_of_its_own_processes():
     assert start("--version").stdout.startswith("fluidwarp ")
     assert (
-        start("-c", "import app.strokes, sys; print(app.strokes.__name__, sys.argv)").stdout == "app.strokes ['-c']\n"
+        start("-c", "import app.model.strokes, sys; print(app.model.strokes.__name__, sys.argv)").stdout
+        == "app.model.strokes ['-c']\n"
     )
     assert '"renderer"' in start("-m", "app.doctor").stdout
     refused = start("render", "nothing.toml")

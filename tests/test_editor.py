@@ -13,14 +13,13 @@ from threading import Event
 import numpy as np
 import pytest
 
-from app import project as projects
-from app.export import Job, MapOutput, run
-from app.maps import Displacement, read_map, write_map
-from app.pictures import Picture, read_picture, write_picture
+from app.media import project as projects
+from app.media.maps import Displacement, read_map, write_map
+from app.media.pictures import Picture, read_picture, write_picture
+from app.media.project import Project
+from app.model.recipe import Recipe
+from app.model.tools import TOOLS
 from app.progress import Progress
-from app.project import Project
-from app.recipe import Recipe
-from app.tools import TOOLS
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
 from app.ui.canvas import shown_pixels
@@ -31,6 +30,7 @@ from app.ui.files import fresh_recipe, load_any
 from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS, Speed
 from app.ui.saving import SaveDialog
+from app.work.export import Job, MapOutput, run
 from editing import Robot, command_line, pattern, small_project, write_foreign_map
 from solver.gl.device import Device
 

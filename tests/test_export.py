@@ -14,22 +14,22 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from app import ffmpeg
-from app.applying import Application, MapSource, converted, inverted
-from app.batch import Edits, Task
 from app.errors import Cancelled, UserError
-from app.export import Job, MapOutput, displacement, run
-from app.files import takes_place
 from app.gallery import sharpness, spline_warp
-from app.maps import Displacement, cropped, read_map, to_st, write_map
-from app.opening import open_source
-from app.pictures import Picture, read_picture, srgb_to_linear, write_picture
+from app.media import ffmpeg
+from app.media.files import takes_place
+from app.media.maps import Displacement, cropped, read_map, to_st, write_map
+from app.media.opening import open_source
+from app.media.pictures import Picture, read_picture, srgb_to_linear, write_picture
+from app.media.video import read_clip
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
 from app.progress import Progress
-from app.recipe import Recipe
-from app.replay import Replay
-from app.sampling import Pictures
-from app.threads import ahead, behind
-from app.video import read_clip
+from app.work.applying import Application, MapSource, converted, inverted
+from app.work.batch import Edits, Task
+from app.work.export import Job, MapOutput, displacement, run
+from app.work.replay import Replay
+from app.work.threads import ahead, behind
 from solver.gl.device import Device
 from solver.resample.sampler import Sampler
 
@@ -337,8 +337,8 @@ def test_a_large_still_says_how_far_it_is(
     device: Device, picture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """Band by band while it is looked up, and that it is being written; by a recipe and by a map."""
-    monkeypatch.setattr("app.export.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
-    monkeypatch.setattr("app.applying.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
+    monkeypatch.setattr("app.work.export.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
+    monkeypatch.setattr("app.work.applying.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
     maps = MapOutput(tmp_path / "m.exr", size=96)
     job = Job(Recipe.parse(WHIRL + "size = 1500"), read_picture(picture), tmp_path, tmp_path / "out.png", maps=maps)
     heard = Heard()
@@ -507,7 +507,7 @@ def test_a_map_that_tears_a_large_picture_is_told(device: Device, tmp_path: Path
     torn = np.zeros((HEIGHT, WIDTH, 2), np.float32)
     torn[::2], torn[1::2] = -0.4, 0.4
     np.save(tmp_path / "torn.npy", torn)
-    monkeypatch.setattr("app.export.Sampler", partial(Sampler, whole=2_000, tile=(48, 32)))
+    monkeypatch.setattr("app.work.export.Sampler", partial(Sampler, whole=2_000, tile=(48, 32)))
     job = Job(Recipe.parse(f'map = "torn.npy"\n{WHIRL}'), Picture(scene()), tmp_path, tmp_path / "x.png")
     with pytest.raises(UserError, match="The map cannot be applied: the map tears a patch"):
         run(device, job, Progress())

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.export import Job
-from app.export_process import ExportProcess
-from app.pictures import read_picture
-from app.recipe import Recipe
+from app.media.pictures import read_picture
+from app.model.recipe import Recipe
+from app.work.export import Job
+from app.work.export_process import ExportProcess
 
 PICTURE = Path(__file__).parent.parent / "assets" / "pictures" / "coffee.png"
 PATIENCE = 60.0  # seconds

@@ -12,10 +12,10 @@ from PIL import Image
 from pydantic import TypeAdapter, ValidationError
 
 from app.errors import UserError
-from app.forces import Force, build
-from app.pictures import Picture
-from app.sampling import Pictures
-from app.schema import frozen
+from app.media.pictures import Picture
+from app.model.forces import Force, build
+from app.model.sampling import Pictures
+from app.model.schema import frozen
 from solver.grid import Grid
 
 WIDE = Grid(96, 64)
@@ -173,7 +173,7 @@ def test_a_straight_curve_has_its_strength_on_it(
 
 
 def test_a_spline_passes_through_its_points_and_a_corner_has_no_seam(pictures: Pictures) -> None:
-    from app.forces import _along
+    from app.model.forces import _along
 
     corner = np.array([[0.2, 0.2], [0.5, 0.8], [0.8, 0.2]])
     at, tangents, lengths = _along(corner, True, 0.01)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.pictures import Picture
-from app.recipe import Recipe
-from app.replay import Replay
-from app.sampling import Pictures
-from app.strokes import Stroke
+from app.media.pictures import Picture
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
+from app.model.strokes import Stroke
+from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.resample.sampler import Sampler
 

@@ -11,9 +11,9 @@ from scipy import ndimage
 from app import gallery
 from app.errors import UserError
 from app.gallery import Studio, arrows, contact_sheet, load, shades, sharpness, spline_warp
-from app.pictures import read_picture
+from app.media.pictures import read_picture
+from app.model.sampling import Pictures
 from app.progress import Progress
-from app.sampling import Pictures
 from solver.gl.device import Device
 from solver.grid import Grid
 
@@ -57,7 +57,7 @@ def test_the_parts_of_a_sheet() -> None:
 
 @pytest.mark.parametrize("name", sorted({*gallery.RECIPES, *gallery.GUIDE}))
 def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str) -> None:
-    from app.forces import build
+    from app.model.forces import build
 
     recipe = load(name)
     assert recipe.picture is not None

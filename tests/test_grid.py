@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.export import displacement
-from app.pictures import Picture
-from app.recipe import Recipe
-from app.replay import Replay
-from app.sampling import Pictures
+from app.media.pictures import Picture
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
+from app.work.export import displacement
+from app.work.replay import Replay
 from solver.brush.brush import Brush
 from solver.brush.tip import Tip
 from solver.fluid import Fluid

@@ -12,15 +12,15 @@ import pytest
 import tifffile
 from PIL import Image
 
-from app.applying import Application, MapSource
-from app.export import Job, run
-from app.ffmpeg import executable
-from app.maps import Displacement, write_map
-from app.opening import open_source
-from app.pictures import Picture, read_picture, to_bits, write_picture
+from app.media.ffmpeg import executable
+from app.media.maps import Displacement, write_map
+from app.media.opening import open_source
+from app.media.pictures import Picture, read_picture, to_bits, write_picture
+from app.media.video import read_clip
+from app.model.recipe import FluidSettings, Output, Recipe
 from app.progress import Progress
-from app.recipe import FluidSettings, Output, Recipe
-from app.video import read_clip
+from app.work.applying import Application, MapSource
+from app.work.export import Job, run
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler

@@ -109,10 +109,10 @@ def test_the_command_line_is_quick_to_load():
 def test_rendering_loads_no_window():
     code = """
 import numpy as np
-from app.pictures import Picture
-from app.recipe import Recipe
-from app.replay import Replay
-from app.sampling import Pictures
+from app.media.pictures import Picture
+from app.model.recipe import Recipe
+from app.work.replay import Replay
+from app.model.sampling import Pictures
 from solver.gl.device import Device
 with Device.headless() as device:
     replay = Replay(device, Recipe.parse("[fluid]\\ngrid = 16"), Pictures(Picture(np.zeros((8, 8, 3), np.uint8))))

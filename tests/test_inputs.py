@@ -18,15 +18,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import inputs, toml
 from app.errors import MOST_SHOWN, UserError, shown
-from app.inputs import open_input, read_input
-from app.maps import holds, read_map
-from app.pictures import Picture, read_picture, write_picture
-from app.project import is_project, load
-from app.recipe import Recipe
+from app.media import inputs
+from app.media.inputs import open_input, read_input
+from app.media.maps import holds, read_map
+from app.media.pictures import Picture, read_picture, write_picture
+from app.media.project import is_project, load
+from app.media.video import read_clip
+from app.model import toml
+from app.model.recipe import Recipe
 from app.ui.preferences import Preferences
-from app.video import read_clip
 
 ROOT = Path(__file__).parent.parent
 MOST_MEMORY = 300 * 2**20  # bytes, beside what the program has before it opens a file
@@ -38,7 +39,7 @@ import json, resource, signal, sys
 from pathlib import Path
 import imagecodecs, tifffile, PIL.Image, OpenEXR
 from app.errors import UserError
-from app.opening import open_recipe
+from app.media.opening import open_recipe
 
 pages = int(Path("/proc/self/statm").read_text().split()[0])
 most = pages * resource.getpagesize() + {MOST_MEMORY}

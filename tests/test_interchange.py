@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from app import ffmpeg
-from app.export import Job, MapOutput, run
-from app.maps import read_map
-from app.opening import open_recipe
-from app.pictures import linear_to_srgb, read_exr, read_picture, srgb_to_linear
+from app.media import ffmpeg
+from app.media.maps import read_map
+from app.media.opening import open_recipe
+from app.media.pictures import linear_to_srgb, read_exr, read_picture, srgb_to_linear
 from app.progress import Progress
+from app.work.export import Job, MapOutput, run
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler

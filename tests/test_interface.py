@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.maps import Displacement, write_map
-from app.pictures import Picture, write_picture
-from app.presets import PUTTY, WATER
-from app.tools import TOOLS
+from app.media.maps import Displacement, write_map
+from app.media.pictures import Picture, write_picture
+from app.model.presets import PUTTY, WATER
+from app.model.tools import TOOLS
 from app.ui.clock import HOVERING
 from app.ui.events import LEFT, Button, Key, Mods, Move, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import pytest
 
-from app.history import Entry, History
-from app.journal import Damaged, Newer, Origin, Work, beginning, continuation, read
-from app.recipe import Recipe
-from app.strokes import Change, Stroke
+from app.model.history import Entry, History
+from app.model.recipe import Recipe
+from app.model.strokes import Change, Stroke
+from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuation, read
 
 ORIGIN = Origin("Käse 1", "/pictures", None, True, False, 12, 34)
 TOOLS = ("push", "twirl", "freeze", "curve")

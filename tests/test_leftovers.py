@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from app import leftovers
-from app.files import replacing, replacing_many, temporary_beside
-from app.leftovers import sweep, temporary_folder, temporary_name
+from app.media import leftovers
+from app.media.files import replacing, replacing_many, temporary_beside
+from app.media.leftovers import sweep, temporary_folder, temporary_name
 
 ROOT = Path(__file__).parent.parent
 
@@ -23,8 +23,8 @@ ROOT = Path(__file__).parent.parent
 HOLDING = """
 import sys, time
 from pathlib import Path
-from app.files import replacing, replacing_many
-from app.leftovers import temporary_folder
+from app.media.files import replacing, replacing_many
+from app.media.leftovers import temporary_folder
 with replacing("a.png") as one, replacing_many(".", "f.%04d.png") as many:
     kept = temporary_folder()
     one.write_bytes(b"half")

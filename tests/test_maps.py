@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import tifffile
 
-from app import files
 from app.errors import UserError
-from app.maps import (
+from app.media import files
+from app.media.maps import (
     Displacement,
     Grid,
     Kind,
@@ -29,7 +29,7 @@ from app.maps import (
     to_st,
     write_map,
 )
-from app.pictures import Picture, read_exr, write_picture
+from app.media.pictures import Picture, read_exr, write_picture
 
 SIZES = [(48, 64), (64, 48), (33, 33), (1, 7)]
 

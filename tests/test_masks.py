@@ -12,10 +12,10 @@ from PIL import Image
 from pydantic import TypeAdapter, ValidationError
 
 from app.errors import UserError
-from app.masks import FreezeLayer, ViscosityLayer, solid, viscosity
-from app.pictures import Picture
-from app.sampling import Pictures, Segment, Window, blurred, intensity, to_grid
-from app.schema import frozen
+from app.media.pictures import Picture
+from app.model.masks import FreezeLayer, ViscosityLayer, solid, viscosity
+from app.model.sampling import Pictures, Segment, Window, blurred, intensity, to_grid
+from app.model.schema import frozen
 from solver.grid import Grid
 
 GRID = Grid(64, 48)

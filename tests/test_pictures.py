@@ -15,10 +15,10 @@ import pytest
 import tifffile
 from PIL import Image, ImageCms, PngImagePlugin
 
-from app import files
 from app.errors import UserError
-from app.ffmpeg import executable
-from app.pictures import Picture, linear_to_srgb, read_exr, read_picture, srgb_to_linear, to_bits, write_picture
+from app.media import files
+from app.media.ffmpeg import executable
+from app.media.pictures import Picture, linear_to_srgb, read_exr, read_picture, srgb_to_linear, to_bits, write_picture
 
 MODES = {1: "grey", 2: "grey+alpha", 3: "RGB", 4: "RGBA"}
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import project as projects
 from app.errors import UserError
-from app.pictures import Picture, write_picture
-from app.project import Project
-from app.recipe import Recipe
-from app.strokes import Stroke
+from app.media import project as projects
+from app.media.pictures import Picture, write_picture
+from app.media.project import Project
+from app.model.recipe import Recipe
+from app.model.strokes import Stroke
 
 
 @pytest.fixture
@@ -168,7 +168,7 @@ def test_a_project_that_is_saved_is_whole_at_every_moment(made: Project, tmp_pat
     code = f"""
 import sys
 from pathlib import Path
-from app import project as projects
+from app.media import project as projects
 path, seen = Path({str(path)!r}), 0
 print("looking", flush=True)
 while seen < 60:

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from app.errors import UserError
-from app.opening import shipped_recipes
-from app.recipe import Density, FluidSettings, Output, Playback, Recipe
-from app.strokes import Change, Dab, Stroke
+from app.media.opening import shipped_recipes
+from app.model.recipe import Density, FluidSettings, Output, Playback, Recipe
+from app.model.strokes import Change, Dab, Stroke
 
 FULL = """
 version = 1

@@ -18,19 +18,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import locks, recovery
-from app import project as projects
-from app.document import Document
 from app.errors import UserError
-from app.history import History
-from app.locks import Lock
-from app.pictures import Picture, write_picture
-from app.project import Project
-from app.recipe import Recipe
-from app.recovery import Found, Journal, find
-from app.session import Session
-from app.strokes import Stroke
+from app.media import project as projects
+from app.media.pictures import Picture, write_picture
+from app.media.project import Project
+from app.model.document import Document
+from app.model.history import History
+from app.model.recipe import Recipe
+from app.model.strokes import Stroke
 from app.ui.recovering import Offer
+from app.work import locks, recovery
+from app.work.locks import Lock
+from app.work.recovery import Found, Journal, find
+from app.work.session import Session
 from editing import Robot, small_project
 from killing import Painter, digest_of, digest_of_warp
 from solver.gl.device import Device
@@ -332,7 +332,7 @@ def test_a_journal_belongs_to_one(desk: Desk, tmp_path: Path) -> None:
 def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
     path = tmp_path / "lock"
     code = (
-        "import sys, time; from pathlib import Path; from app.locks import Lock\n"
+        "import sys, time; from pathlib import Path; from app.work.locks import Lock\n"
         f"lock = Lock.take(Path({str(path)!r})); print(lock is not None, flush=True); time.sleep(600)"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=Path.cwd())

@@ -9,11 +9,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from app.pictures import Picture
-from app.recipe import Recipe
-from app.replay import Replay
-from app.sampling import Pictures
-from app.strokes import Stroke
+from app.media.pictures import Picture
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
+from app.model.strokes import Stroke
+from app.work.replay import Replay
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.pictures import Picture, read_picture, write_picture
+from app.media.pictures import Picture, read_picture, write_picture
 from editing import Robot, small_project
 from solver.gl.device import Device
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import project as projects
-from app.export import Job, run
-from app.pictures import read_picture
-from app.presets import FEELS, HONEY, PUTTY, WATER, Feel
+from app.media import project as projects
+from app.media.pictures import read_picture
+from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
+from app.model.strokes import Stroke
+from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
-from app.session import REST, Session
-from app.strokes import Stroke
-from app.tools import TOOL, TOOLS, BrushSettings, Press
+from app.work.export import Job, run
+from app.work.session import REST, Session
 from editing import small_project
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
@@ -438,8 +438,8 @@ def test_what_waits_is_finished_though_nothing_more_is_recorded(session: Session
 def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     session: Session, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    monkeypatch.setattr("app.session.QUICK", 0.0)  # a machine on which every tick takes a frame
-    monkeypatch.setattr("app.session.PATIENCE", 0.0)
+    monkeypatch.setattr("app.work.session.QUICK", 0.0)  # a machine on which every tick takes a frame
+    monkeypatch.setattr("app.work.session.PATIENCE", 0.0)
     dice = random.Random(seed)
 
     def gesture() -> None:

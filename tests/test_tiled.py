@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.checkpoints import Checkpoint, Checkpoints, Moment
-from app.recipe import Recipe
+from app.model.recipe import Recipe
+from app.work.checkpoints import Checkpoint, Checkpoints, Moment
 from solver.gl.device import Device
 from solver.gl.tiled import TiledField
 from solver.scheme import State

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from app.schema import frozen
-from app.timelaws import FUNCTIONS, Formula, FormulaError, Timed
+from app.model.schema import frozen
+from app.model.timelaws import FUNCTIONS, Formula, FormulaError, Timed
 
 
 def timed(**keys: Any) -> Timed:

@@ -8,8 +8,8 @@ from itertools import pairwise
 import pytest
 
 from app.errors import UserError
-from app.recipe import Playback, Recipe, Stop, Watch
-from app.timeline import Observation, Sentinel, Timeline, frame_positions
+from app.model.recipe import Playback, Recipe, Stop, Watch
+from app.model.timeline import Observation, Sentinel, Timeline, frame_positions
 
 TEN = Timeline(10, 0.1)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.strokes import Stroke
-from app.tools import FASTEST, LINE_SPEED, TOOL, BrushSettings, Press, Touch, path_length
+from app.model.strokes import Stroke
+from app.model.tools import FASTEST, LINE_SPEED, TOOL, BrushSettings, Press, Touch, path_length
 
 EXTENT = (1.0, 0.75)
 DT = 1 / 30

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import project as projects
-from app.pictures import read_picture, write_picture
-from app.recipe import Recipe
-from app.recovery import find
+from app.media import project as projects
+from app.media.pictures import read_picture, write_picture
+from app.model.recipe import Recipe
+from app.work.recovery import find
 from editing import pattern, small_project, write_foreign_map
 
 NEEDED = ("Xvfb", "xdotool")

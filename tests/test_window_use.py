@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import project as projects
-from app.pictures import write_picture
+from app.media import project as projects
+from app.media.pictures import write_picture
 from editing import pattern
 from test_window import Desk, pytestmark  # noqa: F401
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.pictures import Picture
-from app.presets import HONEY, PUTTY, WATER, Feel
-from app.recipe import FluidSettings, Recipe
-from app.replay import Replay
-from app.sampling import Pictures
-from app.strokes import Dab, Stroke
-from app.tools import path_length
-from app.windows import CELLS, Window, detail_for
+from app.media.pictures import Picture
+from app.model.presets import HONEY, PUTTY, WATER, Feel
+from app.model.recipe import FluidSettings, Recipe
+from app.model.sampling import Pictures
+from app.model.strokes import Dab, Stroke
+from app.model.tools import path_length
+from app.model.windows import CELLS, Window, detail_for
+from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.grid import Grid
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from app.tools import TOOLS
+from app.model.tools import TOOLS
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor

@@ -6,11 +6,11 @@ import moderngl
 import numpy as np
 from PIL import Image
 
-from app.pictures import Picture, to_bits
-from app.session import Session
+from app.media.pictures import Picture, to_bits
 from app.ui.state import State
 from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport
+from app.work.session import Session
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldPool
 from solver.grid import Grid

@@ -15,11 +15,9 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import internal
 
 from app.errors import UserError
-from app.presets import Feel
-from app.project import Project
-from app.recovery import Found
-from app.session import Session
-from app.tools import TOOLS
+from app.media.project import Project
+from app.model.presets import Feel
+from app.model.tools import TOOLS
 from app.ui import panels, theme
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.canvas import Canvas
@@ -40,6 +38,8 @@ from app.ui.recovering import Recovery
 from app.ui.state import LARGEST, SMALLEST, State
 from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
+from app.work.recovery import Found
+from app.work.session import Session
 from solver.gl.device import Device
 
 # Bytes of pixels of the pictures that were open before, to which Undo comes back.

@@ -13,11 +13,8 @@ import moderngl
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.export import Job, MapOutput
-from app.export_process import ExportProcess
-from app.leftovers import temporary_folder
-from app.pictures import read_picture
-from app.session import Session
+from app.media.leftovers import temporary_folder
+from app.media.pictures import read_picture
 from app.ui.canvas import shown_pixels
 from app.ui.dialogs import Dialog, beside
 from app.ui.messages import Messages
@@ -25,6 +22,9 @@ from app.ui.theme import packed
 from app.ui.units import SECONDS, Unit
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
+from app.work.export import Job, MapOutput
+from app.work.export_process import ExportProcess
+from app.work.session import Session
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor

@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from app import project as projects
 from app.errors import UserError
-from app.maps import MAP_ENDINGS, holds
-from app.opening import PICTURE_ENDINGS, check_picture
-from app.project import SUFFIX, Project
-from app.recipe import FluidSettings, Recipe
-from app.recovery import Found
+from app.media import project as projects
+from app.media.maps import MAP_ENDINGS, holds
+from app.media.opening import PICTURE_ENDINGS, check_picture
+from app.media.project import SUFFIX, Project
+from app.model.recipe import FluidSettings, Recipe
 from app.ui.browser import Browser
 from app.ui.dialogs import PictureOrMap
 from app.ui.loading import Loading
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
+from app.work.recovery import Found
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
@@ -345,7 +345,7 @@ def settings_of(fluid: FluidSettings) -> dict[str, Any]:
 
 def fresh_recipe(settings: dict[str, Any] | None = None) -> Recipe:
     """What a picture that is newly opened starts with: the default, and what of the fluid the person has set."""
-    from app.presets import DEFAULT
+    from app.model.presets import DEFAULT
 
     fluid = FluidSettings(dt=1 / 30, viscosity=DEFAULT.viscosity, drag=DEFAULT.drag)
     fluid = fluid.model_copy(update=settings or {})

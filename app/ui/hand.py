@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import exp
 from typing import TYPE_CHECKING
 
-from app.tools import Press
+from app.model.tools import Press
 from app.ui.events import LEFT, MIDDLE, RIGHT, Button, Event, Key, Mods, Move, Wheel
 from app.ui.state import LARGEST, SMALLEST
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import UserError
-from app.project import Project
-from app.recipe import Recipe
-from app.recovery import Found
+from app.media.project import Project
+from app.model.recipe import Recipe
 from app.ui.canvas import shown_pixels
+from app.work.recovery import Found
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from app.session import Session
+from app.work.session import Session
 from solver.warp.distortion import MapStatistics
 
 EVERY = 0.5  # seconds

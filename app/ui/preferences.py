@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import UserError
-from app.inputs import read_input
+from app.media.inputs import read_input
 
 MOST_RECENT = 10
 MOST_BYTES = 2**20  # of the file

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from statistics import median_low
 from typing import TYPE_CHECKING
 
-from app.replay import Replay
-from app.strokes import Stroke
+from app.model.strokes import Stroke
 from app.ui.files import fresh_recipe, settings_of
+from app.work.replay import Replay
 
 if TYPE_CHECKING:
-    from app.recovery import Found
-    from app.session import Session
     from app.ui.editor import Editor
+    from app.work.recovery import Found
+    from app.work.session import Session
 
 GRIDS = (96, 128, 160, 192, 256, 384)
 PATIENCE = 1.5  # seconds below the wanted rate, or with time to spare, before something is done about it

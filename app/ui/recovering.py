@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app import recovery
-from app.recovery import Found, Journal
-from app.session import Session
 from app.ui.dialogs import Dialog
 from app.ui.widgets import Ui
+from app.work import recovery
+from app.work.recovery import Found, Journal
+from app.work.session import Session
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor

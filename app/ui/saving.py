@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.project import SUFFIX
+from app.media.project import SUFFIX
 from app.ui.dialogs import Dialog
 from app.ui.widgets import Ui
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.pictures import Picture, write_picture
+from app.media.pictures import Picture, write_picture
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move
 from app.ui.files import load_any

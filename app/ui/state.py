@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from app.tools import TOOL, BrushSettings, Tool
+from app.model.tools import TOOL, BrushSettings, Tool
 
 SMALLEST, LARGEST = 0.005, 0.5  # of a brush's radius, in longer sides
 

@@ -12,11 +12,11 @@ import glfw
 import moderngl
 
 from app.errors import UserError
-from app.recovery import default_folder
 from app.ui.editor import Editor
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
 from app.ui.files import load_any
 from app.ui.preferences import Preferences
+from app.work.recovery import default_folder
 from solver.gl.device import Device
 
 TITLE = "fluidwarp"

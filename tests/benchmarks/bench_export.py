@@ -26,12 +26,12 @@ from unittest.mock import patch
 
 import numpy as np
 
-from app.animation import animation_writer
-from app.export import Job, run
-from app.opening import open_recipe
-from app.pictures import Picture, read_picture
+from app.media.animation import animation_writer
+from app.media.opening import open_recipe
+from app.media.pictures import Picture, read_picture
+from app.model.recipe import Output, Recipe
 from app.progress import Progress
-from app.recipe import Output, Recipe
+from app.work.export import Job, run
 from solver.gl.device import Device
 
 ROUNDS = 3
@@ -98,7 +98,7 @@ def nowhere(*_: object, **__: object) -> Iterator[Callable[[np.ndarray], None]]:
 
 def render(device: Device, job: Job) -> None:
     """The export without its writer."""
-    with patch("app.export.animation_writer", nowhere):
+    with patch("app.work.export.animation_writer", nowhere):
         run(device, job, Progress())
 
 

@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.export import Job, run
-from app.pictures import Picture
+from app.media.pictures import Picture
+from app.model.recipe import FluidSettings, Output, Recipe
 from app.progress import Progress
-from app.recipe import FluidSettings, Output, Recipe
+from app.work.export import Job, run
 from solver.gl.device import Device
 
 MIB = 2**20

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.presets import FEELS
-from app.tools import BrushSettings
+from app.model.presets import FEELS
+from app.model.tools import BrushSettings
 from app.ui.actions import ACTIONS
 from app.ui.state import LARGEST, SMALLEST
 from app.ui.units import PERCENT, Unit

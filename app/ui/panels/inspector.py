@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.presets import DEFAULT, FEELS
-from app.session import Session
+from app.model.presets import DEFAULT, FEELS
 from app.ui.theme import packed
 from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS
 from app.ui.widgets import Slid, Ui
+from app.work.session import Session
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor

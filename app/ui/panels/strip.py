@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.tools import TOOLS
+from app.model.tools import TOOLS
 from app.ui.layout import BETWEEN, GROUP, TOOL
 from app.ui.widgets import Ui
 

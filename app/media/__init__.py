@@ -1,0 +1,1 @@
+"""Files: pictures, maps, clips, animations and projects, read and written."""

@@ -1,0 +1,407 @@
+"""Warp maps out and in: ST maps, pixel offsets, Middlebury .flo and NumPy .npy."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.animation import sequence_writer
+from app.media.files import replacing
+from app.media.inputs import open_input, read_start
+from app.media.pictures import MAX_PIXELS, check_size, exr_channels, read_exr, read_picture, write_exr
+from app.progress import never
+
+Kind = Literal["st", "offsets"]
+"""What an EXR or TIFF holds: absolute places in 0-1 from the bottom left, or pixels from here to there, y up."""
+
+Holds = Literal["map", "picture", "either"]
+
+Grid = Literal["centres", "corners", "pixels"]
+"""The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
+
+FLO_MAGIC = np.float32(202021.25)
+MAP_ENDINGS = (".exr", ".tif", ".tiff", ".flo", ".npy")
+
+# Names of the channels of an EXR that hold a map, whatever layer they are in.
+PAIRS = (("R", "G"), ("U", "V"), ("u", "v"), ("X", "Y"))
+
+HEAD = 65_536  # bytes at the start of a file in which an EXR or TIFF map says what it is
+
+CONVENTIONS = {
+    "st": "ST map: R = u, G = v of the place looked up, 0-1, origin bottom left, pixel centres at (x + .5) / width",
+    "offsets": "R = x, G = y offset in pixels to the place looked up, x to the right, y up",
+}
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """Where each pixel is looked up: at its own centre plus `values`.
+
+    values: (height + 2 overscan, width + 2 overscan, 2), x right and y down, in longer sides of width x height;
+    float32, or float64 when read from a file, so that conversions lose nothing.
+    overscan: pixels beyond each side of the picture.
+    forward: the other way, from places of the original to places of the result.
+    """
+
+    values: np.ndarray
+    overscan: int = 0
+    forward: bool = False
+
+    @property
+    def width(self) -> int:
+        return self.values.shape[1] - 2 * self.overscan
+
+    @property
+    def height(self) -> int:
+        return self.values.shape[0] - 2 * self.overscan
+
+    @property
+    def longest(self) -> int:
+        return max(self.width, self.height)
+
+    def fitted(self, width: int, height: int) -> Displacement:
+        """The map for a picture of width x height, its values in the longer sides of that.
+
+        Sizes may differ, proportions by no more than their rounding: raises `UserError` otherwise.
+        """
+        off = abs(height * self.width / width - self.height), abs(width * self.height / height - self.width)
+        if min(off) >= 1:
+            raise UserError(
+                f"The map is {self.width} x {self.height} and the picture {width} x {height}: "
+                "they must have the same proportions; crop the picture or make the map anew."
+            )
+        longest = max(width, height)
+        scale = self.longest / self.width * width / longest, self.longest / self.height * height / longest
+        if scale == (1, 1):
+            return self
+        values = (self.values * np.array(scale)).astype(self.values.dtype)
+        return Displacement(values, self.overscan, self.forward)
+
+
+def check_map(path: str | os.PathLike[str]) -> None:
+    """Raise `UserError` if `path` has no ending of a map."""
+    if Path(path).suffix.lower() not in MAP_ENDINGS:
+        raise UserError(f"{path}: a map's name must end in one of {' '.join(MAP_ENDINGS)}.")
+
+
+def holds(path: str | os.PathLike[str]) -> Holds:
+    """What a file holds, by its ending and its header: "either" where three channels of floats say nothing about it.
+
+    A file that cannot be read is taken for a picture, or whatever else it turns out to be when it is opened.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in (".exr", ".tif", ".tiff"):
+        return "map" if suffix in MAP_ENDINGS else "picture"
+    try:
+        with open_input(path) as stream:
+            head = stream.read(HEAD)
+        if any(convention.encode() in head for convention in CONVENTIONS.values()):
+            return "map"
+        return _exr_holds(path) if suffix == ".exr" else _tiff_holds(path)
+    except Exception:  # the decoders raise anything
+        return "picture"
+
+
+def _exr_holds(file: Path) -> Holds:
+    names = [name.rpartition(".")[2] for name in exr_channels(file)]
+    if len(names) == 2 and any(set(pair) == set(names) for pair in PAIRS):
+        return "map"
+    return "either" if sorted(names) == ["B", "G", "R"] else "picture"
+
+
+def _tiff_holds(file: Path) -> Holds:
+    import tifffile
+
+    with tifffile.TiffFile(file) as tiff:
+        page = tiff.pages.first
+        if page.dtype is None or page.dtype.kind != "f":
+            return "picture"
+        alpha = any(extra in (1, 2) for extra in page.extrasamples)
+        if page.samplesperpixel == 2 and not alpha:
+            return "map"
+        return "either" if page.samplesperpixel == 3 else "picture"
+
+
+# Conversions --------------------------------------------------------------------------------------------------------
+
+
+def _centres(count: int, overscan: int) -> np.ndarray:
+    return np.arange(-overscan, count + overscan) + 0.5
+
+
+def to_st(displacement: Displacement) -> np.ndarray:
+    """Absolute places (h, w, 2) float32, 0-1 over the picture, y up, pixel centres at (x + .5) / width."""
+    map_, out = displacement, np.empty(displacement.values.shape, np.float32)
+    x, y = _centres(map_.width, map_.overscan), _centres(map_.height, map_.overscan)
+    for rows in _strips(out):
+        # float64 and rounded far below float32, so that a place of exactly 0 comes out of a round trip as 0
+        u = (x + map_.longest * map_.values[rows, :, 0].astype(np.float64)) / map_.width
+        v = 1 - (y[rows, None] + map_.longest * map_.values[rows, :, 1].astype(np.float64)) / map_.height
+        out[rows, :, 0], out[rows, :, 1] = np.round(u, 13), np.round(v, 13)
+    return out
+
+
+def from_st(st: np.ndarray, grid: Grid = "centres", overscan: int = 0) -> Displacement:
+    """The displacement (float64) of absolute places (h, w, 2), y up, on any of the three grids."""
+    width, height = st.shape[1] - 2 * overscan, st.shape[0] - 2 * overscan
+    values = np.empty(st.shape, np.float64)
+    # one step of the stored value in pixels, and the place of its zero
+    step_x, step_y = (max(1, width - 1), max(1, height - 1)) if grid == "corners" else (width, height)
+    zero = 0.0 if grid == "centres" else 0.5
+    x, y = _centres(width, overscan), _centres(height, overscan)
+    longest = max(width, height)
+    for rows in _strips(values):
+        values[rows, :, 0] = (st[rows, :, 0] * np.float64(step_x) + zero - x) / longest
+        values[rows, :, 1] = (height - zero - st[rows, :, 1] * np.float64(step_y) - y[rows, None]) / longest
+    return Displacement(values, overscan)
+
+
+def to_offsets(displacement: Displacement, *, up: bool) -> np.ndarray:
+    """Offsets in pixels of the map's own size, (h, w, 2) float32; y up or down."""
+    pixels = np.array([displacement.longest, -displacement.longest if up else displacement.longest], np.float64)
+    return (displacement.values * pixels).astype(np.float32)
+
+
+def from_offsets(offsets: np.ndarray, *, up: bool, overscan: int = 0) -> Displacement:
+    """The displacement (float64) of offsets in pixels, (h, w, 2); y up or down."""
+    longest = max(offsets.shape[0], offsets.shape[1]) - 2 * overscan
+    return Displacement(offsets / np.array([longest, -longest if up else longest], np.float64), overscan)
+
+
+def folds(values: np.ndarray) -> int:
+    """In how many pixels a map, its values (h, w, 2) in longer sides, turns the picture over: det J <= 0."""
+    height, width = values.shape[:2]
+    longest, count = max(width, height), 0
+    if min(width, height) < 2:
+        return 0
+    for rows in _strips(values):
+        # central differences, which want a row more on each side
+        low, high = max(0, rows.start - 1), min(height, rows.stop + 1)
+        down, along = np.gradient(values[low:high] * longest, axis=(0, 1))
+        inner = slice(rows.start - low, min(height, rows.stop) - low)
+        down, along = down[inner], along[inner]
+        count += int(((1 + along[..., 0]) * (1 + down[..., 1]) <= along[..., 1] * down[..., 0]).sum())
+    return count
+
+
+def _strips(array: np.ndarray) -> Iterator[slice]:
+    rows = max(1, 500_000 // max(1, array[0].size))
+    for top in range(0, len(array), rows):
+        yield slice(top, top + rows)
+
+
+# Files --------------------------------------------------------------------------------------------------------------
+
+
+def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Kind = "st") -> None:
+    """Write a map, whole or not at all: .exr and .tif hold `kind` in 32 bits, with the convention in the metadata.
+
+    .flo holds offsets in pixels, y down; .npy the displacement itself, (h, w, 2) float32. Neither tells its overscan,
+    so they are cut to the picture. Raises `UserError`.
+    """
+    check_map(path)
+    suffix = Path(path).suffix.lower()
+    with replacing(path) as temporary:
+        if suffix in (".flo", ".npy"):
+            displacement = cropped(displacement)
+            with temporary.open("wb") as stream:
+                if suffix == ".npy":
+                    values = np.ascontiguousarray(displacement.values, np.float32)
+                    # not np.save, which on a full disk loses the reason
+                    np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(values))
+                    stream.write(values.data)
+                else:
+                    stream.write(FLO_MAGIC.tobytes())
+                    stream.write(np.array([displacement.width, displacement.height], np.int32).tobytes())
+                    stream.write(to_offsets(displacement, up=False).data)
+            return
+        values = to_st(displacement) if kind == "st" else to_offsets(displacement, up=True)
+        told = {
+            "map": kind,
+            "grid": "centres",
+            "direction": "forward" if displacement.forward else "inverse",
+            "overscan": str(displacement.overscan),
+        }
+        if suffix == ".exr":
+            attributes = {f"fluidwarp/{key}": value for key, value in told.items()}
+            attributes["comments"] = CONVENTIONS[kind]
+            channels = {"R": values[..., 0], "G": values[..., 1], "B": _third(values)}
+            write_exr(temporary, channels, attributes, displacement.overscan)
+        else:
+            _write_tiff(temporary, values, {"fluidwarp": told, "convention": CONVENTIONS[kind]})
+
+
+def cropped(displacement: Displacement) -> Displacement:
+    """The map without its overscan."""
+    edge = displacement.overscan
+    values = displacement.values[edge:-edge, edge:-edge] if edge else displacement.values
+    return Displacement(values, 0, displacement.forward)
+
+
+def _third(values: np.ndarray) -> np.ndarray:
+    """Ones: Blender's Map UV takes the third channel for the alpha of the result, others ignore it."""
+    return np.ones(values.shape[:2], np.float32)
+
+
+def _write_tiff(temporary: Path, values: np.ndarray, told: dict[str, Any]) -> None:
+    import tifffile
+
+    tifffile.imwrite(
+        temporary,
+        np.dstack([values, _third(values)]),
+        photometric="rgb",
+        compression="zlib",
+        predictor=True,
+        description=json.dumps(told),
+        metadata=None,
+        software=False,
+    )
+
+
+def map_writer(
+    path: str | os.PathLike[str], kind: Kind = "st", *, first: int = 0, cancel: Callable[[], bool] = never
+) -> AbstractContextManager[Callable[[Displacement], None]]:
+    """A context that yields a function appending a map to the sequence `name.%04d.exr`; see `animation_writer`."""
+    check_map(path)
+    return sequence_writer(path, lambda file, displacement: write_map(file, displacement, kind), first, cancel)
+
+
+def read_map(
+    path: str | os.PathLike[str],
+    *,
+    kind: Kind | None = None,
+    grid: Grid | None = None,
+    overscan: int | None = None,
+    max_pixels: int = MAX_PIXELS,
+) -> Displacement:
+    """Read a map, also one made elsewhere.
+
+    kind, grid, overscan: what an EXR or TIFF holds; None believes its metadata, and takes it for an ST map on pixel
+    centres when there is none. Raises `UserError` for what is no map, damaged, or holds NaN.
+    """
+    check_map(path)
+    suffix = Path(path).suffix.lower()
+    if suffix in (".flo", ".npy"):
+        offsets = _read_flo(Path(path), max_pixels) if suffix == ".flo" else _read_npy(Path(path), max_pixels)
+        _check_finite(path, offsets)
+        if suffix == ".npy":
+            return Displacement(offsets)
+        return from_offsets(offsets, up=False)
+    values, told, edge = _read_exr(Path(path), max_pixels) if suffix == ".exr" else _read_tiff(Path(path), max_pixels)
+    _check_finite(path, values)
+    edge = edge if overscan is None else overscan
+    if edge < 0 or 2 * edge >= min(values.shape[:2]):
+        height, width = values.shape[:2]
+        named = f"an overscan of {edge}" if overscan is None else f"--overscan {edge}"
+        raise UserError(f"Cannot read {path}: {named} leaves nothing of its {width} x {height} pixels.")
+    if (kind or told.get("map", "st")) == "offsets":
+        read = from_offsets(values, up=True, overscan=edge)
+    else:
+        named = grid or told.get("grid", "centres")
+        read = from_st(values, named if named in ("corners", "pixels") else "centres", edge)
+    return Displacement(read.values, edge, forward=told.get("direction") == "forward")
+
+
+def _check_finite(path: str | os.PathLike[str], values: np.ndarray) -> None:
+    bad = ~np.isfinite(values).all(axis=2)
+    if bad.any():
+        row, column = np.argwhere(bad)[0]
+        raise UserError(
+            f"Cannot use {path}: {int(bad.sum())} of its pixels are NaN or infinite, "
+            f"the first at x {column}, y {row}; fill them where the map was made."
+        )
+
+
+def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
+    head = read_start(file, "map", 12)
+    with open_input(file, "map") as stream:
+        stream.seek(len(head))
+        width, height = (int(side) for side in np.frombuffer(head[4:12].ljust(8, b"\0"), "<i4"))
+        if len(head) < 12 or np.frombuffer(head[:4], "<f4")[0] != FLO_MAGIC or min(width, height) < 1:
+            raise UserError(f"Cannot read {file}: it is no Middlebury .flo file.")
+        check_size(file, width, height, max_pixels)
+        if os.fstat(stream.fileno()).st_size != 12 + width * height * 8:
+            raise UserError(
+                f"Cannot read {file}: {width} x {height} offsets need another length of file; get it again."
+            )
+        return _in_memory(file, lambda: np.fromfile(stream, "<f4", 2 * width * height)).reshape(height, width, 2)
+
+
+def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
+    with open_input(file, "map") as stream:
+        try:
+            headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+            shape, _, kind = headers[np.lib.format.read_magic(stream)](stream)
+            if any(isinstance(side, bool) for side in shape):  # Python's whole numbers, but not NumPy's
+                raise ValueError(f"its shape is {shape}")
+        except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+            raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error
+        if len(shape) != 3 or shape[2] != 2 or kind.kind != "f":
+            raise UserError(
+                f"Cannot read {file}: a map is a float array (height, width, 2), this one is {kind} {shape}."
+            )
+        if min(shape) < 1:
+            raise UserError(f"Cannot read {file}: the array {shape} is empty.")
+        check_size(file, shape[1], shape[0], max_pixels)
+        if os.fstat(stream.fileno()).st_size < stream.tell() + math.prod(shape) * kind.itemsize:
+            raise UserError(f"Cannot read {file}: it is truncated; get it again.")
+        stream.seek(0)
+        return _in_memory(file, lambda: np.load(stream, allow_pickle=False))
+
+
+def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:
+    try:
+        return read()
+    except MemoryError:
+        raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
+    except OSError as error:
+        raise UserError(f"Cannot read {file}: {error.strerror or error}.") from None
+
+
+def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
+    channels, header = read_exr(file, max_pixels)
+    for x, y in PAIRS:
+        found = {key.rpartition(".")[2]: plane for key, plane in reversed(channels.items())}
+        if x in found and y in found:
+            values = np.stack([found[x], found[y]], axis=-1)
+            break
+    else:
+        raise UserError(f"Cannot read {file}: its channels {' '.join(channels)} are no map; it needs R and G.")
+    told = {key.removeprefix("fluidwarp/"): value for key, value in header.items() if key.startswith("fluidwarp/")}
+    (left, top), (right, bottom) = header["dataWindow"]
+    (first_x, first_y), (last_x, last_y) = header["displayWindow"]
+    edges = [int(edge) for edge in (first_x - left, first_y - top, right - last_x, bottom - last_y)]
+    edge = min(edges)
+    if edge < 0:
+        raise UserError(f"Cannot read {file}: its data window does not cover the picture; write all of it.")
+    # as much overscan as all four sides have
+    rows = slice(edges[1] - edge, values.shape[0] - (edges[3] - edge))
+    return values[rows, edges[0] - edge : values.shape[1] - (edges[2] - edge)], told, edge
+
+
+def _read_tiff(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
+    import tifffile
+
+    pixels = read_picture(file, max_pixels).pixels
+    if pixels.shape[2] < 2 or pixels.dtype == np.uint8:
+        raise UserError(f"Cannot read {file}: a map needs two channels of 16 or 32 bits; write it as 32-bit float.")
+    values = pixels[..., :2] if pixels.dtype == np.float32 else pixels[..., :2] / np.float64(65535)
+    told: dict[str, str] = {}
+    with tifffile.TiffFile(file) as tiff:
+        try:
+            told = json.loads(tiff.pages.first.description)["fluidwarp"]
+            edge = int(told["overscan"])
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):  # made elsewhere
+            edge = 0
+    return values, told, edge

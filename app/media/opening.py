@@ -1,0 +1,124 @@
+"""Finding what a name on the command line, or a dropped file, stands for."""
+
+from __future__ import annotations
+
+import os
+from contextlib import closing
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from app.errors import UserError
+from app.media.pictures import FORMATS, MAX_PIXELS, OTHERS, Picture, read_picture
+from app.media.project import Project, is_project, load
+from app.media.video import Clip, read_clip
+from app.model.recipe import Recipe
+from solver.grid import MOST_ALONG, SMALLEST_GRID
+
+SMALLEST_SIDE = 8  # pixels
+PICTURE_ENDINGS = (*FORMATS, ".gif", ".bmp", *OTHERS)
+CLIP_ENDINGS = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".ogv", ".wmv")
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is warped: a picture, or a clip and its first frame."""
+
+    picture: Picture
+    clip: Clip | None = None
+
+
+def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
+    """The picture or, by its ending, the clip in a file.
+
+    Raises:
+        UserError: if it cannot be read.
+    """
+    if path.suffix.lower() not in CLIP_ENDINGS:
+        return Source(read_picture(path, max_pixels))
+    clip = read_clip(path, max_pixels)
+    with closing(clip.read_frames()) as frames:
+        first = next(frames, None)
+    if first is None:
+        raise UserError(f"Cannot read {path}: it has no frame that can be decoded; get it again.")
+    return Source(Picture(first, note=clip.note), clip)
+
+
+def check_picture(picture: Picture, name: str = "the picture") -> None:
+    """Make sure that a picture can be covered by cells that are about square; `name`: what it is called.
+
+    Raises:
+        UserError: if it is too small or too narrow for any grid.
+    """
+    shorter, longer = sorted((picture.width, picture.height))
+    size = f"{name} is {picture.width} x {picture.height} pixels"
+    if shorter < SMALLEST_SIDE:
+        raise UserError(f"{size}; a side must have at least {SMALLEST_SIDE}, so enlarge or crop it")
+    if SMALLEST_GRID * longer > MOST_ALONG * shorter:
+        raise UserError(f"{size}, too narrow for any grid; crop it")
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A recipe that was found, and the folder that the names in it start from; `project` where it came from one."""
+
+    recipe: Recipe
+    folder: Path
+    label: str
+    project: Project | None = None
+
+    def source_file(self, other: Path | None = None) -> Path | None:
+        """The file of the picture or clip `other`, or else of the recipe's own; None if that is part of a project.
+
+        Raises:
+            UserError: if the recipe names none.
+        """
+        if other is not None:
+            return other
+        if self.project is not None:
+            return None
+        if self.recipe.picture is None:
+            raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
+        return self.folder / self.recipe.picture
+
+    def source(self, other: Path | None = None, max_pixels: int = MAX_PIXELS) -> Source:
+        """The picture or clip `other`, or else the recipe's own.
+
+        Raises:
+            UserError: if there is none, or it cannot be read.
+        """
+        file = self.source_file(other)
+        if file is not None:
+            return open_source(file, max_pixels)
+        assert self.project is not None
+        return Source(self.project.picture)
+
+
+def shipped_recipes() -> dict[str, Path]:
+    """The recipes that come with fluidwarp, by name."""
+    folder = Path(str(resources.files("assets"))) / "recipes"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def open_recipe(name: str, max_pixels: int = MAX_PIXELS) -> Opened:
+    """The recipe in a file or a project, or the one of this name that comes with fluidwarp.
+
+    max_pixels: of the picture in a project.
+
+    Raises:
+        UserError: if there is none, naming those that there are.
+    """
+    path = Path(name)
+    if path.suffix.lower() in (*PICTURE_ENDINGS, *CLIP_ENDINGS):
+        kind, out = ("clip", "out.mp4") if path.suffix.lower() in CLIP_ENDINGS else ("picture", "out.png")
+        example = next(iter(shipped_recipes()), "RECIPE")
+        raise UserError(f"{name} is a {kind} and not a recipe; try: fluidwarp render {example} {name} -o {out}")
+    if not os.path.exists(path) and path.suffix == "":
+        known = shipped_recipes()
+        if name not in known:
+            raise UserError(f"{name} does not exist; recipes that come with fluidwarp: {', '.join(known) or 'none'}")
+        path = known[name]
+    if is_project(path):
+        project = load(path, max_pixels)
+        return Opened(project.recipe, project.folder, str(path), project)
+    return Opened(Recipe.load(path), path.parent, str(path))

@@ -1,0 +1,243 @@
+"""Projects: one file that holds a recipe and its pictures, so that the work opens again anywhere."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import zipfile
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.errors import UserError, shown
+from app.media.files import replacing
+from app.media.inputs import MOST_TEXT, Archive, open_input, read_input
+from app.media.leftovers import temporary_folder
+from app.media.pictures import MAX_PIXELS, Picture, read_picture
+from app.model.recipe import Recipe
+from app.model.schema import plain
+
+SUFFIX = ".fluidwarp"
+RECIPE = "recipe.toml"
+FORMAT = "format.txt"
+VERSION = 1
+MOST_BYTES = 4 * 2**30
+
+
+@dataclass(frozen=True)
+class Project:
+    """A recipe with its pictures at hand.
+
+    Attributes:
+        recipe: its names of pictures start from `folder`.
+        picture: the one that is warped.
+        data: the bytes of the file it was read from, so that it can be saved when that file is gone.
+        folder: where the recipe's names start from; a temporary one for a project that holds its pictures.
+        path: the project's own file, if it has one.
+        embedded: pictures are kept in the project and not referred to.
+        keeper: removes the temporary folder when the last copy of this project is gone.
+    """
+
+    recipe: Recipe
+    picture: Picture = field(repr=False)
+    data: bytes = field(repr=False)
+    folder: Path
+    path: Path | None = None
+    embedded: bool = True
+    keeper: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False)
+
+    @property
+    def name(self) -> str:
+        """What the person calls it."""
+        return self.path.stem if self.path else PurePosixPath(self.recipe.picture or "untitled").stem
+
+
+def is_project(path: str | os.PathLike[str]) -> bool:
+    """True if the file's name, or else what it begins with, says that it is a project."""
+    if Path(path).suffix.lower() == SUFFIX:
+        return True
+    try:
+        with open_input(path) as stream:
+            return stream.read(4) == b"PK\3\4"
+    except (OSError, UserError):
+        return False
+
+
+def from_picture(path: str | os.PathLike[str], recipe: Recipe | None = None) -> Project:
+    """A new project for a picture, or for another picture than the recipe was made on.
+
+    Raises:
+        UserError: if it cannot be read.
+    """
+    path = Path(path)
+    picture = read_picture(path)
+    return Project((recipe or Recipe()).edited(picture=path.name), picture, picture_bytes(path), path.parent)
+
+
+def from_recipe(path: str | os.PathLike[str]) -> Project:
+    """A new project from a recipe's TOML file and the picture it names.
+
+    Raises:
+        UserError: if one of them cannot be read.
+    """
+    path = Path(path)
+    recipe = Recipe.load(path)
+    if recipe.picture is None:
+        raise UserError(f"{path} names no picture; open a picture first, then apply the recipe to it")
+    source = path.parent / recipe.picture
+    return Project(recipe, read_picture(source), picture_bytes(source), path.parent)
+
+
+def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
+    """The project in a file, if its picture has no more than `max_pixels`.
+
+    Raises:
+        UserError: if it is none, is cut short, or was written by a newer fluidwarp.
+    """
+    path = Path(path)
+    try:
+        with open_input(path, "project") as stream, Archive(stream) as archive:
+            return _read(path, archive, max_pixels)
+    except (UserError, MemoryError):
+        raise
+    except OSError as error:
+        raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
+    except Exception:  # of a damaged archive: BadZipFile, zlib.error, NotImplementedError, RuntimeError, IndexError ...
+        raise UserError(f"{path} is no fluidwarp project, or is cut short or damaged; get it again") from None
+
+
+def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) -> Project:
+    """Write a project whole or not at all; the project as it is saved. What was there is kept as `backup_of(path)`.
+
+    Raises:
+        UserError: if it cannot be written, or a picture that belongs in it is gone.
+    """
+    path = Path(path)
+    recipe, files = _packed(project) if embedded else (_referring(project, path), {})
+    with (
+        replacing(path, backup_of(path)) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        archive.writestr(FORMAT, f"fluidwarp project {VERSION}\n")
+        archive.writestr(RECIPE, recipe.text())
+        for name, data in files.items():
+            archive.writestr(name, data, zipfile.ZIP_STORED)  # pictures are compressed already
+    return replace(project, path=path, embedded=embedded)
+
+
+def backup_of(path: Path) -> Path:
+    """Where the project that was in `path` before the last one is kept, under the name that editors give it."""
+    target = Path(os.path.realpath(path))
+    return target.with_name(f"{target.name}~")
+
+
+def picture_bytes(file: Path) -> bytes:
+    """All of a picture's file. Raises `UserError`."""
+    return read_input(file, "picture", MOST_BYTES)
+
+
+def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
+    names = set(archive.namelist())
+    if max(archive.getinfo(name).file_size for name in (FORMAT, RECIPE)) > MOST_TEXT:
+        raise UserError(f"{path} holds a recipe of more than {MOST_TEXT >> 20} MB; get it again")
+    words = archive.member(FORMAT).decode().split()
+    if words[:2] != ["fluidwarp", "project"]:
+        raise ValueError
+    if int(words[2]) > VERSION:
+        raise UserError(
+            f"{path} was written by a newer fluidwarp (project format {words[2]}, this one reads up to {VERSION}); "
+            "install a newer fluidwarp"
+        )
+    recipe = Recipe.decode(archive.member(RECIPE), f"the recipe in {path}")
+    if recipe.picture is None:
+        raise ValueError
+    held = [name for name in picture_names(recipe) if name in names]
+    embedded = recipe.picture in names
+    if not embedded:
+        source = path.parent / recipe.picture
+        picture = read_picture(source, max_pixels)
+        return Project(recipe, picture, picture_bytes(source), path.parent, path, embedded=False)
+    if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
+        raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")
+    keeper = temporary_folder()
+    folder = Path(keeper.name)
+    for name in held:
+        archive.unpack(name, folder)
+    data = archive.member(recipe.picture)
+    source = folder / recipe.picture
+    try:
+        picture = read_picture(source, max_pixels)
+    except UserError as error:  # the temporary folder is nobody's business
+        raise UserError(str(error).replace(shown(str(source)), f"{recipe.picture} in {path}")) from None
+    return Project(recipe, picture, data, folder, path, keeper=keeper)
+
+
+def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
+    """The recipe with the names its pictures get in the archive, and their bytes."""
+    files: dict[str, bytes] = {}
+    new_names: dict[str, str] = {}
+    for name in picture_names(project.recipe):
+        inside = name if _is_plain(name) else Path(name).name
+        while inside in files or inside in (RECIPE, FORMAT):
+            inside = f"_{inside}"
+        if name == project.recipe.picture:
+            files[inside] = project.data
+        else:
+            try:
+                files[inside] = picture_bytes(project.folder / name)
+            except UserError as error:
+                raise UserError(f"Cannot save the project. {error}") from None
+        new_names[name] = inside
+    if all(old == new for old, new in new_names.items()):
+        return project.recipe, files
+    return Recipe.model_validate(_renamed(plain(project.recipe), new_names)), files
+
+
+def _referring(project: Project, path: Path) -> Recipe:
+    """The recipe with names of pictures that start from the folder of `path`."""
+    names = {}
+    for name in picture_names(project.recipe):
+        target = (project.folder / name).resolve()
+        if not os.path.exists(target):
+            raise UserError(f"Cannot refer to {target}: it is gone; keep the picture in the project instead")
+        try:
+            names[name] = os.path.relpath(target, path.resolve().parent)
+        except ValueError:  # another drive
+            names[name] = str(target)
+    return Recipe.model_validate(_renamed(plain(project.recipe), names))
+
+
+def _is_plain(name: str) -> bool:
+    """True if a name can be a member of an archive as it is."""
+    place = PurePosixPath(name.replace("\\", "/"))
+    return not place.is_absolute() and ".." not in place.parts and "\\" not in name and ":" not in name
+
+
+def picture_names(recipe: Recipe) -> list[str]:
+    """The names of all pictures of a recipe, its own first."""
+    found = [recipe.picture] if recipe.picture else []
+
+    def visit(data: Any, key: str = "") -> None:
+        if isinstance(data, dict):
+            for name, value in data.items():
+                visit(value, name)
+        elif isinstance(data, (list, tuple)):
+            for value in data:
+                visit(value, key)
+        elif isinstance(data, str) and key in PICTURE_KEYS and data not in found and data != "source":
+            found.append(data)
+
+    visit({key: value for key, value in plain(recipe).items() if key not in ("stroke", "change")})
+    return found
+
+
+def _renamed(data: Any, names: dict[str, str], key: str = "") -> Any:
+    if isinstance(data, dict):
+        return {name: _renamed(value, names, name) for name, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return tuple(_renamed(value, names, key) for value in data)
+    return names.get(data, data) if isinstance(data, str) and key in PICTURE_KEYS else data
+
+
+PICTURE_KEYS = frozenset({"picture", "map", "mask"})
+"""The keys of a recipe that name a picture, or a map."""

@@ -1,0 +1,223 @@
+"""Reading a clip: what it is, and its frames one after the other."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import UserError
+from app.media import ffmpeg
+from app.media.inputs import open_input, read_start
+from app.media.pictures import MAX_PIXELS, check_size, lost
+from app.progress import never
+
+CHANGED = 65  # exit status when a clip changes under the job
+
+# What ffmpeg calls colours that are BT.709 or sRGB, or nearly; and the others' usual names.
+USUAL_PRIMARIES = {"unknown", "reserved", "bt709", "gbr"}
+USUAL_TRANSFERS = {*USUAL_PRIMARIES, "iec61966-2-1", "smpte170m", "bt2020-10", "bt2020-12"}
+NAMES = {
+    "bt2020": "BT.2020", "smpte2084": "PQ", "arib-std-b67": "HLG", "smpte432": "Display P3", "smpte431": "DCI-P3",
+    "smpte170m": "BT.601", "bt470bg": "BT.601",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A video file as it is shown: upright, with square pixels, at a constant rate.
+
+    rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
+    pixel_format: ffmpeg's name of what it is stored in, such as yuv420p.
+    note: what of it is lost, in a sentence; "" if nothing. file_size, inode: of the file when it was looked into.
+    sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
+    as a rule after its sound; 0 where an older ffmpeg does not tell. bits: 8, or 16 for what has more than 8.
+    """
+
+    path: Path
+    width: int
+    height: int
+    fps: Fraction
+    frames: int | None
+    rotation: int
+    sound: str | None
+    late: float
+    bits: int
+    pixel_format: str
+    alpha: bool
+    decoder: tuple[str, ...]
+    filters: str
+    note: str
+    file_size: int
+    inode: tuple[int, int]
+
+    def read_frames(
+        self, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
+    ) -> Generator[np.ndarray, None, None]:
+        """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time.
+
+        notice: hears, at the end, what was damaged or missing in a clip that could be read all the same.
+        Raises `UserError`, with a status of its own if the file was cut or written anew meanwhile.
+        """
+        channels = 4 if self.alpha else 3
+        kind = {(False, 8): "rgb24", (True, 8): "rgba", (False, 16): "rgb48le", (True, 16): "rgba64le"}
+        arguments = [
+            *[*self.decoder, "-i", f"file:{self.path}", "-map", "0:v:0", "-vf", self.filters, "-r", str(self.fps)],
+            *["-f", "rawvideo", "-pix_fmt", kind[self.alpha, self.bits], "-"],
+        ]
+        dtype = np.dtype(np.uint8 if self.bits == 8 else np.uint16)
+        shape = self.height, self.width, channels
+        with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel) as process:
+            count = 0
+            try:
+                for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
+                    yield np.frombuffer(block, dtype).reshape(shape)
+                    count += 1
+            except UserError:
+                self._check_unchanged()
+                raise
+            self._check_unchanged()
+            if complaint := process.complaint():
+                notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
+            elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
+                notice(f"{self.path} should have about {self.frames} frames by its length, and has {count}")
+
+    def _check_unchanged(self) -> None:
+        """Raise `UserError` if the file is not as it was: the frames would be fewer, or some of another clip.
+
+        One that was deleted or replaced by another is still read to its end, as it was opened before.
+        """
+        try:
+            now = self.path.stat()
+        except OSError:
+            return
+        if (now.st_dev, now.st_ino) == self.inode and now.st_size != self.file_size:
+            raise UserError(
+                f"Cannot read {self.path}: it changed while it was read, from {self.file_size} to {now.st_size} bytes; "
+                "start again when it is written whole.",
+                CHANGED,
+            )
+
+
+def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
+    """Look into a video file; raises `UserError` when it is none."""
+    file = Path(path)
+    with open_input(file, "video") as stream:
+        seen = os.fstat(stream.fileno())  # before it is looked into: what is written after that is a change
+    told = _banner(file)
+    video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
+    if video is None:
+        raise UserError(f"Cannot read {path}: it is no video, or damaged; give the name of a video.")
+    kind = re.search(r"Video: [^,]*, ?(?:none, )?(\w+)", video)
+    pixel_format = kind.group(1) if kind else ""
+    hidden = "Video: vp9" in video and "alpha_mode" in told  # a second stream, which only libvpx decodes
+    alpha = hidden or bool(re.match(r"(yuva|gbrap|rgba|bgra|argb|abgr|ya\d|pal8)", pixel_format))
+    matrix = "" if re.search(r"bt709|bt2020|smpte170m|bt470bg|gbr", video) else _untagged(video)
+    aspect = re.search(r"SAR (\d+):(\d+)", video)
+    square = aspect is None or aspect.group(1) == aspect.group(2)
+    filters = f"scale={'iw' if square else 'iw*sar'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
+    late = _late(told, video)
+    if late:  # or the first frame would be shown from the sound's start on
+        filters = f"setpts=PTS-{late}/TB,{filters}"
+    width, height, fps = _shown(file, filters)
+    check_size(file, width, height, max_pixels)
+    length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
+    seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
+    rotation = re.search(r"rotation of (-?[\d.]+) degrees", told)
+    return Clip(
+        path=file,
+        width=width,
+        height=height,
+        fps=fps,
+        frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
+        rotation=round(-float(rotation.group(1))) % 360 if rotation else 0,
+        sound=_sound_codec(told),
+        late=late,
+        bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
+        pixel_format=pixel_format,
+        alpha=alpha,
+        decoder=("-c:v", "libvpx-vp9") if hidden else (),
+        filters=filters,
+        note=lost(file, _losses(told, video, fps)),
+        file_size=seen.st_size,
+        inode=(seen.st_dev, seen.st_ino),
+    )
+
+
+def _losses(told: str, video: str, fps: Fraction) -> list[str]:
+    """What of a clip is not understood, or not carried over, by ffmpeg's words about its first video stream."""
+    found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
+    words = [word.strip() for word in found[1].split(",")] if found else []
+    losses = []
+    if named := next((word for word in words if re.search(r"/|bt|smpte|arib|film|iec", word)), ""):
+        parts = named.split("/")
+        _, primaries, transfer = parts if len(parts) == 3 else [named] * 3
+        odd = [primaries] if primaries not in USUAL_PRIMARIES else []
+        odd += [transfer] if transfer not in USUAL_TRANSFERS and transfer not in odd else []
+        if odd:
+            losses.append(f"its colours are {' '.join(NAMES.get(name, name) for name in odd)} and are taken for BT.709")
+    if any(word.startswith(("top", "bottom")) for word in words):
+        losses.append("it is interlaced, and its fields are taken for whole frames")
+    if rates := re.search(r", ([\d.]+) fps, ([\d.]+)(k?) tbr", video):  # on average, and of the shortest frames
+        times = float(rates[2]) * (1000 if rates[3] else 1) / float(rates[1])
+        if min(abs(times - 1), abs(times - 2)) > 0.02:  # 2: of fields
+            losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
+    for kind, kept in (("Video", "picture tracks"), ("Audio", "sound tracks")):
+        count = sum("attached pic" not in line for line in re.findall(rf"Stream #0.*: {kind}: .*", told))
+        if count > 1:
+            losses.append(f"of its {count} {kept} the first is taken")
+    if re.search(r"Stream #0.*: Subtitle: ", told):
+        losses.append("its subtitles are not kept")
+    return losses
+
+
+def sound_codec(path: str | os.PathLike[str]) -> str | None:
+    """The codec of a file's first sound track, None when it has no sound; raises `UserError` when it has nothing."""
+    told = _banner(Path(path))
+    if "Stream #0" not in told:
+        raise UserError(f"Cannot read {path}: there is neither picture nor sound in it; give the name of a clip.")
+    return _sound_codec(told)
+
+
+def _sound_codec(told: str) -> str | None:
+    found = re.search(r"Stream #0.*: Audio: (\w+)", told)
+    return found.group(1) if found else None
+
+
+def _late(told: str, video: str) -> float:
+    """Seconds that a video stream starts after its file does."""
+    file, stream = re.search(r"Duration: .*, start: (-?[\d.]+)", told), re.search(r", start (-?[\d.]+)", video)
+    return max(0.0, round(float(stream.group(1)) - float(file.group(1)), 6)) if file and stream else 0.0
+
+
+def _banner(file: Path) -> str:
+    """What ffmpeg says of a file it opens; imageio-ffmpeg brings no ffprobe."""
+    if not read_start(file, "video", 1):
+        raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
+    command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}"]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    return done.stderr.decode("utf-8", "replace")
+
+
+def _untagged(video: str) -> str:
+    """The matrix players take for a video that does not tell: BT.709 from 720 lines on."""
+    size = re.search(r", (\d{2,5})x(\d{2,5})", video)
+    return ":in_color_matrix=bt709" if size and "yuv" in video and int(size.group(2)) >= 720 else ""
+
+
+def _shown(file: Path, filters: str) -> tuple[int, int, Fraction]:
+    """Width, height and exact frame rate of the first frame as decoded, from the header of `framemd5`."""
+    arguments = ["-i", f"file:{file}", "-map", "0:v:0", "-vf", filters, "-frames:v", "1", "-f", "framemd5", "-"]
+    with ffmpeg.Ffmpeg(arguments, str(file), doing="read") as process:
+        told = b"".join(bytes(block) for block in process.blocks(1)).decode()
+    size = re.search(r"#dimensions 0: (\d+)x(\d+)", told)
+    step = re.search(r"#tb 0: (\d+)/(\d+)", told)
+    if size is None or step is None:
+        raise UserError(f"Cannot read {file}: it has no frame that can be decoded; get it again.")
+    return int(size.group(1)), int(size.group(2)), Fraction(int(step.group(2)), int(step.group(1)))

@@ -1,0 +1,138 @@
+"""Undo and redo: a list of recipes, each of which shares with its neighbours all that did not change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from app.model.recipe import Recipe
+
+DEFAULT_BUDGET = 256 * 2**20
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One state of the work, and the name of the edit that led to it."""
+
+    name: str
+    recipe: Recipe
+    nbytes: int
+
+
+class History:
+    """Every edit of a recipe, one entry each; unlimited but for `budget` bytes, beyond which the oldest go.
+
+    Args:
+        recipe: where the work begins.
+        name: of that first state, as the list shows it.
+        budget: bytes that the entries may hold together; what entries share is counted once.
+    """
+
+    def __init__(self, recipe: Recipe, name: str = "Open", budget: int = DEFAULT_BUDGET) -> None:
+        self.budget = budget
+        self._entries = [Entry(name, recipe, _own_bytes(recipe, None))]
+        self._index = 0
+
+    @classmethod
+    def restored(cls, entries: Sequence[Entry], index: int, budget: int = DEFAULT_BUDGET) -> History:
+        """The history that had these entries; `index` is the present."""
+        history = cls(entries[0].recipe, budget=budget)
+        history._entries = list(entries)
+        history.go_to(index)
+        return history
+
+    @property
+    def recipe(self) -> Recipe:
+        """The recipe as it is now."""
+        return self._entries[self._index].recipe
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """All states from the oldest, with those that can be redone."""
+        return tuple(self._entries)
+
+    @property
+    def index(self) -> int:
+        """Which of `entries` is the present."""
+        return self._index
+
+    @property
+    def can_undo(self) -> bool:
+        return self._index > 0
+
+    @property
+    def can_redo(self) -> bool:
+        return self._index < len(self._entries) - 1
+
+    @property
+    def undo_name(self) -> str | None:
+        """The edit that `undo` would take back."""
+        return self._entries[self._index].name if self.can_undo else None
+
+    @property
+    def redo_name(self) -> str | None:
+        """The edit that `redo` would make again."""
+        return self._entries[self._index + 1].name if self.can_redo else None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the entries hold, roughly."""
+        return sum(entry.nbytes for entry in self._entries)
+
+    def commit(self, name: str, recipe: Recipe) -> None:
+        """Make `recipe` the present, as the edit `name`; what could be redone is gone. An edit of nothing is none."""
+        if recipe is self.recipe or recipe == self.recipe:
+            return
+        del self._entries[self._index + 1 :]
+        self._entries.append(Entry(name, recipe, _own_bytes(recipe, self.recipe)))
+        self._index += 1
+        while self.nbytes > self.budget and self._index > 0:
+            del self._entries[0]
+            self._index -= 1
+
+    def amend(self, recipe: Recipe) -> None:
+        """Let the present be `recipe`, still as the same edit: the recording goes on while the fluid comes to rest."""
+        if recipe is self.recipe or recipe == self.recipe:
+            return
+        del self._entries[self._index + 1 :]
+        before = self._entries[self._index - 1].recipe if self._index else None
+        self._entries[self._index] = Entry(self._entries[self._index].name, recipe, _own_bytes(recipe, before))
+
+    def replace_all(self, change: Callable[[Recipe], Recipe]) -> None:
+        """Let every state be another recipe, which is no edit: the list stays as it is, and so does the present."""
+        self._entries = [replace(entry, recipe=change(entry.recipe)) for entry in self._entries]
+
+    def undo(self) -> Recipe:
+        """The recipe one edit earlier; the present one where there is none."""
+        self._index = max(self._index - 1, 0)
+        return self.recipe
+
+    def redo(self) -> Recipe:
+        """The recipe one edit later; the present one where there is none."""
+        self._index = min(self._index + 1, len(self._entries) - 1)
+        return self.recipe
+
+    def go_to(self, index: int) -> Recipe:
+        """The recipe of an entry of the list.
+
+        Raises:
+            IndexError: if there is no such entry.
+        """
+        if not 0 <= index < len(self._entries):
+            raise IndexError(f"the history has {len(self._entries)} entries, not one number {index}")
+        self._index = index
+        return self.recipe
+
+
+def _own_bytes(recipe: Recipe, before: Recipe | None) -> int:
+    """Bytes that `recipe` needs beside `before`: the parts that are not the same objects, roughly."""
+    size = 1024
+    for name in ("viscosity", "freeze", "force", "change", "stroke"):
+        known = {id(part) for part in getattr(before, name)} if before is not None else set()
+        parts = getattr(recipe, name)
+        size += 8 * len(parts)
+        for part in parts:
+            if id(part) not in known:
+                # A sample is a tuple of four numbers: 96 bytes and three floats of 24.
+                size += 1024 + 170 * len(getattr(part, "samples", ()))
+    return size

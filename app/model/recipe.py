@@ -1,0 +1,342 @@
+"""The recipe: everything that makes a warp, in one readable, versioned, validated value."""
+
+from __future__ import annotations
+
+import os
+from itertools import pairwise, zip_longest
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from app.errors import UserError
+from app.media.files import replacing
+from app.media.inputs import MOST_TEXT, read_input
+from app.model import toml
+from app.model.forces import Force
+from app.model.masks import FreezeLayer, ViscosityLayer
+from app.model.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
+from app.model.strokes import Change, Stroke
+
+VERSION = 2
+MOST_TICKS = 1_000_000
+FINEST_GRID = 4096  # cells along the longer side
+_SAMPLES = "\ue000 samples"  # a character that nobody writes
+
+Seconds = Annotated[float, Field(ge=0, le=100_000)]
+
+
+class FluidSettings(Model):
+    """The fluid and the grid it is computed on.
+
+    Attributes:
+        solver: "mac", the default scheme, or "paper", the paper's own.
+        grid: cells along the picture's longer side.
+        dt: seconds a tick.
+        viscosity: of the whole picture, in longer sides squared per second; layers and strokes work on it.
+        drag: rate at which all motion dies away, per second.
+        walls: "free-slip" glides along the picture's edge, "no-slip" sticks to it.
+        sweeps: Jacobi sweeps of the solver "paper".
+    """
+
+    solver: Literal["mac", "paper"] = "mac"
+    grid: Annotated[int, Field(ge=8, le=FINEST_GRID)] = 256
+    dt: Annotated[float, Field(gt=0, le=10)] = 1 / 60
+    viscosity: Annotated[float, Field(ge=0, le=1000)] = 0.001
+    drag: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    walls: Literal["free-slip", "no-slip"] = "free-slip"
+    sweeps: Annotated[int, Field(ge=1, le=10_000)] = 40
+
+
+class Density(Model):
+    """Eq. (5): the picture's values as a density that diffuses with `kappa` while `source` is fed into it.
+
+    Attributes:
+        kappa: diffusion rate, in longer sides squared per second.
+        source: colour added per second, red, green and blue of 0-1.
+    """
+
+    kappa: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    source: Several[Annotated[float, Field(ge=-1000, le=1000)]] = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _three(self) -> Self:
+        if len(self.source) != 3:
+            raise ValueError(f"'source' must be three numbers (red, green, blue), not {len(self.source)}")
+        return self
+
+
+class Watch(Model):
+    """A point of the picture that ends the simulation when it has moved far enough, or has reached a place.
+
+    Attributes:
+        point: where it starts, as fractions of width and height.
+        distance: stop when it has moved this far, in longer sides.
+        place: stop when it is within `within` of this place (fractions of width and height).
+        within: in longer sides.
+    """
+
+    point: tuple[Place, Place]
+    distance: Annotated[float, Field(gt=0, le=10)] | None = None
+    place: tuple[Place, Place] | None = None
+    within: Radius = 0.01
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.distance is None) == (self.place is None):
+            raise ValueError("give either 'distance' or 'place'")
+        return self
+
+
+class Stop(Model):
+    """Conditions that end the simulation before its duration, whichever comes first.
+
+    Attributes:
+        energy_below: kinetic energy (half the mean squared speed times the area), once it has been above.
+        speed_below: largest speed, in longer sides per second, once it has been above.
+        displacement_above: largest displacement of the warp map, in longer sides.
+        det_below: smallest det J of the warp map: 0 is a fold.
+        watch: points of the picture.
+    """
+
+    energy_below: Annotated[float, Field(gt=0)] | None = None
+    speed_below: Annotated[float, Field(gt=0)] | None = None
+    displacement_above: Annotated[float, Field(gt=0)] | None = None
+    det_below: Annotated[float, Field(lt=1)] | None = None
+    watch: Several[Watch] = ()
+
+
+class Playback(Model):
+    """How an animation runs through the warps W_t; the simulation itself is not touched by it.
+
+    Attributes:
+        speed: simulated seconds per second of animation; 0.5 is slow motion.
+        reverse: from the last warp to the first.
+        ping_pong: there and back again.
+        hold_first, hold_last: seconds that the first and last frame stand still.
+        start, end: the part of the simulation that is shown, in simulated seconds.
+    """
+
+    speed: Annotated[float, Field(gt=0, le=1000)] = 1.0
+    reverse: bool = False
+    ping_pong: bool = False
+    hold_first: Seconds = 0.0
+    hold_last: Seconds = 0.0
+    start: Seconds = 0.0
+    end: Seconds | None = None
+
+    @model_validator(mode="after")
+    def _forwards(self) -> Self:
+        if self.end is not None and self.end < self.start:
+            raise ValueError(f"'end' ({self.end:g}) is before 'start' ({self.start:g})")
+        return self
+
+
+class Output(Model):
+    """What is written.
+
+    Attributes:
+        size: longer side of the result in pixels; left out, the picture's own.
+        fps: frames per second of an animation.
+        quality: 1-100, of JPEG, WebP and video.
+        samples: places looked up along a side of each pixel: "auto", as many as the map stretches there; 1 is sharper,
+            and shows steps where the map shrinks the picture.
+    """
+
+    size: Annotated[int, Field(ge=1, le=32768)] | None = None
+    fps: Annotated[float, Field(gt=0, le=1000)] = 30.0
+    quality: Annotated[int, Field(ge=1, le=100)] = 90
+    samples: Literal["auto", 1] = "auto"
+
+
+class Recipe(Model):
+    """Everything that makes a warp; see the modules of its parts for the units.
+
+    Attributes:
+        version: of this format. In version 1 strokes had no `detail`; one that is read becomes one of this version.
+        name: a title.
+        picture: the source, relative to the recipe's own folder.
+        map: a warp map to begin with instead of the picture as it is, in any format of `app.media.maps`.
+        duration: T, in simulated seconds.
+        edges: what lies beyond the picture's edge.
+        mode: "coordinates" warps the picture's coordinates, "density" moves its values (see `Density`).
+        viscosity, freeze, force, stroke, change: applied in the order they are written in.
+    """
+
+    version: Literal[2] = VERSION
+    name: str = ""
+    picture: FileName | None = None
+    map: FileName | None = None
+    duration: Annotated[float, Field(gt=0, le=1_000_000)] = 1.0
+    edges: Literal["transparent", "black", "clamp", "mirror", "wrap"] = "transparent"
+    mode: Literal["coordinates", "density"] = "coordinates"
+    fluid: FluidSettings = FluidSettings()
+    density: Density = Density()
+    stop: Stop = Stop()
+    time: Playback = Playback()
+    output: Output = Output()
+    viscosity: Several[ViscosityLayer] = ()
+    freeze: Several[FreezeLayer] = ()
+    force: Several[Force] = ()
+    change: Several[Change] = ()
+    stroke: Several[Stroke] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_this_version(cls, data: Any) -> Any:
+        """What an older version had not, this one has by default, and it means the same."""
+        if isinstance(data, dict) and type(data.get("version")) is int and 1 <= data["version"] < VERSION:
+            return {**data, "version": VERSION}
+        return data
+
+    @model_validator(mode="after")
+    def _affordable(self) -> Self:
+        if self.duration / self.fluid.dt > MOST_TICKS:
+            raise ValueError(f"'duration' / 'fluid.dt' is more than {MOST_TICKS} ticks; make dt larger")
+        if self.map is not None and self.mode == "density":
+            raise ValueError("a 'map' warps coordinates, and mode \"density\" has none; remove one of them")
+        ticks = [change.tick for change in self.change]
+        if any(later < earlier for earlier, later in pairwise(ticks)):
+            raise ValueError("the ticks of [[change]] must not go backwards")
+        return self
+
+    # -- files ------------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def parse(cls, text: str, source: str = "the recipe") -> Self:
+        """The recipe written in `text`.
+
+        Raises:
+            UserError: naming `source`, the line, the key, and what was expected.
+        """
+        data = toml.parsed(text, source)
+        version = data.get("version", VERSION)
+        if isinstance(version, int) and version > VERSION:
+            raise UserError(
+                f"{source} is of version {version}, and this fluidwarp reads recipes up to version {VERSION}; "
+                "install a newer fluidwarp"
+            )
+        try:
+            return cls.model_validate(frozen(data))
+        except ValidationError as error:
+            raise complaint(error, cls, data, text, source) from None
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """The recipe in a TOML file.
+
+        Raises:
+            UserError: if it cannot be read, or as `parse`.
+        """
+        return cls.decode(read_input(path, "recipe", MOST_TEXT), str(path))
+
+    @classmethod
+    def decode(cls, data: bytes, source: str) -> Self:
+        """The recipe in the bytes of a file. Raises `UserError` as `parse`."""
+        try:
+            text = data.decode("utf-8-sig")  # some editors put a mark before the text
+        except UnicodeDecodeError:
+            raise UserError(f"{source} is not a recipe: it is not text, or not saved as UTF-8") from None
+        return cls.parse(text, source)
+
+    def text(self) -> str:
+        """The recipe as TOML, without what is as by default; `parse` gives the same recipe back, bit for bit."""
+        import tomlkit
+
+        document, samples = tomlkit.document(), []
+        for key, value in plain(self).items():
+            if not (isinstance(value, list) and value and isinstance(value[0], dict)):
+                document.add(key, tomlkit.item(value))
+                continue
+            tables = tomlkit.aot()
+            for entry in value:
+                if key == "stroke":
+                    # Of samples there are thousands, and tomlkit takes its time over each; a list's repr is TOML too.
+                    samples.append(repr(entry["samples"]))
+                    entry["samples"] = _SAMPLES
+                tables.append(tomlkit.item({name: _inline(part) for name, part in entry.items()}))
+            document.add(key, tables)
+        pieces = tomlkit.dumps(document).split(f'"{_SAMPLES}"')
+        return "".join(part for pair in zip_longest(pieces, samples, fillvalue="") for part in pair)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the recipe to `path`, all of it or nothing.
+
+        Raises:
+            UserError: if it cannot be written.
+        """
+        with replacing(path) as temporary:
+            temporary.write_text(self.text(), "utf-8")
+
+    # -- what it says -----------------------------------------------------------------------------------------------
+
+    @property
+    def ticks(self) -> int:
+        """The whole number of steps nearest to the duration, at least 1."""
+        return max(1, round(self.duration / self.fluid.dt))
+
+    def fluid_at(self, tick: int) -> FluidSettings:
+        """The fluid's settings in force during `tick`, with all changes up to it."""
+        changed: dict[str, Any] = {}
+        for change in self.change:
+            if change.tick <= tick:
+                for key in ("viscosity", "drag", "walls"):
+                    if (value := getattr(change, key)) is not None:
+                        changed[key] = value
+        return self.fluid.model_copy(update=changed) if changed else self.fluid
+
+    def edited(self, **parts: Any) -> Self:
+        """The recipe with some of its parts replaced by parts that are valid in themselves; shares all the others."""
+        return self.model_copy(update=parts)
+
+    def on_grid(self, cells: int) -> Self:
+        """The recipe, simulated on another grid."""
+        return self.edited(fluid=self.fluid.model_copy(update={"grid": cells}))
+
+    def checked(self, source: str = "the recipe") -> Self:
+        """The recipe, validated as a whole again: for parts that came from outside, that is from `source`.
+
+        Raises:
+            UserError: naming the key and what was expected.
+        """
+        data = plain(self)
+        try:
+            return type(self).model_validate(frozen(data))
+        except ValidationError as error:
+            raise complaint(error, type(self), data, "", source) from None
+
+    def agrees_until(self, other: Recipe) -> float:
+        """The tick before which both recipes simulate the same; infinite where they do so for ever.
+
+        Checkpoints up to and including that tick are common to both.
+        """
+        if not self.is_set_up_as(other):
+            return 0
+        agreed: float = float("inf")
+        for mine, theirs in zip_longest(self.stroke, other.stroke):
+            if mine is not theirs and mine != theirs:
+                both = [stroke for stroke in (mine, theirs) if stroke is not None]
+                until = both[0].agrees_until(both[1]) if len(both) == 2 else both[0].first_tick
+                agreed = min(agreed, until)
+        for mine, theirs in zip_longest(self.change, other.change):
+            if mine != theirs:
+                agreed = min([agreed, *(change.tick for change in (mine, theirs) if change is not None)])
+        return agreed
+
+    def is_set_up_as(self, other: Recipe) -> bool:
+        """True if both are the same simulation but for strokes and changes."""
+        return self._set_up() == other._set_up()
+
+    def _set_up(self) -> tuple[object, ...]:
+        """What is in force from the first tick on."""
+        return self.picture, self.map, self.mode, self.density, self.fluid, self.viscosity, self.freeze, self.force
+
+
+def _inline(value: Any) -> Any:
+    """A table within a table of a list, as `{ ... }` on its own line: headers of headers are hard to read."""
+    import tomlkit
+
+    if not isinstance(value, dict):
+        return value
+    table = tomlkit.inline_table()
+    table.update({name: _inline(part) for name, part in value.items()})
+    return table

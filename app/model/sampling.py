@@ -1,0 +1,312 @@
+"""Pictures and shapes as numbers on the simulation's grid: intensities, segmentations, windows, all in [0, 1].
+
+Everything is averaged over the cells (never point-sampled), so that grids of 256 and 512 see the same picture.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from app.errors import UserError
+from app.media.maps import cropped, folds, read_map
+from app.media.pictures import Picture, linear_to_srgb, read_picture
+from app.model.schema import FileName, Fraction01, Model, Place, Radius
+from solver.grid import Grid
+
+SOURCE = "source"
+"""The name by which a recipe calls the picture that is warped, where it could name an auxiliary one."""
+
+PictureName = FileName
+Point = tuple[Place, Place]
+"""x and y as fractions of the picture's width and height, from its top left corner."""
+Box = tuple[Place, Place, Place, Place]
+"""Left, top, right and bottom, as fractions of the picture's width and height."""
+
+
+class Pictures:
+    """The picture that is warped and the auxiliary pictures a recipe names, each read once.
+
+    Args:
+        source: the picture that is warped.
+        folder: where relative names of auxiliary pictures start from.
+    """
+
+    def __init__(self, source: Picture, folder: str | Path = ".") -> None:
+        self.source = source
+        self.folder = Path(folder)
+        self.notices: list[str] = [source.note] if source.note else []
+        self._read: dict[str, Picture] = {}
+        self._maps: dict[str, np.ndarray] = {}
+
+    def load(self, name: str) -> Picture:
+        """The picture called `name`, or the source itself.
+
+        One whose size is not the source's is fitted to it, and a notice says so. Raises UserError if it cannot be read.
+        """
+        if name == SOURCE:
+            return self.source
+        if name not in self._read:
+            picture = self._read[name] = read_picture(self.folder / name)
+            if picture.note:
+                self.notice(picture.note)
+            mine, wanted = (picture.width, picture.height), (self.source.width, self.source.height)
+            if mine != wanted:
+                same = abs(mine[0] * wanted[1] - mine[1] * wanted[0]) <= max(mine + wanted)
+                how = "scaled" if same else "stretched"
+                self.notice(
+                    f"{name} is {mine[0]} x {mine[1]} and the picture {wanted[0]} x {wanted[1]}: {how} to fit it"
+                )
+        return self._read[name]
+
+    def load_map(self, name: str) -> np.ndarray:
+        """The displacement (h, w, 2) of the warp map called `name`, in the longer sides of the source.
+
+        Raises UserError if it cannot be read, or has other proportions than the source.
+        """
+        if name not in self._maps:
+            given = read_map(self.folder / name)
+            if given.forward:
+                goes = f"{name} tells where each point goes"
+                raise UserError(
+                    f"{goes}; turn it round with: fluidwarp convert --invert",
+                    in_window=f"{goes}, and what is needed is where it comes from; write it the other way round.",
+                )
+            self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
+            if folded := folds(self._maps[name]):
+                self.notice(f"{name} folds over itself in {folded} of its pixels")
+        return self._maps[name]
+
+    def forget_map(self, name: str) -> None:
+        """Read a map anew when it is wanted next: its file may be another one now."""
+        self._maps.pop(name, None)
+
+    def values(self) -> list[np.ndarray]:
+        """The pixels of all that was read so far and the values of maps, the source first, the others by name."""
+        read = [self._read[name].pixels for name in sorted(self._read)]
+        return [self.source.pixels, *read, *(self._maps[name] for name in sorted(self._maps))]
+
+    def notice(self, text: str) -> None:
+        """Note something the user should hear of, once."""
+        if text not in self.notices:
+            self.notices.append(text)
+
+
+# Pictures as numbers ------------------------------------------------------------------------------------------------
+
+
+def channels(picture: Picture) -> tuple[np.ndarray, np.ndarray]:
+    """Red, green and blue (h, w, 3) as the eye sees them (sRGB curve), and alpha (h, w), float32 in [0, 1]."""
+    pixels = picture.straight().pixels
+    if picture.linear:
+        colours = linear_to_srgb(np.clip(np.nan_to_num(pixels), 0, 1)).astype(np.float32)
+    else:
+        colours = pixels.astype(np.float32) / np.iinfo(pixels.dtype).max
+    if picture.has_alpha:
+        # The curve does not hold for alpha; it never was in it.
+        alpha = np.clip(pixels[..., -1], 0, 1) if picture.linear else colours[..., -1]
+        colours = colours[..., :-1]
+    else:
+        alpha = np.ones(pixels.shape[:2], np.float32)
+    return np.broadcast_to(colours, (*colours.shape[:2], 3)), alpha.astype(np.float32)
+
+
+def intensity(picture: Picture) -> np.ndarray:
+    """The grey of each pixel (h, w), float32 in [0, 1]; what is transparent is black. Rec. 709 luma."""
+    colours, alpha = channels(picture)
+    return colours @ np.array([0.2126, 0.7152, 0.0722], np.float32) * alpha
+
+
+def to_grid(values: np.ndarray, grid: Grid) -> np.ndarray:
+    """Values of pixels (h, w) as averages over the cells (ny, nx), float32; the picture is fitted to the whole grid."""
+    return _resized(_resized(values, grid.nx, 1), grid.ny, 0).astype(np.float32)
+
+
+def _resized(values: np.ndarray, n: int, axis: int) -> np.ndarray:
+    """Values resampled to `n` along an axis: exact means over the new cells, or interpolated if there are more."""
+    values = np.moveaxis(values, axis, 0)
+    m = len(values)
+    if n >= m:
+        at = np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1)
+        k = np.minimum(at.astype(int), max(m - 2, 0))
+        part = (at - k).reshape(-1, *(1,) * (values.ndim - 1))
+        resized = values[k] * (1 - part) + values[np.minimum(k + 1, m - 1)] * part
+    else:
+        # The integral up to each of the new edges, which may lie within a pixel.
+        integral = np.cumsum(values, axis=0, dtype=np.float64)
+        integral = np.concatenate([np.zeros_like(integral[:1]), integral])
+        edges = np.arange(n + 1) * (m / n)
+        k = np.minimum(edges.astype(int), m - 1)
+        part = (edges - k).reshape(-1, *(1,) * (values.ndim - 1))
+        resized = np.diff(integral[k] * (1 - part) + integral[k + 1] * part, axis=0) * (n / m)
+    return np.moveaxis(resized, 0, axis)
+
+
+def blurred(values: np.ndarray, radius: float, grid: Grid) -> np.ndarray:
+    """(ny, nx) values blurred by a Gaussian whose standard deviation is half of `radius`, mirrored at the edges."""
+    hx, hy = grid.spacing
+    rows, columns = (_blur_matrix(n, radius / 2 / h) for n, h in zip(values.shape, (hy, hx), strict=True))
+    return rows @ values @ columns.T
+
+
+def _blur_matrix(n: int, sigma: float) -> np.ndarray:
+    """(n, n), rows of sum 1: as dense matrices, blurs of any width cost the same, and little."""
+    here = np.arange(n)[:, None]
+    there = np.arange(-n, 2 * n)[None, :]
+    weights = np.exp(-0.5 * ((there - here) / max(sigma, 1e-3)) ** 2)
+    mirrored = weights[:, n : 2 * n] + weights[:, n - 1 :: -1] + weights[:, : 2 * n - 1 : -1]
+    return mirrored / mirrored.sum(axis=1, keepdims=True)
+
+
+def quantised(values: np.ndarray, levels: int) -> np.ndarray:
+    """Values in [0, 1] cut into `levels` equal steps, the lowest 0 and the highest 1."""
+    return np.minimum(np.floor(values * levels), levels - 1) / (levels - 1)
+
+
+# Shapes -------------------------------------------------------------------------------------------------------------
+
+
+def smoothstep(values: np.ndarray) -> np.ndarray:
+    """0 below 0, 1 above 1, smooth in between."""
+    s = np.clip(values, 0.0, 1.0)
+    return s * s * (3 - 2 * s)
+
+
+def falloff(q: np.ndarray, hardness: float = 0.0) -> np.ndarray:
+    """A brush's weight at `q` radii from its path, as `shaders/lib/brush.glsl` draws it."""
+    core = 0.9 * hardness
+    w = 1.0 - np.clip((q - core) / (1.0 - core), 0.0, 1.0) ** 2
+    return w**3
+
+
+def places(points: Sequence[tuple[float, float]], grid: Grid) -> np.ndarray:
+    """Fractions of width and height as lengths on the grid, (n, 2) float64."""
+    return np.asarray(points, np.float64) * grid.extent
+
+
+def distance_to_path(points: np.ndarray, grid: Grid) -> np.ndarray:
+    """Distance (ny, nx) of the cell centres from a polyline (n, 2), or from a single point; all in lengths."""
+    x, y = grid.centres()
+    nearest = np.full(x.shape, np.inf)
+    for a, b in zip(points, points[1:] if len(points) > 1 else points, strict=False):
+        along = b - a
+        length2 = float(along @ along)
+        s = np.clip(((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length2, 0, 1) if length2 > 0 else 0.0
+        nearest = np.minimum(nearest, np.hypot(x - a[0] - s * along[0], y - a[1] - s * along[1]))
+    return nearest
+
+
+class Window(Model):
+    """A part of the picture: 1 inside, 0 outside, soft within the edge.
+
+    Attributes:
+        box: left, top, right, bottom, as fractions of the picture's width and height.
+        shape: the rectangle itself or the ellipse in it.
+        soft: how far inside the edge the weight has risen to 1, in longer sides; outside it is 0 in any case.
+        invert: 1 outside and 0 inside.
+    """
+
+    box: Box
+    shape: Literal["rectangle", "ellipse"] = "rectangle"
+    soft: Annotated[float, Field(ge=0, le=10)] = 0.0
+    invert: bool = False
+
+    @model_validator(mode="after")
+    def _has_area(self) -> Self:
+        left, top, right, bottom = self.box
+        if right <= left or bottom <= top:
+            raise ValueError("'box' must be [left, top, right, bottom] with left < right and top < bottom")
+        return self
+
+    def weight(self, grid: Grid) -> np.ndarray:
+        """The window on the cells, (ny, nx) float64 in [0, 1]."""
+        (left, top), (right, bottom) = places((self.box[:2], self.box[2:]), grid)
+        x, y = grid.centres()
+        x, y = x - (left + right) / 2, y - (top + bottom) / 2
+        a, b = (right - left) / 2, (bottom - top) / 2
+        if self.shape == "rectangle":
+            depth = np.minimum(a - np.abs(x), b - np.abs(y))
+        else:
+            # First order in the distance from the ellipse, as is enough for a soft edge.
+            norm = np.hypot(x / a, y / b)
+            slope = np.hypot(x / a**2, y / b**2)
+            depth = np.where(norm > 0, (1 - norm) * norm / np.maximum(slope, 1e-12), min(a, b))
+        # Without a soft edge, a cell that the edge cuts is in by the part of it that lies inside.
+        weight = smoothstep(depth / self.soft) if self.soft > grid.h else np.clip(0.5 + depth / grid.h, 0.0, 1.0)
+        return 1.0 - weight if self.invert else weight
+
+
+class Segment(Model):
+    """A segmentation of a picture: 1 in what is chosen, 0 elsewhere. One of the four choices, within the window.
+
+    Attributes:
+        above, below: intensity, 0-1; both together are a band.
+        color: "#rrggbb"; pixels within `tolerance` of it, as the distance in RGB, each of 0-1.
+        mask: a picture file, chosen where it is brighter than middle grey.
+        window: nothing outside it is chosen.
+    """
+
+    above: Fraction01 | None = None
+    below: Fraction01 | None = None
+    color: str | None = None
+    tolerance: Annotated[float, Field(gt=0, le=2)] = 0.15
+    mask: PictureName | None = None
+    window: Window | None = None
+
+    @model_validator(mode="after")
+    def _one_choice(self) -> Self:
+        given = [
+            name
+            for name, there in (
+                ("above/below", self.above is not None or self.below is not None),
+                ("color", self.color is not None),
+                ("mask", self.mask is not None),
+            )
+            if there
+        ]
+        if len(given) != 1:
+            here = " and ".join(given) or "none of them"
+            raise ValueError(f"a segment chooses by 'above' and 'below', by 'color' or by 'mask'; here is {here}")
+        if self.above is not None and self.below is not None and self.below <= self.above:
+            raise ValueError(f"nothing lies above {self.above:g} and below {self.below:g}")
+        if self.color is not None and not re.fullmatch(r"#[0-9a-fA-F]{6}", self.color):
+            raise ValueError(f"'color' must be like \"#c8a040\", not {self.color!r}")
+        return self
+
+    def weight(self, picture: str, grid: Grid, pictures: Pictures) -> np.ndarray:
+        """How much of each cell (ny, nx) is chosen, in [0, 1].
+
+        Raises:
+            ValueError: if it chooses nothing or everything, so that it has no edge.
+        """
+        chosen = to_grid(self._pixels(picture, pictures).astype(np.float32), grid).astype(np.float64)
+        if self.window:
+            chosen = chosen * self.window.weight(grid)
+        if chosen.max() < 0.5:
+            raise ValueError("the segmentation is empty; nothing in the picture is chosen by it")
+        if chosen.min() > 0.5:
+            raise ValueError("the segmentation chooses the whole picture, so that it has no edge")
+        return chosen
+
+    def _pixels(self, picture: str, pictures: Pictures) -> np.ndarray:
+        if self.mask is not None:
+            return intensity(pictures.load(self.mask)) > 0.5
+        if self.color is not None:
+            colours, alpha = channels(pictures.load(picture))
+            wanted = np.array([int(self.color[k : k + 2], 16) / 255 for k in (1, 3, 5)], np.float32)
+            return (np.linalg.norm(colours - wanted, axis=-1) <= self.tolerance) & (alpha > 0.5)
+        grey = intensity(pictures.load(picture))
+        low = -1.0 if self.above is None else self.above
+        high = 2.0 if self.below is None else self.below
+        return (grey > low) & (grey < high)
+
+
+__all__ = [
+    "SOURCE", "Box", "PictureName", "Pictures", "Point", "Radius", "Segment", "Window", "blurred", "channels",
+    "distance_to_path", "falloff", "intensity", "places", "quantised", "smoothstep", "to_grid",
+]  # fmt: skip

@@ -1,0 +1,147 @@
+"""What a hand does to the picture over time: strokes of a brush, and changes of the fluid at a tick."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import hypot
+from typing import Annotated, Literal, NamedTuple, Self
+
+from pydantic import Field, model_validator
+
+from app.model.schema import Fraction01, Model, Place, Radius, Several
+
+Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
+Tick = Annotated[int, Field(ge=0, le=10_000_000)]
+FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1 / 200 of such a cell
+Sample = tuple[Tick, Place, Place, Fraction01]
+"""(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
+
+
+class Dab(NamedTuple):
+    """A straight piece of a stroke's path, passed within one tick; from and to coincide where the brush stood still."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    pressure: float
+
+
+class Stroke(Model):
+    """One stroke: a tool and the samples of the pointer, in order.
+
+    Between two samples the pointer moved at a constant speed, so that a stroke does not depend on how often the pointer
+    was sampled: during tick n (the step from n to n + 1) the brush passes the path from time n - 1 to time n. A tool
+    that acts while it stands still (twirl, bloat, thicken ...) acts in every tick from the first sample to the last.
+    A curve acts all at once, in the tick of its last sample, along the whole path.
+
+    Attributes:
+        radius: of the brush, in longer sides.
+        hardness: 0 is a soft falloff, 1 a hard edge.
+        strength: 1 carries along at the pointer's speed (push), or works at the tool's own rate.
+        reverse: the tool's opposite: push against the drag, twirl anticlockwise.
+        detail: cells along the picture's longer side that the flow is solved with, in a window around the brush (see
+            `app.model.windows`); 0: on the grid of the whole picture.
+        local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
+    """
+
+    tool: Tool
+    radius: Radius = 0.08
+    hardness: Fraction01 = 0.5
+    strength: Annotated[float, Field(ge=0, le=100)] = 1.0
+    reverse: bool = False
+    detail: Annotated[int, Field(ge=0, le=FINEST_DETAIL)] = 0
+    local: Fraction01 = 0.0
+    samples: Annotated[Several[Sample], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        ticks = [sample[0] for sample in self.samples]
+        if any(later < earlier for earlier, later in pairwise(ticks)):
+            raise ValueError("the ticks of the samples must not go backwards")
+        if self.tool == "curve" and len(self.samples) < 2:
+            raise ValueError("a curve needs at least two samples")
+        return self
+
+    @property
+    def first_tick(self) -> int:
+        return self.samples[0][0]
+
+    @property
+    def last_tick(self) -> int:
+        return self.samples[-1][0]
+
+    def with_sample(self, tick: int, x: float, y: float, pressure: float = 1.0) -> Stroke:
+        """The stroke, one sample longer; the sample is trusted to be in order."""
+        return self.model_copy(update={"samples": (*self.samples, (tick, x, y, pressure))})
+
+    def at(self, tick: int) -> tuple[Dab, ...]:
+        """The pieces of the path that are passed in this tick: none before the first sample and after the last."""
+        if not self.first_tick <= tick <= self.last_tick:
+            return ()
+        if self.tool == "curve":
+            return self._joined(self.samples) if tick == self.last_tick else ()
+        inside = [sample for sample in self.samples if sample[0] == tick]
+        before = None if tick == self.first_tick else self._interpolated(tick - 1)
+        after = [] if inside else [self._interpolated(tick)]
+        return self._joined(([before] if before else []) + inside + after)
+
+    def travelled(self, tick: int, extent: tuple[float, float]) -> float:
+        """The length of the path up to where the pieces of `at(tick)` begin, in units of `extent`'s sides."""
+        if tick <= self.first_tick:
+            return 0.0
+        passed = [sample for sample in self.samples if sample[0] < tick]
+        passed.append(self._interpolated(min(tick - 1, self.last_tick)))
+        return sum(hypot((b[1] - a[1]) * extent[0], (b[2] - a[2]) * extent[1]) for a, b in pairwise(passed))
+
+    def _interpolated(self, tick: int) -> tuple[int, float, float, float]:
+        """Where the pointer was at the end of `tick`, which lies between the first and the last."""
+        earlier = [sample for sample in self.samples if sample[0] <= tick][-1]
+        if earlier[0] == tick:
+            return earlier
+        later = next(sample for sample in self.samples if sample[0] > tick)
+        part = (tick - earlier[0]) / (later[0] - earlier[0])
+        x, y, pressure = (a + (b - a) * part for a, b in zip(earlier[1:], later[1:], strict=True))
+        return tick, x, y, pressure
+
+    @staticmethod
+    def _joined(points: list[tuple[int, float, float, float]] | tuple[Sample, ...]) -> tuple[Dab, ...]:
+        if len(points) == 1:
+            _, x, y, pressure = points[0]
+            return (Dab(x, y, x, y, pressure),)
+        return tuple(Dab(a[1], a[2], b[1], b[2], (a[3] + b[3]) / 2) for a, b in pairwise(points))
+
+    def agrees_until(self, other: Stroke) -> int:
+        """The tick before which both strokes do the same; at least the earlier one's first."""
+        start = min(self.first_tick, other.first_tick)
+        if self._head() != other._head():
+            return start
+        if self.tool == "curve":
+            return min(self.last_tick, other.last_tick)
+        together = 0
+        for mine, theirs in zip(self.samples, other.samples, strict=False):
+            if mine != theirs:
+                break
+            together += 1
+        # After its last common sample a stroke may end or go on: in the tick after it, they already differ.
+        return start if together == 0 else self._turning_point(other, together)
+
+    def _turning_point(self, other: Stroke, together: int) -> int:
+        last = self.samples[together - 1][0]
+        following = [stroke.samples[together][0] for stroke in (self, other) if len(stroke.samples) > together]
+        return last if last in following else last + 1
+
+    def _head(self) -> tuple[object, ...]:
+        return self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.local
+
+
+class Change(Model):
+    """What the user sets at a tick, before anything else happens in it; a key that is left out stays as it is."""
+
+    tick: Tick
+    viscosity: Annotated[float, Field(ge=0, le=1000)] | None = None
+    drag: Annotated[float, Field(ge=0, le=1000)] | None = None
+    walls: Literal["free-slip", "no-slip"] | None = None
+    clear_velocity: bool = False
+    reset_warp: bool = False
+    clear_masks: bool = False

@@ -1,0 +1,150 @@
+"""Time: integer ticks of a constant dt, where an animation's frames lie, and what ends a simulation early."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from app.errors import UserError
+from app.model.recipe import Playback, Recipe, Stop
+
+MOST_FRAMES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """The ticks 0 .. `ticks` of a simulation; tick n is the time n * dt, and the warp at tick 0 is the identity."""
+
+    ticks: int
+    dt: float
+
+    @classmethod
+    def of(cls, recipe: Recipe) -> Timeline:
+        return cls(recipe.ticks, recipe.fluid.dt)
+
+    def tick_at(self, seconds: float) -> int:
+        """The tick nearest to a time, within the timeline."""
+        return min(max(round(seconds / self.dt), 0), self.ticks)
+
+    def time_of(self, tick: float) -> float:
+        """Seconds at a tick, which may lie between two."""
+        return tick * self.dt
+
+
+def frame_rate(fps: float) -> Fraction:
+    """A rate that was given as a decimal; of 23.976, 29.97, 47.952, 59.94 and 119.88 the NTSC rate, as 24000/1001."""
+    for whole in (24, 30, 48, 60, 120):
+        exact = Fraction(whole * 1000, 1001)
+        if round(float(exact), 3) == round(fps, 3):
+            return exact
+    return Fraction(fps).limit_denominator(1001)
+
+
+def frame_positions(timeline: Timeline, playback: Playback, fps: float) -> list[Fraction]:
+    """The position in ticks of every distinct frame of an animation, forwards in time.
+
+    A position may lie between two ticks; it is then reached by a shorter last step of the warp map (`Replay.seek`).
+    Frames are evenly spaced from the part's start to its end, both included, and as many as make the spacing nearest
+    to speed / fps: the animation begins and ends exactly where it should, whatever fps and dt. In which order they are
+    shown is `app.media.animation.frame_order`'s.
+
+    Raises:
+        UserError: if the animation would have more than a million frames.
+    """
+    start = timeline.tick_at(playback.start)
+    end = timeline.ticks if playback.end is None else max(timeline.tick_at(playback.end), start)
+    wanted = timeline.time_of(end - start) / playback.speed * fps
+    if wanted + (playback.hold_first + playback.hold_last) * fps > MOST_FRAMES:
+        raise UserError(
+            f"the animation would have more than {MOST_FRAMES} frames; raise 'time.speed' or lower 'output.fps'"
+        )
+    if end == start:
+        return [Fraction(start)]
+    count = max(1, round(wanted))
+    return [start + Fraction((end - start) * frame, count) for frame in range(count + 1)]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What stop conditions look at after a tick; None where nobody asked for it.
+
+    Attributes:
+        energy: kinetic energy.
+        speed: largest speed, longer sides per second.
+        displacement: largest displacement, longer sides.
+        det: smallest det J of the warp map.
+        points: where the watched points are now, as (x, y) in longer sides.
+        extent: (width, height) of the picture, the longer of them 1.
+    """
+
+    energy: float | None = None
+    speed: float | None = None
+    displacement: float | None = None
+    det: float | None = None
+    points: tuple[tuple[float, float], ...] = ()
+    extent: tuple[float, float] = (1.0, 1.0)
+
+
+class Sentinel:
+    """Watches a simulation and says when a condition of the recipe's [stop] ends it.
+
+    It remembers whether the fluid has moved at all, so that a fluid that has not been pushed yet is not "at rest".
+    """
+
+    def __init__(self, stop: Stop, dt: float) -> None:
+        self.stop = stop
+        self._dt = dt
+        self._energetic = self._fast = False
+
+    @property
+    def needs_motion(self) -> bool:
+        return self.stop.energy_below is not None or self.stop.speed_below is not None
+
+    @property
+    def needs_map(self) -> bool:
+        return self.stop.displacement_above is not None or self.stop.det_below is not None
+
+    @property
+    def needs_points(self) -> bool:
+        return bool(self.stop.watch)
+
+    @property
+    def is_idle(self) -> bool:
+        """True if there is nothing to watch."""
+        return not (self.needs_motion or self.needs_map or self.needs_points)
+
+    def verdict(self, tick: int, seen: Observation) -> str | None:
+        """Which condition fired at this tick and when, or None."""
+        reason = next(self._reasons(seen), None)
+        return reason and f"stopped at t = {tick * self._dt:g} s (tick {tick}): {reason}"
+
+    def _reasons(self, seen: Observation) -> Iterator[str]:
+        stop = self.stop
+        if stop.energy_below is not None and seen.energy is not None:
+            if self._energetic and seen.energy < stop.energy_below:
+                yield f"kinetic energy {seen.energy:.3g} is below {stop.energy_below:g}"
+            self._energetic |= seen.energy >= stop.energy_below
+        if stop.speed_below is not None and seen.speed is not None:
+            if self._fast and seen.speed < stop.speed_below:
+                yield f"largest speed {seen.speed:.3g} is below {stop.speed_below:g}"
+            self._fast |= seen.speed >= stop.speed_below
+        most = stop.displacement_above
+        if most is not None and seen.displacement is not None and seen.displacement > most:
+            yield f"largest displacement {seen.displacement:.3g} is above {most:g}"
+        if stop.det_below is not None and seen.det is not None and seen.det < stop.det_below:
+            yield f"smallest det J {seen.det:.3g} is below {stop.det_below:g}"
+        width, height = seen.extent
+        for number, (watch, (x, y)) in enumerate(zip(stop.watch, seen.points, strict=False), 1):
+            if watch.distance is not None:
+                moved = _distance((x, y), (watch.point[0] * width, watch.point[1] * height))
+                if moved >= watch.distance:
+                    yield f"watched point {number} has moved {moved:.3g}, at least {watch.distance:g}"
+            elif watch.place is not None:
+                away = _distance((x, y), (watch.place[0] * width, watch.place[1] * height))
+                if away <= watch.within:
+                    yield f"watched point {number} has reached its place ({away:.3g} away, within {watch.within:g})"
+
+
+def _distance(a: tuple[float, float], b: tuple[float, float]) -> float:
+    return ((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) ** 0.5

@@ -1,0 +1,239 @@
+"""The tools: how the samples of a pointer become a stroke, one small tool each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from itertools import pairwise
+from math import hypot
+from typing import NamedTuple
+
+from app.model.strokes import Stroke
+from app.model.strokes import Tool as StrokeTool
+from app.model.windows import FLOWING
+
+FASTEST = 2.0  # longer sides per second that a brush can follow
+LINE_SPEED = 0.8  # longer sides per second at which a stroke is drawn that was only clicked
+
+
+class Touch(NamedTuple):
+    """The pointer at a tick: x, y as fractions of the picture, pressure 0-1, and the modifiers held."""
+
+    tick: int
+    x: float
+    y: float
+    pressure: float = 1.0
+    shift: bool = False
+
+
+@dataclass(frozen=True)
+class BrushSettings:
+    """A brush as the person sets it: radius in longer sides, the rest 0-1; see `Stroke`."""
+
+    radius: float = 0.15
+    hardness: float = 0.0
+    strength: float = 1.0
+    local: float = 0.0
+
+
+@dataclass(frozen=True)
+class Press:
+    """What a gesture starts from.
+
+    Attributes:
+        brush: as set.
+        opposite: the tool's other direction was asked for.
+        extent: (width, height) of the picture, the longer of them 1.
+        dt: seconds a tick.
+        last: where the last stroke ended, for a straight line from there.
+        detail: how finely the flow of such a brush is solved; see `app.model.windows`.
+    """
+
+    brush: BrushSettings
+    opposite: bool
+    extent: tuple[float, float]
+    dt: float
+    last: tuple[float, float] | None = None
+    detail: int = 0
+
+
+Gesture = Generator[Stroke | None, Touch | None, Stroke | None]
+"""Sent a touch, it yields the stroke so far (None while nothing is to be applied); sent None, it returns the stroke."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool of the strip.
+
+    Attributes:
+        name: its name and that of its icon.
+        label, hint: as the person reads them.
+        key: chooses it; with Shift, its opposite.
+        gesture: from a press to its strokes; None for tools that move the view and not the picture.
+        directions: what its two directions are called.
+        masks: it paints a mask, which then is shown.
+        own: what of the brush is set for it alone.
+    """
+
+    name: str
+    label: str
+    key: str
+    hint: str
+    gesture: Callable[[Press, Touch], Gesture] | None = None
+    directions: tuple[str, str] | None = None
+    masks: bool = False
+    own: tuple[str, ...] = ()
+
+
+def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke:
+    brush = press.brush
+    return Stroke(
+        tool=name,
+        radius=brush.radius,
+        hardness=brush.hardness,
+        strength=brush.strength,
+        reverse=reverse,
+        detail=press.detail if name in FLOWING else 0,
+        local=brush.local if name == "push" else 0.0,
+        samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
+    )
+
+
+def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callable[[Press, Touch], Gesture]:
+    """A tool that works where the pointer is: `backward` is its opposite, or else the stroke is reversed."""
+
+    def gesture(press: Press, first: Touch) -> Gesture:
+        name, reverse = forward, press.opposite
+        if backward is not None:
+            name, reverse = (backward if press.opposite else forward), False
+        if first.shift and press.last is not None:
+            return _line(press, _stroke(press, name, reverse, first), press.last)
+        return _follow(_stroke(press, name, reverse, first), press)
+
+    return gesture
+
+
+def _follow(stroke: Stroke, press: Press) -> Gesture:
+    """The stroke follows the pointer; with Shift along the axis it set out on.
+
+    A pointer that is faster than the fluid can be carried is followed along its path at that speed, also after it is
+    let go: on a slow machine, where there are few ticks to a movement, nothing is torn.
+    """
+    _, x0, y0, _ = stroke.samples[0]
+    path = _Path(press.extent, FASTEST * press.dt, (x0, y0))
+    tick, pressure = stroke.samples[0][0], stroke.samples[0][3]
+    axis: str | None = None
+    while (touch := (yield stroke)) is not None:
+        x, y, pressure = touch.x, touch.y, touch.pressure
+        if touch.shift:
+            dx, dy = (x - x0) * press.extent[0], (y - y0) * press.extent[1]
+            if axis is None and hypot(dx, dy) > 0.01:
+                axis = "x" if abs(dx) >= abs(dy) else "y"
+            x, y = (x, y0) if axis == "x" else (x0, y) if axis == "y" else (x0, y0)
+        if touch.tick > tick:
+            path.refresh()
+            tick = touch.tick
+        path.wanted.append((x, y))
+        for place in path.follow():
+            stroke = stroke.with_sample(tick, *place, pressure)
+    while path.wanted:
+        tick += 1
+        path.refresh()
+        for place in path.follow():
+            stroke = stroke.with_sample(tick, *place, pressure)
+    return stroke
+
+
+class _Path:
+    """Where a brush has still to go, of which it can do only so much in a tick.
+
+    Args:
+        extent: of the picture.
+        reach: longer sides a tick.
+        place: where it is.
+    """
+
+    def __init__(self, extent: tuple[float, float], reach: float, place: tuple[float, float]) -> None:
+        self.wanted: list[tuple[float, float]] = []
+        self._extent, self._reach, self._place = extent, reach, place
+        self._left = reach
+
+    def refresh(self) -> None:
+        """A new tick begins."""
+        self._left = self._reach
+
+    def follow(self) -> list[tuple[float, float]]:
+        """The places that are reached now; where nothing is left to do, the brush stays where it is."""
+        reached = []
+        while self.wanted:
+            (x, y), (px, py) = self.wanted[0], self._place
+            far = hypot((x - px) * self._extent[0], (y - py) * self._extent[1])
+            if far > self._left:
+                part = self._left / far
+                if part > 1e-6:
+                    self._place = round(px + (x - px) * part, 5), round(py + (y - py) * part, 5)
+                    reached.append(self._place)
+                self._left = 0.0
+                break
+            self._left -= far
+            self._place = x, y
+            reached.append(self._place)
+            self.wanted.pop(0)
+        return reached
+
+
+def _line(press: Press, stroke: Stroke, start: tuple[float, float]) -> Gesture:
+    """A straight stroke from where the last one ended to where was clicked, at an even speed."""
+    tick, x, y, pressure = stroke.samples[0]
+    length = hypot((x - start[0]) * press.extent[0], (y - start[1]) * press.extent[1])
+    steps = max(2, round(length / LINE_SPEED / press.dt))
+    stroke = stroke.model_copy(update={"samples": ((tick, *start, pressure),)})
+    for k in range(1, steps + 1):
+        part = k / steps
+        stroke = stroke.with_sample(
+            tick + k, start[0] + (x - start[0]) * part, start[1] + (y - start[1]) * part, pressure
+        )
+    while (yield stroke) is not None:
+        pass
+    return stroke
+
+
+def _curve(press: Press, first: Touch) -> Gesture:
+    """A path is drawn while nothing happens; on release the fluid is blown along it."""
+    touches, last = [first], first
+    while (touch := (yield None)) is not None:
+        before, last = touches[-1], touch
+        if hypot((touch.x - before.x) * press.extent[0], (touch.y - before.y) * press.extent[1]) > 0.004:
+            touches.append(touch)
+    if len(touches) < 2:
+        return None
+    points = touches[::-1] if press.opposite else touches
+    return _stroke(press, "curve", False, *(point._replace(tick=last.tick) for point in points))
+
+
+TOOLS = (
+    Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
+         own=("local",)),
+    Tool("curve", "Curve", "c", "Draw a path: the picture is blown along it", _curve, ("Forwards", "Backwards")),
+    Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
+    Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),
+    Tool(
+        "thicken", "Thicken", "v", "Paint where the fluid is thick and hardly bends",
+        painting("thicken", "thin"), ("Thicken", "Thin"), masks=True,
+    ),
+    Tool(
+        "freeze", "Freeze", "f", "Paint what must stay as it is", painting("freeze", "thaw"), ("Freeze", "Thaw"),
+        masks=True,
+    ),
+    Tool("smooth", "Smooth mask", "s", "Soften the edges of what you have painted", painting("smooth"), masks=True),
+    Tool("restore", "Restore", "r", "Hold to bring the picture back as it was", painting("restore")),
+    Tool("pan", "Pan", "h", "Drag to move the view (or hold Space with any tool)"),
+    Tool("zoom", "Zoom", "z", "Click to zoom in, with Alt to zoom out; drag left or right"),
+)  # fmt: skip
+TOOL = {tool.name: tool for tool in TOOLS}
+
+
+def path_length(stroke: Stroke, extent: tuple[float, float]) -> float:
+    """How long a stroke's path is, in longer sides."""
+    points = ((sample[1] * extent[0], sample[2] * extent[1]) for sample in stroke.samples)
+    return sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(points))

@@ -1,0 +1,629 @@
+"""A recipe made into files: a picture, an animation, a clip warped, maps; streamed frame by frame."""
+
+from __future__ import annotations
+
+import errno
+import gc
+import json
+import os
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from itertools import chain, count, groupby, islice, pairwise, repeat
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.animation import (
+    FrameWriter,
+    animation_writer,
+    check_output,
+    frame_order,
+    is_animation,
+    passes,
+    reordered,
+    unheld_of_clip,
+)
+from app.media.files import cannot_write, is_sequence, replacing, writable
+from app.media.maps import Displacement, Kind, check_map, map_writer, write_map
+from app.media.opening import check_picture
+from app.media.pictures import MAX_PIXELS, Picture, picture_format, unheld, write_picture
+from app.media.video import Clip
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
+from app.model.timeline import Sentinel, Timeline, frame_positions, frame_rate
+from app.progress import Progress
+from app.work.checkpoints import DEFAULT_BUDGET
+from app.work.replay import Replay
+from app.work.states import StoredStates
+from app.work.threads import ahead, behind
+from solver.gl.device import Device
+from solver.resample.plan import GivenMap, Sampling, SamplingError
+from solver.resample.sampler import Sampler
+from solver.warp.map import WarpMap
+
+POINTS_AT_ONCE = 1_000_000  # of a map
+PIXELS_A_STEP = 100_000  # whose look-up, or writing as PNG, takes about as long on a CPU as a step on 256 cells
+
+
+@dataclass(frozen=True)
+class MapOutput:
+    """What is written of the warp map.
+
+    Attributes:
+        path: a file for the last frame's map, or the pattern of a sequence for every frame's; see `app.media.maps`.
+        kind: what an EXR or TIFF holds.
+        forward: where the points of the original go, instead of where those of the result come from.
+        overscan: pixels more on every side.
+        size: longer side in pixels; None is the result's.
+    """
+
+    path: Path
+    kind: Kind = "st"
+    forward: bool = False
+    overscan: int = 0
+    size: int | None = None
+
+    @property
+    def is_sequence(self) -> bool:
+        return is_sequence(self.path)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is made of what.
+
+    Attributes:
+        recipe: all settings; its [output] says the size and the rate.
+        picture: the source; of a clip, its first frame.
+        folder: where the names of auxiliary pictures in the recipe start from.
+        output: the file, or the pattern of a sequence's files; None for maps alone.
+        stats: a JSON file for numbers about every frame.
+        maps: what is written of the warp map.
+        clip: the source, where it moves: its frames are warped by W_t at its own rate, its sound is carried over.
+        part: the first and the last frame of the animation that are written, from 0; None is to the end.
+        animated: for endings that stand for both, as .webp does: an animation is wanted.
+        bits: a channel, of pictures; None keeps the source's.
+        strip: leave out the source's metadata.
+        codec: of a video; None is the usual one of its ending.
+        states: a folder of states of the simulation, for parts to begin with and to leave for others.
+    """
+
+    recipe: Recipe
+    picture: Picture
+    folder: Path
+    output: Path | None
+    stats: Path | None = None
+    maps: MapOutput | None = None
+    clip: Clip | None = None
+    part: tuple[int, int | None] = (0, None)
+    animated: bool = False
+    bits: int | None = None
+    strip: bool = False
+    codec: str | None = None
+    states: Path | None = None
+
+    @property
+    def target(self) -> Path:
+        """The file that it is all about."""
+        path = self.output or (self.maps and self.maps.path)
+        assert path is not None
+        return path
+
+    @property
+    def is_animation(self) -> bool:
+        return self.output is not None and (self.animated or is_animation(self.output))
+
+    @property
+    def has_frames(self) -> bool:
+        """True if more than the end is written."""
+        return self.is_animation or (self.output is None and self.maps is not None and self.maps.is_sequence)
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames per second."""
+        return self.clip.fps if self.clip else frame_rate(self.recipe.output.fps)
+
+    def check(self) -> None:
+        """Find out before the work what would keep it from being written.
+
+        Raises:
+            UserError: naming the file and the mend.
+        """
+        check_picture(self.picture)
+        if self.output is not None:
+            check_output(
+                self.output,
+                animated=self.animated,
+                fps=self.rate,
+                codec=self.codec,
+                bits=self.bits,
+                size=result_size(self.recipe, self.picture),
+            )
+        if self.maps is not None:
+            check_map(self.maps.path)
+            self._check_map_size(self.maps)
+            if self.maps.is_sequence and not self.has_frames:
+                raise UserError(
+                    f"{self.maps.path} numbers the maps of an animation and {self.output} is a picture; "
+                    f"give one map's name, or leave out --output to write the maps alone"
+                )
+        start, end = self.recipe.time.start, self.recipe.duration
+        if self.has_frames and start > end:
+            late = f"the animation ends at {end:g} s, and cannot begin at {start:g} s"
+            raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
+        if self.part != (0, None) and not self.has_frames:
+            raise UserError(f"only an animation has --frames, and {self.output} is a picture; write f.%04d.png or .mp4")
+        if self.clip is not None and self.recipe.mode == "density":
+            raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
+        for path in (self.output, self.stats, self.maps and self.maps.path):
+            if path is not None:
+                writable(path)
+        if self.states is not None and os.path.exists(self.states) and not os.path.isdir(self.states):
+            raise cannot_write(self.states, FileExistsError(errno.EEXIST, "it is a file"))
+
+    def _check_map_size(self, maps: MapOutput) -> None:
+        size = result_size(self.recipe, self.picture)
+        width, height = size if maps.size is None else longer_side(size, maps.size)
+        why = "the size of the result" if maps.size is None else f"--map-size {maps.size}"
+        mend = "ask for fewer by --map-size" if maps.size is None else "ask for fewer"
+        if width * height <= MAX_PIXELS:
+            width, height = width + 2 * maps.overscan, height + 2 * maps.overscan
+            why, mend = f"--overscan {maps.overscan}", "ask for fewer"
+        if width * height > MAX_PIXELS:
+            large = f"a map of {width} x {height} pixels"
+            raise UserError(f"{why} makes {large}; {mend}", in_window=f"{large} is too large; choose a smaller size")
+
+
+@dataclass(frozen=True)
+class Report:
+    """How a job went.
+
+    Attributes:
+        frames: written.
+        ticks: simulated.
+        verdict: which stop condition ended the simulation and when, or None.
+        notices: what the user should hear of.
+    """
+
+    frames: int
+    ticks: int
+    verdict: str | None
+    notices: tuple[str, ...]
+
+
+def run(device: Device, job: Job, progress: Progress) -> Report:
+    """Do the job; nothing of it is left behind if it is cancelled or fails.
+
+    Raises:
+        UserError: what is wrong with the recipe, the picture or the output.
+        Cancelled: if `progress` says so.
+    """
+    job.check()
+    with _garbage_kept():
+        export = _Export(device, job, progress)
+        try:
+            return export.run()
+        finally:
+            export.release()
+
+
+@contextmanager
+def _garbage_kept() -> Iterator[None]:
+    """Collect no garbage but where we say, in this thread: in the writer's there is no GL to release textures with."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.collect()
+        if was_enabled:
+            gc.enable()
+
+
+class _Export:
+    def __init__(self, device: Device, job: Job, progress: Progress) -> None:
+        self.job = job
+        self.recipe = job.recipe
+        self.progress = progress
+        self.device = device
+        self.pictures = Pictures(job.picture, job.folder)
+        job.picture.pixels.flags.writeable = False  # so that it stays on the GPU from frame to frame
+        playback = job.recipe.time
+        # A moving source has no frame that is shown twice: what goes back does so in the simulation.
+        self.is_spooled = job.clip is None and not (job.maps and job.maps.is_sequence)
+        goes_back = (playback.reverse or playback.ping_pong) and not self.is_spooled
+        self.replay = Replay(device, job.recipe, self.pictures, budget=DEFAULT_BUDGET if goes_back else 0)
+        self.states = StoredStates(job.states, self.replay, self.pictures.notice) if job.states else None
+        self.sampler = Sampler(device)
+        self.size = result_size(job.recipe, job.picture)
+        # What the results belong to; densities are straight, whatever the picture is.
+        self.like = replace(job.picture, premultiplied=False) if job.recipe.mode == "density" else job.picture
+        self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
+        self.numbers: list[dict[str, Any]] = []
+        self._position: Fraction | None = None
+        device.timings.enabled = self.replay.fluid.measuring = job.stats is not None
+
+    def release(self) -> None:
+        self.device.timings.enabled = False
+        self.sampler.release()
+        self.replay.release()
+
+    def run(self) -> Report:
+        recipe, job = self.recipe, self.job
+        watched = not self.sentinel.is_idle
+        runs, stills = 2 if watched and job.has_frames else 1, self._steps_for_stills()
+        self.progress.total = runs * recipe.ticks + stills
+        verdict = self._run_until_stopped() if watched else None
+        end = self.replay.tick if watched else recipe.ticks
+        self.progress.total = runs * end + stills
+        if job.has_frames:
+            count = self._write_frames(shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate)), end)
+        else:
+            self._go_to(Fraction(end))
+            if job.output is not None:
+                steps = steps_for(self.size)
+                frame = self._frame(job.picture.pixels, self.progress.parts(steps, self.size[1]))
+                picture = self.like.with_pixels(frame)
+                self.progress.enter("writing")
+                write_picture(job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip)
+                self.progress.count(steps)
+            self._note(0, Fraction(end))
+            count = 1
+        if job.maps is not None and not job.maps.is_sequence:
+            self.progress.enter("making the map")
+            try:
+                found = self._map(job.maps)
+            except MemoryError:
+                width, height = (side + 2 * job.maps.overscan for side in self._map_size(job.maps))
+                little = f"there is not enough memory for a map of {width} x {height} pixels"
+                raise UserError(
+                    f"{little}; lower --map-size or --overscan", in_window=f"{little}; choose a smaller size"
+                ) from None
+            self.progress.advance(steps_for((found.width, found.height)))
+            self.progress.enter("writing the map")
+            write_map(job.maps.path, found, job.maps.kind)
+            self.progress.count(steps_for((found.width, found.height)))
+        if job.stats is not None:
+            with replacing(job.stats) as temporary:
+                temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
+        if self.states is not None:
+            self.states.keep(last=True)  # where the next part begins
+        self._note_losses()
+        return Report(count, end, verdict, tuple(self.pictures.notices))
+
+    def _note_losses(self) -> None:
+        """What the user should know of the last warp, and of what the output cannot hold."""
+        if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
+            self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
+        output, clip = self.job.output, self.job.clip
+        if output is not None and (said := unheld(output, self.job.picture)):
+            self.pictures.notice(said)
+        if output is not None and clip is not None and (said := unheld_of_clip(output, self.job.codec, clip)):
+            self.pictures.notice(said)
+
+    def _steps_for_stills(self) -> int:
+        """What the last picture and the last map count as, looked up and written."""
+        job = self.job
+        sizes = [self.size] if job.output is not None and not job.has_frames else []
+        sizes += [self._map_size(job.maps)] if job.maps is not None and not job.maps.is_sequence else []
+        return sum(2 * steps_for(size) for size in sizes)
+
+    def _run_until_stopped(self) -> str | None:
+        """Simulate until a stop condition fires, or to the end; says which fired."""
+        for _ in range(self.recipe.ticks):
+            self._advance()
+            if verdict := self.sentinel.verdict(self.replay.tick, self.replay.observe(self.sentinel)):
+                return verdict
+        return None
+
+    # -- frames -----------------------------------------------------------------------------------------------------
+
+    def _write_frames(self, shown: list[Fraction], end: int) -> int:
+        """Write the frames, each warped by the map at its position in `shown`; says how many there were."""
+        job, (first, last) = self.job, self.job.part
+        if job.clip is None and first >= len(shown):
+            raise UserError(f"the animation has the frames 0-{len(shown) - 1}, and none from {first} on")
+        until = None if last is None else last + 1
+        wanted = shown[first:until]
+        self.progress.expect(ceil(max(wanted, default=shown[-1])) - end)
+        with ExitStack() as stack:
+            take_map, times = None, passes(job.output) if job.output is not None else 1
+            if job.maps is not None and job.maps.is_sequence:
+                writer = map_writer(job.maps.path, job.maps.kind, first=first, cancel=self.progress.cancel)
+                take_map = stack.enter_context(behind(stack.enter_context(writer)))
+            if job.clip is not None:
+                clip_frames = job.clip.read_frames(self.progress.cancel, self.pictures.notice)
+                source = stack.enter_context(ahead(part_of(clip_frames, first, until)))
+                self.progress.expect(len(range(job.clip.frames or len(shown))[first:until]) * times)
+                # Once the fluid has come to its end, the clip goes on with the last warp.
+                positions = islice(chain(shown, repeat(shown[-1])), first, None)
+                frames = self._frames(zip(count(first), positions, strict=False), source, take_map)
+            else:
+                self.progress.expect(len(wanted) * times)
+                frames = self._frames_of_picture(wanted, take_map)
+            write = None
+            if job.output is not None:
+                write = stack.enter_context(behind(stack.enter_context(self._writer())))
+            written = 0
+            for frame in frames:
+                if write is not None:
+                    write(frame)
+                written += 1
+                self.progress.advance()
+            self.progress.enter("writing")  # what the encoder still holds, and what it does with all frames
+        if job.maps is not None and not job.maps.is_sequence:
+            self._go_to(max(wanted, default=shown[-1]))
+        return written
+
+    def _frames_of_picture(
+        self, wanted: list[Fraction], take_map: Callable[[Displacement], None] | None
+    ) -> Iterator[np.ndarray]:
+        """The picture warped by the maps at these positions; one that is shown again is not made again."""
+        first, source = self.job.part[0], repeat(self.job.picture.pixels)
+        if not self.is_spooled or self.job.output is None:
+            return self._frames(zip(count(first), wanted, strict=False), source, take_map)
+        numbers: dict[Fraction, int] = {}
+        for number, position in enumerate(wanted, first):
+            numbers.setdefault(position, number)
+        distinct = sorted(numbers)
+        places = {position: place for place, position in enumerate(distinct)}
+        order = [places[position] for position in wanted]
+        frames = self._frames(((numbers[position], position) for position in distinct), source, take_map)
+        goes_back = any(later < earlier for earlier, later in pairwise(order))
+        return reordered(frames, order, self.job.output.parent) if goes_back else held(frames, order)
+
+    def _writer(self) -> AbstractContextManager[FrameWriter]:
+        job, output, (first, last) = self.job, self.recipe.output, self.job.part
+        assert job.output is not None
+        return animation_writer(
+            job.output,
+            job.rate,
+            codec=job.codec,
+            crf=round(45 - 0.3 * output.quality),
+            quality=output.quality,
+            bits=job.bits,
+            sound=job.clip.path if job.clip and job.clip.sound else None,
+            sound_from=float(first / job.rate) + (job.clip.late if job.clip else 0),
+            frames=None if last is None else last + 1 - first,
+            first=first,
+            like=self.like.stripped() if job.strip else self.like,
+            cancel=self.progress.cancel,
+            passed=self.progress.advance,
+        )
+
+    def _frames(
+        self,
+        positions: Iterable[tuple[int, Fraction]],
+        source: Iterator[np.ndarray],
+        take_map: Callable[[Displacement], None] | None,
+    ) -> Iterator[np.ndarray]:
+        """The frames of the source, (h, w, c) each, warped by the maps at the numbered positions."""
+        nothing = np.empty((0, 0, 1), np.uint8)
+        for (number, position), pixels in zip(positions, source, strict=False):
+            self._go_to(position)
+            if take_map is not None and self.job.maps is not None:
+                take_map(self._map(self.job.maps))
+            frame = self._frame(pixels) if self.job.output is not None else nothing
+            self._note(number, position)
+            gc.collect(1)
+            yield frame
+
+    def _go_to(self, position: Fraction) -> None:
+        if position == self._position:
+            return
+        whole = position // 1
+        begins = self._position is None or whole < self.replay.tick
+        if whole < self.replay.tick:
+            nearest = self.replay.checkpoints.nearest(self.recipe, whole)
+            self.replay.seek(nearest.tick if nearest else 0)
+        before = self.replay.tick
+        if self.states is not None and begins and self.states.resume(whole):
+            self.progress.advance(self.replay.tick - before)
+        while self.replay.tick < whole:
+            self._advance()
+        self.replay.seek(position)
+        self._position = position
+
+    def _frame(self, pixels: np.ndarray, heard: Callable[[int], None] | None = None) -> np.ndarray:
+        """The pixels warped by the map as it is; for `heard` see `looked_up`."""
+        heard = heard or (lambda rows: self.progress.check())
+        if self.replay.density is not None:
+            frame = self._density_frame(self.replay.density.get())
+            heard(len(frame))
+            return frame
+        # The frames of an animation are all of one kind, and most of its formats have no alpha.
+        alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
+        with self.device.stage("sample picture"):
+            premultiplied = self.job.picture.premultiplied
+            how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples, premultiplied=premultiplied)
+            try:
+                return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, heard)
+            except SamplingError as error:
+                raise UserError(f"The map cannot be applied: {error}.") from None
+
+    def _density_frame(self, values: np.ndarray) -> np.ndarray:
+        """The densities as 8-bit colours, in the result's size."""
+        channels = 4 if self.job.picture.has_alpha else 3
+        pixels = (np.clip(values[..., :channels], 0, 1) * 255 + 0.5).astype(np.uint8)
+        if self.size == pixels.shape[1::-1]:
+            return pixels
+        still = GivenMap(self.device, np.zeros((8, 8, 2), np.float32))
+        try:
+            return self.sampler.apply(still, pixels, self.size)
+        finally:
+            still.release()
+
+    def _map(self, wanted: MapOutput) -> Displacement:
+        return displacement(self.replay, self._map_size(wanted), wanted.overscan, wanted.forward, self.progress.check)
+
+    def _map_size(self, wanted: MapOutput) -> tuple[int, int]:
+        return self.size if wanted.size is None else longer_side(self.size, wanted.size)
+
+    def _advance(self) -> None:
+        self.replay.advance()
+        if self.states is not None:
+            self.states.keep()
+        self.progress.advance()
+
+    # -- numbers ----------------------------------------------------------------------------------------------------
+
+    def _note(self, number: int, position: Fraction) -> None:
+        """Keep the numbers about a frame, if they are asked for."""
+        if self.job.stats is None:
+            return
+        replay, residuals = self.replay, self.replay.fluid.residuals
+        told = {
+            "frame": number,
+            "tick": float(position),
+            "time": float(position) * self.recipe.fluid.dt,
+            **asdict(residuals),
+            "divergence_left": residuals.divergence_left,
+            **asdict(replay.fluid.motion()),
+            **asdict(replay.warp.statistics()),
+            "milliseconds": {stage: round(spent, 3) for stage, spent in self.device.timings.take().items()},
+        }
+        self.numbers.append(told)
+
+    def _document(self, verdict: str | None) -> dict[str, Any]:
+        return {
+            "fluidwarp": 1,
+            "opengl": self.device.limits.renderer,
+            "picture": [self.job.picture.width, self.job.picture.height],
+            "result": list(self.size),
+            "grid": list(self.replay.grid.size),
+            "dt": self.recipe.fluid.dt,
+            "solver": self.recipe.fluid.solver,
+            "stopped": verdict,
+            "frames": self.numbers,
+        }
+
+
+def part_of(
+    frames: Generator[np.ndarray, None, None], first: int, until: int | None
+) -> Generator[np.ndarray, None, None]:
+    """The frames of a clip from `first` to before `until`, or to its end.
+
+    Raises:
+        UserError: if it ends before the first.
+    """
+    number = -1
+    with closing(frames):
+        for number, frame in enumerate(islice(frames, until)):
+            if number >= first:
+                yield frame
+    if 0 <= number < first:
+        raise UserError(f"the clip has the frames 0-{number}, and none from {first} on")
+
+
+def held(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]:
+    """Frames in an `order` that never goes back, each as often as it is in it."""
+    for frame, (_, repeats) in zip(frames, groupby(order), strict=True):
+        for _ in repeats:
+            yield frame
+
+
+def shown_positions(timeline: Timeline, recipe: Recipe, fps: float) -> list[Fraction]:
+    """The position in ticks of every frame of an animation in the order they are shown."""
+    playback = recipe.time
+    positions = frame_positions(timeline, playback, fps)
+    if playback.reverse:
+        positions.reverse()
+    order = frame_order(
+        len(positions),
+        ping_pong=playback.ping_pong,
+        hold_first=round(playback.hold_first * fps),
+        hold_last=round(playback.hold_last * fps),
+    )
+    return [positions[index] for index in order]
+
+
+def displacement(
+    replay: Replay,
+    size: tuple[int, int],
+    overscan: int = 0,
+    forward: bool = False,
+    check: Callable[[], None] = lambda: None,
+) -> Displacement:
+    """The warp map at this moment, for a picture of `size` with `overscan` pixels more on every side.
+
+    Nothing flows beyond the picture's edge: the displacement there is that of the nearest point on it.
+    forward: where the points of the original go. check: called now and then; may raise, as `Progress.check` does.
+    """
+    # A size in whole pixels has nearly the picture's aspect.
+    fit = np.divide(size, max(size)) / replay.grid.extent
+    warp = replay.warp.forward if forward else replay.warp
+    if not overscan and max(size) <= replay.device.limits.max_texture_size:
+        return Displacement((warp.read(size) * fit).astype(np.float32), 0, forward)
+    (width, height), (right, bottom) = size, replay.grid.extent
+    x = np.clip((np.arange(-overscan, width + overscan) + 0.5) / width, 0, 1) * right
+    y = np.clip((np.arange(-overscan, height + overscan) + 0.5) / height, 0, 1) * bottom
+    values = np.empty((len(y), len(x), 2), np.float32)
+    rows = max(1, POINTS_AT_ONCE // len(x))
+    for top in range(0, len(y), rows):
+        check()
+        points = np.stack(np.meshgrid(x, y[top : top + rows]), axis=-1).reshape(-1, 2)
+        values[top : top + rows] = (warp.at(points) * fit).reshape(-1, len(x), 2)
+    return Displacement(values, overscan, forward)
+
+
+def looked_up(
+    sampler: Sampler,
+    warp: WarpMap | GivenMap,
+    pixels: np.ndarray,
+    size: tuple[int, int],
+    how: Sampling,
+    alpha: bool,
+    heard: Callable[[int], None],
+) -> np.ndarray:
+    """The pixels (h, w, c) looked up through a map, in bands, so that little more than the result is in memory.
+
+    alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
+    heard: called with the number of rows in every band; may raise, as `Progress.check` does.
+    """
+    result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)
+    if not alpha or pixels.shape[2] in (2, 4) or how.edges != "transparent":
+        for band in sampler.bands(warp, pixels, size, how, result):
+            heard(len(band))
+        return result
+    top = 0
+    for band in sampler.bands(warp, with_alpha(pixels), size, how):
+        heard(len(band))
+        if result.shape[2] == pixels.shape[2] and (band[..., -1] < opaque_value(band)).any():
+            result = with_alpha(result)
+        result[top : top + len(band)] = band[..., : result.shape[2]]
+        top += len(band)
+    return result
+
+
+def steps_for(size: tuple[int, int]) -> int:
+    """How many steps of a job looking up a still of this size counts as; writing it counts as many again."""
+    return max(1, size[0] * size[1] // PIXELS_A_STEP)
+
+
+def longer_side(size: tuple[int, int], longest: int) -> tuple[int, int]:
+    """A size of the same proportions, its longer side `longest` pixels."""
+    width, height = (max(1, round(side * longest / max(size))) for side in size)
+    return width, height
+
+
+def result_size(recipe: Recipe, picture: Picture) -> tuple[int, int]:
+    """(width, height) of the result in pixels: the recipe's size, or the picture's own."""
+    own = picture.width, picture.height
+    return own if recipe.output.size is None else longer_side(own, recipe.output.size)
+
+
+def with_alpha(pixels: np.ndarray) -> np.ndarray:
+    """(h, w, 1-4) with an alpha channel: opaque where there was none."""
+    if pixels.shape[2] in (2, 4):
+        return pixels
+    return np.concatenate([pixels, np.full_like(pixels[..., :1], opaque_value(pixels))], axis=2)
+
+
+def opaque_value(pixels: np.ndarray) -> int:
+    """The alpha of a pixel that hides what is below it."""
+    return 1 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max

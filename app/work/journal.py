@@ -1,0 +1,283 @@
+"""What a journal of unsaved work says: records in lines, each with its checksum, read until one is torn.
+
+The first line names the format. Every other one is a checksum (CRC 32, in eight hexadecimal digits) and a JSON object:
+what has changed since the record before. A recipe is told by how it differs from the one before it in the history, so
+that a stroke is written once, in however many states of the history it is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from app.errors import UserError
+from app.media import project as projects
+from app.media.pictures import read_picture
+from app.media.project import Project
+from app.model.history import Entry, History
+from app.model.recipe import VERSION as RECIPE_VERSION
+from app.model.recipe import Recipe
+from app.model.schema import frozen, plain
+
+VERSION = 1
+_HEAD = "fluidwarp journal"
+
+
+class Damaged(Exception):
+    """There is nothing in it that can be read."""
+
+
+class Newer(Exception):
+    """It was written by a newer fluidwarp."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the pictures of the work are.
+
+    Attributes:
+        name: what the person calls the work.
+        folder: where the recipe's names of pictures start from.
+        path: the project's own file, if it has one.
+        embedded: pictures are kept in the project and not referred to.
+        inside: the picture is nowhere but in the project's file.
+        size, crc: of the bytes of the picture's file, by which it is known again.
+    """
+
+    name: str
+    folder: str
+    path: str | None
+    embedded: bool
+    inside: bool
+    size: int
+    crc: int
+
+    @classmethod
+    def of(cls, project: Project) -> Origin:
+        path = os.path.abspath(project.path) if project.path is not None else None
+        data, inside = project.data, project.keeper is not None
+        folder = os.path.abspath(project.folder)
+        return cls(project.name, folder, path, project.embedded, inside, len(data), zlib.crc32(data))
+
+    def is_of(self, data: bytes) -> bool:
+        """True if `data` are the bytes of the picture that was worked on."""
+        return len(data) == self.size and zlib.crc32(data) == self.crc
+
+
+@dataclass(frozen=True)
+class Work:
+    """A work with all its edits, as it is at a moment.
+
+    Attributes:
+        entries: all of its history, from the oldest.
+        index: which of them is the present.
+        saved: the recipe as it was saved last, or opened.
+        is_grid_automatic: nobody has chosen the grid.
+    """
+
+    entries: tuple[Entry, ...]
+    index: int
+    saved: Recipe
+    is_grid_automatic: bool = False
+
+    @property
+    def recipe(self) -> Recipe:
+        return self.entries[self.index].recipe
+
+    @property
+    def strokes(self) -> int:
+        """How many strokes there are, with those that have been undone."""
+        return max(len(entry.recipe.stroke) for entry in self.entries[self.index :])
+
+    @property
+    def is_unsaved(self) -> bool:
+        """True if something would be lost: the present, or what can be redone."""
+        return self.recipe != self.saved or self.index < len(self.entries) - 1
+
+    @property
+    def history(self) -> History:
+        return History.restored(self.entries, self.index)
+
+
+# -- writing ----------------------------------------------------------------------------------------------------------
+
+
+def beginning(origin: Origin, work: Work) -> Iterator[bytes]:
+    """The lines of a new journal that holds all of a work."""
+    yield f"{_HEAD} {VERSION} {RECIPE_VERSION}\n".encode()
+    first, *_ = work.entries
+    yield _line({"origin": asdict(origin), "add": [_told(first, Recipe())], "index": 0})
+    for number, (before, entry) in enumerate(pairwise(work.entries), 1):
+        yield _line({"add": [_told(entry, before.recipe)], "index": number})
+    # What was saved is mostly one of the entries; otherwise it is the present but for a few ticks of coming to rest.
+    same = (number for number, entry in enumerate(work.entries) if entry.recipe is work.saved)
+    nearest = next(same, work.index)
+    saved = [nearest, _difference(work.saved, work.entries[nearest].recipe)]
+    yield _line({"index": work.index, "saved": saved, "automatic": work.is_grid_automatic})
+
+
+def continuation(work: Work, before: Work) -> bytes:
+    """The line that makes `before`, which has been written, `work`."""
+    old, new = before.entries, work.entries
+    # The oldest entries go where a history grows too large.
+    dropped = next((number for number, entry in enumerate(old) if entry is new[0]), 0)
+    old = old[dropped:]
+    kept = next((number for number, pair in enumerate(zip(old, new, strict=False)) if pair[0] is not pair[1]), None)
+    kept = min(len(old), len(new)) if kept is None else kept
+    same = not dropped and kept == before.index == work.index == len(new) - 1 and old[kept].name == new[kept].name
+    if same and work.is_grid_automatic == before.is_grid_automatic:
+        # The same edit, while the fluid comes to rest.
+        return _line({"amend": _difference(new[kept].recipe, old[kept].recipe)})
+    record: dict[str, Any] = {"drop": dropped, "keep": kept, "index": work.index}
+    record["automatic"] = work.is_grid_automatic
+    earlier = [new[kept - 1].recipe if kept else Recipe(), *(entry.recipe for entry in new[kept:])]
+    record["add"] = [_told(entry, recipe) for entry, recipe in zip(new[kept:], earlier, strict=False)]
+    return _line(record)
+
+
+def _told(entry: Entry, before: Recipe) -> tuple[str, int, dict[str, Any]]:
+    return entry.name, entry.nbytes, _difference(entry.recipe, before)
+
+
+def _difference(recipe: Recipe, before: Recipe) -> dict[str, Any]:
+    """What of `recipe` is not as in `before`; of lists, how many items stay, and those that follow."""
+    changed: dict[str, Any] = {}
+    for key in Recipe.model_fields:
+        mine, theirs = getattr(recipe, key), getattr(before, key)
+        if mine is theirs or mine == theirs:
+            continue
+        if isinstance(mine, tuple):
+            kept = _agreeing(mine, theirs)
+            changed[key] = [kept, mine[kept:]]
+        else:
+            changed[key] = mine
+    return changed
+
+
+def _agreeing(mine: tuple[Any, ...], theirs: tuple[Any, ...]) -> int:
+    """How many of the first items are the same."""
+    both = min(len(mine), len(theirs))
+    if mine[:both] == theirs[:both]:
+        return both
+    return next(number for number, pair in enumerate(zip(mine, theirs, strict=False)) if pair[0] != pair[1])
+
+
+def _line(record: dict[str, Any]) -> bytes:
+    # JSON's floats are Python's own, which are read back bit for bit; line ends and foreign letters are escaped.
+    text = json.dumps(record, default=plain, separators=(",", ":"), allow_nan=False).encode()
+    return b"%08x %s\n" % (zlib.crc32(text), text)
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+
+
+def read(data: bytes) -> tuple[Origin, Work]:
+    """The work in a journal, up to the last record that is whole; what comes after a torn one is not looked at.
+
+    Raises:
+        Damaged: if not even its beginning is whole.
+        Newer: if it was written by a newer fluidwarp.
+    """
+    head, *lines = data.split(b"\n")[:-1] or [b""]
+    words = head.decode("ascii", "replace").rsplit(" ", 2)
+    if len(words) != 3 or words[0] != _HEAD or not (words[1].isdecimal() and words[2].isdecimal()):
+        raise Damaged
+    if int(words[1]) > VERSION or int(words[2]) > RECIPE_VERSION:
+        raise Newer
+    origin: Origin | None = None
+    work = Work((), 0, Recipe())
+    failures = (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError)
+    for line in lines:
+        try:
+            record = _record(line)
+            origin = origin or Origin(**record["origin"])
+            work = _followed(work, record)
+        except failures:
+            break
+    if origin is None or not work.entries:
+        raise Damaged
+    return origin, work
+
+
+def _record(line: bytes) -> dict[str, Any]:
+    if line[8:9] != b" " or int(line[:8], 16) != zlib.crc32(line[9:]):
+        raise ValueError
+    return json.loads(line[9:])
+
+
+def _followed(work: Work, record: dict[str, Any]) -> Work:
+    """`work` after a record."""
+    entries = list(work.entries)
+    if "amend" in record:
+        entry = entries[work.index]
+        amended = replace(entry, recipe=_changed(entry.recipe, record["amend"]))
+        return replace(work, entries=(*entries[: work.index], amended))
+    del entries[: record.get("drop", 0)]
+    del entries[record.get("keep", len(entries)) :]
+    for name, nbytes, changes in record.get("add", ()):
+        entries.append(Entry(name, _changed(entries[-1].recipe if entries else Recipe(), changes), nbytes))
+    saved = work.saved if work.entries else entries[0].recipe
+    if "saved" in record:
+        nearest, changes = record["saved"]
+        saved = _changed(entries[nearest].recipe, changes)
+    index = record["index"]
+    if not 0 <= index < len(entries):
+        raise IndexError
+    return Work(tuple(entries), index, saved, bool(record.get("automatic", work.is_grid_automatic)))
+
+
+def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:
+    parts = {}
+    for key, value in changes.items():
+        before = getattr(recipe, key)
+        if isinstance(before, tuple):
+            kept, items = value
+            parts[key] = (*before[:kept], *_type(key).validate_python(frozen(items)))
+        else:
+            parts[key] = _type(key).validate_python(frozen(value))
+    return recipe.edited(**parts) if parts else recipe
+
+
+@cache
+def _type(key: str) -> TypeAdapter[Any]:
+    annotation: Any = Recipe.model_fields[key].annotation
+    return TypeAdapter(annotation)
+
+
+# -- the pictures -----------------------------------------------------------------------------------------------------
+
+
+def picture_file(origin: Origin, recipe: Recipe) -> Path:
+    """The file that the picture of the work is in."""
+    if origin.inside and origin.path is not None:
+        return Path(origin.path)
+    return Path(origin.folder) / (recipe.picture or "")
+
+
+def project_of(origin: Origin, recipe: Recipe) -> Project:
+    """The project that was worked on, with `recipe` for its recipe and its picture read again.
+
+    Raises:
+        UserError: if the picture is gone, or cannot be read.
+    """
+    path = Path(origin.path) if origin.path is not None else None
+    if not origin.inside:
+        source = picture_file(origin, recipe)
+        try:
+            picture, data = read_picture(source), projects.picture_bytes(source)
+            return Project(recipe, picture, data, Path(origin.folder), path, origin.embedded)
+        except (UserError, OSError):
+            # A picture that was put into the project when it was saved is there still.
+            if path is None or not origin.embedded or not path.exists():
+                raise
+    assert path is not None
+    return replace(projects.load(path), recipe=recipe)

@@ -1,0 +1,590 @@
+"""Working on a document live: gestures become strokes, time goes on while something moves, every edit is kept.
+
+Knows the solver and no window; the clock comes in from outside, as ticks.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.project import Project
+from app.model.document import Document
+from app.model.recipe import Recipe
+from app.model.sampling import Pictures
+from app.model.strokes import Change, Stroke
+from app.model.tools import Gesture, Press, Tool, Touch
+from app.model.windows import detail_for
+from app.work.replay import Replay
+from solver.gl.device import Device
+
+REST = 0.004  # longer sides a second: a pixel of a screen in four frames
+LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each waits for the GPU
+KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
+MOST_COASTING = 60.0  # seconds
+PATIENCE = 0.05  # seconds of a frame for getting to where the playhead was sent
+QUICK = 0.01  # seconds a tick may take for another one in the same frame: rather a slower fluid than fewer frames
+
+
+class Session:
+    """A document being worked on, and its simulation at the playhead.
+
+    Args:
+        device: where it is simulated.
+        project: what is worked on.
+        budget: bytes of texture memory for checkpoints.
+
+    Attributes:
+        project: where it came from and is saved to.
+        document: the recipe with all its edits.
+        replay: the simulation.
+        playing: the recording is being played.
+        coasting: time goes on because the fluid still moves.
+        path: where the gesture that is under way has been, as fractions of the picture.
+        stroke: the stroke that is open.
+        is_rebuilding: all is made again on another grid; what is seen in between is of no interest.
+        notice: something the person should hear of, for the window to take.
+        is_grid_automatic: nobody has chosen the grid, and it may follow the machine.
+        changes: grows with everything that changes what is seen.
+    """
+
+    def __init__(self, device: Device, project: Project, budget: int = 400 * 2**20) -> None:
+        self.device = device
+        self.project = project
+        self.document = Document(project.picture, project.recipe, project.path)
+        self.pictures = Pictures(project.picture, project.folder)
+        self.replay = Replay(device, project.recipe, self.pictures, budget)
+        self.playing = False
+        self.coasting = False
+        self.path: list[tuple[float, float]] = []
+        self.stroke: Stroke | None = None
+        self.notice: str | None = None
+        self.changes = 0
+        self.is_rebuilding = False
+        self.is_grid_automatic = False
+        self.last_place: tuple[float, float] | None = None
+        self._gesture: Gesture | None = None
+        # The tick that the gesture is recorded at: ahead of the simulation while strokes before it are still waiting.
+        self._pen = 0
+        # The person has sent the playhead back, and what is done next takes the place of what comes after it.
+        self._went_back = False
+        self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
+        self._tool: Tool | None = None
+        self._opposite = False
+        self._touch: Touch | None = None
+        # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
+        self._base = project.recipe
+        self._live = project.recipe
+        self._target: int | None = self.end or None
+        self._still = True
+        self._coasted = 0
+
+    # -- what it is now ---------------------------------------------------------------------------------------------
+
+    @property
+    def recipe(self) -> Recipe:
+        """The recipe as it is now, with the stroke that is open."""
+        return self._live
+
+    @property
+    def tick(self) -> int:
+        """The playhead."""
+        return self.replay.tick
+
+    @property
+    def end(self) -> int:
+        """Ticks recorded; 0 where nothing has been yet."""
+        recipe = self._live if hasattr(self, "_live") else self.project.recipe
+        return recipe.ticks if recipe.stroke or recipe.change or recipe.force else 0
+
+    @property
+    def dt(self) -> float:
+        return self._live.fluid.dt
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        return self.replay.grid.extent
+
+    @property
+    def is_painting(self) -> bool:
+        return self._gesture is not None
+
+    @property
+    def is_moving(self) -> bool:
+        """True while time goes on."""
+        return self.playing or self.coasting or self.is_painting or self.is_behind
+
+    @property
+    def is_behind(self) -> bool:
+        """True while the playhead is on its way: to where it was sent, or through strokes that are still waiting."""
+        return self.target != self.tick
+
+    @property
+    def target(self) -> int:
+        """Where the playhead is or is going."""
+        if self._target is not None:
+            return self._target
+        if self.is_painting:
+            return self._pen
+        return self.end if self.coasting else self.tick
+
+    @property
+    def waiting(self) -> list[Stroke]:
+        """The strokes that are drawn already, and that the simulation has not come to the end of."""
+        if self._target is not None or not (self.is_painting or self.coasting):
+            return []
+        return [stroke for stroke in self._live.stroke if stroke.last_tick >= self.tick]
+
+    # -- painting ---------------------------------------------------------------------------------------------------
+
+    def press(self, tool: Tool, press: Press, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
+        """The pointer went down at (x, y), fractions of the picture: a gesture begins, and time with it.
+
+        Where strokes before it are not yet simulated to their ends, it is recorded behind them.
+        """
+        if tool.gesture is None:
+            return
+        self.release()
+        self.playing = False
+        self._pen = self._go_on()
+        self._target = None
+        self._tool, self._opposite = tool, press.opposite
+        self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
+        self.path = [self._touch[1:3]]
+        detail = detail_for(press.brush.radius, self._base, self._base.fluid_at(self._pen))
+        self._gesture = tool.gesture(replace(press, last=self.last_place, detail=detail), self._touch)
+        self.replay.checkpoint()
+        self._hear(next(self._gesture))
+
+    def move(self, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
+        """The pointer moved; every sample counts."""
+        if self._gesture is None:
+            return
+        self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
+        self.path.append(self._touch[1:3])
+        self._hear(self._gesture.send(self._touch))
+
+    def release(self) -> None:
+        """The pointer went up: the gesture becomes an entry of the history, and the fluid comes to rest by itself."""
+        if self._gesture is None:
+            return
+        gesture, self._gesture = self._gesture, None
+        stroke = self.stroke
+        try:
+            gesture.send(None)
+        except StopIteration as finished:
+            stroke = finished.value
+        self.stroke, path, self.path = None, self.path, []
+        if stroke is None:
+            if not self.coasting:
+                self._show(self.document.recipe)
+            return
+        self.last_place = path[-1]
+        ticks = max(self._pen, stroke.last_tick + 1)
+        self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=ticks * self.dt)
+        self.replay.use(self._live)
+        self.commit(self._label(stroke))
+        self._coast()
+
+    def cancel(self) -> None:
+        """Give up the gesture, as if it had not been."""
+        if self._gesture is None:
+            return
+        self._gesture.close()
+        self._gesture = self.stroke = None
+        self.path, coasting = [], self.coasting
+        self._show(self.document.recipe)
+        if coasting:
+            self._coast()
+
+    def _hear(self, stroke: Stroke | None) -> None:
+        self.stroke = stroke
+        if stroke is not None:
+            duration = (self._pen + 1) * self.dt
+            self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=duration)
+            self.replay.use(self._live)
+        self.changes += 1
+
+    def _label(self, stroke: Stroke) -> str:
+        if self._tool is None:
+            return stroke.tool.capitalize()
+        if (self._tool.directions and self._tool.masks) or stroke.tool in ("bloat", "pinch"):
+            return stroke.tool.capitalize()
+        return self._tool.label
+
+    def _inside(self, x: float, y: float) -> tuple[float, float]:
+        """Places are kept within half a picture of it, and with as many digits as a recipe needs."""
+        return round(min(max(x, -0.5), 1.5), 5), round(min(max(y, -0.5), 1.5), 5)
+
+    # -- time -------------------------------------------------------------------------------------------------------
+
+    def advance(self, ticks: int) -> None:
+        """Let time go on by up to `ticks`, but always by one; on the way to the playhead's target, by what it takes."""
+        start = time.perf_counter()
+        if self._target is not None:
+            self._approach(start + PATIENCE)
+            return
+        while ticks > 0 or self.is_behind:
+            if self.is_painting and ticks > 0 and (self.stroke is not None or self.coasting):
+                self._record()
+            elif self.is_behind:
+                self._step()
+            elif self.coasting:
+                self._record()
+                self._look_for_rest()
+            elif self.playing and self.tick < self.end:
+                self._step()
+            else:
+                self.playing = False
+                break
+            ticks -= 1
+            if time.perf_counter() - start > QUICK:
+                break
+        if not self.is_behind:
+            self.is_rebuilding = False
+
+    def play(self) -> None:
+        """Play the recording, from the start when it is at its end; while the fluid moves, pause."""
+        self.release()
+        if self.coasting or self.playing or (self._target is not None and not self._went_back):
+            self.pause()
+        elif not self._went_back and self.tick < self.end:
+            self._finish()
+        elif self.end and self.target >= self.end and self._is_fast():
+            self._coast()
+        elif self.end:
+            if self.target >= self.end:
+                self.seek(0)
+            self.playing = True
+
+    def pause(self) -> None:
+        """Let time stand still, also while strokes are waiting; a playhead that was sent back still arrives."""
+        self.release()
+        self.playing = self.coasting = False
+        if not self._went_back and not self.is_rebuilding:
+            self._target = None
+        self.changes += 1
+
+    def stop_recording(self) -> None:
+        """Let time stand still at the end of all that has been done; what is still waiting is simulated."""
+        self.release()
+        self.playing = self.coasting = False
+        if not self._went_back:
+            self._send(self.end)
+        self.changes += 1
+
+    def step(self) -> None:
+        """One tick forward; at the end of the recording, it is recorded."""
+        self.pause()
+        self._arrive()
+        if self.tick < self.end:
+            self._step()
+        elif self.end:
+            self._record()
+
+    def seek(self, tick: int) -> None:
+        """Send the playhead to a tick of the recording; it arrives over the next frames."""
+        self.release()
+        self.playing = self.coasting = False
+        tick = min(max(tick, 0), self.end)
+        self._went_back = tick < self.end
+        self._send(tick)
+        self.changes += 1
+
+    def settle(self, patience: float = 600.0) -> None:
+        """Let everything that moves come to rest, at once: for saving, for tests."""
+        deadline = time.perf_counter() + patience
+        self._arrive()
+        while self.coasting and time.perf_counter() < deadline:
+            self.advance(1)
+
+    def _coast(self) -> None:
+        self.coasting, self._coasted = True, 0
+        self.changes += 1
+
+    def _finish(self) -> None:
+        """Go on through what is waiting; the fluid comes to rest by itself if it ends with a stroke."""
+        if any(stroke.last_tick + 1 >= self.end for stroke in self._live.stroke):
+            self._coast()
+        else:
+            self._send(self.end)
+
+    def _record(self) -> None:
+        """One tick more than there has been, and a step; the open stroke stays where the pointer is.
+
+        While strokes are waiting, a gesture is recorded as it would be without them: a tick for every step.
+        """
+        if self._gesture is not None:
+            assert self._touch is not None
+            if self.stroke is None or self.stroke.last_tick < self._pen:
+                self._touch = self._touch._replace(tick=self._pen)
+                self._hear(self._gesture.send(self._touch))
+            self._pen += 1
+        ticks = self._pen if self.is_painting else self.tick + 1
+        if self._live.ticks < ticks:
+            self._live = self._live.edited(duration=ticks * self.dt)
+            self.replay.use(self._live)
+            if self.stroke is None:
+                self.document.history.amend(self._live)
+                self._base = self._live
+        self._step()
+
+    def _step(self) -> None:
+        self.replay.advance()
+        if self.tick % KEEP_EVERY == 0:
+            self.replay.checkpoint()
+        self.changes += 1
+
+    def _look_for_rest(self) -> None:
+        self._coasted += 1
+        if self._coasted % LOOK_EVERY:
+            return
+        if not self._is_fast() or self._coasted * self.dt > MOST_COASTING:
+            self.coasting = False
+            self.replay.checkpoint()
+            self.changes += 1
+
+    def _is_fast(self) -> bool:
+        return self.replay.fluid.motion().largest_speed > REST
+
+    def _send(self, tick: int) -> None:
+        """Let the playhead go to a tick over the next frames."""
+        self._target = tick if tick != self.tick else None
+
+    def _approach(self, deadline: float) -> None:
+        """Work towards the target until the deadline, by way of the nearest checkpoint."""
+        target = self._target
+        if target is None:
+            return
+        self.replay.head_for(target)
+        while self.tick < target:
+            self._step()
+            if time.perf_counter() > deadline:
+                break
+        self.changes += 1
+        if self.tick == target:
+            self._target, self.is_rebuilding = None, False
+
+    def _arrive(self) -> None:
+        while self._target is not None:
+            self._approach(time.perf_counter() + 60)
+
+    # -- edits ------------------------------------------------------------------------------------------------------
+
+    def change(self, name: str, **settings: Any) -> None:
+        """Set something from the playhead on: viscosity, drag, walls, clear_velocity, reset_warp, clear_masks."""
+        self.preview_change(**settings)
+        self.commit(name)
+        if self.tick == self.end - 1:
+            self._arrive()
+        if self.end and (self.is_behind or self._is_fast()):
+            self._coast()
+
+    def preview_change(self, **settings: Any) -> None:
+        """As `change`, without an entry in the history yet: for a slider that is being dragged."""
+        self.release()
+        base, lasts = self._base, settings.keys() <= {"viscosity", "drag", "walls"}
+        if not base.stroke and not base.change and self.target == 0 and lasts:
+            self._use(base.edited(fluid=base.fluid.model_copy(update=settings)))
+            return
+        tick = self._go_on()
+        self.playing = self.coasting = False
+        base = self._base
+        before = [change for change in base.change if change.tick != tick]
+        here = [change for change in base.change if change.tick == tick]
+        made = (here[-1] if here else Change(tick=tick)).model_copy(update=settings)
+        # What is done at once needs a tick to be done in.
+        duration = base.duration if lasts else (tick + 1) * self.dt
+        self._use(base.edited(change=(*before, made), duration=duration))
+        self._send(self.end)
+
+    def preview(self, **parts: Any) -> None:
+        """Replace parts of the recipe, without an entry in the history yet."""
+        self.release()
+        self._use(self._base.edited(**parts))
+
+    def commit(self, name: str) -> None:
+        """Make what was previewed an entry of the history."""
+        self.document.history.commit(name, self._live)
+        self._base = self._live
+        self.changes += 1
+
+    def edit(self, name: str, **parts: Any) -> None:
+        """Replace parts of the recipe, as one entry of the history."""
+        self.preview(**parts)
+        self.commit(name)
+
+    def start_from_map(self, name: str | None) -> None:
+        """Begin with a warp map instead of the picture as it is, or, None, as it is again; an entry of the history.
+
+        Raises:
+            UserError: if it cannot be read, or does not fit the picture or the machine.
+        """
+        self.release()
+        recipe = self._base.edited(map=name)
+        if name is not None:
+            self.pictures.forget_map(name)
+            height, width = self.pictures.load_map(name).shape[:2]
+            most = self.device.limits.max_texture_size
+            if min(width, height) < 6 or max(width, height) > most:
+                raise UserError(f"{name} is {width} x {height}: a map to begin with has from 6 to {most} along a side")
+            recipe.checked(name)
+        if recipe.map == self._live.map:
+            # The same name, and perhaps another file by now.
+            self.preview(map=None)
+        self.edit("Start from a map" if name else "Start from the picture", map=name)
+
+    def set_grid(self, cells: int, name: str = "Quality") -> None:
+        """Simulate on another grid, by replaying all that has been done; from now on it is the person's choice."""
+        self.is_grid_automatic = False
+        self.forget_grid()
+        if cells != self._live.fluid.grid:
+            self.edit(name, fluid=self._live.fluid.model_copy(update={"grid": cells}))
+
+    def prepare_grid(self, cells: int, seconds: float) -> bool:
+        """Simulate all that has been done on another grid too, for a while; True once that has taken this one's place.
+
+        Until then everything stays as it is, and also then it is no edit.
+        """
+        recipe, start = self._live.on_grid(cells), time.perf_counter()
+        if self._prepared is not None and not recipe.is_set_up_as(self._prepared.recipe):
+            self.forget_grid()
+        if self._prepared is None:
+            self._prepared = Replay(self.device, recipe, self.pictures, self.replay.checkpoints.budget // 2)
+        prepared = self._prepared
+        if (common := recipe.agrees_until(prepared.recipe)) < prepared.tick:
+            prepared.head_for(int(common))
+        prepared.use(recipe)
+        prepared.head_for(self.tick)
+        while prepared.tick < self.tick:
+            prepared.advance()
+            if time.perf_counter() - start > seconds:
+                break
+        if prepared.tick < self.tick:
+            return False
+        prepared.checkpoints.budget = self.replay.checkpoints.budget
+        self.replay.release()
+        self.replay, self._prepared = prepared, None
+        self.document.simulate_on(cells)
+        self._base, self._live = self._base.on_grid(cells), recipe
+        self.changes += 1
+        return True
+
+    def forget_grid(self) -> None:
+        """Go on with this grid, whatever another one was prepared for."""
+        if self._prepared is not None:
+            self._prepared.release()
+            self._prepared = None
+
+    def begin_with(self, **fluid: Any) -> None:
+        """Other settings of the fluid for work that has not begun yet: no edit, and nothing to save."""
+        if self.end:
+            return
+        recipe = self._live.edited(fluid=self._live.fluid.model_copy(update=fluid))
+        recipe = recipe.edited(duration=recipe.fluid.dt)
+        self.document.begin_with(recipe)
+        self._base = recipe
+        self._use(recipe)
+        self._target = None
+
+    def undo(self) -> str | None:
+        """Take back the last edit; its name."""
+        self.release()
+        name = self.document.history.undo_name
+        if name is not None:
+            self._show(self.document.history.undo())
+        return name
+
+    def redo(self) -> str | None:
+        """Make an edit again that was taken back; its name."""
+        self.release()
+        name = self.document.history.redo_name
+        if name is not None:
+            self._show(self.document.history.redo())
+        return name
+
+    def go_to(self, index: int) -> None:
+        """Any state of the history."""
+        self.release()
+        self._show(self.document.history.go_to(index))
+
+    def _show(self, recipe: Recipe) -> None:
+        """Another state of the work, with the playhead at its end."""
+        self.playing = self.coasting = self._went_back = False
+        self.replay.checkpoint()
+        self._base = recipe
+        self._use(recipe)
+        self._target = self.end
+        self._approach(time.perf_counter() + 0.08)
+
+    def _use(self, recipe: Recipe) -> None:
+        """Simulate another recipe; what differs in the past is made again over the next frames."""
+        before, replay = self._live, self.replay
+        if recipe is before or recipe == before:
+            self._live = recipe
+            return
+        tick = self.target
+        if not recipe.is_set_up_as(before):
+            self.is_rebuilding = tick > 0
+            replay.seek(0)
+        else:
+            common = recipe.agrees_until(before)
+            if common < replay.tick:
+                replay.head_for(int(common))
+        self._live = recipe
+        replay.use(recipe)
+        self._send(min(tick, self.end))
+        self.changes += 1
+
+    def _go_on(self) -> int:
+        """The tick at which what is done next begins: behind all that is recorded, or where the playhead was sent back.
+
+        There, what was recorded after it is left to undo.
+        """
+        tick = self.target if self._went_back else self.end
+        self.replay.head_for(tick)
+        if tick < self.end:
+            self._cut(tick)
+        self._went_back = False
+        return tick
+
+    def _cut(self, tick: int) -> None:
+        base, strokes = self._base, []
+        for stroke in base.stroke:
+            kept = tuple(sample for sample in stroke.samples if sample[0] < tick)
+            if len(kept) == len(stroke.samples):
+                strokes.append(stroke)
+            elif kept and stroke.tool != "curve":
+                strokes.append(stroke.model_copy(update={"samples": kept}))
+        cut = base.edited(
+            stroke=tuple(strokes),
+            change=tuple(change for change in base.change if change.tick < tick),
+            duration=max(tick, 1) * self.dt,
+        )
+        if cut.stroke != base.stroke or cut.change != base.change:
+            self.notice = f"Going on from {tick * self.dt:.1f} s. What came after it is one Undo away."
+        self._base = self._live = cut
+        self.replay.use(cut)
+
+    # -- numbers ----------------------------------------------------------------------------------------------------
+
+    def divergence(self) -> float:
+        """The largest divergence that is left, 1 / s; reads the velocity back."""
+        return float(np.abs(self.replay.fluid.divergence()).max())
+
+    def saved(self, project: Project) -> None:
+        """Take note that the work has been saved as `project`: what is in the file is exported too, grid and all."""
+        assert project.path is not None
+        self.project = project
+        self.is_grid_automatic = False
+        self.forget_grid()
+        self.document.saved(project.path)
+
+    def release_gpu(self) -> None:
+        """Free the textures."""
+        self.forget_grid()
+        self.replay.release()
