@@ -12,12 +12,14 @@ from PIL import Image, ImageDraw, ImageFont
 
 from app.errors import UserError
 from app.media.animation import animation_writer
+from app.media.auxiliary import Pictures
 from app.media.files import MENDS
-from app.media.pictures import Picture, read_picture, srgb_to_linear, to_bits, write_picture
+from app.media.pictures import read_picture, to_bits, write_picture
+from app.media.recipes import read_recipe
 from app.model.forces import CurveForce, GradientForce, PointForce
 from app.model.masks import solid
+from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.progress import Progress
 from app.work.export import displacement
 from app.work.replay import Replay
@@ -146,7 +148,7 @@ def recipes_folder() -> Path:
 
 def load(name: str) -> Recipe:
     """A recipe of the gallery."""
-    return Recipe.load(recipes_folder() / f"{name}.toml")
+    return read_recipe(recipes_folder() / f"{name}.toml")
 
 
 def source_of(recipe: Recipe) -> np.ndarray:

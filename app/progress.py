@@ -12,12 +12,14 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
 from app.errors import Cancelled
-from app.media.files import abandon
 
 # Ctrl+C, a scheduler's, and that the terminal was closed, where the system knows it
 SIGNALS = tuple(number for number in signal.Signals if number.name in ("SIGINT", "SIGTERM", "SIGHUP"))
 GRACE = 0.2  # seconds that a job has to notice Ctrl+C between two of its steps
 INTERRUPTED = 130
+
+appearing = threading.Lock()  # held while files that belong together appear under their names
+_undoing: list[Callable[[], object]] = []
 
 
 def never() -> bool:
@@ -98,6 +100,24 @@ class Progress:
         if not self.done or self.total is None:
             return None
         return (time.monotonic() - self._started) / self.done * max(0, self.total - self.done)
+
+
+def abandon() -> None:
+    """Undo everything that is half done, for a process that is about to end at once."""
+    with appearing:
+        for undo in reversed(_undoing):
+            with suppress(OSError):
+                undo()
+
+
+@contextmanager
+def if_abandoned(undo: Callable[[], object]) -> Iterator[None]:
+    """While the block runs, `abandon` calls `undo`."""
+    _undoing.append(undo)
+    try:
+        yield
+    finally:
+        _undoing.remove(undo)
 
 
 def leave() -> None:

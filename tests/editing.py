@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.media.pictures import Picture
 from app.media.project import Project, from_picture
+from app.model.picture import Picture
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
 from app.ui.files import fresh_recipe

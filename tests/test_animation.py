@@ -27,8 +27,9 @@ from app.media.animation import (
     order_length,
     reordered,
 )
-from app.media.pictures import Picture, read_picture, to_bits
+from app.media.pictures import read_picture, to_bits
 from app.media.video import read_clip
+from app.model.picture import Picture
 
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 

@@ -22,7 +22,8 @@ import pytest
 
 from app.errors import Cancelled, UserError
 from app.media import files
-from app.media.pictures import Picture, read_picture, write_picture
+from app.media.pictures import read_picture, write_picture
+from app.model.picture import Picture
 from app.progress import INTERRUPTED, Progress
 from app.work import batch, states
 from app.work.batch import Edits, Outcome, Task, perform, run_batch, spread

@@ -16,8 +16,9 @@ from PIL import Image
 
 from app import cli, doctor
 from app.media.maps import Displacement, write_map
-from app.media.pictures import Picture, read_picture, write_picture
+from app.media.pictures import read_picture, write_picture
 from app.media.project import from_recipe, save
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
 from app.work.export import Job, run

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.media.pictures import Picture
+from app.media.auxiliary import Pictures
+from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.model.schema import frozen
 from app.work.replay import Replay
 from solver.gl.device import Device

@@ -13,8 +13,9 @@ from PIL import Image
 from app import cli
 from app.media.animation import animation_writer
 from app.media.maps import Displacement, write_map
-from app.media.pictures import Picture, write_picture
+from app.media.pictures import write_picture
 from app.media.project import from_recipe, save
+from app.model.picture import Picture
 from solver.gl.device import Device
 
 RECIPE = """

@@ -15,8 +15,9 @@ import pytest
 
 from app.media import project as projects
 from app.media.maps import Displacement, read_map, write_map
-from app.media.pictures import Picture, read_picture, write_picture
+from app.media.pictures import read_picture, write_picture
 from app.media.project import Project
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.tools import TOOLS
 from app.progress import Progress

@@ -17,13 +17,14 @@ from scipy import ndimage
 from app.errors import Cancelled, UserError
 from app.gallery import sharpness, spline_warp
 from app.media import ffmpeg
+from app.media.auxiliary import Pictures
 from app.media.files import takes_place
 from app.media.maps import Displacement, cropped, read_map, to_st, write_map
 from app.media.opening import open_source
-from app.media.pictures import Picture, read_picture, srgb_to_linear, write_picture
+from app.media.pictures import read_picture, write_picture
 from app.media.video import read_clip
+from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.progress import Progress
 from app.work.applying import Application, MapSource, converted, inverted
 from app.work.batch import Edits, Task

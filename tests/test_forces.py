@@ -12,9 +12,9 @@ from PIL import Image
 from pydantic import TypeAdapter, ValidationError
 
 from app.errors import UserError
-from app.media.pictures import Picture
+from app.media.auxiliary import Pictures
 from app.model.forces import Force, build
-from app.model.sampling import Pictures
+from app.model.picture import Picture
 from app.model.schema import frozen
 from solver.grid import Grid
 

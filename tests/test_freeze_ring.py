@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.media.pictures import Picture
+from app.media.auxiliary import Pictures
+from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.model.strokes import Stroke
 from app.work.replay import Replay
 from solver.gl.device import Device

@@ -11,8 +11,8 @@ from scipy import ndimage
 from app import gallery
 from app.errors import UserError
 from app.gallery import Studio, arrows, contact_sheet, load, shades, sharpness, spline_warp
+from app.media.auxiliary import Pictures
 from app.media.pictures import read_picture
-from app.model.sampling import Pictures
 from app.progress import Progress
 from solver.gl.device import Device
 from solver.grid import Grid

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.media.pictures import Picture
+from app.media.auxiliary import Pictures
+from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.work.export import displacement
 from app.work.replay import Replay
 from solver.brush.brush import Brush

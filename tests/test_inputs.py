@@ -22,11 +22,12 @@ from app.errors import MOST_SHOWN, UserError, shown
 from app.media import inputs
 from app.media.inputs import open_input, read_input
 from app.media.maps import holds, read_map
-from app.media.pictures import Picture, read_picture, write_picture
+from app.media.pictures import read_picture, write_picture
 from app.media.project import is_project, load
+from app.media.recipes import read_recipe
 from app.media.video import read_clip
 from app.model import toml
-from app.model.recipe import Recipe
+from app.model.picture import Picture
 from app.ui.preferences import Preferences
 
 ROOT = Path(__file__).parent.parent
@@ -361,7 +362,7 @@ def endless(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], P
 
 
 READERS: dict[str, Callable[[Path], object]] = {
-    "a.toml": Recipe.load,
+    "a.toml": read_recipe,
     "a.fluidwarp": load,
     "a.png": read_picture,
     "a.mp4": read_clip,
@@ -397,7 +398,7 @@ def test_files_are_of_a_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with path.open("wb") as stream:
         stream.truncate(10 * 2**40)  # on the disk it takes nothing
     with pytest.raises(UserError, match=rf"{path}: it has more than 128 MB, the most that a recipe may have"):
-        Recipe.load(path)
+        read_recipe(path)
     with pytest.raises(UserError, match="has more than 5 bytes"):
         read_input(path, "file", 5)
     # One that tells a size of 0, and goes on.

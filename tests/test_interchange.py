@@ -12,7 +12,8 @@ import pytest
 from app.media import ffmpeg
 from app.media.maps import read_map
 from app.media.opening import open_recipe
-from app.media.pictures import linear_to_srgb, read_exr, read_picture, srgb_to_linear
+from app.media.pictures import read_exr, read_picture
+from app.model.picture import linear_to_srgb, srgb_to_linear
 from app.progress import Progress
 from app.work.export import Job, MapOutput, run
 from solver.gl.device import Device

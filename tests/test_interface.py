@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from app.media.maps import Displacement, write_map
-from app.media.pictures import Picture, write_picture
+from app.media.pictures import write_picture
+from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER
 from app.model.tools import TOOLS
 from app.ui.clock import HOVERING

@@ -29,7 +29,8 @@ from app.media.maps import (
     to_st,
     write_map,
 )
-from app.media.pictures import Picture, read_exr, write_picture
+from app.media.pictures import read_exr, write_picture
+from app.model.picture import Picture
 
 SIZES = [(48, 64), (64, 48), (33, 33), (1, 7)]
 

@@ -12,9 +12,10 @@ from PIL import Image
 from pydantic import TypeAdapter, ValidationError
 
 from app.errors import UserError
-from app.media.pictures import Picture
+from app.media.auxiliary import Pictures
 from app.model.masks import FreezeLayer, ViscosityLayer, solid, viscosity
-from app.model.sampling import Pictures, Segment, Window, blurred, intensity, to_grid
+from app.model.picture import Picture
+from app.model.sampling import Segment, Window, blurred, intensity, to_grid
 from app.model.schema import frozen
 from solver.grid import Grid
 

@@ -18,7 +18,8 @@ from PIL import Image, ImageCms, PngImagePlugin
 from app.errors import UserError
 from app.media import files
 from app.media.ffmpeg import executable
-from app.media.pictures import Picture, linear_to_srgb, read_exr, read_picture, srgb_to_linear, to_bits, write_picture
+from app.media.pictures import read_exr, read_picture, to_bits, write_picture
+from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
 
 MODES = {1: "grey", 2: "grey+alpha", 3: "RGB", 4: "RGBA"}
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()

@@ -20,10 +20,11 @@ import pytest
 
 from app.errors import UserError
 from app.media import project as projects
-from app.media.pictures import Picture, write_picture
+from app.media.pictures import write_picture
 from app.media.project import Project
 from app.model.document import Document
 from app.model.history import History
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.ui.recovering import Offer

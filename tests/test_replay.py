@@ -9,9 +9,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from app.media.pictures import Picture
+from app.media.auxiliary import Pictures
+from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.model.strokes import Stroke
 from app.work.replay import Replay
 from solver.fluid import Fluid

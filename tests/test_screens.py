@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.media.pictures import Picture, read_picture, write_picture
+from app.media.pictures import read_picture, write_picture
+from app.model.picture import Picture
 from editing import Robot, small_project
 from solver.gl.device import Device
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.media.pictures import Picture
+from app.media.auxiliary import Pictures
+from app.model.picture import Picture
 from app.model.presets import HONEY, PUTTY, WATER, Feel
 from app.model.recipe import FluidSettings, Recipe
-from app.model.sampling import Pictures
 from app.model.strokes import Dab, Stroke
 from app.model.tools import path_length
 from app.model.windows import CELLS, Window, detail_for

@@ -25,8 +25,9 @@ from app.media.files import (
     temporary_beside,
     temporary_file,
 )
-from app.media.pictures import FORMATS, WEBP, Picture, check_picture_output, lost, to_bits, write_picture
+from app.media.pictures import FORMATS, WEBP, check_picture_output, lost, to_bits, write_picture
 from app.media.video import Clip, sound_codec
+from app.model.picture import Picture
 from app.progress import never
 
 T = TypeVar("T")

@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 
 from app.errors import Cancelled, UserError
-from app.media.files import cannot_write, if_abandoned
-from app.progress import never
+from app.media.files import cannot_write
+from app.progress import if_abandoned, never
 
 EMPTY_WORDS = (
     "Conversion failed",

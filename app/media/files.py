@@ -6,14 +6,14 @@ import errno
 import os
 import re
 import shutil
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
 from app.errors import UserError
 from app.media.leftovers import sweep, temporary_name
+from app.progress import appearing, if_abandoned
 
 MENDS = {
     errno.ENOSPC: "the disk is full; free some space or choose another folder",
@@ -29,27 +29,6 @@ MENDS = {
 
 
 NUMBER = re.compile(r"%(0\d+)?d")
-
-_undoing: list[Callable[[], object]] = []
-_moving = threading.Lock()
-
-
-def abandon() -> None:
-    """Undo everything that is half done, for a process that is about to end at once."""
-    with _moving:  # a sequence that is appearing appears as a whole
-        for undo in reversed(_undoing):
-            with suppress(OSError):
-                undo()
-
-
-@contextmanager
-def if_abandoned(undo: Callable[[], object]) -> Iterator[None]:
-    """While the block runs, `abandon` calls `undo`."""
-    _undoing.append(undo)
-    try:
-        yield
-    finally:
-        _undoing.remove(undo)
 
 
 @contextmanager
@@ -186,7 +165,7 @@ def replacing_many(folder: str | os.PathLike[str], label: str) -> Iterator[Path]
         try:
             temporary.mkdir()
             yield temporary
-            with _moving:
+            with appearing:
                 for file in sorted(temporary.iterdir()):
                     os.replace(file, target / file.name)
         except OSError as error:

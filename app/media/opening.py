@@ -9,9 +9,11 @@ from importlib import resources
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.pictures import FORMATS, MAX_PIXELS, OTHERS, Picture, read_picture
+from app.media.pictures import FORMATS, MAX_PIXELS, OTHERS, read_picture
 from app.media.project import Project, is_project, load
+from app.media.recipes import read_recipe
 from app.media.video import Clip, read_clip
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from solver.grid import MOST_ALONG, SMALLEST_GRID
 
@@ -121,4 +123,4 @@ def open_recipe(name: str, max_pixels: int = MAX_PIXELS) -> Opened:
     if is_project(path):
         project = load(path, max_pixels)
         return Opened(project.recipe, project.folder, str(path), project)
-    return Opened(Recipe.load(path), path.parent, str(path))
+    return Opened(read_recipe(path), path.parent, str(path))

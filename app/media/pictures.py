@@ -12,7 +12,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.files import replacing
 from app.media.inputs import read_start
+from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
 
 EXR_LAYOUT = frozenset({"version", "chunkCount", "maxSamplesPerPixel", "dwaCompressionLevel"})
 
@@ -33,69 +34,6 @@ ORIENTATION, DESCRIPTION, EXIF_IFD, GPS_IFD = 0x0112, 0x010E, 0x8769, 0x8825
 TIFF_TEXTS = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
 # Descriptions in which tifffile, ImageJ and OME keep the shape, which readers believe and a result would belie.
 LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
-
-
-@dataclass(frozen=True)
-class Picture:
-    """Pixels, top row first, with what belongs to them.
-
-    `pixels` is (h, w, c), c = 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; uint8 and uint16 hold the whole range in the
-    transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
-    premultiplied: where there is alpha, the colours are multiplied by it, as the file has them. They stay so, since
-    dividing rounds, and since the colour where alpha is 0 (a flame, a glow) would be lost.
-    attributes: numbers of an EXR's header by name, such as pixelAspectRatio. chunks: a PNG's, that say what its colours
-    mean. note: what of the file is lost, in a sentence that names it; "" if nothing.
-    """
-
-    pixels: np.ndarray
-    icc: bytes | None = None
-    exif: bytes | None = None
-    xmp: bytes | None = None
-    dpi: tuple[float, float] | None = None
-    chromaticities: tuple[float, ...] | None = None
-    texts: Mapping[str, str] = field(default_factory=dict)
-    premultiplied: bool = False
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    chunks: Mapping[bytes, bytes] = field(default_factory=dict)
-    note: str = ""
-
-    @property
-    def width(self) -> int:
-        return self.pixels.shape[1]
-
-    @property
-    def height(self) -> int:
-        return self.pixels.shape[0]
-
-    @property
-    def bits(self) -> int:
-        """Bits a channel: 8, 16 or 32."""
-        return self.pixels.dtype.itemsize * 8
-
-    @property
-    def linear(self) -> bool:
-        """Whether the values are linear light."""
-        return self.pixels.dtype == np.float32
-
-    @property
-    def has_alpha(self) -> bool:
-        return self.pixels.shape[2] in (2, 4)
-
-    def with_pixels(self, pixels: np.ndarray) -> Picture:
-        """The same picture with other pixels, of any size."""
-        return replace(self, pixels=pixels)
-
-    def stripped(self) -> Picture:
-        """The same pixels without the metadata; what the colours mean is kept."""
-        kept = {key: value for key, value in self.attributes.items() if key == "pixelAspectRatio"}
-        return replace(self, exif=None, xmp=None, dpi=None, texts={}, attributes=kept)
-
-    def straight(self) -> Picture:
-        """The same picture, its colours not multiplied by alpha."""
-        if not self.premultiplied:
-            return self
-        pixels = unpremultiplied(self.pixels) if self.has_alpha else self.pixels
-        return replace(self, pixels=pixels, premultiplied=False)
 
 
 @dataclass(frozen=True)
@@ -167,16 +105,6 @@ def check_picture_output(
 # Depth and alpha ----------------------------------------------------------------------------------------------------
 
 
-def srgb_to_linear(values: np.ndarray) -> np.ndarray:
-    """Linear light of sRGB values 0-1 (IEC 61966-2-1)."""
-    return np.where(values <= 0.04045, values / 12.92, ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4)
-
-
-def linear_to_srgb(values: np.ndarray) -> np.ndarray:
-    """sRGB values 0-1 of linear light (IEC 61966-2-1)."""
-    return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)
-
-
 def to_bits(pixels: np.ndarray, bits: int, *, dither: bool = True) -> np.ndarray:
     """Pixels (h, w, c) in another depth: 8 and 16 are sRGB, 32 is linear light; alpha is never curved.
 
@@ -211,18 +139,6 @@ def _strip_to_bits(pixels: np.ndarray, bits: int, noise: np.random.Generator | N
     # a little less than a whole step, so that rounding errors do not move values that are exact
     offset = 0.5 if noise is None else 0.001 + 0.998 * noise.random(values.shape, np.float32)
     return np.minimum(values + offset, top).astype(np.uint8 if bits == 8 else np.uint16)
-
-
-def unpremultiplied(pixels: np.ndarray) -> np.ndarray:
-    """Straight alpha from premultiplied; colour without alpha is left as it is."""
-    alpha = pixels[..., -1:].astype(np.float32)
-    whole = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
-    with np.errstate(all="ignore"):  # what is infinite or NaN stays so
-        scale = np.divide(whole, alpha, out=np.ones_like(alpha), where=alpha > 0)
-        colours = pixels[..., :-1] * scale
-    if pixels.dtype != np.float32:
-        colours = np.clip(colours + 0.5, 0, whole)
-    return np.concatenate([colours.astype(pixels.dtype), pixels[..., -1:]], axis=2)
 
 
 def over(pixels: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:

@@ -13,7 +13,9 @@ from app.errors import UserError, shown
 from app.media.files import replacing
 from app.media.inputs import MOST_TEXT, Archive, open_input, read_input
 from app.media.leftovers import temporary_folder
-from app.media.pictures import MAX_PIXELS, Picture, read_picture
+from app.media.pictures import MAX_PIXELS, read_picture
+from app.media.recipes import read_recipe
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import plain
 
@@ -81,7 +83,7 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
         UserError: if one of them cannot be read.
     """
     path = Path(path)
-    recipe = Recipe.load(path)
+    recipe = read_recipe(path)
     if recipe.picture is None:
         raise UserError(f"{path} names no picture; open a picture first, then apply the recipe to it")
     source = path.parent / recipe.picture

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.media.pictures import Picture
 from app.model.history import DEFAULT_BUDGET, History
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 
 

@@ -21,8 +21,8 @@ from pydantic import Field, field_validator, model_validator
 from app.errors import UserError
 from app.model.sampling import (
     SOURCE,
+    NamedPictures,
     PictureName,
-    Pictures,
     Point,
     Segment,
     Window,
@@ -50,7 +50,7 @@ class _Force(Timed):
     name: str = ""
     strength: Strength = 1.0
 
-    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+    def faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         """Acceleration (ny, nx, 2) float32 on left and upper faces, the walls' own faces zero; None if it has none.
 
         Raises:
@@ -58,11 +58,11 @@ class _Force(Timed):
         """
         return None
 
-    def divergence(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+    def divergence(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         """Divergence (ny, nx) float32 the velocity shall have, of zero net; None if it has none."""
         return None
 
-    def motion(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+    def motion(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         """Velocity (ny, nx, 2) float32 on left and upper faces that carries the picture alone; None if it has none."""
         return None
 
@@ -82,10 +82,10 @@ class _Push(_Force):
     falloff: Falloff = "smooth"
     local: Fraction01 = 0.0
 
-    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+    def faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         return None if self.local == 1 else (1 - self.local) * self._force(grid)
 
-    def motion(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+    def motion(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         return None if self.local == 0 else self.local * self._bare(grid)
 
     def _force(self, grid: Grid) -> np.ndarray:
@@ -204,7 +204,7 @@ class FieldForce(_Force):
     picture: PictureName
     green: Literal["up", "down"] = "down"
 
-    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         if self.picture == SOURCE:
             raise ValueError("a field needs a picture of its own, not the source")
         picture = pictures.load(self.picture)
@@ -240,10 +240,10 @@ class GradientForce(_Force):
     within: Window | None = None
     swell: bool = False
 
-    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+    def faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         return None if self.swell else self._faces(grid, pictures)
 
-    def divergence(self, grid: Grid, pictures: Pictures) -> np.ndarray | None:
+    def divergence(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         if not self.swell:
             return None
         faces = np.pad(self._faces(grid, pictures).astype(np.float64), ((0, 1), (0, 1), (0, 0)))
@@ -251,7 +251,7 @@ class GradientForce(_Force):
         across, down = np.diff(u[:-1], axis=1), np.diff(v[:, :-1], axis=0)
         return (across / grid.spacing[0] + down / grid.spacing[1]).astype(np.float32)
 
-    def _faces(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def _faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         height = self.potential(grid, pictures)
         if np.ptp(height) < 1e-6:
             raise ValueError(f"{self.picture} is the same everywhere, so that it has no gradient")
@@ -266,7 +266,7 @@ class GradientForce(_Force):
             u, v = u * weight_u, v * weight_v
         return _on_faces(u, v)
 
-    def potential(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def potential(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         """What the force is the gradient of, (ny, nx) in [0, 1]."""
         if self.segment:
             height = self.segment.weight(self.picture, grid, pictures)
@@ -288,7 +288,7 @@ class VortexForce(_Force):
     radius: Radius = 0.15
     falloff: Falloff = "smooth"
 
-    def faces(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         (centre,) = places([self.point], grid)
 
         def stream(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -318,7 +318,7 @@ class _Room(_Force):
 
     _sign = 1.0
 
-    def divergence(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def divergence(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         (centre,) = places([self.point], grid)
         x, y = grid.centres()
         # A source smaller than a cell would fall between the centres.
@@ -360,7 +360,7 @@ class BuiltForce:
     motion: np.ndarray | None
 
 
-def build(forces: Sequence[Force], grid: Grid, pictures: Pictures, duration: float) -> list[BuiltForce]:
+def build(forces: Sequence[Force], grid: Grid, pictures: NamedPictures, duration: float) -> list[BuiltForce]:
     """The recipe's forces on a grid.
 
     Raises:

@@ -23,8 +23,8 @@ from pydantic import Field, model_validator
 from app.errors import UserError
 from app.model.sampling import (
     SOURCE,
+    NamedPictures,
     PictureName,
-    Pictures,
     Point,
     Segment,
     Window,
@@ -57,7 +57,7 @@ class _Layer(Model, ABC):
     window: Window | None = None
 
     @abstractmethod
-    def intensity(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def intensity(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         """The layer on the cells, (ny, nx) float64 in [0, 1].
 
         Raises:
@@ -74,7 +74,7 @@ class _Constant(_Layer):
 
     kind: Literal["constant"]
 
-    def intensity(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def intensity(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         return np.ones((grid.ny, grid.nx))
 
 
@@ -100,7 +100,7 @@ class _PictureLayer(_Layer):
     blur: Annotated[float, Field(ge=0, le=10)] = 0.0
     levels: Annotated[int, Field(ge=2, le=256)] | None = None
 
-    def intensity(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def intensity(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         if self.levels is None:
             return self._shades(grid, pictures)
         # The steps are cut on a fine grid and then averaged, or their edges would lie elsewhere on every grid.
@@ -108,7 +108,7 @@ class _PictureLayer(_Layer):
         steps = quantised(self._shades(grid.refined(finer), pictures), self.levels)
         return steps.reshape(grid.ny, finer, grid.nx, finer).mean(axis=(1, 3))
 
-    def _shades(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def _shades(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         if self.segment:
             values = self.segment.weight(self.picture, grid, pictures)
         else:
@@ -139,7 +139,7 @@ class _Path(_Layer):
     radius: Radius = 0.08
     hardness: Fraction01 = 0.5
 
-    def intensity(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def intensity(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         return falloff(distance_to_path(places(self.points, grid), grid) / self.radius, self.hardness)
 
 
@@ -191,7 +191,7 @@ class PictureViscosity(_PictureLayer, _Thickness):
 class PathViscosity(_Path, _Thickness):
     """Viscosity painted along a path, blending into what is below with the brush's falloff."""
 
-    def intensity(self, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def intensity(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         return np.ones((grid.ny, grid.nx))
 
     def coverage(self, grid: Grid) -> np.ndarray:
@@ -233,7 +233,7 @@ ViscosityLayer = Annotated[ConstantViscosity | PictureViscosity | PathViscosity,
 FreezeLayer = Annotated[ConstantFreeze | PictureFreeze | PathFreeze, Field(discriminator="kind")]
 
 
-def viscosity(layers: Sequence[ViscosityLayer], base: float, grid: Grid, pictures: Pictures) -> np.ndarray:
+def viscosity(layers: Sequence[ViscosityLayer], base: float, grid: Grid, pictures: NamedPictures) -> np.ndarray:
     """The viscosity of the cells, (ny, nx) float32: `base` with the layers on top, in order.
 
     Raises:
@@ -250,7 +250,7 @@ def viscosity(layers: Sequence[ViscosityLayer], base: float, grid: Grid, picture
     return result.astype(np.float32)
 
 
-def solid(layers: Sequence[FreezeLayer], grid: Grid, pictures: Pictures) -> np.ndarray:
+def solid(layers: Sequence[FreezeLayer], grid: Grid, pictures: NamedPictures) -> np.ndarray:
     """What is frozen on a grid or a canvas, (ny, nx) bool: nothing, with the layers on top, in order.
 
     On a canvas above `FINEST` along its longer side it is worked out on one of that size, and its edge interpolated.

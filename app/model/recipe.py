@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from itertools import pairwise, zip_longest
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
 from app.errors import UserError
-from app.media.files import replacing
-from app.media.inputs import MOST_TEXT, read_input
 from app.model import toml
 from app.model.forces import Force
 from app.model.masks import FreezeLayer, ViscosityLayer
@@ -199,7 +196,7 @@ class Recipe(Model):
             raise ValueError("the ticks of [[change]] must not go backwards")
         return self
 
-    # -- files ------------------------------------------------------------------------------------------------------
+    # -- text -------------------------------------------------------------------------------------------------------
 
     @classmethod
     def parse(cls, text: str, source: str = "the recipe") -> Self:
@@ -219,15 +216,6 @@ class Recipe(Model):
             return cls.model_validate(frozen(data))
         except ValidationError as error:
             raise complaint(error, cls, data, text, source) from None
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Self:
-        """The recipe in a TOML file.
-
-        Raises:
-            UserError: if it cannot be read, or as `parse`.
-        """
-        return cls.decode(read_input(path, "recipe", MOST_TEXT), str(path))
 
     @classmethod
     def decode(cls, data: bytes, source: str) -> Self:
@@ -257,15 +245,6 @@ class Recipe(Model):
             document.add(key, tables)
         pieces = tomlkit.dumps(document).split(f'"{_SAMPLES}"')
         return "".join(part for pair in zip_longest(pieces, samples, fillvalue="") for part in pair)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the recipe to `path`, all of it or nothing.
-
-        Raises:
-            UserError: if it cannot be written.
-        """
-        with replacing(path) as temporary:
-            temporary.write_text(self.text(), "utf-8")
 
     # -- what it says -----------------------------------------------------------------------------------------------
 

@@ -7,15 +7,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Protocol, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from app.errors import UserError
-from app.media.maps import cropped, folds, read_map
-from app.media.pictures import Picture, linear_to_srgb, read_picture
+from app.model.picture import Picture, linear_to_srgb
 from app.model.schema import FileName, Fraction01, Model, Place, Radius
 from solver.grid import Grid
 
@@ -29,72 +26,16 @@ Box = tuple[Place, Place, Place, Place]
 """Left, top, right and bottom, as fractions of the picture's width and height."""
 
 
-class Pictures:
-    """The picture that is warped and the auxiliary pictures a recipe names, each read once.
-
-    Args:
-        source: the picture that is warped.
-        folder: where relative names of auxiliary pictures start from.
-    """
-
-    def __init__(self, source: Picture, folder: str | Path = ".") -> None:
-        self.source = source
-        self.folder = Path(folder)
-        self.notices: list[str] = [source.note] if source.note else []
-        self._read: dict[str, Picture] = {}
-        self._maps: dict[str, np.ndarray] = {}
+class NamedPictures(Protocol):
+    """The picture that is warped and the others that a recipe names; `app.media.auxiliary.Pictures` reads them."""
 
     def load(self, name: str) -> Picture:
-        """The picture called `name`, or the source itself.
-
-        One whose size is not the source's is fitted to it, and a notice says so. Raises UserError if it cannot be read.
-        """
-        if name == SOURCE:
-            return self.source
-        if name not in self._read:
-            picture = self._read[name] = read_picture(self.folder / name)
-            if picture.note:
-                self.notice(picture.note)
-            mine, wanted = (picture.width, picture.height), (self.source.width, self.source.height)
-            if mine != wanted:
-                same = abs(mine[0] * wanted[1] - mine[1] * wanted[0]) <= max(mine + wanted)
-                how = "scaled" if same else "stretched"
-                self.notice(
-                    f"{name} is {mine[0]} x {mine[1]} and the picture {wanted[0]} x {wanted[1]}: {how} to fit it"
-                )
-        return self._read[name]
-
-    def load_map(self, name: str) -> np.ndarray:
-        """The displacement (h, w, 2) of the warp map called `name`, in the longer sides of the source.
-
-        Raises UserError if it cannot be read, or has other proportions than the source.
-        """
-        if name not in self._maps:
-            given = read_map(self.folder / name)
-            if given.forward:
-                goes = f"{name} tells where each point goes"
-                raise UserError(
-                    f"{goes}; turn it round with: fluidwarp convert --invert",
-                    in_window=f"{goes}, and what is needed is where it comes from; write it the other way round.",
-                )
-            self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
-            if folded := folds(self._maps[name]):
-                self.notice(f"{name} folds over itself in {folded} of its pixels")
-        return self._maps[name]
-
-    def forget_map(self, name: str) -> None:
-        """Read a map anew when it is wanted next: its file may be another one now."""
-        self._maps.pop(name, None)
-
-    def values(self) -> list[np.ndarray]:
-        """The pixels of all that was read so far and the values of maps, the source first, the others by name."""
-        read = [self._read[name].pixels for name in sorted(self._read)]
-        return [self.source.pixels, *read, *(self._maps[name] for name in sorted(self._maps))]
+        """The picture called `name`; the one that is warped is called `SOURCE`. Raises UserError."""
+        ...
 
     def notice(self, text: str) -> None:
         """Note something the user should hear of, once."""
-        if text not in self.notices:
-            self.notices.append(text)
+        ...
 
 
 # Pictures as numbers ------------------------------------------------------------------------------------------------
@@ -278,7 +219,7 @@ class Segment(Model):
             raise ValueError(f"'color' must be like \"#c8a040\", not {self.color!r}")
         return self
 
-    def weight(self, picture: str, grid: Grid, pictures: Pictures) -> np.ndarray:
+    def weight(self, picture: str, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         """How much of each cell (ny, nx) is chosen, in [0, 1].
 
         Raises:
@@ -293,7 +234,7 @@ class Segment(Model):
             raise ValueError("the segmentation chooses the whole picture, so that it has no edge")
         return chosen
 
-    def _pixels(self, picture: str, pictures: Pictures) -> np.ndarray:
+    def _pixels(self, picture: str, pictures: NamedPictures) -> np.ndarray:
         if self.mask is not None:
             return intensity(pictures.load(self.mask)) > 0.5
         if self.color is not None:
@@ -307,6 +248,21 @@ class Segment(Model):
 
 
 __all__ = [
-    "SOURCE", "Box", "PictureName", "Pictures", "Point", "Radius", "Segment", "Window", "blurred", "channels",
-    "distance_to_path", "falloff", "intensity", "places", "quantised", "smoothstep", "to_grid",
+    "SOURCE",
+    "Box",
+    "NamedPictures",
+    "PictureName",
+    "Point",
+    "Radius",
+    "Segment",
+    "Window",
+    "blurred",
+    "channels",
+    "distance_to_path",
+    "falloff",
+    "intensity",
+    "places",
+    "quantised",
+    "smoothstep",
+    "to_grid",
 ]  # fmt: skip

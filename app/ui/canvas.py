@@ -6,7 +6,8 @@ import moderngl
 import numpy as np
 from PIL import Image
 
-from app.media.pictures import Picture, to_bits
+from app.media.pictures import to_bits
+from app.model.picture import Picture
 from app.ui.state import State
 from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport

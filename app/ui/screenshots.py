@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.media.pictures import Picture, write_picture
+from app.media.pictures import write_picture
+from app.model.picture import Picture
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move
 from app.ui.files import load_any

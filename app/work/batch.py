@@ -24,12 +24,12 @@ from typing import Any
 
 from app.errors import Cancelled, UserError
 from app.media.animation import ANIMATIONS
-from app.media.files import abandon, cannot_write, check_kept, is_sequence, takes_place
+from app.media.files import cannot_write, check_kept, is_sequence, takes_place
 from app.media.opening import CLIP_ENDINGS, Opened, open_recipe
 from app.media.pictures import FORMATS, MAX_PIXELS
 from app.media.project import picture_names
 from app.model.recipe import Recipe
-from app.progress import GRACE, INTERRUPTED, Progress, interruptible, never
+from app.progress import GRACE, INTERRUPTED, Progress, abandon, interruptible, never
 from app.work.export import Job, MapOutput, run
 from solver.gl.device import Device
 

@@ -28,13 +28,14 @@ from app.media.animation import (
     reordered,
     unheld_of_clip,
 )
+from app.media.auxiliary import Pictures
 from app.media.files import cannot_write, is_sequence, replacing, writable
 from app.media.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.media.opening import check_picture
-from app.media.pictures import MAX_PIXELS, Picture, picture_format, unheld, write_picture
+from app.media.pictures import MAX_PIXELS, picture_format, unheld, write_picture
 from app.media.video import Clip
+from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.model.timeline import Sentinel, Timeline, frame_positions, frame_rate
 from app.progress import Progress
 from app.work.checkpoints import DEFAULT_BUDGET

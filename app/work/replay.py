@@ -10,10 +10,11 @@ from math import ceil, hypot
 import numpy as np
 
 from app.errors import UserError
+from app.media.auxiliary import Pictures
 from app.model.forces import BuiltForce, build
 from app.model.masks import FINEST, solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
-from app.model.sampling import Pictures, channels
+from app.model.sampling import channels
 from app.model.strokes import FINEST_DETAIL, Change, Dab, Stroke
 from app.model.timelaws import Feedback, Law
 from app.model.timeline import Observation, Sentinel

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
+from app.media.auxiliary import Pictures
 from app.media.project import Project
 from app.model.document import Document
 from app.model.recipe import Recipe
-from app.model.sampling import Pictures
 from app.model.strokes import Change, Stroke
 from app.model.tools import Gesture, Press, Tool, Touch
 from app.model.windows import detail_for

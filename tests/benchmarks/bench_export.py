@@ -28,7 +28,8 @@ import numpy as np
 
 from app.media.animation import animation_writer
 from app.media.opening import open_recipe
-from app.media.pictures import Picture, read_picture
+from app.media.pictures import read_picture
+from app.model.picture import Picture
 from app.model.recipe import Output, Recipe
 from app.progress import Progress
 from app.work.export import Job, run

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.media.pictures import Picture
+from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Output, Recipe
 from app.progress import Progress
 from app.work.export import Job, run

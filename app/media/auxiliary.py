@@ -1,0 +1,81 @@
+"""The picture that is warped, and the pictures and maps that its recipe names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.maps import cropped, folds, read_map
+from app.media.pictures import read_picture
+from app.model.picture import Picture
+from app.model.sampling import SOURCE
+
+
+class Pictures:
+    """The picture that is warped and the auxiliary pictures a recipe names, each read once.
+
+    Args:
+        source: the picture that is warped.
+        folder: where relative names of auxiliary pictures start from.
+    """
+
+    def __init__(self, source: Picture, folder: str | Path = ".") -> None:
+        self.source = source
+        self.folder = Path(folder)
+        self.notices: list[str] = [source.note] if source.note else []
+        self._read: dict[str, Picture] = {}
+        self._maps: dict[str, np.ndarray] = {}
+
+    def load(self, name: str) -> Picture:
+        """The picture called `name`, or the source itself.
+
+        One whose size is not the source's is fitted to it, and a notice says so. Raises UserError if it cannot be read.
+        """
+        if name == SOURCE:
+            return self.source
+        if name not in self._read:
+            picture = self._read[name] = read_picture(self.folder / name)
+            if picture.note:
+                self.notice(picture.note)
+            mine, wanted = (picture.width, picture.height), (self.source.width, self.source.height)
+            if mine != wanted:
+                same = abs(mine[0] * wanted[1] - mine[1] * wanted[0]) <= max(mine + wanted)
+                how = "scaled" if same else "stretched"
+                self.notice(
+                    f"{name} is {mine[0]} x {mine[1]} and the picture {wanted[0]} x {wanted[1]}: {how} to fit it"
+                )
+        return self._read[name]
+
+    def load_map(self, name: str) -> np.ndarray:
+        """The displacement (h, w, 2) of the warp map called `name`, in the longer sides of the source.
+
+        Raises UserError if it cannot be read, or has other proportions than the source.
+        """
+        if name not in self._maps:
+            given = read_map(self.folder / name)
+            if given.forward:
+                goes = f"{name} tells where each point goes"
+                raise UserError(
+                    f"{goes}; turn it round with: fluidwarp convert --invert",
+                    in_window=f"{goes}, and what is needed is where it comes from; write it the other way round.",
+                )
+            self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
+            if folded := folds(self._maps[name]):
+                self.notice(f"{name} folds over itself in {folded} of its pixels")
+        return self._maps[name]
+
+    def forget_map(self, name: str) -> None:
+        """Read a map anew when it is wanted next: its file may be another one now."""
+        self._maps.pop(name, None)
+
+    def values(self) -> list[np.ndarray]:
+        """The pixels of all that was read so far and the values of maps, the source first, the others by name."""
+        read = [self._read[name].pixels for name in sorted(self._read)]
+        return [self.source.pixels, *read, *(self._maps[name] for name in sorted(self._maps))]
+
+    def notice(self, text: str) -> None:
+        """Note something the user should hear of, once."""
+        if text not in self.notices:
+            self.notices.append(text)

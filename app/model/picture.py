@@ -1,0 +1,94 @@
+"""A picture as a value: its pixels and what belongs to them, wherever they came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Pixels, top row first, with what belongs to them.
+
+    `pixels` is (h, w, c), c = 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; uint8 and uint16 hold the whole range in the
+    transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
+    premultiplied: where there is alpha, the colours are multiplied by it, as the file has them. They stay so, since
+    dividing rounds, and since the colour where alpha is 0 (a flame, a glow) would be lost.
+    attributes: numbers of an EXR's header by name, such as pixelAspectRatio. chunks: a PNG's, that say what its colours
+    mean. note: what of the file is lost, in a sentence that names it; "" if nothing.
+    """
+
+    pixels: np.ndarray
+    icc: bytes | None = None
+    exif: bytes | None = None
+    xmp: bytes | None = None
+    dpi: tuple[float, float] | None = None
+    chromaticities: tuple[float, ...] | None = None
+    texts: Mapping[str, str] = field(default_factory=dict)
+    premultiplied: bool = False
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    chunks: Mapping[bytes, bytes] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def width(self) -> int:
+        return self.pixels.shape[1]
+
+    @property
+    def height(self) -> int:
+        return self.pixels.shape[0]
+
+    @property
+    def bits(self) -> int:
+        """Bits a channel: 8, 16 or 32."""
+        return self.pixels.dtype.itemsize * 8
+
+    @property
+    def linear(self) -> bool:
+        """Whether the values are linear light."""
+        return self.pixels.dtype == np.float32
+
+    @property
+    def has_alpha(self) -> bool:
+        return self.pixels.shape[2] in (2, 4)
+
+    def with_pixels(self, pixels: np.ndarray) -> Picture:
+        """The same picture with other pixels, of any size."""
+        return replace(self, pixels=pixels)
+
+    def stripped(self) -> Picture:
+        """The same pixels without the metadata; what the colours mean is kept."""
+        kept = {key: value for key, value in self.attributes.items() if key == "pixelAspectRatio"}
+        return replace(self, exif=None, xmp=None, dpi=None, texts={}, attributes=kept)
+
+    def straight(self) -> Picture:
+        """The same picture, its colours not multiplied by alpha."""
+        if not self.premultiplied:
+            return self
+        pixels = unpremultiplied(self.pixels) if self.has_alpha else self.pixels
+        return replace(self, pixels=pixels, premultiplied=False)
+
+
+def srgb_to_linear(values: np.ndarray) -> np.ndarray:
+    """Linear light of sRGB values 0-1 (IEC 61966-2-1)."""
+    return np.where(values <= 0.04045, values / 12.92, ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def linear_to_srgb(values: np.ndarray) -> np.ndarray:
+    """sRGB values 0-1 of linear light (IEC 61966-2-1)."""
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def unpremultiplied(pixels: np.ndarray) -> np.ndarray:
+    """Straight alpha from premultiplied; colour without alpha is left as it is."""
+    alpha = pixels[..., -1:].astype(np.float32)
+    whole = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
+    with np.errstate(all="ignore"):  # what is infinite or NaN stays so
+        scale = np.divide(whole, alpha, out=np.ones_like(alpha), where=alpha > 0)
+        colours = pixels[..., :-1] * scale
+    if pixels.dtype != np.float32:
+        colours = np.clip(colours + 0.5, 0, whole)
+    return np.concatenate([colours.astype(pixels.dtype), pixels[..., -1:]], axis=2)
