@@ -8,8 +8,8 @@ import moderngl
 import pytest
 
 import solver.gl.passes
-from khronos import Programs
 from solver.gl.device import Device
+from support.khronos import Programs
 
 
 @pytest.fixture(scope="session", autouse=True)

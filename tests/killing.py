@@ -172,8 +172,8 @@ def tell_states() -> None:
 
 def paint(folder: Path, root: Path, seed: int) -> None:
     """Paint on a picture made in `folder`, without a window, until somebody puts an end to it."""
-    from editing import Robot, small_project
     from solver.gl.device import Device
+    from support.editing import Robot, small_project
 
     tell_states()
     dice = random.Random(seed)
@@ -214,8 +214,8 @@ def kill_painters(kills: int, seed: int) -> Iterator[Outcome]:
 
 def kill_windows(kills: int, seed: int) -> Iterator[Outcome]:
     """Kill the real editor, painted on with xdotool."""
-    from editing import pattern
-    from test_window import Desk
+    from support.desk import Desk
+    from support.editing import pattern
 
     dice = random.Random(seed)
     with tempfile.TemporaryDirectory() as name:

@@ -21,8 +21,8 @@ from solver import Device, Fluid, FluidParams, Grid, PaperWarpMap, Walls, WarpMa
 # The references lie with the tests.
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import reference
-from flows import VORTEX_TIME, vortex
+from support import reference
+from support.flows import VORTEX_TIME, vortex
 
 # Of u on the vertical centre line, and v on the horizontal: Botella and Peyret, Computers & Fluids 27 (1998).
 CAVITY_1000 = np.array([-0.3885698, 0.3769447, -0.5270771])

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-import reference
 from properties.fluid import TURNS, turned, turned_cells, turned_walls
 from solver.gl.device import Device
 from solver.params import Walls
 from solver.viscosity.solve import Viscosity
+from support import reference
 
 SIZES = (96, 96), (200, 133), (256, 256)
 CONTRASTS = 1e2, 1e5, 1e8

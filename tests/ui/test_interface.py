@@ -22,8 +22,8 @@ from app.ui.files import load_any
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
-from editing import Robot, pattern, small_project
 from solver.gl.device import Device
+from support.editing import Robot, pattern, small_project
 
 
 @pytest.fixture

@@ -177,7 +177,7 @@ while seen < 60:
     assert now >= seen
     seen = now
 """
-    looker = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=Path(__file__).parent.parent)
+    looker = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])
     assert looker.stdout is not None
     assert looker.stdout.readline() == b"looking\n"
     for number in range(1, 61):

@@ -17,7 +17,7 @@ from app.media import leftovers
 from app.media.files import replacing, replacing_many, temporary_beside
 from app.media.leftovers import sweep, temporary_folder, temporary_name
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 # Holds a file, a sequence of files and the folder of a project, half written, until it is killed.
 HOLDING = """

@@ -10,11 +10,11 @@ import pytest
 import scipy.fft
 from scipy import ndimage
 
-import reference
 from solver import Fluid, Grid, WarpMap
 from solver.gl.device import Device
 from solver.params import Walls
 from solver.viscosity.solve import Viscosity
+from support import reference
 
 
 class Step:

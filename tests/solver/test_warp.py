@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-import reference
-from flows import VORTEX_TIME, vortex, vortex_faces
 from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
@@ -18,6 +16,8 @@ from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
 from solver.warp.frozen import Frozen
 from solver.warp.map import WarpMap
+from support import reference
+from support.flows import VORTEX_TIME, vortex, vortex_faces
 
 
 def smooth(rng: np.random.Generator, size: tuple[int, int], amplitude: float) -> np.ndarray:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,134 +18,10 @@ from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
 from app.model.recipe import Recipe
 from app.work.recovery import find
-from editing import pattern, small_project, write_foreign_map
+from support.desk import PATIENCE, Desk, needs_a_screen
+from support.editing import pattern, small_project, write_foreign_map
 
-NEEDED = ("Xvfb", "xdotool")
-PATIENCE = 90.0
-
-pytestmark = pytest.mark.skipif(
-    sys.platform != "linux" or (not all(map(shutil.which, NEEDED)) and "CI" not in os.environ),
-    reason=f"needs {' and '.join(NEEDED)}; tests/run installs them",
-)
-
-
-class Desk:
-    """A virtual screen with the editor on it."""
-
-    def __init__(self, folder: Path, size: tuple[int, int] = (1280, 800)) -> None:
-        self.folder = folder
-        # The server takes a display that nobody has, and tells its number once it listens.
-        command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size[0]}x{size[1]}x24", "-noreset", "-nolisten", "tcp"]
-        command += ["-fbdir", str(folder)]
-        self.screen = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        assert self.screen.stdout is not None
-        number = int(self.screen.stdout.readline())
-        self.env = {
-            **os.environ,
-            "DISPLAY": f":{number}",
-            "XDG_CONFIG_HOME": str(folder / "config"),
-            "XDG_STATE_HOME": str(folder / "state"),
-            "HOME": str(folder),
-            "PATH": os.environ["PATH"],
-        }
-        self.env.pop("WAYLAND_DISPLAY", None)
-        self.editor: subprocess.Popen[str] | None = None
-        self.window = ""
-
-    def open(self, file: Path, *command: str) -> None:
-        """Start the editor with a file, by `command` or else by the file alone, and wait until it is open."""
-        self.editor = subprocess.Popen(
-            [sys.executable, "-m", "app", *command, str(file)],
-            env=self.env,
-            cwd=Path(__file__).parent.parent,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.until(lambda: bool(self._find()), "a window")
-        self.window = self._find()[0]
-        self.until(lambda: self.title() == f"{file.stem} - fluidwarp", "the file to be open")
-
-    def _find(self) -> list[str]:
-        return self.do("search", "--onlyvisible", "--name", "fluidwarp").split()
-
-    def seen(self) -> np.ndarray:
-        """The screen as it is now, (h, w, 3) int, from the file in which the server keeps it."""
-        data = (self.folder / "Xvfb_screen0").read_bytes()
-        # The header of an X window dump: 25 numbers, then the window's name up to its own length, then the colours.
-        head = np.frombuffer(data, ">u4", 25)
-        start, width, height, row, colours = (int(head[at]) for at in (0, 4, 5, 12, 19))
-        rows = np.frombuffer(data, np.uint8, row * height, start + 12 * colours).reshape(height, row)
-        return rows[:, : 4 * width].reshape(height, width, 4)[..., 2::-1].astype(int)
-
-    def title(self) -> str:
-        return self.do("getwindowname", self.window or (self._find() or ["0"])[0]).strip()
-
-    def do(self, *words: str) -> str:
-        return subprocess.run(["xdotool", *words], env=self.env, capture_output=True, text=True).stdout
-
-    def drag(self, *points: tuple[int, int]) -> None:
-        self.do("mousemove", *map(str, points[0]), "sleep", "0.1", "mousedown", "1", "sleep", "0.1")
-        for start, end in pairwise(points):
-            for step in range(1, 11):
-                x, y = (round(a + (b - a) * step / 10) for a, b in zip(start, end, strict=True))
-                self.do("mousemove", str(x), str(y), "sleep", "0.03")
-        self.do("sleep", "0.1", "mouseup", "1", "sleep", "0.2")
-
-    def key(self, chord: str) -> None:
-        self.do("key", "--delay", "60", chord)
-        time.sleep(0.3)
-
-    def type(self, text: str) -> None:
-        self.do("type", "--delay", "60", text)
-        time.sleep(0.3)
-
-    def until(self, condition: Callable[[], bool], what: str) -> None:
-        deadline = time.monotonic() + PATIENCE
-        while not condition():
-            if self.editor is not None and self.editor.poll() is not None:
-                said = self.editor.stdout.read() if self.editor.stdout else ""
-                raise AssertionError(f"the editor ended while waiting for {what}: {said}")
-            assert time.monotonic() < deadline, f"waited in vain for {what}"
-            time.sleep(0.1)
-
-    def insist(self, doing: Callable[[], None], condition: Callable[[], bool], what: str) -> None:
-        """Do something until it has worked, as a person would: a busy machine may miss a key between two frames."""
-        for attempt in range(3):
-            doing()
-            deadline = time.monotonic() + PATIENCE / 3
-            while time.monotonic() < deadline:
-                if condition():
-                    return
-                time.sleep(0.1)
-            self.key("Escape")
-            time.sleep(attempt)
-        self.until(condition, what)
-
-    def save(self, path: Path) -> None:
-        """Save what is open under a new name in the folder that is proposed."""
-
-        def do() -> None:
-            self.key("ctrl+s")
-            time.sleep(1.5)
-            # The name is marked, and what is typed takes its place.
-            self.key("ctrl+a")
-            self.type(path.stem)
-            self.key("Return")
-
-        self.insist(do, path.exists, "the project to be saved")
-        self.until(lambda: self.title() == f"{path.stem} - fluidwarp", "the title to say so")
-
-    def until_gone(self) -> None:
-        """Wait until the editor has ended by itself, and well."""
-        assert self.editor is not None
-        assert self.editor.wait(PATIENCE) == 0, self.editor.stdout.read() if self.editor.stdout else ""
-
-    def close(self) -> None:
-        if self.editor is not None and self.editor.poll() is None:
-            self.editor.kill()
-        self.screen.terminate()
-        self.screen.wait(10)
+pytestmark = needs_a_screen
 
 
 @pytest.fixture
@@ -192,7 +67,7 @@ def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
     desk.until_gone()
     rendered = tmp_path / "rendered.png"
     command = [sys.executable, "-m", "app", "render", str(work), "-o", str(rendered)]
-    subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
+    subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
     assert np.array_equal(read_picture(exported).pixels, read_picture(rendered).pixels)
     assert isinstance(saved.recipe, Recipe)
 
@@ -222,7 +97,7 @@ def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path
         assert stroke.samples[-1][1] - stroke.samples[0][1] == pytest.approx(400 / 864, abs=0.01)
     assert all(later.first_tick > stroke.last_tick for stroke, later in pairwise(strokes))
     command = [sys.executable, "-m", "app", "render", str(work), "-o", str(rendered)]
-    subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
+    subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
     assert exported.read_bytes() == rendered.read_bytes()
 
 
@@ -301,7 +176,7 @@ def test_a_minimised_window_with_unsaved_work_comes_back_to_ask(desk: Desk, tmp_
 def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
     env = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = subprocess.run(
-        [sys.executable, "-m", "app", "edit"], env=env, capture_output=True, text=True, cwd=Path(__file__).parent.parent
+        [sys.executable, "-m", "app", "edit"], env=env, capture_output=True, text=True, cwd=Path(__file__).parents[2]
     )
     assert done.returncode == 2
     assert "fluidwarp render" in done.stderr
@@ -312,7 +187,7 @@ def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["nonesuch.png", "nonesuch.toml", "nonesuch.fluidwarp"])
 def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, name: str) -> None:
     command = [sys.executable, "-m", "app", "edit", str(tmp_path / name)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parent.parent)
+    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
     assert done.returncode == 1
     assert name in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
@@ -323,7 +198,7 @@ def test_a_file_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
     write_picture(picture, pattern())
     write_picture(other, pattern(100, 60))
     desk.open(picture)
-    command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(other)]
+    command = [sys.executable, str(Path(__file__).parents[1] / "support" / "dropping.py"), desk.window, str(other)]
     subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
     desk.until(lambda: desk.title() == "Käse 2 - fluidwarp", "the dropped picture")
     desk.key("ctrl+z")
@@ -339,7 +214,7 @@ def test_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Pa
     write_picture(picture, pattern())
     write_foreign_map(st_map, 240, 180)
     desk.open(picture)
-    command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(st_map)]
+    command = [sys.executable, str(Path(__file__).parents[1] / "support" / "dropping.py"), desk.window, str(st_map)]
 
     def use_as_map() -> None:
         subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
@@ -443,7 +318,7 @@ def test_what_is_exported_is_what_the_command_line_makes(
     line.mkdir()
     how = ["--map", str(line / name)] if kind == "map" else ["-o", str(line / name)]
     command = [sys.executable, "-m", "app", "render", str(work), *how]
-    subprocess.run(command, check=True, cwd=Path(__file__).parent.parent)
+    subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
     made = sorted(line.iterdir())
     assert [path.name for path in made] == sorted(path.name for path in tmp_path.glob(pattern_of_names))
     assert (len(made) > 10) == (kind == "animation")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import shaders
-from khronos import Programs
 from solver.gl.device import Device
 from solver.gl.program import ShaderError, assemble, compile_program, read_shader
+from support.khronos import Programs
 
 ROOT = Path(shaders.__file__).parent
 STAGES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.frag"))

@@ -12,10 +12,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-import reference
 from solver import Brush, Density, Device, Fluid, FluidParams, Grid, PaperFluid, Tip, Walls, WarpMap
+from support import reference
 
-SECTION = (Path(__file__).parent.parent / "README.md").read_text("utf-8").split("## Scripting")[1].split("\n## ")[0]
+SECTION = (Path(__file__).parents[2] / "README.md").read_text("utf-8").split("## Scripting")[1].split("\n## ")[0]
 BLOCKS = re.findall(r"```python\n(.*?)```", SECTION, re.DOTALL)
 
 

@@ -14,10 +14,10 @@ import pytest
 
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
-from editing import Robot, small_project
 from solver.gl.device import Device
+from support.editing import Robot, small_project
 
-GOLDEN = Path(__file__).parent / "golden"
+GOLDEN = Path(__file__).parents[1] / "golden"
 SIZE = (960, 600)
 SQUARE = 24
 

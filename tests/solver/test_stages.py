@@ -8,11 +8,11 @@ import sys
 import numpy as np
 import pytest
 
-import reference
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
 from solver.params import FluidParams, Walls
+from support import reference
 
 SIZES = [(8, 8), (33, 17), (64, 48), (31, 64)]
 SPEED = (0.3, -0.2, 1.0, 0.5)

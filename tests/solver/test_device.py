@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 NO_EGL = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere.json"}  # the loader is there, but no driver for it
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL and X11 are Linux's")

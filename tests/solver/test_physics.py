@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-import reference
 from solver.brush.brush import Brush, Tip
 from solver.brush.push import Push
 from solver.fluid import Fluid
@@ -16,6 +15,7 @@ from solver.grid import Grid
 from solver.paper import PaperFluid
 from solver.params import FluidParams, Walls
 from solver.warp.map import WarpMap
+from support import reference
 
 PI = np.pi
 

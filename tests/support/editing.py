@@ -51,7 +51,7 @@ def write_foreign_map(path: Path, width: int, height: int, names: str = "RGB") -
 
 def command_line(*words: str) -> None:
     """Run `fluidwarp words...` in a process of its own."""
-    subprocess.run([sys.executable, "-m", "app", *words], check=True, cwd=Path(__file__).parent.parent)
+    subprocess.run([sys.executable, "-m", "app", *words], check=True, cwd=Path(__file__).parents[2])
 
 
 class Robot:

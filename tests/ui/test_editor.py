@@ -32,8 +32,8 @@ from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS, Speed
 from app.ui.saving import SaveDialog
 from app.work.export import Job, MapOutput, run
-from editing import Robot, command_line, pattern, small_project, write_foreign_map
 from solver.gl.device import Device
+from support.editing import Robot, command_line, pattern, small_project, write_foreign_map
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from app.work.batch import Edits, Outcome, Task, perform, run_batch, spread
 from app.work.replay import Replay
 from solver.gl.device import Device
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 RECIPE = """
 duration = 0.2
 [fluid]
@@ -147,7 +147,9 @@ def test_one_that_fails_does_not_stop_the_others(folder: Path, jobs: int):
 
 def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Killed as for want of memory: whatever it had is done by another; what kills each of them is told."""
-    serving = "import app.work.batch, test_batch; app.work.batch.perform = test_batch.dying; app.work.batch.serve()"
+    serving = (
+        "import app.work.batch, support.dying; app.work.batch.perform = support.dying.dying; app.work.batch.serve()"
+    )
     monkeypatch.setattr(batch, "SERVING", serving)
     pictures = [folder / f"p{number}.png" for number in range(4)]
     heard: list[Outcome] = []
@@ -156,16 +158,6 @@ def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.Monke
     assert sorted(told) == [path.name for path in pictures]
     assert [name for name, error in told.items() if error] == ["p3.png"]
     assert told["p3.png"] == batch.DIED
-
-
-def dying(task: Task, cancel: Callable[[], bool]) -> Outcome:
-    """A worker's work that kills it: for p0 the first time, for p3 each time."""
-    assert task.picture is not None
-    mark = task.picture.with_suffix(".tried")
-    if task.picture.stem == "p3" or (task.picture.stem == "p0" and not mark.exists()):
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return Outcome(task.label)
 
 
 def test_cancelling_leaves_what_is_finished(folder: Path):

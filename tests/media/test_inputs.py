@@ -30,7 +30,7 @@ from app.model import toml
 from app.model.picture import Picture
 from app.ui.preferences import Preferences
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 MOST_MEMORY = 300 * 2**20  # bytes, beside what the program has before it opens a file
 PATIENCE = 60  # seconds for each file; they take milliseconds, and a fault hours
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-import reference
 from solver.gl.device import Device
 from solver.params import Walls
 from solver.viscosity.solve import Viscosity
+from support import reference
 
 
 def test_error_is_a_fraction_of_the_change(device: Device) -> None:

@@ -19,9 +19,9 @@ from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import Job, run
 from app.work.session import REST, Session
-from editing import small_project
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
+from support.editing import small_project
 
 PAINTING = [tool for tool in TOOLS if tool.gesture is not None]
 

@@ -32,9 +32,9 @@ from app.work import locks, recovery
 from app.work.locks import Lock
 from app.work.recovery import Found, Journal, find
 from app.work.session import Session
-from editing import Robot, small_project
 from killing import Painter, digest_of, digest_of_warp
 from solver.gl.device import Device
+from support.editing import Robot, small_project
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -472,7 +472,7 @@ def test_a_disk_that_is_full_loses_nothing_that_was_written(tmp_path: Path) -> N
     code = f"""
 import resource, signal, sys
 from pathlib import Path
-sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(Path(__file__).parent.parent)!r}]
+sys.path[:0] = {[str(folder) for folder in Path(__file__).parents[:3]]!r}
 from test_recovery import Desk, small_project
 desk = Desk(Path({str(tmp_path)!r}) / "journals", small_project(Path({str(tmp_path)!r})))
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

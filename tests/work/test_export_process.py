@@ -14,7 +14,7 @@ from app.model.recipe import Recipe
 from app.work.export import Job
 from app.work.export_process import ExportProcess
 
-PICTURE = Path(__file__).parent.parent / "assets" / "pictures" / "coffee.png"
+PICTURE = Path(__file__).parents[2] / "assets" / "pictures" / "coffee.png"
 PATIENCE = 60.0  # seconds
 
 

@@ -171,7 +171,7 @@ def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
 
 @pytest.mark.parametrize("page", ["README.md", "assets/guide/README.md"])
 def test_examples_of_the_documentation_are_recipes(page: str):
-    text = (Path(__file__).parent.parent / page).read_text("utf-8")
+    text = (Path(__file__).parents[2] / page).read_text("utf-8")
     examples = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     assert examples
     for example in examples:
@@ -179,7 +179,7 @@ def test_examples_of_the_documentation_are_recipes(page: str):
 
 
 def test_the_guide_names_what_holds_where_a_key_is_left_out():
-    text = (Path(__file__).parent.parent / "assets/guide/README.md").read_text("utf-8")
+    text = (Path(__file__).parents[2] / "assets/guide/README.md").read_text("utf-8")
     written = Recipe.parse(re.findall(r"```toml\n(version.*?)```", text, re.DOTALL)[-1])
     own = written.edited(
         name="",

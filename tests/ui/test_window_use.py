@@ -14,8 +14,10 @@ import pytest
 
 from app.media import project as projects
 from app.media.pictures import write_picture
-from editing import pattern
-from test_window import Desk, pytestmark  # noqa: F401
+from support.desk import Desk, needs_a_screen
+from support.editing import pattern
+
+pytestmark = needs_a_screen
 
 RESTED = 2.0  # seconds in which everything that comes by itself has come, also on a busy machine
 
@@ -120,7 +122,12 @@ def test_clicks_beside_the_picture_do_not_paint(desk: Desk, tmp_path: Path) -> N
     desk.key("f")
     desk.until(lambda: differs(desk.seen(), before, 50, 0, 220, 48), "the tool")
     (tmp_path / "no.png").write_bytes(b"no picture")
-    command = [sys.executable, str(Path(__file__).parent / "dropping.py"), desk.window, str(tmp_path / "no.png")]
+    command = [
+        sys.executable,
+        str(Path(__file__).parents[1] / "support" / "dropping.py"),
+        desk.window,
+        str(tmp_path / "no.png"),
+    ]
     desk.do("mousemove", "1140", "780")
     before = still(desk)
     subprocess.run(command, env=desk.env, check=True, timeout=60)
@@ -177,7 +184,7 @@ def test_with_little_room_everything_is_reached(tmp_path: Path) -> None:
 
 
 def told(folder: Path, *words: str) -> tuple[int, str]:
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent)}
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     done = subprocess.run([sys.executable, "-m", "app", *words], cwd=folder, env=env, capture_output=True, text=True)
     return done.returncode, done.stderr
 
