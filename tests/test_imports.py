@@ -16,14 +16,25 @@ FOLDERS = ("shaders", "solver", "app", "assets")
 ROOMS = {
     "shaders": set[str](),
     "assets": set[str](),
-    "solver": {"shaders"},
+    "solver.grid": set[str](),
+    "solver": {"shaders", "solver.grid"},
     "app.errors": set[str](),
     "app.progress": {"app.errors"},
-    "app.model": {"app.errors", "app.progress", "solver"},
-    "app.media": {"app.errors", "app.progress", "solver", "app.model"},
-    "app.work": {"app.errors", "app.progress", "solver", "app.model", "app.media"},
-    "app.ui": {"app.errors", "app.progress", "solver", "app.model", "app.media", "app.work", "assets"},
-    "app": {"app.errors", "app.progress", "solver", "app.model", "app.media", "app.work", "app.ui", "assets"},
+    "app.model": {"app.errors", "app.progress", "solver.grid"},
+    "app.media": {"app.errors", "app.progress", "solver.grid", "app.model"},
+    "app.work": {"app.errors", "app.progress", "solver", "solver.grid", "app.model", "app.media"},
+    "app.ui": {"app.errors", "app.progress", "solver", "solver.grid", "app.model", "app.media", "app.work", "assets"},
+    "app": {
+        "app.errors",
+        "app.progress",
+        "solver",
+        "solver.grid",
+        "app.model",
+        "app.media",
+        "app.work",
+        "app.ui",
+        "assets",
+    },
 }
 # The same of the solver's own.
 SOLVER = {
@@ -121,6 +132,13 @@ def test_a_room_looks_one_way(name: str):
         looked_into = room_of(other)
         assert looked_into in {room, None, *ROOMS[room]} or room == "assets", f"{name} imports {other}"
         assert room == "app.ui" or other.split(".")[0] not in TOOLKITS, f"{name} imports {other}"
+
+
+def test_the_model_knows_numbers_and_text_only():
+    for name, path in MODULES.items():
+        if room_of(name) == "app.model":
+            tops = {other.split(".")[0] for other in imported(path)} - {"app", "solver", *sys.stdlib_module_names}
+            assert tops <= {"numpy", "pydantic", "tomlkit"}, name
 
 
 def test_no_modules_import_each_other_in_a_circle():

@@ -1,1 +1,1 @@
-"""The recipe and all its parts: numpy and pydantic only, no GL, no file formats and no window."""
+"""The recipe and all its parts, as values: no file, no GL and no window."""

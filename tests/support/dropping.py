@@ -1,6 +1,6 @@
 """A program that lets files fall on a window, as a file manager does: the source's side of XDND, version 5.
 
-`python dropping.py WINDOW FILE...` under the display in DISPLAY; ends with 0 once the window has taken them.
+`python tests/support/dropping.py WINDOW FILE...` under the display in DISPLAY; its status is 0 once they were taken.
 https://www.freedesktop.org/wiki/Specifications/XDND/
 """
 

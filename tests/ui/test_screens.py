@@ -1,6 +1,6 @@
 """The window as it should look: pictures of its main states, compared with a tolerance on a software rasteriser.
 
-After a change of the looks that is meant: `FLUIDWARP_GOLDEN=write pytest tests/test_screens.py`, and look at them.
+After a change of the looks that is meant: `FLUIDWARP_GOLDEN=write pytest tests/ui/test_screens.py`, and look at them.
 """
 
 from __future__ import annotations
