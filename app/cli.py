@@ -16,7 +16,7 @@ from app.progress import INTERRUPTED
 if TYPE_CHECKING:
     from app.media.opening import Opened
     from app.work.applying import MapSource
-    from app.work.batch import Task
+    from app.work.tasks import Task
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
@@ -199,8 +199,8 @@ def render(
     Several pictures go into the folder OUT under their own names, or to OUT with {name} in it for the name of each.
     """
     from app.media.opening import open_recipe
-    from app.work import batch
-    from app.work.export import MapOutput
+    from app.work.jobs import MapOutput, Outputs
+    from app.work.tasks import Edits, Task, spread
 
     opened = open_recipe(recipe, max_pixels)
     tables = {
@@ -208,7 +208,7 @@ def render(
         "output": {"size": size, "fps": fps, "quality": quality},
         "time": {"start": start, "end": end},
     }
-    edits = batch.Edits.of(tables, {"duration": duration})
+    edits = Edits.of(tables, {"duration": duration})
     edits.applied(opened.recipe)
     if output is None and map_ is None:
         output = Path("out.png")
@@ -216,27 +216,14 @@ def render(
     if maps is None and (forward or offsets or overscan or map_size):
         raise UserError("--forward, --offsets, --overscan and --map-size say what --map writes; give its name too")
     given = [*([image] if image else []), *(pictures or [])]
-    task = batch.Task(
-        recipe,
-        edits,
-        given[0] if given else None,
-        output,
-        stats,
-        maps,
-        _part(frames),
-        animated,
-        bits,
-        strip,
-        max_pixels,
-        codec,
-        states,
-    )
+    outputs = Outputs(output, stats, maps, _part(frames), animated, bits, strip, codec, states)
+    task = Task(recipe, edits, given[0] if given else None, outputs, max_pixels)
     if len(given) < 2 and cluster is None and not (given and output and _is_folder(output)):
         _render_one(task.named(), opened)
         return
     if not given:
         raise UserError("a cluster is for many pictures: name them after the recipe")
-    _render_many(batch.spread(task, given), jobs, cluster)
+    _render_many(spread(task, given), jobs, cluster)
 
 
 def _is_folder(output: Path) -> bool:
@@ -260,7 +247,7 @@ def _render_one(task: Task, opened: Opened) -> None:
     from app.work.export import run
     from solver.gl.device import Device
 
-    with on_terminal(task.written[0].name, None) as progress:
+    with on_terminal(task.outputs.files[0].name, None) as progress:
         progress.enter("reading")  # a large picture takes its time too
         job = task.job(opened)
         job.check()
@@ -273,10 +260,11 @@ def _render_one(task: Task, opened: Opened) -> None:
 def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
     """Render all, with a line about each that fails."""
     from app.progress import leave, on_terminal
-    from app.work.batch import Outcome, run_batch
+    from app.work.batch import run_batch
+    from app.work.worker import Outcome
 
     def tell(outcome: Outcome) -> None:
-        _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices) if said))
+        _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices, outcome.verdict) if said))
 
     written = 0
 
@@ -332,7 +320,7 @@ def apply(
     from app.model.recipe import Recipe
     from app.progress import on_terminal
     from app.work.applying import Application
-    from app.work.batch import Edits
+    from app.work.tasks import Edits
     from solver.gl.device import Device
 
     asked = Edits.of({"output": {"size": size, "fps": fps, "quality": quality}}, {"edges": edges}).applied(Recipe())

@@ -21,7 +21,8 @@ from app.media.project import from_recipe, save
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
-from app.work.export import Job, run
+from app.work.export import run
+from app.work.jobs import Job, Outputs
 from solver.gl.device import Device
 
 ROOT = Path(__file__).parent.parent
@@ -401,7 +402,7 @@ def test_memory_does_not_grow_with_the_frames(device: Device, tmp_path: Path):
     )
     y, x = np.mgrid[0:480, 0:640]
     picture = Picture(np.stack([x // 3, y // 2, (x + y) // 5], axis=-1).astype(np.uint8))
-    report = run(device, Job(recipe, picture, tmp_path, tmp_path / "x.%03d.jpg"), Progress(report=look))
+    report = run(device, Job(recipe, picture, tmp_path, Outputs(tmp_path / "x.%03d.jpg")), Progress(report=look))
     assert report.frames == 41
     assert resident[39] < resident[9] + 10
 

@@ -22,8 +22,8 @@ from app.ui.theme import packed
 from app.ui.units import SECONDS, Unit
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
-from app.work.export import Job, MapOutput
 from app.work.export_process import ExportProcess
+from app.work.jobs import Job, MapOutput, Outputs
 from app.work.session import Session
 
 if TYPE_CHECKING:
@@ -107,8 +107,8 @@ class ExportDialog(Dialog):
         )
         if self.kind == MAP:
             maps = MapOutput(self.output, "offsets" if self.offsets else "st", self.forward)
-            return Job(recipe, self.picture, session.project.folder, None, maps=maps)
-        return Job(recipe, self.picture, session.project.folder, self.output)
+            return Job(recipe, self.picture, session.project.folder, Outputs(None, maps=maps))
+        return Job(recipe, self.picture, session.project.folder, Outputs(self.output))
 
     def body(self, ui: Ui, editor: Editor) -> bool:
         # Enter belongs to the field that is being typed in, or to what the arrows have gone to.
@@ -186,7 +186,8 @@ class ExportDialog(Dialog):
                 small = job.recipe.output.model_copy(update={"size": min(PREVIEW, self.size)})
                 recipe = job.recipe.edited(output=small)
                 self._folder = folder
-                self._preview = ExportProcess(Job(recipe, job.picture, job.folder, Path(folder.name) / "preview.png"))
+                outputs = Outputs(Path(folder.name) / "preview.png")
+                self._preview = ExportProcess(Job(recipe, job.picture, job.folder, outputs))
         else:
             process.poll()
             ui.dim(f"Making a preview: {process.part:.0%}")
@@ -307,7 +308,7 @@ class Exports:
             self.went_well = not process.error
             if process.error:
                 self.messages.warn(process.error)
-            elif not process.cancelled:
+            else:
                 for notice in process.notices:
                     self.messages.say(notice)
                 self.messages.done(f"Exported {process.job.target.name} to {process.job.target.parent}")

@@ -13,15 +13,16 @@ import numpy as np
 
 from app.errors import UserError
 from app.media import maps
-from app.media.animation import animation_writer, check_output, is_animation, passes, unheld_of_clip
+from app.media.animation import animation_writer, check_output, crf_of, is_animation, passes, unheld_of_clip
 from app.media.files import check_kept, is_sequence, number_in, writable
 from app.media.maps import Displacement, Kind, cropped, folds, read_map
 from app.media.opening import Source, open_source
 from app.media.pictures import MAX_PIXELS, picture_format, unheld, write_picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
-from app.work.export import longer_side, looked_up, steps_for
-from app.work.threads import ahead, behind
+from app.work.export import looked_up, steps_for, write_all
+from app.work.jobs import longer_side
+from app.work.threads import ahead
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
@@ -101,12 +102,13 @@ class Application:
             check_kept(source, self.output)
 
     def run(self, device: Device, progress: Progress) -> tuple[str, ...]:
-        """Do it; nothing is left behind if it is cancelled or fails. Says what the user should hear of.
+        """Do it, once it has been checked; nothing is left behind if it is cancelled or fails.
+
+        Says what the user should hear of.
 
         Raises:
             UserError: if a map has other proportions than the picture, or anything cannot be read or written.
         """
-        self.check()
         progress.enter("reading")
         animated = is_animation(self.output)
         source = open_source(self.source, self.maps.max_pixels)
@@ -150,30 +152,29 @@ class Application:
         progress.total = frames and frames * passes(self.output)
         progress.enter("")
         size, like = self._size(source), source.picture.stripped() if self.strip else source.picture
+        writer = animation_writer(
+            self.output,
+            clip.fps if clip else frame_rate(self.fps),
+            codec=self.codec,
+            crf=crf_of(self.quality),
+            quality=self.quality,
+            bits=self.bits,
+            sound=clip.path if clip and clip.sound else None,
+            sound_from=clip.late if clip else 0.0,
+            like=like,
+            cancel=progress.cancel,
+            passed=progress.advance,
+        )
         with ExitStack() as stack:
-            writer = animation_writer(
-                self.output,
-                clip.fps if clip else frame_rate(self.fps),
-                codec=self.codec,
-                crf=round(45 - 0.3 * self.quality),
-                quality=self.quality,
-                bits=self.bits,
-                sound=clip.path if clip and clip.sound else None,
-                sound_from=clip.late if clip else 0.0,
-                like=like,
-                cancel=progress.cancel,
-                passed=progress.advance,
-            )
-            write = stack.enter_context(behind(stack.enter_context(writer)))
-            given_maps = self.maps.read()
-            frames = repeat(source.picture.pixels)
+            given_maps, source_frames = self.maps.read(), repeat(source.picture.pixels)
             if clip:
-                frames = stack.enter_context(ahead(clip.read_frames(progress.cancel, notices.append)))
+                source_frames = stack.enter_context(ahead(clip.read_frames(progress.cancel, notices.append)))
                 given_maps = _staying(given_maps)
-            for given, pixels in zip(given_maps, frames, strict=False):
-                write(applier.warped(given, pixels, size, self._alpha, lambda rows: progress.check()))
-                progress.advance()
-            progress.enter("writing")
+            warped = (
+                applier.warped(given, pixels, size, self._alpha, lambda rows: progress.check())
+                for given, pixels in zip(given_maps, source_frames, strict=False)
+            )
+            write_all(warped, writer, progress)
 
 
 class Applier:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import errno
 import gc
 import json
-import os
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import chain, count, groupby, islice, pairwise, repeat
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,24 +18,21 @@ from app.errors import UserError
 from app.media.animation import (
     FrameWriter,
     animation_writer,
-    check_output,
+    crf_of,
     frame_order,
-    is_animation,
     passes,
     reordered,
     unheld_of_clip,
 )
 from app.media.auxiliary import Pictures
-from app.media.files import cannot_write, is_sequence, replacing, writable
-from app.media.maps import Displacement, Kind, check_map, map_writer, write_map
-from app.media.opening import check_picture
-from app.media.pictures import MAX_PIXELS, picture_format, unheld, write_picture
-from app.media.video import Clip
-from app.model.picture import Picture
+from app.media.files import replacing
+from app.media.maps import Displacement, map_writer, write_map
+from app.media.pictures import picture_format, unheld, write_picture
 from app.model.recipe import Recipe
-from app.model.timeline import Sentinel, Timeline, frame_positions, frame_rate
+from app.model.timeline import Sentinel, Timeline, frame_positions
 from app.progress import Progress
 from app.work.checkpoints import DEFAULT_BUDGET
+from app.work.jobs import Job, MapOutput, longer_side, result_size
 from app.work.replay import Replay
 from app.work.states import StoredStates
 from app.work.threads import ahead, behind
@@ -49,135 +43,6 @@ from solver.warp.map import WarpMap
 
 POINTS_AT_ONCE = 1_000_000  # of a map
 PIXELS_A_STEP = 100_000  # whose look-up, or writing as PNG, takes about as long on a CPU as a step on 256 cells
-
-
-@dataclass(frozen=True)
-class MapOutput:
-    """What is written of the warp map.
-
-    Attributes:
-        path: a file for the last frame's map, or the pattern of a sequence for every frame's; see `app.media.maps`.
-        kind: what an EXR or TIFF holds.
-        forward: where the points of the original go, instead of where those of the result come from.
-        overscan: pixels more on every side.
-        size: longer side in pixels; None is the result's.
-    """
-
-    path: Path
-    kind: Kind = "st"
-    forward: bool = False
-    overscan: int = 0
-    size: int | None = None
-
-    @property
-    def is_sequence(self) -> bool:
-        return is_sequence(self.path)
-
-
-@dataclass(frozen=True)
-class Job:
-    """What is made of what.
-
-    Attributes:
-        recipe: all settings; its [output] says the size and the rate.
-        picture: the source; of a clip, its first frame.
-        folder: where the names of auxiliary pictures in the recipe start from.
-        output: the file, or the pattern of a sequence's files; None for maps alone.
-        stats: a JSON file for numbers about every frame.
-        maps: what is written of the warp map.
-        clip: the source, where it moves: its frames are warped by W_t at its own rate, its sound is carried over.
-        part: the first and the last frame of the animation that are written, from 0; None is to the end.
-        animated: for endings that stand for both, as .webp does: an animation is wanted.
-        bits: a channel, of pictures; None keeps the source's.
-        strip: leave out the source's metadata.
-        codec: of a video; None is the usual one of its ending.
-        states: a folder of states of the simulation, for parts to begin with and to leave for others.
-    """
-
-    recipe: Recipe
-    picture: Picture
-    folder: Path
-    output: Path | None
-    stats: Path | None = None
-    maps: MapOutput | None = None
-    clip: Clip | None = None
-    part: tuple[int, int | None] = (0, None)
-    animated: bool = False
-    bits: int | None = None
-    strip: bool = False
-    codec: str | None = None
-    states: Path | None = None
-
-    @property
-    def target(self) -> Path:
-        """The file that it is all about."""
-        path = self.output or (self.maps and self.maps.path)
-        assert path is not None
-        return path
-
-    @property
-    def is_animation(self) -> bool:
-        return self.output is not None and (self.animated or is_animation(self.output))
-
-    @property
-    def has_frames(self) -> bool:
-        """True if more than the end is written."""
-        return self.is_animation or (self.output is None and self.maps is not None and self.maps.is_sequence)
-
-    @property
-    def rate(self) -> Fraction:
-        """Frames per second."""
-        return self.clip.fps if self.clip else frame_rate(self.recipe.output.fps)
-
-    def check(self) -> None:
-        """Find out before the work what would keep it from being written.
-
-        Raises:
-            UserError: naming the file and the mend.
-        """
-        check_picture(self.picture)
-        if self.output is not None:
-            check_output(
-                self.output,
-                animated=self.animated,
-                fps=self.rate,
-                codec=self.codec,
-                bits=self.bits,
-                size=result_size(self.recipe, self.picture),
-            )
-        if self.maps is not None:
-            check_map(self.maps.path)
-            self._check_map_size(self.maps)
-            if self.maps.is_sequence and not self.has_frames:
-                raise UserError(
-                    f"{self.maps.path} numbers the maps of an animation and {self.output} is a picture; "
-                    f"give one map's name, or leave out --output to write the maps alone"
-                )
-        start, end = self.recipe.time.start, self.recipe.duration
-        if self.has_frames and start > end:
-            late = f"the animation ends at {end:g} s, and cannot begin at {start:g} s"
-            raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
-        if self.part != (0, None) and not self.has_frames:
-            raise UserError(f"only an animation has --frames, and {self.output} is a picture; write f.%04d.png or .mp4")
-        if self.clip is not None and self.recipe.mode == "density":
-            raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
-        for path in (self.output, self.stats, self.maps and self.maps.path):
-            if path is not None:
-                writable(path)
-        if self.states is not None and os.path.exists(self.states) and not os.path.isdir(self.states):
-            raise cannot_write(self.states, FileExistsError(errno.EEXIST, "it is a file"))
-
-    def _check_map_size(self, maps: MapOutput) -> None:
-        size = result_size(self.recipe, self.picture)
-        width, height = size if maps.size is None else longer_side(size, maps.size)
-        why = "the size of the result" if maps.size is None else f"--map-size {maps.size}"
-        mend = "ask for fewer by --map-size" if maps.size is None else "ask for fewer"
-        if width * height <= MAX_PIXELS:
-            width, height = width + 2 * maps.overscan, height + 2 * maps.overscan
-            why, mend = f"--overscan {maps.overscan}", "ask for fewer"
-        if width * height > MAX_PIXELS:
-            large = f"a map of {width} x {height} pixels"
-            raise UserError(f"{why} makes {large}; {mend}", in_window=f"{large} is too large; choose a smaller size")
 
 
 @dataclass(frozen=True)
@@ -198,13 +63,12 @@ class Report:
 
 
 def run(device: Device, job: Job, progress: Progress) -> Report:
-    """Do the job; nothing of it is left behind if it is cancelled or fails.
+    """Do the job, which has been checked; nothing of it is left behind if it is cancelled or fails.
 
     Raises:
         UserError: what is wrong with the recipe, the picture or the output.
         Cancelled: if `progress` says so.
     """
-    job.check()
     with _garbage_kept():
         export = _Export(device, job, progress)
         try:
@@ -229,6 +93,7 @@ def _garbage_kept() -> Iterator[None]:
 class _Export:
     def __init__(self, device: Device, job: Job, progress: Progress) -> None:
         self.job = job
+        self.outputs = job.outputs
         self.recipe = job.recipe
         self.progress = progress
         self.device = device
@@ -236,10 +101,11 @@ class _Export:
         job.picture.pixels.flags.writeable = False  # so that it stays on the GPU from frame to frame
         playback = job.recipe.time
         # A moving source has no frame that is shown twice: what goes back does so in the simulation.
-        self.is_spooled = job.clip is None and not (job.maps and job.maps.is_sequence)
+        self.is_spooled = job.clip is None and not (self.outputs.maps and self.outputs.maps.is_sequence)
         goes_back = (playback.reverse or playback.ping_pong) and not self.is_spooled
         self.replay = Replay(device, job.recipe, self.pictures, budget=DEFAULT_BUDGET if goes_back else 0)
-        self.states = StoredStates(job.states, self.replay, self.pictures.notice) if job.states else None
+        states = job.outputs.states
+        self.states = StoredStates(states, self.replay, self.pictures.notice) if states else None
         self.sampler = Sampler(device)
         self.size = result_size(job.recipe, job.picture)
         # What the results belong to; densities are straight, whatever the picture is.
@@ -247,7 +113,7 @@ class _Export:
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.numbers: list[dict[str, Any]] = []
         self._position: Fraction | None = None
-        device.timings.enabled = self.replay.fluid.measuring = job.stats is not None
+        device.timings.enabled = self.replay.fluid.measuring = self.outputs.stats is not None
 
     def release(self) -> None:
         self.device.timings.enabled = False
@@ -255,7 +121,7 @@ class _Export:
         self.replay.release()
 
     def run(self) -> Report:
-        recipe, job = self.recipe, self.job
+        recipe, job, outputs = self.recipe, self.job, self.outputs
         watched = not self.sentinel.is_idle
         runs, stills = 2 if watched and job.has_frames else 1, self._steps_for_stills()
         self.progress.total = runs * recipe.ticks + stills
@@ -266,31 +132,33 @@ class _Export:
             count = self._write_frames(shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate)), end)
         else:
             self._go_to(Fraction(end))
-            if job.output is not None:
+            if outputs.file is not None:
                 steps = steps_for(self.size)
                 frame = self._frame(job.picture.pixels, self.progress.parts(steps, self.size[1]))
                 picture = self.like.with_pixels(frame)
                 self.progress.enter("writing")
-                write_picture(job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip)
+                write_picture(
+                    outputs.file, picture, bits=outputs.bits, quality=recipe.output.quality, strip=outputs.strip
+                )
                 self.progress.count(steps)
             self._note(0, Fraction(end))
             count = 1
-        if job.maps is not None and not job.maps.is_sequence:
+        if outputs.maps is not None and not outputs.maps.is_sequence:
             self.progress.enter("making the map")
             try:
-                found = self._map(job.maps)
+                found = self._map(outputs.maps)
             except MemoryError:
-                width, height = (side + 2 * job.maps.overscan for side in self._map_size(job.maps))
+                width, height = (side + 2 * outputs.maps.overscan for side in self._map_size(outputs.maps))
                 little = f"there is not enough memory for a map of {width} x {height} pixels"
                 raise UserError(
                     f"{little}; lower --map-size or --overscan", in_window=f"{little}; choose a smaller size"
                 ) from None
             self.progress.advance(steps_for((found.width, found.height)))
             self.progress.enter("writing the map")
-            write_map(job.maps.path, found, job.maps.kind)
+            write_map(outputs.maps.path, found, outputs.maps.kind)
             self.progress.count(steps_for((found.width, found.height)))
-        if job.stats is not None:
-            with replacing(job.stats) as temporary:
+        if outputs.stats is not None:
+            with replacing(outputs.stats) as temporary:
                 temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
         if self.states is not None:
             self.states.keep(last=True)  # where the next part begins
@@ -301,17 +169,18 @@ class _Export:
         """What the user should know of the last warp, and of what the output cannot hold."""
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
-        output, clip = self.job.output, self.job.clip
+        output, clip = self.outputs.file, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture)):
             self.pictures.notice(said)
-        if output is not None and clip is not None and (said := unheld_of_clip(output, self.job.codec, clip)):
+        if output is not None and clip is not None and (said := unheld_of_clip(output, self.outputs.codec, clip)):
             self.pictures.notice(said)
 
     def _steps_for_stills(self) -> int:
         """What the last picture and the last map count as, looked up and written."""
         job = self.job
-        sizes = [self.size] if job.output is not None and not job.has_frames else []
-        sizes += [self._map_size(job.maps)] if job.maps is not None and not job.maps.is_sequence else []
+        file, maps = self.outputs.file, self.outputs.maps
+        sizes = [self.size] if file is not None and not job.has_frames else []
+        sizes += [self._map_size(maps)] if maps is not None and not maps.is_sequence else []
         return sum(2 * steps_for(size) for size in sizes)
 
     def _run_until_stopped(self) -> str | None:
@@ -326,16 +195,16 @@ class _Export:
 
     def _write_frames(self, shown: list[Fraction], end: int) -> int:
         """Write the frames, each warped by the map at its position in `shown`; says how many there were."""
-        job, (first, last) = self.job, self.job.part
+        job, file, maps, (first, last) = self.job, self.outputs.file, self.outputs.maps, self.outputs.part
         if job.clip is None and first >= len(shown):
             raise UserError(f"the animation has the frames 0-{len(shown) - 1}, and none from {first} on")
         until = None if last is None else last + 1
         wanted = shown[first:until]
         self.progress.expect(ceil(max(wanted, default=shown[-1])) - end)
         with ExitStack() as stack:
-            take_map, times = None, passes(job.output) if job.output is not None else 1
-            if job.maps is not None and job.maps.is_sequence:
-                writer = map_writer(job.maps.path, job.maps.kind, first=first, cancel=self.progress.cancel)
+            take_map, times = None, passes(file) if file is not None else 1
+            if maps is not None and maps.is_sequence:
+                writer = map_writer(maps.path, maps.kind, first=first, cancel=self.progress.cancel)
                 take_map = stack.enter_context(behind(stack.enter_context(writer)))
             if job.clip is not None:
                 clip_frames = job.clip.read_frames(self.progress.cancel, self.pictures.notice)
@@ -347,17 +216,8 @@ class _Export:
             else:
                 self.progress.expect(len(wanted) * times)
                 frames = self._frames_of_picture(wanted, take_map)
-            write = None
-            if job.output is not None:
-                write = stack.enter_context(behind(stack.enter_context(self._writer())))
-            written = 0
-            for frame in frames:
-                if write is not None:
-                    write(frame)
-                written += 1
-                self.progress.advance()
-            self.progress.enter("writing")  # what the encoder still holds, and what it does with all frames
-        if job.maps is not None and not job.maps.is_sequence:
+            written = write_all(frames, self._writer() if file is not None else None, self.progress)
+        if maps is not None and not maps.is_sequence:
             self._go_to(max(wanted, default=shown[-1]))
         return written
 
@@ -365,8 +225,8 @@ class _Export:
         self, wanted: list[Fraction], take_map: Callable[[Displacement], None] | None
     ) -> Iterator[np.ndarray]:
         """The picture warped by the maps at these positions; one that is shown again is not made again."""
-        first, source = self.job.part[0], repeat(self.job.picture.pixels)
-        if not self.is_spooled or self.job.output is None:
+        first, source = self.outputs.part[0], repeat(self.job.picture.pixels)
+        if not self.is_spooled or self.outputs.file is None:
             return self._frames(zip(count(first), wanted, strict=False), source, take_map)
         numbers: dict[Fraction, int] = {}
         for number, position in enumerate(wanted, first):
@@ -376,23 +236,23 @@ class _Export:
         order = [places[position] for position in wanted]
         frames = self._frames(((numbers[position], position) for position in distinct), source, take_map)
         goes_back = any(later < earlier for earlier, later in pairwise(order))
-        return reordered(frames, order, self.job.output.parent) if goes_back else held(frames, order)
+        return reordered(frames, order, self.outputs.file.parent) if goes_back else held(frames, order)
 
     def _writer(self) -> AbstractContextManager[FrameWriter]:
-        job, output, (first, last) = self.job, self.recipe.output, self.job.part
-        assert job.output is not None
+        job, output, (first, last) = self.job, self.recipe.output, self.outputs.part
+        assert self.outputs.file is not None
         return animation_writer(
-            job.output,
+            self.outputs.file,
             job.rate,
-            codec=job.codec,
-            crf=round(45 - 0.3 * output.quality),
+            codec=self.outputs.codec,
+            crf=crf_of(output.quality),
             quality=output.quality,
-            bits=job.bits,
+            bits=self.outputs.bits,
             sound=job.clip.path if job.clip and job.clip.sound else None,
             sound_from=float(first / job.rate) + (job.clip.late if job.clip else 0),
             frames=None if last is None else last + 1 - first,
             first=first,
-            like=self.like.stripped() if job.strip else self.like,
+            like=self.like.stripped() if self.outputs.strip else self.like,
             cancel=self.progress.cancel,
             passed=self.progress.advance,
         )
@@ -407,9 +267,9 @@ class _Export:
         nothing = np.empty((0, 0, 1), np.uint8)
         for (number, position), pixels in zip(positions, source, strict=False):
             self._go_to(position)
-            if take_map is not None and self.job.maps is not None:
-                take_map(self._map(self.job.maps))
-            frame = self._frame(pixels) if self.job.output is not None else nothing
+            if take_map is not None and self.outputs.maps is not None:
+                take_map(self._map(self.outputs.maps))
+            frame = self._frame(pixels) if self.outputs.file is not None else nothing
             self._note(number, position)
             gc.collect(1)
             yield frame
@@ -419,9 +279,7 @@ class _Export:
             return
         whole = position // 1
         begins = self._position is None or whole < self.replay.tick
-        if whole < self.replay.tick:
-            nearest = self.replay.checkpoints.nearest(self.recipe, whole)
-            self.replay.seek(nearest.tick if nearest else 0)
+        self.replay.head_for(int(whole))
         before = self.replay.tick
         if self.states is not None and begins and self.states.resume(whole):
             self.progress.advance(self.replay.tick - before)
@@ -438,7 +296,8 @@ class _Export:
             heard(len(frame))
             return frame
         # The frames of an animation are all of one kind, and most of its formats have no alpha.
-        alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
+        file = self.outputs.file
+        alpha = not self.job.is_animation and file is not None and picture_format(file).alpha
         with self.device.stage("sample picture"):
             premultiplied = self.job.picture.premultiplied
             how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples, premultiplied=premultiplied)
@@ -475,7 +334,7 @@ class _Export:
 
     def _note(self, number: int, position: Fraction) -> None:
         """Keep the numbers about a frame, if they are asked for."""
-        if self.job.stats is None:
+        if self.outputs.stats is None:
             return
         replay, residuals = self.replay, self.replay.fluid.residuals
         told = {
@@ -502,6 +361,25 @@ class _Export:
             "stopped": verdict,
             "frames": self.numbers,
         }
+
+
+def write_all(
+    frames: Iterable[np.ndarray], writer: AbstractContextManager[FrameWriter] | None, progress: Progress
+) -> int:
+    """Write the frames of an animation, each while the next one is made; says how many there were.
+
+    writer: None if they are made for something else.
+    """
+    count = 0
+    with ExitStack() as stack:
+        write = stack.enter_context(behind(stack.enter_context(writer))) if writer is not None else None
+        for frame in frames:
+            if write is not None:
+                write(frame)
+            count += 1
+            progress.advance()
+        progress.enter("writing")  # what the encoder still holds, and what it does with all frames
+    return count
 
 
 def part_of(
@@ -604,18 +482,6 @@ def looked_up(
 def steps_for(size: tuple[int, int]) -> int:
     """How many steps of a job looking up a still of this size counts as; writing it counts as many again."""
     return max(1, size[0] * size[1] // PIXELS_A_STEP)
-
-
-def longer_side(size: tuple[int, int], longest: int) -> tuple[int, int]:
-    """A size of the same proportions, its longer side `longest` pixels."""
-    width, height = (max(1, round(side * longest / max(size))) for side in size)
-    return width, height
-
-
-def result_size(recipe: Recipe, picture: Picture) -> tuple[int, int]:
-    """(width, height) of the result in pixels: the recipe's size, or the picture's own."""
-    own = picture.width, picture.height
-    return own if recipe.output.size is None else longer_side(own, recipe.output.size)
 
 
 def with_alpha(pixels: np.ndarray) -> np.ndarray:

@@ -32,7 +32,8 @@ from app.media.pictures import read_picture
 from app.model.picture import Picture
 from app.model.recipe import Output, Recipe
 from app.progress import Progress
-from app.work.export import Job, run
+from app.work.export import run
+from app.work.jobs import Job, Outputs
 from solver.gl.device import Device
 
 ROUNDS = 3
@@ -61,7 +62,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         frames = rendered(device, recipe, source, opened.folder, Path(folder))
         for ending in ENDINGS:
-            job = Job(recipe, source, opened.folder, Path(folder) / f"b{ending}")
+            job = Job(recipe, source, opened.folder, Outputs(Path(folder) / f"b{ending}"))
             works = (
                 partial(encode, Path(folder) / f"a{ending}", frames),
                 partial(render, device, job),
@@ -105,7 +106,7 @@ def render(device: Device, job: Job) -> None:
 
 def rendered(device: Device, recipe: Recipe, source: Picture, folder: Path, target: Path) -> list[np.ndarray]:
     """The animation's frames in memory."""
-    run(device, Job(recipe, source, folder, target / "f.%04d.png"), Progress())
+    run(device, Job(recipe, source, folder, Outputs(target / "f.%04d.png")), Progress())
     return [read_picture(path).pixels for path in sorted(target.glob("f.*.png"))]
 
 

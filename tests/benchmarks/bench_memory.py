@@ -20,7 +20,8 @@ import numpy as np
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Output, Recipe
 from app.progress import Progress
-from app.work.export import Job, run
+from app.work.export import run
+from app.work.jobs import Job, Outputs
 from solver.gl.device import Device
 
 MIB = 2**20
@@ -59,7 +60,7 @@ def animation(frames: int) -> None:
         seen.append((done, resident()))
 
     with tempfile.TemporaryDirectory() as folder, Device.headless() as device:
-        job = Job(recipe(1024, frames - 1), source, Path(folder), Path(folder) / "f.%04d.jpg")
+        job = Job(recipe(1024, frames - 1), source, Path(folder), Outputs(Path(folder) / "f.%04d.jpg"))
         started = time.perf_counter()
         written = run(device, job, Progress(report=report)).frames
         spent = time.perf_counter() - started
@@ -76,7 +77,7 @@ def animation(frames: int) -> None:
 def still() -> None:
     source = picture(12_000, 9_000)
     with tempfile.TemporaryDirectory() as folder, Device.headless() as device:
-        job = Job(recipe(256, 30), source, Path(folder), Path(folder) / "a.png")
+        job = Job(recipe(256, 30), source, Path(folder), Outputs(Path(folder) / "a.png"))
         before, peak, ended = resident(), [0], threading.Event()
 
         def watch() -> None:

@@ -21,7 +21,8 @@ from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Output, Recipe
 from app.progress import Progress
 from app.work.applying import Application, MapSource
-from app.work.export import Job, run
+from app.work.export import run
+from app.work.jobs import Job, Outputs
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
@@ -103,7 +104,11 @@ def rendered(device: Device, source: Path, output: Path, animated: bool = False,
     if min(open_source(source).picture.pixels.shape[:2]) < 12:
         recipe = recipe.edited(fluid=FluidSettings(grid=160))
     opened = open_source(source)
-    run(device, Job(recipe, opened.picture, source.parent, output, clip=opened.clip, animated=animated), Progress())
+    run(
+        device,
+        Job(recipe, opened.picture, source.parent, Outputs(output, animated=animated), clip=opened.clip),
+        Progress(),
+    )
 
 
 @pytest.mark.parametrize("channels", CHANNELS, ids=CHANNELS.get)
@@ -267,7 +272,7 @@ def test_what_holds_no_premultiplied_colours_gets_straight_ones(device: Device, 
     frame = next(read_clip(tmp_path / "out.mkv").read_frames())
     assert (frame == wanted).all()
     recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), mode="density")
-    run(device, Job(recipe, read_picture(source), tmp_path, tmp_path / "density.png"), Progress())
+    run(device, Job(recipe, read_picture(source), tmp_path, Outputs(tmp_path / "density.png")), Progress())
     np.testing.assert_allclose(in_png(tmp_path / "density.png")[12, 18], wanted // 257, atol=1)
 
 

@@ -15,7 +15,8 @@ from app.media.opening import open_recipe
 from app.media.pictures import read_exr, read_picture
 from app.model.picture import linear_to_srgb, srgb_to_linear
 from app.progress import Progress
-from app.work.export import Job, MapOutput, run
+from app.work.export import run
+from app.work.jobs import Job, MapOutput, Outputs
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
@@ -33,7 +34,7 @@ def warped(request: pytest.FixtureRequest, shared_device: Device, tmp_path_facto
     photograph = opened.source().picture
     path = tmp_path_factory.mktemp("maps") / f"{request.param}.exr"
     recipe = opened.recipe.edited(duration=min(0.8, opened.recipe.duration))
-    run(shared_device, Job(recipe, photograph, opened.folder, None, maps=MapOutput(path)), Progress())
+    run(shared_device, Job(recipe, photograph, opened.folder, Outputs(None, maps=MapOutput(path))), Progress())
     x, y = places(path, photograph.width, photograph.height)
     moved = np.hypot(x - np.arange(photograph.width), y - np.arange(photograph.height)[:, None])
     assert moved.max() > 10  # pixels: there is something to be seen
@@ -91,7 +92,9 @@ def test_opencv_comes_to_our_render_by_our_map(device: Device, tmp_path: Path, n
     soft = cv2.GaussianBlur(source.pixels, (0, 0), 4)
     recipe = opened.recipe.edited(duration=min(0.8, opened.recipe.duration), edges="clamp")
     maps = MapOutput(tmp_path / "a.exr", size=FINER * max(soft.shape))
-    run(device, Job(recipe, source.with_pixels(soft), opened.folder, tmp_path / "a.png", maps=maps), Progress())
+    run(
+        device, Job(recipe, source.with_pixels(soft), opened.folder, Outputs(tmp_path / "a.png", maps=maps)), Progress()
+    )
     ours = read_picture(tmp_path / "a.png").pixels.astype(float)
     x, y = places(tmp_path / "a.exr", soft.shape[1], soft.shape[0])
     light = srgb_to_linear(soft / 255.0).astype(np.float32)

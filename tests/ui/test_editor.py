@@ -31,7 +31,8 @@ from app.ui.files import fresh_recipe, load_any
 from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS, Speed
 from app.ui.saving import SaveDialog
-from app.work.export import Job, MapOutput, run
+from app.work.export import run
+from app.work.jobs import Job, MapOutput, Outputs
 from solver.gl.device import Device
 from support.editing import Robot, command_line, pattern, small_project, write_foreign_map
 
@@ -485,13 +486,13 @@ def test_a_session_saved_and_rendered_is_the_same_picture(device: Device, robot:
     robot.rest()
     assert np.array_equal(robot.warp(), warp)
     out = tmp_path / "out.png"
-    run(device, Job(loaded.recipe, loaded.picture, loaded.folder, out), Progress())
+    run(device, Job(loaded.recipe, loaded.picture, loaded.folder, Outputs(out)), Progress())
     seen = robot.editor.exports
     job = ExportDialog(robot.editor.session, str(tmp_path)).job()
     run(device, job, Progress())
     assert not seen.is_running
-    assert job.output is not None
-    assert np.array_equal(read_picture(job.output).pixels, read_picture(out).pixels)
+    assert job.outputs.file is not None
+    assert np.array_equal(read_picture(job.outputs.file).pixels, read_picture(out).pixels)
 
 
 def test_files_that_are_no_pictures_leave_the_work_alone(robot: Robot, tmp_path: Path) -> None:
@@ -750,7 +751,9 @@ def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
     run(
-        device, Job(robot.editor.session.recipe, pattern(), tmp_path, None, maps=MapOutput(tmp_path / name)), Progress()
+        device,
+        Job(robot.editor.session.recipe, pattern(), tmp_path, Outputs(None, maps=MapOutput(tmp_path / name))),
+        Progress(),
     )
     warped = robot.warp()
     robot.key("ctrl+z")
@@ -774,8 +777,8 @@ def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
     painted = robot.warp()
     files = [tmp_path / "window.png", tmp_path / "line.png"]
     job = ExportDialog(robot.editor.session, str(tmp_path)).job()
-    run(device, replace(job, output=files[0]), Progress())
-    run(device, Job(loaded.recipe, loaded.picture, loaded.folder, files[1]), Progress())
+    run(device, replace(job, outputs=Outputs(files[0])), Progress())
+    run(device, Job(loaded.recipe, loaded.picture, loaded.folder, Outputs(files[1])), Progress())
     assert files[0].read_bytes() == files[1].read_bytes()
     robot.key("ctrl+z")
     robot.key("ctrl+z")

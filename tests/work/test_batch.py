@@ -25,9 +25,12 @@ from app.media import files
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
 from app.progress import INTERRUPTED, Progress
-from app.work import batch, states
-from app.work.batch import Edits, Outcome, Task, perform, run_batch, spread
+from app.work import cluster, states, worker
+from app.work.batch import run_batch
+from app.work.jobs import Outputs
 from app.work.replay import Replay
+from app.work.tasks import Edits, Task, spread
+from app.work.worker import Outcome, perform
 from solver.gl.device import Device
 
 ROOT = Path(__file__).parents[2]
@@ -55,7 +58,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture(autouse=True)
 def _shared(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """One GL context for the whole test process: a second one would take the other tests' place."""
-    monkeypatch.setattr(batch._here, "device", device, raising=False)
+    monkeypatch.setattr(worker, "own_device", lambda: device)
 
 
 def draw(path: Path, number: int, width: int = 64) -> None:
@@ -64,7 +67,7 @@ def draw(path: Path, number: int, width: int = 64) -> None:
 
 
 def tasks(folder: Path, pictures: list[Path], **options: object) -> list[Task]:
-    task = Task(str(folder / "a.toml"), Edits(), None, folder / "out", **options)  # type: ignore[arg-type]
+    task = Task(str(folder / "a.toml"), Edits(), None, Outputs(folder / "out", **options))  # type: ignore[arg-type]
     return spread(task, pictures)
 
 
@@ -74,7 +77,7 @@ def alone(folder: Path, pictures: list[Path]) -> dict[str, bytes]:
     made = {}
     for picture in pictures:
         output = folder / "alone" / picture.name
-        assert perform(Task(str(folder / "a.toml"), Edits(), picture, output)).error == ""
+        assert perform(Task(str(folder / "a.toml"), Edits(), picture, Outputs(output)), Progress()).error == ""
         made[picture.name] = output.read_bytes()
     return made
 
@@ -87,15 +90,15 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_names_of_the_results(tmp_path: Path):
-    task = Task("coffee", Edits(), None, tmp_path / "new/out")
+    task = Task("coffee", Edits(), None, Outputs(tmp_path / "new/out"))
     pictures = [Path(name) for name in ("a.JPG", "b.bmp", "c.mov", "d.avi")]
-    made = [one.output for one in spread(task, pictures)]
+    made = [one.outputs.file for one in spread(task, pictures)]
     assert made == [tmp_path / "new/out" / name for name in ("a.JPG", "b.png", "c.mov", "d.mp4")]
     assert (tmp_path / "new/out").is_dir()
 
-    pattern = Task("coffee", Edits(), None, tmp_path / "{name} new.tif", stats=tmp_path / "{name}.json")
+    pattern = Task("coffee", Edits(), None, Outputs(tmp_path / "{name} new.tif", stats=tmp_path / "{name}.json"))
     (one,) = spread(pattern, [Path("x/e.png")])
-    assert (one.output, one.stats) == (tmp_path / "e new.tif", tmp_path / "e.json")
+    assert (one.outputs.file, one.outputs.stats) == (tmp_path / "e new.tif", tmp_path / "e.json")
     assert one.picture == Path("x/e.png").absolute()
 
 
@@ -113,17 +116,22 @@ def test_names_that_cannot_be(
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=message):
-        spread(Task("coffee", Edits(), None, Path(output)), [Path(name) for name in pictures])
+        spread(Task("coffee", Edits(), None, Outputs(Path(output))), [Path(name) for name in pictures])
 
 
 def test_one_file_of_numbers_for_many_pictures_is_refused(tmp_path: Path):
     with pytest.raises(UserError, match=r"put \{name\} into its name"):
-        spread(Task("coffee", Edits(), None, tmp_path, stats=tmp_path / "s.json"), [Path("a.png"), Path("b.png")])
+        spread(
+            Task("coffee", Edits(), None, Outputs(tmp_path, stats=tmp_path / "s.json")), [Path("a.png"), Path("b.png")]
+        )
 
 
 def test_numbers_of_two_pictures_in_one_file_are_refused(tmp_path: Path):
     with pytest.raises(UserError, match="would both become"):
-        spread(Task("coffee", Edits(), None, tmp_path, stats=tmp_path / "{name}.json"), [Path("a.png"), Path("a.jpg")])
+        spread(
+            Task("coffee", Edits(), None, Outputs(tmp_path, stats=tmp_path / "{name}.json")),
+            [Path("a.png"), Path("a.jpg")],
+        )
 
 
 # One after the other, and in processes ------------------------------------------------------------------------------
@@ -147,17 +155,14 @@ def test_one_that_fails_does_not_stop_the_others(folder: Path, jobs: int):
 
 def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Killed as for want of memory: whatever it had is done by another; what kills each of them is told."""
-    serving = (
-        "import app.work.batch, support.dying; app.work.batch.perform = support.dying.dying; app.work.batch.serve()"
-    )
-    monkeypatch.setattr(batch, "SERVING", serving)
+    monkeypatch.setattr(worker, "SERVING", "import support.dying as d, app.work.worker as w; w.serve(d.dying)")
     pictures = [folder / f"p{number}.png" for number in range(4)]
     heard: list[Outcome] = []
     assert run_batch(tasks(folder, pictures), heard.append, Progress(), 2) == 1
     told = {Path(outcome.label).name: outcome.error for outcome in heard}
     assert sorted(told) == [path.name for path in pictures]
     assert [name for name, error in told.items() if error] == ["p3.png"]
-    assert told["p3.png"] == batch.DIED
+    assert told["p3.png"] == worker.DIED
 
 
 def test_cancelling_leaves_what_is_finished(folder: Path):
@@ -273,7 +278,7 @@ def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):
 
 def test_no_cluster_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(batch, "CONNECTING", 1)
+    monkeypatch.setattr(cluster, "CONNECTING", 1)
     with pytest.raises(UserError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         run_batch(tasks(folder, [folder / "p0.png"]), lambda outcome: None, Progress(), cluster="tcp://127.0.0.1:9")
 
@@ -305,7 +310,7 @@ def test_what_is_no_scheduler_is_told(
 ):
     """Something else answers there, or takes the call and is silent."""
     pytest.importorskip("distributed")
-    monkeypatch.setattr(batch, "CONNECTING", 1)
+    monkeypatch.setattr(cluster, "CONNECTING", 1)
     with socket.create_server(("127.0.0.1", 0)) as server:
         kept: list[socket.socket] = []
 
@@ -384,13 +389,15 @@ def test_the_parts_are_the_whole(folder: Path, playback: str):
     for path in (whole, parts):
         path.mkdir()
     recipe, picture = str(folder / "b.toml"), folder / "p0.png"
-    assert perform(Task(recipe, Edits(), picture, whole / "f.%03d.png")).error == ""
+    assert perform(Task(recipe, Edits(), picture, Outputs(whole / "f.%03d.png")), Progress()).error == ""
     count = len(contents(whole))
     for first in range(0, count, 4):
-        outcome = perform(Task(recipe, Edits(), picture, parts / "f.%03d.png", part=(first, first + 3)))
+        outcome = perform(
+            Task(recipe, Edits(), picture, Outputs(parts / "f.%03d.png", part=(first, first + 3))), Progress()
+        )
         assert outcome.error == ""
     assert contents(parts) == contents(whole)
-    told = perform(Task(recipe, Edits(), picture, parts / "f.%03d.png", part=(count, None)))
+    told = perform(Task(recipe, Edits(), picture, Outputs(parts / "f.%03d.png", part=(count, None))), Progress())
     assert f"the frames 0-{count - 1}, and none from {count} on" in told.error
     assert read_picture(whole / "f.000.png").pixels.shape == (48, 64, 3)
 
@@ -431,15 +438,13 @@ def part(
         str(folder / recipe),
         Edits(),
         folder / "p0.png",
-        folder / output / "f.%03d.png",
-        part=(first, last),
-        **options,
+        Outputs(folder / output / "f.%03d.png", part=(first, last), **options),
     )
     steps: list[int] = []
     advance = Replay.advance
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(Replay, "advance", lambda replay: (steps.append(replay.tick), advance(replay))[1])
-        outcome = perform(task)
+        outcome = perform(task, Progress())
     return len(steps), outcome
 
 

@@ -27,8 +27,8 @@ from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
 from app.progress import Progress
 from app.work.applying import Application, MapSource, converted, inverted
-from app.work.batch import Edits, Task
-from app.work.export import Job, MapOutput, displacement, run
+from app.work.export import displacement, run
+from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
@@ -75,16 +75,17 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def render(device: Device, recipe: str, source: Path, output: Path | None, **options: object) -> None:
-    task = Task("unused", Edits(), source, output, **options)  # type: ignore[arg-type]
     opened = open_source(source)
-    job = Job(
-        Recipe.parse(recipe), opened.picture, source.parent, output, maps=task.maps, clip=opened.clip, part=task.part
-    )
+    outputs = Outputs(output, **options)  # type: ignore[arg-type]
+    job = Job(Recipe.parse(recipe), opened.picture, source.parent, outputs, opened.clip)
+    job.check()
     run(device, job, Progress())
 
 
 def apply(device: Device, maps: Path, source: Path, output: Path, **options: object) -> None:
-    Application(MapSource(maps), source, output, edges="clamp", **options).run(device, Progress())  # type: ignore[arg-type]
+    job = Application(MapSource(maps), source, output, edges="clamp", **options)  # type: ignore[arg-type]
+    job.check()
+    job.run(device, Progress())
 
 
 def files(folder: Path, start: str) -> list[str]:
@@ -286,7 +287,7 @@ def test_opencv_warps_by_the_map_as_we_do(device: Device, picture: Path, tmp_pat
 def test_a_map_as_large_as_too_large_a_picture_is_refused_before_the_work(tmp_path: Path):
     """And the window, which has no options, names none."""
     pixels = np.broadcast_to(np.uint8(0), (24_000, 24_000, 1))
-    job = Job(Recipe.parse(WHIRL), Picture(pixels), tmp_path, None, maps=MapOutput(tmp_path / "m.exr"))
+    job = Job(Recipe.parse(WHIRL), Picture(pixels), tmp_path, Outputs(None, maps=MapOutput(tmp_path / "m.exr")))
     with pytest.raises(UserError) as refused:
         job.check()
     large = "a map of 24000 x 24000 pixels"
@@ -341,7 +342,9 @@ def test_a_large_still_says_how_far_it_is(
     monkeypatch.setattr("app.work.export.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
     monkeypatch.setattr("app.work.applying.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
     maps = MapOutput(tmp_path / "m.exr", size=96)
-    job = Job(Recipe.parse(WHIRL + "size = 1500"), read_picture(picture), tmp_path, tmp_path / "out.png", maps=maps)
+    job = Job(
+        Recipe.parse(WHIRL + "size = 1500"), read_picture(picture), tmp_path, Outputs(tmp_path / "out.png", maps=maps)
+    )
     heard = Heard()
     run(device, job, heard.progress)
     heard.check()
@@ -368,7 +371,7 @@ def test_an_animation_says_how_far_it_is(
         (WHIRL + stop, (0, None), None),
     ):
         heard = Heard()
-        job = Job(Recipe.parse(recipe), read_picture(picture), tmp_path, tmp_path / name, part=part)
+        job = Job(Recipe.parse(recipe), read_picture(picture), tmp_path, Outputs(tmp_path / name, part=part))
         report = run(device, job, heard.progress)
         heard.check()
         assert heard.steps[-1][0] == (steps or 2 * report.ticks + report.frames * passes)
@@ -509,7 +512,7 @@ def test_a_map_that_tears_a_large_picture_is_told(device: Device, tmp_path: Path
     torn[::2], torn[1::2] = -0.4, 0.4
     np.save(tmp_path / "torn.npy", torn)
     monkeypatch.setattr("app.work.export.Sampler", partial(Sampler, whole=2_000, tile=(48, 32)))
-    job = Job(Recipe.parse(f'map = "torn.npy"\n{WHIRL}'), Picture(scene()), tmp_path, tmp_path / "x.png")
+    job = Job(Recipe.parse(f'map = "torn.npy"\n{WHIRL}'), Picture(scene()), tmp_path, Outputs(tmp_path / "x.png"))
     with pytest.raises(UserError, match="The map cannot be applied: the map tears a patch"):
         run(device, job, Progress())
     assert not (tmp_path / "x.png").exists()

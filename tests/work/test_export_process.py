@@ -11,8 +11,8 @@ from typing import Any
 
 from app.media.pictures import read_picture
 from app.model.recipe import Recipe
-from app.work.export import Job
 from app.work.export_process import ExportProcess
+from app.work.jobs import Job, Outputs
 
 PICTURE = Path(__file__).parents[2] / "assets" / "pictures" / "coffee.png"
 PATIENCE = 60.0  # seconds
@@ -48,12 +48,12 @@ def ended(process: ExportProcess) -> ExportProcess:
 def test_a_process_that_dies_while_it_gets_its_job_is_told_of(tmp_path: Path):
     """Nor does whoever started it wait, though the picture is more than a pipe holds."""
     picture = read_picture(PICTURE)
-    job = Dying(Recipe(), picture, tmp_path, tmp_path / "out.png", rest=bytes(10_000_000))
+    job = Dying(Recipe(), picture, tmp_path, Outputs(tmp_path / "out.png"), rest=bytes(10_000_000))
     assert "stopped unexpectedly" in ended(ExportProcess(job)).error
 
 
 def test_a_picture_larger_than_a_pipe_is_exported(tmp_path: Path):
     recipe = Recipe.parse("duration = 0.1\n[fluid]\ngrid = 16\n")
-    process = ended(ExportProcess(Job(recipe, read_picture(PICTURE), tmp_path, tmp_path / "out.png")))
+    process = ended(ExportProcess(Job(recipe, read_picture(PICTURE), tmp_path, Outputs(tmp_path / "out.png"))))
     assert process.error == ""
     assert (read_picture(tmp_path / "out.png").pixels == read_picture(PICTURE).pixels).all()

@@ -17,7 +17,8 @@ from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.model.strokes import Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
-from app.work.export import Job, run
+from app.work.export import run
+from app.work.jobs import Job, Outputs
 from app.work.session import REST, Session
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
@@ -72,7 +73,7 @@ def test_two_hundred_strokes_saved_and_rendered_are_the_same_picture(
     again.release_gpu()
     files = [tmp_path / "one.png", tmp_path / "two.png"]
     for source, file in ((project, files[0]), (loaded, files[1])):
-        run(device, Job(source.recipe, source.picture, source.folder, file), Progress())
+        run(device, Job(source.recipe, source.picture, source.folder, Outputs(file)), Progress())
     assert np.array_equal(read_picture(files[0]).pixels, read_picture(files[1]).pixels)
 
 

@@ -1,0 +1,193 @@
+"""What is made of what: the picture, the recipe, and all that is written."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+from app.errors import UserError
+from app.media.animation import check_output, is_animation
+from app.media.files import cannot_write, is_sequence, writable
+from app.media.maps import Kind, check_map
+from app.media.opening import check_picture
+from app.media.pictures import MAX_PIXELS
+from app.media.video import Clip
+from app.model.picture import Picture
+from app.model.recipe import Recipe
+from app.model.timeline import frame_rate
+
+
+@dataclass(frozen=True)
+class MapOutput:
+    """What is written of the warp map.
+
+    Attributes:
+        path: a file for the last frame's map, or the pattern of a sequence for every frame's; see `app.media.maps`.
+        kind: what an EXR or TIFF holds.
+        forward: where the points of the original go, instead of where those of the result come from.
+        overscan: pixels more on every side.
+        size: longer side in pixels; None is the result's.
+    """
+
+    path: Path
+    kind: Kind = "st"
+    forward: bool = False
+    overscan: int = 0
+    size: int | None = None
+
+    @property
+    def is_sequence(self) -> bool:
+        return is_sequence(self.path)
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What is written, and how.
+
+    Attributes:
+        file: the result, or the pattern of a sequence's files; None for maps alone.
+        stats: a JSON file for numbers about every frame.
+        maps: what is written of the warp map.
+        part: the first and the last frame of the animation that are written, from 0; None is to the end.
+        animated: for endings that stand for both, as .webp does: an animation is wanted.
+        bits: a channel, of pictures; None keeps the source's.
+        strip: leave out the source's metadata.
+        codec: of a video; None is the usual one of its ending.
+        states: a folder of states of the simulation, for parts to begin with and to leave for others.
+    """
+
+    file: Path | None
+    stats: Path | None = None
+    maps: MapOutput | None = None
+    part: tuple[int, int | None] = (0, None)
+    animated: bool = False
+    bits: int | None = None
+    strip: bool = False
+    codec: str | None = None
+    states: Path | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """The names of all that is written; states, which others may use as well, are not among them."""
+        return [path for path in (self.file, self.stats, self.maps and self.maps.path) if path is not None]
+
+    def renamed(self, name: Callable[[Path], Path]) -> Outputs:
+        """The same written to other files, each as `name` says."""
+        file, stats, states = (path and name(path) for path in (self.file, self.stats, self.states))
+        maps = self.maps and replace(self.maps, path=name(self.maps.path))
+        return replace(self, file=file, stats=stats, maps=maps, states=states)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is made of what.
+
+    Attributes:
+        recipe: all settings; its [output] says the size and the rate.
+        picture: the source; of a clip, its first frame.
+        folder: where the names of auxiliary pictures in the recipe start from.
+        outputs: what is written.
+        clip: the source, where it moves: its frames are warped by W_t at its own rate, its sound is carried over.
+    """
+
+    recipe: Recipe
+    picture: Picture
+    folder: Path
+    outputs: Outputs
+    clip: Clip | None = None
+
+    @property
+    def target(self) -> Path:
+        """The file that it is all about."""
+        output, maps = self.outputs.file, self.outputs.maps
+        path = output or (maps and maps.path)
+        assert path is not None
+        return path
+
+    @property
+    def label(self) -> str:
+        """What the user calls it."""
+        return self.target.name
+
+    @property
+    def is_animation(self) -> bool:
+        output = self.outputs.file
+        return output is not None and (self.outputs.animated or is_animation(output))
+
+    @property
+    def has_frames(self) -> bool:
+        """True if more than the end is written."""
+        output, maps = self.outputs.file, self.outputs.maps
+        return self.is_animation or (output is None and maps is not None and maps.is_sequence)
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames per second."""
+        return self.clip.fps if self.clip else frame_rate(self.recipe.output.fps)
+
+    def check(self) -> None:
+        """Find out before the work what would keep it from being written.
+
+        Raises:
+            UserError: naming the file and the mend.
+        """
+        check_picture(self.picture)
+        outputs = self.outputs
+        output, maps = outputs.file, outputs.maps
+        if output is not None:
+            check_output(
+                output,
+                animated=outputs.animated,
+                fps=self.rate,
+                codec=outputs.codec,
+                bits=outputs.bits,
+                size=result_size(self.recipe, self.picture),
+            )
+        if maps is not None:
+            check_map(maps.path)
+            self._check_map_size(maps)
+            if maps.is_sequence and not self.has_frames:
+                raise UserError(
+                    f"{maps.path} numbers the maps of an animation and {output} is a picture; "
+                    f"give one map's name, or leave out --output to write the maps alone"
+                )
+        start, end = self.recipe.time.start, self.recipe.duration
+        if self.has_frames and start > end:
+            late = f"the animation ends at {end:g} s, and cannot begin at {start:g} s"
+            raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
+        if outputs.part != (0, None) and not self.has_frames:
+            raise UserError(f"only an animation has --frames, and {output} is a picture; write f.%04d.png or .mp4")
+        if self.clip is not None and self.recipe.mode == "density":
+            raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
+        for path in outputs.files:
+            writable(path)
+        if outputs.states is not None and os.path.exists(outputs.states) and not os.path.isdir(outputs.states):
+            raise cannot_write(outputs.states, FileExistsError(errno.EEXIST, "it is a file"))
+
+    def _check_map_size(self, maps: MapOutput) -> None:
+        size = result_size(self.recipe, self.picture)
+        width, height = size if maps.size is None else longer_side(size, maps.size)
+        why = "the size of the result" if maps.size is None else f"--map-size {maps.size}"
+        mend = "ask for fewer by --map-size" if maps.size is None else "ask for fewer"
+        if width * height <= MAX_PIXELS:
+            width, height = width + 2 * maps.overscan, height + 2 * maps.overscan
+            why, mend = f"--overscan {maps.overscan}", "ask for fewer"
+        if width * height > MAX_PIXELS:
+            large = f"a map of {width} x {height} pixels"
+            raise UserError(f"{why} makes {large}; {mend}", in_window=f"{large} is too large; choose a smaller size")
+
+
+def longer_side(size: tuple[int, int], longest: int) -> tuple[int, int]:
+    """A size of the same proportions, its longer side `longest` pixels."""
+    width, height = (max(1, round(side * longest / max(size))) for side in size)
+    return width, height
+
+
+def result_size(recipe: Recipe, picture: Picture) -> tuple[int, int]:
+    """(width, height) of the result in pixels: the recipe's size, or the picture's own."""
+    own = picture.width, picture.height
+    return own if recipe.output.size is None else longer_side(own, recipe.output.size)

@@ -1,0 +1,202 @@
+"""A process that does one piece of work after the other: for many pictures, for a cluster, and for the window."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+
+from app.errors import Cancelled, UserError
+from app.progress import GRACE, INTERRUPTED, Progress, abandon, interruptible
+from app.work.export import run
+from app.work.jobs import Job
+from app.work.tasks import Task
+from solver.gl.device import Device
+
+SERVING = "from app.work.worker import serve; serve()"
+ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
+DIED = "its process died each time, perhaps for want of memory; use fewer --jobs or a smaller --size"
+LOOK = 0.1  # seconds between two looks at the wish to stop
+
+Work = Task | Job
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a piece of work went.
+
+    Attributes:
+        label: what the user calls it.
+        error: why it failed, as a sentence; "" if it went well.
+        in_window: the same for someone who gave no command.
+        notices: what the user should hear of.
+        verdict: which stop condition ended the simulation and when; "" if none.
+    """
+
+    label: str
+    error: str = ""
+    in_window: str = ""
+    notices: tuple[str, ...] = ()
+    verdict: str = ""
+
+
+@dataclass(frozen=True)
+class Part:
+    """How much of a piece of work is done, 0 to 1, and what is being done beside the work itself, as "writing"."""
+
+    done: float
+    state: str
+
+
+Heard = Part | Outcome | None
+"""What a worker says; None once it has died."""
+
+
+@cache
+def own_device() -> Device:
+    """The one of this process, in whose main thread it is used."""
+    return Device.headless()
+
+
+def perform(work: Work, progress: Progress) -> Outcome:
+    """Do it here, on the device that is kept for the next one. Raises nothing but `Cancelled`."""
+    label = work.label
+    try:
+        job = work.job() if isinstance(work, Task) else work
+        job.check()
+        report = run(own_device(), job, progress)
+    except Cancelled:
+        raise
+    except UserError as error:
+        return Outcome(label, str(error), error.in_window)
+    except MemoryError:
+        little = "there is not enough memory for it"
+        return Outcome(label, f"{little}; use fewer --jobs or a smaller --size", f"{little}; choose a smaller size")
+    except Exception as error:
+        return Outcome(label, f"{type(error).__name__}: {in_a_line(error)}", f"The export failed: {in_a_line(error)}")
+    return Outcome(label, notices=report.notices, verdict=report.verdict or "")
+
+
+def in_a_line(error: BaseException) -> str:
+    """What an error says."""
+    return " ".join(str(error).split()) or "no reason given"
+
+
+class Worker:
+    """A process that does one piece of work after the other, and ends as soon as nobody is left who could give it one.
+
+    A forked process would share this one's GL, which no driver survives. A pool of the standard library's is lost with
+    any of its processes; here each stands for itself.
+
+    Args:
+        inbox: gets what it says, each with the worker itself; an `Outcome` ends a piece of work, None the worker.
+    """
+
+    def __init__(self, inbox: queue.SimpleQueue[tuple[Worker, Heard]]) -> None:
+        with _deaf_children():
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", SERVING],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            )
+        threading.Thread(target=self._listen, args=(inbox,), daemon=True).start()
+
+    def begin(self, work: Work) -> None:
+        """Give it a piece of work; it has none. Waits until the process has taken it."""
+        tasks = self._process.stdin
+        assert tasks is not None
+        with suppress(OSError, ValueError):  # it has died, as the inbox will tell
+            pickle.dump(work, tasks)
+            tasks.flush()
+
+    def end(self) -> None:
+        """End it in the middle of whatever it does, with nothing half-written left."""
+        assert self._process.stdin is not None
+        with suppress(OSError):
+            self._process.stdin.close()
+        try:
+            self._process.wait(10 * GRACE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _listen(self, inbox: queue.SimpleQueue[tuple[Worker, Heard]]) -> None:
+        said = self._process.stdout
+        assert said is not None
+        with said, suppress(EOFError, pickle.UnpicklingError):
+            while True:
+                inbox.put((self, pickle.load(said)))
+        inbox.put((self, None))
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Keep Ctrl+C and a hang-up, which reach every process of a terminal, from those that are started in the block.
+
+    They inherit what this thread has blocked, while for itself it only waits until the block ends; a handler that a
+    process sets for itself would come too late for one that is still being started.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def serve(do: Callable[[Work, Progress], Outcome] = perform) -> None:
+    """Do the work that comes by standard input, until its end or SIGTERM comes, in the middle of some if need be."""
+    said = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # nothing else may get among what is said
+    waiting: queue.SimpleQueue[Work] = queue.SimpleQueue()
+
+    def say(word: Heard) -> None:
+        pickle.dump(word, said)
+        said.flush()
+
+    with interruptible(_end_now) as cancel, suppress(Cancelled, KeyboardInterrupt, BrokenPipeError):
+        threading.Thread(target=_take, args=(waiting,), daemon=True).start()
+        while True:
+            say(do(waiting.get(), _told(say, cancel)))
+    _end_now()
+
+
+def _told(say: Callable[[Heard], None], cancel: Callable[[], bool]) -> Progress:
+    """The progress of a piece of work, said to whoever gave it."""
+    now = Part(0.0, "")
+
+    def report(done: int, total: int | None) -> None:
+        nonlocal now
+        now = Part(done / total if total else 0.0, now.state)
+        say(now)
+
+    def tell(state: str) -> None:
+        nonlocal now
+        now = Part(now.done, state)
+        say(now)
+
+    return Progress(None, report, cancel, tell)
+
+
+def _take(waiting: queue.SimpleQueue[Work]) -> None:
+    while True:
+        try:
+            waiting.put(pickle.load(sys.stdin.buffer))
+        except Exception:  # its end, or something that is no work
+            _end_now()
+
+
+def _end_now() -> None:
+    abandon()
+    os._exit(INTERRUPTED)
