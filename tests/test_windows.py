@@ -130,7 +130,7 @@ def off_the_whole(device: Device, stroke: Stroke, feel: Feel) -> tuple[float, fl
     """How far a stroke in a window is off the same on cells as small all over the picture, and how far that moves."""
     maps = []
     for cells in (64, stroke.detail):
-        recipe = painted(stroke, feel=feel, cells=cells)
+        recipe = painted(stroke, feel=feel, cells=cells, ticks=stroke.last_tick + 12)
         replay = replayed(device, recipe)
         replay.seek(recipe.ticks)
         assert (replay.window is None) == (cells == stroke.detail)
@@ -227,6 +227,43 @@ def test_a_replay_in_windows_gives_the_same_bytes_by_any_path(device: Device):
         replay.resume(54, wanted[54] | {"settings/window": np.array([455, 10**6, 0])})
     same(replay.snapshot(), before)
     for item in (plain, replay):
+        item.release()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_strokes_in_windows_give_the_same_bytes_by_any_path(device: Device, seed: int):
+    """Over the picture's edges and beyond, of any detail and a brush of any size, masks among them, on any shape."""
+    rng = np.random.default_rng(seed)
+    size = tuple(rng.choice([3, 40, 150, 400], 2).tolist())
+    tools = ("push", "twirl", "bloat", "pinch", "curve", "freeze", "thicken")
+    strokes, first = list[Stroke](), 0
+    for _ in range(6):
+        ticks, places = int(rng.integers(2, 8)), rng.uniform(-0.2, 1.2, (2, 2))
+        samples = tuple((first + k * ticks, *place, 1.0) for k, place in enumerate(places.tolist()))
+        fine, radius = int(10 ** rng.uniform(0, 4.8)), float(10 ** rng.uniform(-6, 0))
+        given = {"tool": rng.choice(tools), "radius": radius, "detail": fine, "samples": samples}
+        strokes.append(Stroke.model_validate(given | {"local": float(rng.random())}))
+        first += int(rng.integers(1, 8))
+    recipe = painted(*strokes, feel=HONEY, cells=24, ticks=first + 8)
+    pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
+    plain, other = (Replay(device, recipe, pictures, budget) for budget in (0, 2**28))
+    moments = {}
+    for tick in range(recipe.ticks + 1):
+        plain.seek(tick)
+        moments[tick] = plain.snapshot()
+    assert np.isfinite(plain.warp.read()).all()
+    for _ in range(4):
+        tick = int(rng.integers(recipe.ticks + 1))
+        other.seek(tick)
+        same(other.snapshot(), moments[tick])
+        other.use(recipe.edited(stroke=recipe.stroke[: int(rng.integers(5))]))
+        other.use(recipe)
+        same(other.snapshot(), moments[tick])
+        start = int(rng.integers(recipe.ticks))
+        other.resume(start, moments[start])
+        other.advance()
+        same(other.snapshot(), moments[start + 1])
+    for item in (plain, other):
         item.release()
 
 
