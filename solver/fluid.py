@@ -277,14 +277,16 @@ class Fluid(Scheme):
     # -- on another grid of the picture ------------------------------------------------------------------------------
 
     def lay_on(self, grid: Grid) -> None:
-        """Go on at rest with the same cells elsewhere in the picture; viscosity and solid cells are to be set anew.
+        """Go on at rest with as many cells elsewhere in the picture; viscosity and solid cells are to be set anew.
 
         Raises:
-            ValueError: if there are not as many, or they are larger or smaller.
+            ValueError: if there are not as many.
         """
-        if grid.size != self.grid.size or not np.allclose(grid.spacing, self.grid.spacing, rtol=1e-6):
+        if grid.size != self.grid.size:
             raise ValueError(f"a fluid of {self.grid} cannot be laid on {grid}")
         self.grid = grid
+        self._viscosity_solver.set_spacing(grid.spacing)
+        self._pressure_solver.set_spacing(grid.spacing)
         self.clear_velocity()
         self.masks_changed()
 

@@ -8,11 +8,12 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from app.model.schema import Fraction01, Model, Place, Radius, Several
+from app.model.schema import Fraction01, Model, Place, Several
 
 Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
 Tick = Annotated[int, Field(ge=0, le=10_000_000)]
 FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1 / 200 of such a cell
+SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
 
@@ -41,12 +42,13 @@ class Stroke(Model):
         strength: 1 carries along at the pointer's speed (push), or works at the tool's own rate.
         reverse: the tool's opposite: push against the drag, twirl anticlockwise.
         detail: cells along the picture's longer side that the flow is solved with, in a window around the brush (see
-            `app.model.windows`); 0: on the grid of the whole picture.
+            `app.model.windows`), and then the brush takes back nearby the area and momentum that it gives (see `Tip`); 0: on
+            the grid of the whole picture.
         local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 
     tool: Tool
-    radius: Radius = 0.08
+    radius: Annotated[float, Field(ge=SMALLEST_RADIUS, le=10)] = 0.08
     hardness: Fraction01 = 0.5
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0
     reverse: bool = False

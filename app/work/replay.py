@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import ceil, hypot
@@ -334,14 +334,13 @@ class Replay:
             return
         grid, self.window = self._cells_of(window), window
         if window is None:
-            self.fluid = self._fluids[0]
+            self.fluid = self._on_whole
         else:
-            if window.detail not in self._fluids:
-                # Of those on windows one is kept, that of the brush in hand.
-                for detail in [detail for detail in self._fluids if detail]:
-                    self._fluids.pop(detail).release()
-                self._fluids[window.detail] = Fluid(self.device, grid)
-            self.fluid = self._fluids[window.detail]
+            if self._in_window is None or self._in_window.grid.size != grid.size:
+                if self._in_window is not None:
+                    self._in_window.release()
+                self._in_window = Fluid(self.device, grid)
+            self.fluid = self._in_window
         if isinstance(self.fluid, Fluid):
             self.fluid.lay_on(grid)
         self.masks.forget_fluid()
@@ -376,7 +375,7 @@ class Replay:
         strength = -stroke.strength if stroke.reverse else stroke.strength
         tips = [(self._tip(stroke, dab), strength * dab.pressure) for dab in dabs]
         # Several samples in one tick: the fluid is carried by the whole way, a mask is painted piece by piece.
-        whole = Tip(tips[0][0].start, tips[-1][0].end, stroke.radius, stroke.hardness)
+        whole = replace(tips[0][0], end=tips[-1][0].end)
         pressed = sum(amount for _, amount in tips) / len(tips)
         match stroke.tool:
             case "push":
@@ -440,7 +439,8 @@ class Replay:
 
     def _tip(self, stroke: Stroke, dab: Dab) -> Tip:
         width, height = self.grid.extent
-        return Tip((dab.x0 * width, dab.y0 * height), (dab.x1 * width, dab.y1 * height), stroke.radius, stroke.hardness)
+        start, end = (dab.x0 * width, dab.y0 * height), (dab.x1 * width, dab.y1 * height)
+        return Tip(start, end, stroke.radius, stroke.hardness, near=stroke.detail > 0)
 
     # -- its state --------------------------------------------------------------------------------------------------
 
@@ -451,8 +451,8 @@ class Replay:
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.window: Window | None = None
         self._has_windows = may_have_windows(recipe)
-        self.fluid = fluid(self.device, self.grid)
-        self._fluids = {0: self.fluid}  # by the detail of their windows
+        self.fluid = self._on_whole = fluid(self.device, self.grid)
+        self._in_window: Fluid | None = None
         largest = self.device.limits.max_texture_size
         fine = map_size(self.grid, (source.width, source.height), largest)
         self.warp = warp(self.device, self.grid, fine)
@@ -501,7 +501,7 @@ class Replay:
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence, force.motion)]
-        for thing in (*self._fluids.values(), self.warp, self.masks, self.density, *fields):
+        for thing in (self._on_whole, self._in_window, self.warp, self.masks, self.density, *fields):
             if thing is not None:
                 thing.release()
 

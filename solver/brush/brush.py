@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from solver.brush.push import Push, Slip
-from solver.brush.tip import Tip
+from solver.brush.tip import NEAR, Tip
 from solver.brush.twirl import Twirl
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.reduction import Reduction
 from solver.scheme import Scheme, check_finite
 from solver.warp.map import WarpMap
 
@@ -27,6 +32,7 @@ class Brush:
         self._motion = device.field((1, 1), 4, "motion at the brush")
         self._obstruction = device.field((1, 1), 1, "obstruction factor")
         self._slip = Slip(device)
+        self._sums: dict[tuple[tuple[int, int], int], Sum] = {}
 
     def lead(self, fluid: Scheme, motion: Motion, gain: float = 1.0, warp: WarpMap | None = None) -> None:
         """Add to the fluid's next step what it lacks of a motion, `gain` times (see `gain_compensation`).
@@ -69,14 +75,18 @@ class Brush:
         self.lead(fluid, Twirl(tip, rate))
 
     def expand(self, fluid: Scheme, tip: Tip, rate: float) -> None:
-        """Let the area under the tip grow (or, negative, shrink) at `rate` 1/s in the next projection."""
+        """Let the area under the tip grow (or, negative, shrink) at `rate` 1/s in the next projection.
+
+        The room comes from all of the fluid or, if the tip is near, from that around it.
+        """
         check_finite("a rate", rate)
-        expand, region = self.device.pass_("brush/expand.frag"), tip.region(fluid.grid)
-        fluid.source.add(lambda source: expand(source, add=True, region=region, rate=rate, **tip.inputs(fluid.grid)))
+        self._expand(fluid, tip, rate)
+        if tip.near and (around := self._area(fluid, tip.wide)):
+            self._expand(fluid, tip.wide, -rate * self._area(fluid, tip) / around)
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self._motion, self._obstruction, self._slip):
+        for item in (self._motion, self._obstruction, self._slip, *self._sums.values()):
             item.release()
 
     def _look(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None) -> None:
@@ -101,7 +111,83 @@ class Brush:
         self, fluid: Scheme, motion: Motion, faces: Field, gain: float, attenuation: dict[str, Any] | None = None
     ) -> None:
         paint = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {}))
-        inputs = motion.tip.inputs(fluid.grid) | motion.inputs() | {"motion": self._motion, "gain": gain}
+        inputs: dict[str, Any] = motion.tip.inputs(fluid.grid) | motion.inputs()
+        inputs |= {"motion": self._motion, "gain": gain}
         if isinstance(motion, Push):
             inputs |= {"slip": self._slip.factor, "part": self._slip.part}
-        paint(faces, add=True, region=motion.tip.region(fluid.grid), **inputs, **(attenuation or {}))
+        inputs |= attenuation or {}
+
+        def draw(target: Field) -> None:
+            paint(target, add=True, region=motion.tip.region(fluid.grid), **inputs)
+
+        draw(faces)
+        if any(glides := _glides(fluid, motion.tip)):
+            given = self._sum(fluid, 2, draw)
+            self._take_back(fluid, motion.tip, faces, np.where(glides, given, 0.0))
+
+    def _take_back(self, fluid: Scheme, tip: Tip, faces: Field, given: np.ndarray) -> None:
+        """Add what has the opposite momentum of `given`, a sum over the faces, around the end of the tip's way.
+
+        A curl within the fluid has none. But where the picture's edge cuts through it and the fluid glides, some is
+        left, and drives the fluid along the edge as far as that goes: what is driven falls off with the logarithm of
+        the distance only (Stokes' paradox).
+        """
+        foot = tuple(0.0 if 2 * at < side else side for at, side in zip(tip.end, fluid.grid.picture, strict=True))
+        hx, hy = fluid.grid.spacing
+        counter = self.device.pass_("brush/counter.frag")
+        for axis in np.flatnonzero(given):
+            # The momentum of u is that along the edges above and below.
+            place = (tip.end[0], foot[1]) if axis == 0 else (foot[0], tip.end[1])
+            wide = Tip(place, place, NEAR * tip.radius)
+            # A soft brush of half a disc has the integral pi r^2 / 8.
+            speed = np.zeros(2)
+            speed[axis] = -given[axis] * hx * hy / (math.pi * wide.radius**2 / 8)
+            inputs: dict[str, Any] = wide.inputs(fluid.grid) | {"speed": tuple(speed.tolist())}
+            counter(faces, add=True, region=wide.region(fluid.grid), **inputs)
+
+    def _expand(self, fluid: Scheme, tip: Tip, rate: float) -> None:
+        expand, region = self.device.pass_("brush/expand.frag"), tip.region(fluid.grid)
+        fluid.source.add(lambda source: expand(source, add=True, region=region, rate=rate, **tip.inputs(fluid.grid)))
+
+    def _area(self, fluid: Scheme, tip: Tip) -> float:
+        """The fluid's cells under a tip, each by how much it is under it."""
+        weigh, region = self.device.pass_("brush/weigh.frag"), tip.region(fluid.grid)
+        inputs: dict[str, Any] = tip.inputs(fluid.grid) | {"solid": fluid.solid}
+        return float(self._sum(fluid, 1, lambda weights: weigh(weights, region=region, **inputs))[0])
+
+    def _sum(self, fluid: Scheme, components: int, draw: Callable[[Field], None]) -> np.ndarray:
+        """The sum over the grid of what `draw` draws; waits for the GPU."""
+        key = fluid.grid.size, components
+        if key not in self._sums:
+            self._sums[key] = Sum(self.device, *key)
+        return self._sums[key].of(draw)
+
+
+class Sum:
+    """The sum of what is drawn: a field to draw into, and its reduction."""
+
+    def __init__(self, device: Device, size: tuple[int, int], components: int) -> None:
+        self._drawn = device.field(size, components, "drawn to be summed up")
+        self._reduction = Reduction(device, size, components, "sum")
+
+    def of(self, draw: Callable[[Field], None]) -> np.ndarray:
+        """What `draw` draws into a field of zeros, one number a component."""
+        self._drawn.clear()
+        draw(self._drawn)
+        return self._reduction(self._drawn)
+
+    def release(self) -> None:
+        self._drawn.release()
+        self._reduction.release()
+
+
+def _glides(fluid: Scheme, tip: Tip) -> tuple[bool, bool]:
+    """Whether a tip that is near reaches over edges of the picture along which the fluid glides: for u, and for v."""
+    edges = [edge and not sticks for edge, sticks in zip(fluid.grid.at_edge, fluid.params.walls.no_slip, strict=False)]
+    over = [
+        over
+        for a, b, side in zip(tip.start, tip.end, fluid.grid.picture, strict=True)
+        for over in (min(a, b) < tip.radius, max(a, b) > side - tip.radius)
+    ]
+    left, right, top, bottom = (tip.near and at_edge and beyond for at_edge, beyond in zip(edges, over, strict=True))
+    return top or bottom, left or right

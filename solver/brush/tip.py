@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from solver.gl.passes import Region
@@ -14,6 +14,9 @@ Point = tuple[float, float]
 # Longer sides: how far off the picture a tip may be, and how large.
 FARTHEST = 100.0
 
+# Radii within which a tip that is `near` takes back what it does to the rest.
+NEAR = 4.0
+
 
 @dataclass(frozen=True)
 class Tip:
@@ -23,6 +26,7 @@ class Tip:
         start, end: places, in lengths (the longer side of the picture is 1), y down.
         radius: in lengths.
         hardness: 0 is a soft falloff, 1 a core of nine tenths of the radius.
+        near: it takes back within `NEAR` radii the area and the momentum that it gives, so that the rest feels nothing.
 
     Raises:
         ValueError: if a number is not finite, or beyond all measure, or the radius is not positive.
@@ -32,6 +36,7 @@ class Tip:
     end: Point
     radius: float
     hardness: float = 0.0
+    near: bool = False
 
     def __post_init__(self) -> None:
         places = (*self.start, *self.end)
@@ -43,6 +48,11 @@ class Tip:
             raise ValueError(f"a brush of radius {self.radius} was given; it must be from 1e-06 to {FARTHEST:g}")
         if math.isnan(self.hardness):
             raise ValueError("a brush's hardness must be a number from 0 to 1")
+
+    @property
+    def wide(self) -> Tip:
+        """The soft one on the same way under which it takes back."""
+        return replace(self, radius=NEAR * self.radius, hardness=0.0)
 
     def inputs(self, grid: Grid) -> dict[str, Any]:
         """The uniforms of `lib/brush.glsl`, from the corner of the grid."""

@@ -59,10 +59,20 @@ class Projection:
 
     # -- what goes in and comes out ---------------------------------------------------------------------------------
 
+    def set_spacing(self, spacing: tuple[float, float]) -> None:
+        """Let the cells have other sides."""
+        self.spacing = spacing
+        if self._aspect != spacing[0] / spacing[1]:
+            self._aspect = spacing[0] / spacing[1]
+            self._prepare()
+
     def set_solids(self, solid: Field | None) -> None:
         """Close every face of the solid cells (R8 at cells, 1 = solid), and of no others; None for no solids at all."""
         self._solid = None if solid is None else solid.get() >= 128
         self._regions = None
+        self._prepare()
+
+    def _prepare(self) -> None:
         self._cycle.release()
         self._cycle = Cycle(self.device, self.size, self._aspect, self._solid)
 

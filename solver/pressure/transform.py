@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,6 +65,7 @@ class FastDiagonalization:
         self._modes.release()
 
 
+@lru_cache(16)
 def _modes(span: float, padded: int) -> tuple[np.ndarray, np.ndarray]:
     """Of one axis: S and k, with zeros up to `padded` cells."""
     count = int(np.ceil(span))

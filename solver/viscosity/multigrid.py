@@ -60,13 +60,11 @@ class Multigrid:
 
     def __init__(self, device: Device, size: tuple[int, int], spacing: tuple[float, float]) -> None:
         self.device = device
-        self.spacing = spacing
         self.plan = Plan()
         self.levels: list[Level] = []
-        finest, (hx, hy) = size, spacing
-        shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
+        finest = size
         while not self.levels or not self.levels[-1].is_coarsest:
-            self.levels.append(Level(device, size, len(self.levels), finest, shear))
+            self.levels.append(Level(device, size, len(self.levels), finest))
             size = -(-size[0] // 2), -(-size[1] // 2)
         # Between free-slip walls one viscosity is solved directly on a much finer level than any other.
         first = 0 if math.prod(self.levels[0].texels) <= SMALL_GRID else 1
@@ -74,12 +72,19 @@ class Multigrid:
         self._transform_level = worth[0] if worth else self.levels[-1]
         self._transform = SineCosineTransform(device, self._transform_level.box, self._transform_level.texels)
         self.has_transform = False
-        self._taken_up: TakenUp | None = None
+        self.set_spacing(spacing)
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
         self._largest = 0.0  # kappa
 
     # -- what is solved ---------------------------------------------------------------------------------------------
+
+    def set_spacing(self, spacing: tuple[float, float]) -> None:
+        """Let the cells have other sides; the coefficients are to be set anew."""
+        self.spacing = hx, hy = spacing
+        self._taken_up: TakenUp | None = None
+        for level in self.levels:
+            level.shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
 
     def set_uniform(self, viscosity: float, dt: float, no_slip: NoSlip) -> None:
         """Take up one viscosity, lengths^2 / s, in a box without solids."""

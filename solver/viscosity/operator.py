@@ -116,15 +116,14 @@ class Level:
         size: (nx, ny) in cells of the level.
         depth: 0 is the finest.
         finest: (nx, ny) of the finest.
-        shear: (s_y, s_x), see `Coefficients`.
+
+    Attributes:
+        shear: (s_y, s_x), see `Coefficients`; of square cells, until it is set.
     """
 
-    def __init__(
-        self, device: Device, size: tuple[int, int], depth: int, finest: tuple[int, int], shear: tuple[float, float]
-    ) -> None:
+    def __init__(self, device: Device, size: tuple[int, int], depth: int, finest: tuple[int, int]) -> None:
         self.device = device
-        self.shear = shear
-        self.aspect = shear[0] ** 4  # K of e_yy over that of e_xx, (hx / hy)^2
+        self.shear = 1.0, 1.0
         self.size = size
         self.depth = depth
         self.texels = -(-size[0] // 2), -(-size[1] // 2)
@@ -229,6 +228,11 @@ class Level:
             return {}
         self.walls |= {"no_slip": tuple(map(float, no_slip[:4])), "solids_no_slip": float(no_slip.solids)}
         return {"NO_SLIP": 1}
+
+    @property
+    def aspect(self) -> float:
+        """K of e_yy over that of e_xx, (hx / hy)^2."""
+        return self.shear[0] ** 4
 
     @property
     def bounds(self) -> dict[str, Any]:

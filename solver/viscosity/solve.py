@@ -43,6 +43,11 @@ class Viscosity:
         self._change = PackedFaces(device, ringed, "viscous change")
         self._dragged = PackedFaces(device, ringed, "viscous right-hand side between moving walls")
 
+    def set_spacing(self, spacing: tuple[float, float]) -> None:
+        """Let the cells have other sides; the coefficients are to be set anew."""
+        self.spacing = spacing
+        self.multigrid.set_spacing(spacing)
+
     @property
     def plan(self) -> Plan:
         """How much is solved: chosen by `set_coefficients`."""

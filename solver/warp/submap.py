@@ -34,14 +34,18 @@ class Submap(DoubleField):
 
     def advance(self, trace: Field) -> None:
         """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
-        advance = self.device.pass_("warp/advance.frag")
-        advance(self.write, displacement=self.read, trace=trace, spacing=self.grid.spacing)
-        self.swap()
+        self._advance(self.write, {}, {"trace": trace})
 
     def advance_tracing(self, trace: Field, defines: dict[str, Any], inputs: dict[str, Any]) -> None:
         """Carry it one step and draw `trace`, the fluid's own, beside it: the defines and inputs of `trace.frag`."""
-        advance = self.device.pass_("warp/advance.frag", TRACE=1, **defines)
-        advance((self.write, trace), displacement=self.read, spacing=self.grid.spacing, **inputs)
+        self._advance((self.write, trace), {"TRACE": 1, **defines}, inputs)
+
+    def _advance(self, target: Field | tuple[Field, Field], defines: dict[str, Any], inputs: dict[str, Any]) -> None:
+        inner = tuple(0.0 if at_edge else 1.0 for at_edge in self.grid.at_edge)
+        if any(inner):
+            defines, inputs = defines | {"INNER": 1}, inputs | {"inner": inner}
+        advance = self.device.pass_("warp/advance.frag", **defines)
+        advance(target, displacement=self.read, spacing=self.grid.spacing, **inputs)
         self.swap()
 
     def replace(self) -> Field:

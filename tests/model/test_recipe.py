@@ -146,7 +146,15 @@ def test_save_and_load(tmp_path: Path):
         ("[[stop.watch]]\npoint = [0.1, 0.1]", "stop.watch[1]: give either 'distance' or 'place'"),
         ("[[stroke]]\ntool = 'push'\nsamples = []", "line 3: stroke[1]: 'samples' must be a list of at least 1"),
         ("[[stroke]]\ntool = 'pish'\nsamples = [[0, 0, 0, 1]]", "'tool' must be one of 'push'"),
-        ("[[stroke]]\ntool = 'push'\nradius = 0\nsamples = [[0, 0, 0, 1]]", "'radius' must be greater than 0, not 0"),
+        ("[[stroke]]\ntool = 'push'\nradius = 0\nsamples = [[0, 0, 0, 1]]", "'radius' must be at least 1e-06, not 0"),
+        (
+            "[[stroke]]\ntool = 'push'\nradius = 1e-7\nsamples = [[0, 0, 0, 1]]",
+            "'radius' must be at least 1e-06, not 1e-07",
+        ),
+        (
+            "[[stroke]]\ntool = 'push'\ndetail = 65537\nsamples = [[0, 0, 0, 1]]",
+            "'detail' must be at most 65536, not 65537",
+        ),
         ("[[stroke]]\ntool = 'push'\nsamples = [[1, 0, 0, 1], [0, 0, 0, 1]]", "must not go backwards"),
         ("[[stroke]]\ntool = 'push'\nsamples = [[0, 0, nan, 1]]", "'samples[1][3]' must be a finite number"),
         ("[density]\nsource = [1]", "'source' must be three numbers"),
