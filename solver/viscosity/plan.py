@@ -15,7 +15,7 @@ BARELY_VISCOUS = 0.05
 STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
-# fifths. Of one viscosity nothing is read and two sweeps cost a tenth more; a first step then leaves 1 % of its change.
+# fifths. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
 # Conjugate gradients end when less than this part of the energy, squared, is left: the error is below 1 % where the
 # viscosity varies so much at most, and below 5 % beyond.
@@ -37,7 +37,8 @@ class Plan:
     Attributes:
         method: "smooth": v* is smoothed; "direct": the grid is so small that its inverse is at hand; "cg": by conjugate
             gradients, each iteration with one multigrid cycle.
-        sweeps: smoothing sweeps; of conjugate gradients, before and after the coarser levels.
+        sweeps: smoothing sweeps; of conjugate gradients, before and after the coarser levels, or of one viscosity only
+            after them.
         tolerance: of the conjugate gradients.
         iterations: of the conjugate gradients, at most.
         stiff: dt mu / h^2 above which cores and runs are deflated; 0: none are.
