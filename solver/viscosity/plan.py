@@ -21,6 +21,7 @@ ONE_SWEEP = 4.0
 # viscosity varies so much at most, and below 5 % beyond.
 MODERATE = 300.0
 TOLERANCE = 0.017
+TOLERANCE_UNIFORM = 0.008  # for one viscosity, whose cycle leaves more: of noise between sticky sides 1.8 % with .017
 TOLERANCE_STIFF = 0.07, 0.036  # for the softest kappa below and above ONE_SWEEP
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
 # third of the tolerance is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
@@ -61,6 +62,8 @@ def plan_for(least: float, largest: float, cells: int) -> Plan:
     count = 1 if is_soft and least < largest else 2
     stiff = max(STIFF, STIFF_OF_SOFTEST * least)
     tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF[0 if is_soft else 1]
+    if least == largest:
+        tolerance = TOLERANCE_UNIFORM
     if cells <= SMALL:
         tolerance /= 3
     if largest <= stiff:
