@@ -1,5 +1,6 @@
-// Apply operator: A z and, texel by texel, the scalar products (r . z, z . A z, z . A p) of the conjugate gradients.
-// u_u, u_v: z; u_r_u, u_r_v: the residual r; u_ap_u, u_ap_v: A p of the last search direction p.
+// Apply operator: A z and, texel by texel, the scalar products of the conjugate gradients.
+// u_u, u_v: z; u_r_u, u_r_v: the residual r; not with FIRST u_ap_u, u_ap_v: A p of the last search direction p.
+// Out: A z; (r . z, z . A z, z . A p).
 // reads: 22
 #include "viscosity/operator.glsl"
 uniform sampler2D u_u;
@@ -18,6 +19,8 @@ void main() {
     out_u = is_open.u * az.u;
     out_v = is_open.v * az.v;
     out_products = vec4(dot(texture(u_r_u, v_uv), z.u) + dot(texture(u_r_v, v_uv), z.v),
-                        dot(out_u, z.u) + dot(out_v, z.v),
-                        dot(texture(u_ap_u, v_uv), z.u) + dot(texture(u_ap_v, v_uv), z.v), 0.0);
+                        dot(out_u, z.u) + dot(out_v, z.v), 0.0, 0.0);
+#ifndef FIRST
+    out_products.z = dot(texture(u_ap_u, v_uv), z.u) + dot(texture(u_ap_v, v_uv), z.v);
+#endif
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf, isfinite
+from typing import Any
 
 from solver.gl.device import Device
 from solver.gl.field import Field
@@ -32,6 +33,7 @@ class ConjugateGradients:
         self._az = PackedFaces(device, ringed, "viscous A z")
         self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
+        self._guess_products = device.field(ringed, 4, "viscous products of the guess")
         self._change_product = device.field(ringed, 1, "viscous product of the change")
         self._change_sum = Reduction(device, ringed, 1, "sum")
         self.iterations = 0
@@ -39,7 +41,7 @@ class ConjugateGradients:
     def solve(
         self,
         v_star: PackedFaces,
-        change: PackedFaces,
+        change: DoublePackedFaces,
         rhs: PackedFaces,
         precondition: Callable[[PackedFaces], PackedFaces],
         tolerance: float,
@@ -51,54 +53,48 @@ class ConjugateGradients:
         is left, or after so many iterations at most. What is left is the rest of the geometric series of what
         iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r.
         """
-        found, of_v_star = self._galerkin_initial_guess(v_star, change, rhs)
+        parts, found, of_v_star = self._galerkin_initial_guess(v_star, change.read, rhs)
         self.iterations = 0
         if rhs is v_star and not of_v_star:  # at rest
-            for field in change.fields:
+            for field in change.read.fields:
                 field.clear()
             return v_star
-        x = self._p.read  # The guess is a step from rest, along itself.
-        curvature, before = found, inf
+        before: dict[str, Any] = {"parts": parts, **v_star.inputs(), **change.read.inputs("change_")}
+        draw = self.device.pass_("viscosity/guess_residual.frag", **self.level.defines)
+        draw(self._r.read.fields, region=self.level.region, **before, **rhs.inputs("rhs_"), **self.level.operator)
+        curvature, gained_before = 0.0, inf
         while True:
+            is_first = not self.iterations
             self.iterations += 1
             z = precondition(self._r.read)
-            rz, z_az, z_ap = self._apply_operator(z)
+            rz, z_az, z_ap = self._apply_operator(z, is_first)
             alpha, beta, curvature = cg_coefficients(rz, z_az, z_ap, curvature)
             gained = alpha**2 * curvature
             found += gained
-            left = max(gained, _series(gained, before))
+            left = max(gained, _series(gained, gained_before))
+            if not is_first:
+                before = {**v_star.inputs(), **self._x.read.inputs("x_"), **self._p.read.inputs("p_"), "beta": beta}
             if not alpha or self.iterations == most or left <= tolerance**2 * found:
-                break
-            before = gained
-            self._update(x, z, alpha, beta)
-            x = self._x.read
-        p = self._p.read
-        self.device.pass_("viscosity/finish.frag")(
-            (*self._x.write.fields, *change.fields),
-            region=self.level.region,
-            alpha=alpha,
-            beta=beta,
-            **x.inputs("x_"),
-            **(z if alpha else p).inputs("z_"),  # what has been spoiled may be no number
-            **p.inputs("p_"),
-            **v_star.inputs(),
-        )
-        return self._x.write
+                # What has been spoiled may be no number.
+                return self._finish(change, before, z if alpha else self._r.read, alpha)
+            gained_before = gained
+            self._update(before, z, alpha, is_first)
 
     def _galerkin_initial_guess(
         self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces
-    ) -> tuple[float, float]:
-        """Leave in p the a v* + c d of least energy, d the `change`; A p, and b - A p in r; p . A p and v* . A v*."""
+    ) -> tuple[tuple[float, float], float, float]:
+        """(a, c) of the x = a v* + c d of least energy, d the `change`; x . A x, and v* . A v*."""
+        x, y, width, height = self.level.region
         draw = self.device.pass_("viscosity/galerkin_guess.frag", **self.level.defines)
         draw(
-            (*self._az.fields, *self._ap.read.fields, self._products, self._change_product),
-            region=self.level.region,
+            (self._guess_products, self._change_product),
+            region=(x, y, width + 1, height + 1),
             **v_star.inputs(),
             **change.inputs("change_"),
             **rhs.inputs("rhs_"),
             **self.level.operator,
         )
-        bv, bd, vav, vad = (float(value) for value in self._sum(self._products))
+        bv, bd, vav, vad = self._sum(self._guess_products).tolist()
         dad = float(self._change_sum(self._change_product)[0])
         # Along v*; then along what of d is conjugate to v*, unless rounding has spoiled it or nothing is left.
         a = bv / vav if vav > 0.0 else 0.0
@@ -108,72 +104,75 @@ class ConjugateGradients:
         a -= conjugate * c
         if not (isfinite(a) and isfinite(c)) or a == 0.0:
             a, c = 0.0, 0.0
-        self.device.pass_("viscosity/begin.frag")(
-            (*self._p.read.fields, *self._ap.write.fields, *self._r.read.fields),
-            region=self.level.region,
-            parts=(a, c),
-            **v_star.inputs(),
-            **change.inputs("change_"),
-            **self._az.inputs("af_"),
-            **self._ap.read.inputs("ad_"),
-            **rhs.inputs("rhs_"),
-        )
-        self._ap.swap()
-        return a * bv + c * bd, vav
+        return (a, c), a * bv + c * bd, vav
 
-    def _apply_operator(self, z: PackedFaces) -> tuple[float, float, float]:
-        """A z, and r . z, z . A z, z . A p."""
-        draw = self.device.pass_("viscosity/apply_operator.frag", **self.level.defines)
+    def _apply_operator(self, z: PackedFaces, first: bool) -> tuple[float, float, float]:
+        """A z, and r . z, z . A z, z . A p, at first 0."""
+        draw = self.device.pass_("viscosity/apply_operator.frag", **_first(first), **self.level.defines)
         draw(
             (*self._az.fields, self._products),
             region=self.level.region,
             **z.inputs(),
             **self._r.read.inputs("r_"),
-            **self._ap.read.inputs("ap_"),
+            **({} if first else self._ap.read.inputs("ap_")),
             **self.level.operator,
         )
-        rz, z_az, z_ap, _ = (float(value) for value in self._sum(self._products))
+        rz, z_az, z_ap, _ = self._sum(self._products).tolist()
         return rz, z_az, z_ap
 
-    def _update(self, x: PackedFaces, z: PackedFaces, alpha: float, beta: float) -> None:
-        """p = z + beta p, A p likewise, x + alpha p, r - alpha A p."""
+    def _update(self, before: dict[str, Any], z: PackedFaces, alpha: float, first: bool) -> None:
+        """p = z + beta p, A p likewise, x + alpha p, r - alpha A p; x and p are those `before`."""
         pairs = self._x, self._r, self._p, self._ap
-        self.device.pass_("viscosity/update.frag")(
+        self.device.pass_("viscosity/update.frag", **_first(first))(
             [field for pair in pairs for field in pair.write.fields],
             region=self.level.region,
             alpha=alpha,
-            beta=beta,
-            **x.inputs("x_"),
-            **self._r.read.inputs("r_"),
-            **self._p.read.inputs("p_"),
-            **self._ap.read.inputs("ap_"),
+            **before,
             **z.inputs("z_"),
             **self._az.inputs("az_"),
+            **self._r.read.inputs("r_"),
+            **({} if first else self._ap.read.inputs("ap_")),
         )
         for pair in pairs:
             pair.swap()
 
-    @property
-    def _pairs(self) -> list[PackedFaces]:
-        doubles = self._x, self._r, self._p, self._ap
-        return [side for pair in doubles for side in (pair.read, pair.write)] + [self._az]
+    def _finish(self, change: DoublePackedFaces, before: dict[str, Any], z: PackedFaces, alpha: float) -> PackedFaces:
+        """x + alpha p, and what that has made of v* as the `change`; x and p are those `before`."""
+        finish = self.device.pass_("viscosity/finish.frag", **_first("parts" in before))
+        targets = (*self._x.write.fields, *change.write.fields)
+        finish(targets, region=self.level.region, alpha=alpha, **before, **z.inputs("z_"))
+        change.swap()
+        return self._x.write
 
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
         fields: list[Field] = [field for pair in self._pairs for field in pair.fields]
-        items = *fields, self._products, self._change_product, self._sum, self._change_sum
-        return sum(item.nbytes for item in items)
+        return sum(item.nbytes for item in (*fields, *self._sums))
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self._pairs, self._products, self._change_product, self._sum, self._change_sum):
+        for item in (*self._pairs, *self._sums):
             item.release()
+
+    @property
+    def _pairs(self) -> list[PackedFaces]:
+        doubles = self._x, self._r, self._p, self._ap
+        return [self._az, *(pair for double in doubles for pair in (double.read, double.write))]
+
+    @property
+    def _sums(self) -> tuple[Field | Reduction, ...]:
+        return self._products, self._sum, self._guess_products, self._change_product, self._change_sum
 
 
 def _series(last: float, before: float) -> float:
     """The rest of the geometric series that two terms belong to."""
     return last**2 / (before - last) if before > last else inf
+
+
+def _first(is_first: bool) -> dict[str, Any]:
+    """The variant of a pass before which there is no iterate and no search direction, only the guess."""
+    return {"FIRST": 1} if is_first else {}
 
 
 def cg_coefficients(rz: float, z_az: float, z_ap: float, p_ap: float) -> tuple[float, float, float]:

@@ -146,7 +146,10 @@ class Multigrid:
 
     def precondition(self, rhs: PackedFaces, start: bool) -> PackedFaces:
         """About A^-1 rhs, by one cycle from rest, or from what the finest level's iterate holds if it is to `start`."""
-        self.cycle(self.finest, rhs, begun=0 if start else self._begin(self.finest, rhs))
+        if "UNIFORM" in self.finest.defines:
+            self.sawtooth(self.finest, rhs)
+        else:
+            self.cycle(self.finest, rhs, begun=0 if start else self._begin(self.finest, rhs))
         return self.finest.faces.read
 
     def cycle(self, level: Level, rhs: PackedFaces, begun: int) -> None:
@@ -158,6 +161,24 @@ class Multigrid:
         self.smooth(level, rhs, weights[begun:])
         self._coarse_correction(level, rhs)
         self.smooth(level, rhs, weights[::-1])
+
+    def sawtooth(self, level: Level, rhs: PackedFaces) -> None:
+        """A cycle from rest that smooths only after the coarse correction, for one viscosity.
+
+        It leaves a fifth more than one that also smooths before (.63 of the error in the median of random grids and
+        viscosities, where that leaves .53), and costs half.
+        """
+        if level is self.direct_level:
+            self.direct_solve(rhs)
+            return
+        coarser = self.levels[level.depth + 1]
+        restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
+        restrict(coarser.rhs.fields, region=coarser.region, **rhs.inputs(), **coarser.bounds)
+        self.sawtooth(coarser, coarser.rhs)
+        prolong = self.device.pass_("viscosity/prolong.frag", FROM_REST=1, **level.defines)
+        prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **level.bounds)
+        level.faces.swap()
+        self.smooth(level, rhs, self.weights(level))
 
     def _coarse_correction(self, level: Level, rhs: PackedFaces) -> None:
         # The write side is free until the correction is added.

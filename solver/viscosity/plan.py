@@ -15,12 +15,13 @@ BARELY_VISCOUS = 0.05
 STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
-# fifths. Of one viscosity nothing is read and two sweeps cost a tenth more; a first step then leaves 1 % of its change.
+# fifths. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
 # Conjugate gradients end when less than this part of the energy, squared, is left: the error is below 1 % where the
 # viscosity varies so much at most, and below 5 % beyond.
 MODERATE = 300.0
 TOLERANCE = 0.017
+TOLERANCE_UNIFORM = 0.008  # for one viscosity, whose cycle leaves more: of noise between sticky sides 1.8 % with .017
 TOLERANCE_STIFF = 0.07, 0.036  # for the softest kappa below and above ONE_SWEEP
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
 # third of the tolerance is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
@@ -37,7 +38,8 @@ class Plan:
     Attributes:
         method: "smooth": v* is smoothed; "direct": the grid is so small that its inverse is at hand; "cg": by conjugate
             gradients, each iteration with one multigrid cycle.
-        sweeps: smoothing sweeps; of conjugate gradients, before and after the coarser levels.
+        sweeps: smoothing sweeps; of conjugate gradients, before and after the coarser levels, or of one viscosity only
+            after them.
         tolerance: of the conjugate gradients.
         iterations: of the conjugate gradients, at most.
         stiff: dt mu / h^2 above which cores and runs are deflated; 0: none are.
@@ -60,6 +62,8 @@ def plan_for(least: float, largest: float, cells: int) -> Plan:
     count = 1 if is_soft and least < largest else 2
     stiff = max(STIFF, STIFF_OF_SOFTEST * least)
     tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF[0 if is_soft else 1]
+    if least == largest:
+        tolerance = TOLERANCE_UNIFORM
     if cells <= SMALL:
         tolerance /= 3
     if largest <= stiff:

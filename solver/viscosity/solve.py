@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
-from solver.packing import PackedFaces, Packing
+from solver.packing import DoublePackedFaces, PackedFaces, Packing
 from solver.params import Walls
 from solver.viscosity.conjugate_gradients import ConjugateGradients
 from solver.viscosity.deflation import Deflation
@@ -40,7 +40,7 @@ class Viscosity:
         self.deflation = Deflation(device, finest)
         ringed = finest.rhs.u.size
         # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
-        self._change = PackedFaces(device, ringed, "viscous change")
+        self._change = DoublePackedFaces(device, ringed, "viscous change")
         self._dragged = PackedFaces(device, ringed, "viscous right-hand side between moving walls")
 
     def set_spacing(self, spacing: tuple[float, float]) -> None:
@@ -139,7 +139,7 @@ class Viscosity:
 
     def state(self) -> tuple[Field, Field]:
         """The fields that a later step depends on."""
-        return self._change.fields
+        return self._change.read.fields
 
     def forget(self) -> None:
         """Expect no change: the velocity is a new one."""
@@ -165,7 +165,7 @@ class Viscosity:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        pairs = self._change, self._dragged
+        pairs = self._change.read, self._change.write, self._dragged
         fields = [field for pair in pairs for field in pair.fields]
         return sum(item.nbytes for item in (*fields, *self._parts))
 
