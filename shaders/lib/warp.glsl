@@ -1,9 +1,11 @@
 // The warp map as its parts: submaps on windows of the picture, the identity outside them, then the accumulated map.
-//   D(x) = S(x) + A(x + S(x));   with PENDING defined, while a submap P is being taken into A, D(x) = S + P + A, each
-//   where those before it have led. x + S(x) is kept in the picture, and x + D(x) within u_limits, which the texels of
-//   all are: between them a polynomial reaches beyond, and what is composed again and again would grow without end.
-// u_submap, u_pending, u_accumulated: displacements, longer sides; u_window, u_pending_window: left, top, width and height
-// that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right, bottom, longer sides.
+//   D(x) = S(x) + A(x + S(x));   with LEVELS defined as 2 or 3, with the submaps that are still to be taken into A,
+//   D(x) = S + S2 + S3 + A, each where those before it have led. x + S(x) is kept in the picture, and x + D(x) within
+//   u_limits, which the texels of all are: between them a polynomial reaches beyond, and what is composed again and again
+//   would grow without end.
+// u_submap, u_second, u_third, u_accumulated: displacements, longer sides; u_window, u_second_window, u_third_window: left,
+// top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
+// bottom, longer sides.
 // Define HELD if something is frozen: where u_near is 1, A is taken as it is, and the nearer to it, the less do the
 // submaps move, for along a wall the fluid may glide; over A's texels.
 #include "lib/displacement.glsl"
@@ -12,9 +14,16 @@ uniform sampler2D u_accumulated;
 uniform vec4 u_window;
 uniform vec2 u_picture;
 uniform vec4 u_limits;
-#ifdef PENDING
-uniform sampler2D u_pending;
-uniform vec4 u_pending_window;
+#ifndef LEVELS
+#define LEVELS 1
+#endif
+#if LEVELS > 1
+uniform sampler2D u_second;
+uniform vec4 u_second_window;
+#endif
+#if LEVELS > 2
+uniform sampler2D u_third;
+uniform vec4 u_third_window;
 #endif
 #ifdef HELD
 uniform sampler2D u_near;
@@ -42,8 +51,11 @@ vec2 displacement_of(sampler2D submap, vec4 window, vec2 x) {
 // Where the submaps lead from x.
 vec2 displacement_of_submaps(vec2 x) {
     vec2 moved = within_picture(x, freedom(x) * displacement_of(u_submap, u_window, x));
-#ifdef PENDING
-    moved = within_picture(x, moved + freedom(x + moved) * displacement_of(u_pending, u_pending_window, x + moved));
+#if LEVELS > 1
+    moved = within_picture(x, moved + freedom(x + moved) * displacement_of(u_second, u_second_window, x + moved));
+#endif
+#if LEVELS > 2
+    moved = within_picture(x, moved + freedom(x + moved) * displacement_of(u_third, u_third_window, x + moved));
 #endif
     return moved;
 }

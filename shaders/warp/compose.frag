@@ -2,7 +2,8 @@
 // Define REMAP if the fragments are the texels of A, which then are met to the bit where nothing has moved.
 // Define CUBIC to look into A by the cubic: where it has four texels a cell, or whoever looks between the texels of the
 // result will again.
-// reads: 48, and 24 with CUBIC; 12 more with PENDING
+// Define GATHER for what the submaps alone add up to.
+// reads: 48, and 24 with CUBIC, 12 with GATHER; 12 more for each of LEVELS above 1
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
 layout(location = 0) out vec2 out_displacement;
@@ -22,6 +23,10 @@ void main() {
     }
 #endif
     vec2 moved = displacement_of_submaps(x);
+#ifdef GATHER
+    out_displacement = moved;
+    return;
+#endif
     place += moved / texel;
 #ifdef CUBIC
     moved += cubic_displacement(u_accumulated, place);

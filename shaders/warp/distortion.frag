@@ -3,7 +3,7 @@
 // x: see lib/place.glsl.
 // largest: (-det J, det J, |D|), to be reduced to the largest of each;
 // total: (1 where det J <= 0, |D|, |det J - 1|), to be reduced to their sums.
-// reads: 32, and 16 more with PENDING
+// reads: 32, and 16 more for each of LEVELS above 1
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
 layout(location = 0) out vec4 out_largest;
@@ -34,8 +34,11 @@ void main() {
     vec2 x = fragment_place() * u_picture, size = vec2(textureSize(u_accumulated, 0)), density = size / u_picture;
     vec2 moved = vec2(0.0);
     float change = stretch_of(u_submap, u_window, x, moved);
-#ifdef PENDING
-    change *= stretch_of(u_pending, u_pending_window, x, moved);
+#if LEVELS > 1
+    change *= stretch_of(u_second, u_second_window, x, moved);
+#endif
+#if LEVELS > 2
+    change *= stretch_of(u_third, u_third_window, x, moved);
 #endif
     mat2 slope;
     vec2 more = cubic_displacement(u_accumulated, (x + moved) * density, slope);

@@ -15,7 +15,7 @@ from solver.grid import Grid
 
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
-REACH = 3  # cells that the cubic reaches to one side, at most
+REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels that what has moved less has not moved
 
 
@@ -49,6 +49,7 @@ class AccumulatedMap:
 
     Attributes:
         now: the displacement. What is drawn anew is drawn into another field, which takes its place once it is whole.
+        begun: the part of `draw`, below 1, that what is planned begins at.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
@@ -61,24 +62,32 @@ class AccumulatedMap:
         self._moved: list[Region] = []  # tiles to be drawn anew
         self._copied: list[Region] = []  # tiles to be copied
         self._done = 0  # of both
+        self.begun = 0.0
 
     def is_fine(self, grid: Grid) -> bool:
         """True if it has `LEAST_TEXELS` texels along a cell of a grid."""
         texels = (n * step / side for n, step, side in zip(self.size, grid.spacing, self.extent, strict=True))
         return min(texels) > LEAST_TEXELS - 1e-6
 
-    def begin(self, submap: np.ndarray, grid: Grid) -> bool:
-        """Plan to draw all tiles anew in which a submap (ny, nx, 2) on a grid moves anything; True if there are any."""
+    def begin(self, *moved: tuple[np.ndarray, Grid]) -> int:
+        """Plan to draw all tiles anew in which one of several submaps moves anything; how many there are.
+
+        Each has a texel, or a whole number both ways, for every cell of its grid: (ny, nx, 2).
+        """
         self.forget()
-        least = NOWHERE * self.extent[0] / self.size[0]
-        counts = np.pad((np.abs(submap) > least).any(axis=-1).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-        for tile in self._tiles:
-            left, right = self._cells(tile, grid, 0)
-            top, bottom = self._cells(tile, grid, 1)
-            if counts[bottom, right] - counts[top, right] - counts[bottom, left] + counts[top, left]:
-                self._moved.append(tile)
-        self._copied = sorted(self._stale.difference(self._moved))
-        return bool(self._moved)
+        least, wanted = NOWHERE * self.extent[0] / self.size[0], set[Region]()
+        for submap, cells in moved:
+            grid = cells.refined(submap.shape[1] // cells.nx)
+            counts = np.pad((np.abs(submap) > least).any(axis=-1).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+            for tile in self._tiles:
+                left, right = self._cells(tile, grid, 0)
+                top, bottom = self._cells(tile, grid, 1)
+                if counts[bottom, right] - counts[top, right] - counts[bottom, left] + counts[top, left]:
+                    wanted.add(tile)
+        self._moved = [tile for tile in self._tiles if tile in wanted]
+        self._copied = sorted(self._stale.difference(wanted))
+        self.begun = 0.0
+        return len(self._moved)
 
     def _cells(self, tile: Region, grid: Grid, axis: int) -> tuple[int, int]:
         """The first cell along an axis that a tile is interpolated from, and the one after the last."""
@@ -90,7 +99,8 @@ class AccumulatedMap:
 
     def draw(self, part: float, draw: Callable[[Field, list[Region]], None]) -> None:
         """Come to a `part` of what is planned, 0-1: `draw` draws regions anew, out of `now`, into another field."""
-        before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
+        share = (part - self.begun) / (1 - self.begun)
+        before, until = self._done, math.ceil(share * (len(self._moved) + len(self._copied)))
         if anew := self._moved[before:until]:
             draw(self._next, anew)
         count = len(self._moved)

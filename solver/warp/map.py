@@ -18,8 +18,8 @@ from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen, saved_of
 from solver.warp.inverse import ForwardMap
-from solver.warp.state import MapState, grid_in, kind_values, values_of
-from solver.warp.submap import Submap, window_of
+from solver.warp.state import SUBMAPS, MapState, grid_in, kind_values, values_of
+from solver.warp.submap import Level, Submap, window_of
 
 if TYPE_CHECKING:
     from solver.fluid import Fluid
@@ -28,7 +28,10 @@ Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarra
 
 CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last remap
 MOST_PLACES = 2**19  # at which its distortion is looked at
-REMAP_STEPS = CHECK_EVERY  # steps over which a remap is spread; the next one cannot begin before they are over
+REMAP_STEPS = CHECK_EVERY  # steps over which a remap is spread, at least
+MOST_TILES = 8  # that are made anew in a step, unless something has to be out of the way: the work of one of the fluid
+MOST_GATHERED = 8, 2**19  # texels of what is gathered, along a cell and in all, but for `LEAST_TEXELS` along a cell
+NAMES = ("submap", "window"), ("second", "second_window"), ("third", "third_window")  # of levels, in shaders
 
 
 class WarpMap:
@@ -38,9 +41,10 @@ class WarpMap:
     may be a window of the picture, and the accumulated map A of the whole picture, which takes the submap S in (a
     remap) before that is bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0
     outside the window; longer sides, RG32F at the centres of cells and texels. Only tiles of A that have moved are made
-    anew, some in each of `REMAP_STEPS` steps; until all are there, the submap that they take in, *pending*, stands
-    between S and A. Every place x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set`
-    had looked. Looking at the map changes nothing of it.
+    anew, a few in each step; until all are there, the submap that they take in, *pending*, stands between S and A, and
+    what is to be remapped meanwhile is *gathered* in a level between the two, of several texels a cell. Every place
+    x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set` had looked. Looking at the map
+    changes nothing of it.
 
     Args:
         device: the device.
@@ -62,9 +66,10 @@ class WarpMap:
         across, down = self.coarse_size
         self.size = size or (LEAST_TEXELS * across, LEAST_TEXELS * down)
         self._accumulated = AccumulatedMap(device, self.size, self.extent)
-        self._pending: Field | None = None
-        self._pending_grid = grid
-        self._remapping = 0  # steps that the pending submap has been taken in for
+        self._gathered: Level | None = None  # only while another is pending
+        self._pending: Level | None = None
+        self._tiles = 0  # that are made anew for it
+        self._remapping = 0  # how far they are, of `_whole`
         self._frozen = Frozen(device, self.size)
         self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
         self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
@@ -107,8 +112,10 @@ class WarpMap:
         self._steps += 1
         self._changed()
         if self._pending is not None:
-            self._remapping += 1
-            self._take_in(self._remapping / REMAP_STEPS)
+            # What was gathered on another grid has to be out of the way when the submap on this one is bent.
+            waits = self._gathered is not None and self._gathered.grid != self.grid
+            self._remapping += self._whole // REMAP_STEPS if waits else REMAP_STEPS
+            self._take_in(min(self._remapping / self._whole, 1.0))
         # The look waits for the GPU, so not at every step; at fixed steps, so that a replay remaps at the same ones.
         if self._steps >= self.remap_every or (self._steps % CHECK_EVERY == 0 and self._submap.is_steep):
             self._begin_remap()
@@ -142,7 +149,7 @@ class WarpMap:
     def remap(self) -> None:
         """Let the accumulated map take in all that has moved, at once; the whole map stays what it was."""
         self._begin_remap()
-        self._take_in(1.0)
+        self._take_in_all()
 
     def move_to(self, grid: Grid) -> None:
         """Go on with a submap on another grid of the same picture; the map stays what it was.
@@ -156,7 +163,7 @@ class WarpMap:
             raise ValueError(f"a map of a picture of {self.extent} cannot go on in one of {grid.picture}")
         self._begin_remap()
         if self._frozen.near is not None:
-            self._take_in(1.0)  # it fades over the cells of its own grid
+            self._take_in_all()  # it fades over the cells of its own grid
         self._submap.release()
         self._submap = Submap(self.device, grid)
         self._frozen.fade_over(self._cell)
@@ -188,7 +195,7 @@ class WarpMap:
             hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
             amount: 0-1, the part of the displacement that is taken away at the centre.
         """
-        self._take_in(1.0)
+        self._take_in_all()
         restore = self.device.pass_("warp/restore.frag", **self._held_defines())
         inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
         if self._frozen.near is not None:
@@ -214,7 +221,7 @@ class WarpMap:
 
     def reset(self) -> None:
         """Back to the identity."""
-        self._drop_pending()
+        self._drop_waiting()
         self._submap.read.clear()
         self._accumulated.clear()
         self._steps = 0
@@ -252,9 +259,10 @@ class WarpMap:
         """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._limits, "grid": values_of(self.grid)}
-        if self._pending is not None:
-            fields["pending"] = self._pending
-            values |= {"remapping": self._remapping, "pending grid": values_of(self._pending_grid)}
+        for name, level in (("gathered", self._gathered), ("pending", self._pending)):
+            if level is not None:
+                fields[name] = level.field
+                values |= {SUBMAPS[name]: values_of(level.grid), "remapping": self._remapping}
         state = MapState.of(self.device, fields, **values)
         if self._frozen.saved is not None:
             state.tiles["frozen"] = self._frozen.saved.held()
@@ -280,24 +288,22 @@ class WarpMap:
         left, top, right, bottom = state.values["limits"].tolist()
         self._limits = left, top, right, bottom
         self._frozen.restore(state.tiles.get("frozen"), self._cell)
-        self._drop_pending()
-        if (pending := state.fields.get("pending")) is not None:
-            self._pending = self.device.field(pending.size, 2, "pending submap")
-            self._pending.copy_from(pending)
-            self._pending_grid = grid_in(state.values, "pending grid")
-            self._remapping = int(state.values["remapping"])
-            self._accumulated.begin(self._pending.get(), self._pending_grid)
+        self._drop_waiting()
+        self._pending, self._gathered = self._level_in(state, "pending"), self._level_in(state, "gathered")
+        if self._pending is not None:
+            self._stand_by(self._pending, int(state.values["remapping"]))
         self._changed()
 
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory, as long as nothing is read at other sizes."""
-        parts = [self._submap, self._accumulated, self._frozen, *self._composed.values()]
-        return sum(part.nbytes for part in parts) + (0 if self._pending is None else self._pending.nbytes)
+        waiting = (level.field for level in self._waiting)
+        parts = self._submap, self._accumulated, self._frozen, *waiting, *self._composed.values()
+        return sum(part.nbytes for part in parts)
 
     def release(self) -> None:
         """Free the textures."""
-        self._drop_pending()
+        self._drop_waiting()
         for thing in (self._submap, self._accumulated, self._frozen, *self._composed.values()):
             thing.release()
         if "forward" in self.__dict__:
@@ -383,7 +389,7 @@ class WarpMap:
             width, height = self.size
             apart = math.ceil(math.sqrt(width * height / MOST_PLACES))
             size = -(-width // apart), -(-height // apart)
-        return distortion(self.device, size, self._chain_defines(), self._parts())
+        return distortion(self.device, size, self._defines_of(self._levels), self._parts())
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
@@ -391,54 +397,120 @@ class WarpMap:
         """Let what has moved stand by to be taken in, and begin with a submap of nothing."""
         if not self._steps:
             return
-        self._take_in(1.0)
+        if self._frozen.near is not None or (self._gathered is not None and self._gathered.grid != self.grid):
+            self._take_in_all()
+        elif self._tiles * (1 - self._remapping / self._whole) <= MOST_TILES:
+            self._take_in(1.0)  # which is less work than to gather
         self._steps = 0
-        if self._accumulated.begin(self._submap.read.get(), self.grid):
-            self._pending, self._pending_grid = self._submap.replace(), self.grid
-            self._remapping = 0
+        if self._pending is not None:
+            self._gather()
+        elif self._stand_by(Level(self._submap.read, self.grid)):
+            self._submap.replace()
+
+    def _stand_by(self, moved: Level, remapping: int = 0) -> bool:
+        """Let a level be taken in from the next step on, or go on with it; False if there is nothing to take in."""
+        self._tiles = self._accumulated.begin((moved.field.get(), moved.grid))
+        self._remapping = max(0, min(remapping, self._whole - 1))
+        self._accumulated.begun = self._remapping / self._whole
+        self._pending = moved if self._tiles else None
+        return self._tiles > 0
+
+    def _gather(self) -> None:
+        """Let the submap go into what is to be taken in after what is pending."""
+        (nx, ny), (most, in_all) = self.grid.size, MOST_GATHERED
+        times = max(LEAST_TEXELS, min(math.isqrt(in_all // (nx * ny)), most))
+        field = self.device.field((times * nx, times * ny), 2, "gathered submap")
+        levels = [Level(self._submap.read, self.grid), *([] if self._gathered is None else [self._gathered])]
+        compose = self.device.pass_("warp/compose.frag", GATHER=1, **self._defines_of(levels))
+        left, top, width, height = window_of(self.grid)
+        step = width / field.width, height / field.height
+        origin = left / step[0], top / step[1]
+        compose(field, **self._parts_of(levels), origin=origin, step=np.divide(step, self.extent).tolist())
+        self._submap.read.clear()
+        if self._gathered is not None:
+            self._gathered.field.release()
+        self._gathered = Level(field, self.grid)
 
     def _take_in(self, part: float) -> None:
-        """Come to a `part`, 0-1, of what the pending submap wants."""
+        """Come to a `part`, 0-1, of what the pending level wants."""
         if self._pending is None:
             return
-        inputs = self._inputs() | {"submap": self._pending, "window": window_of(self._pending_grid)}
-        fine = {"CUBIC": 1} if self._accumulated.is_fine(self._pending_grid) else {}
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **self._held_defines())
-        self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
+        self._draw_anew([self._pending], part)
         if part >= 1:
-            self._drop_pending()
+            gathered, self._gathered = self._gathered, None
+            self._drop_waiting()
+            if gathered is not None and not self._stand_by(gathered):
+                gathered.field.release()
 
-    def _drop_pending(self) -> None:
-        if self._pending is not None:
-            self._pending.release()
-        self._pending = None
+    def _take_in_all(self) -> None:
+        """Let the accumulated map take in all levels but the submap, at once."""
+        if self._gathered is None:
+            self._take_in(1.0)
+        else:
+            self._accumulated.begin(*((level.field.get(), level.grid) for level in self._waiting))
+            self._draw_anew(self._waiting, 1.0)
+            self._drop_waiting()
+
+    def _draw_anew(self, levels: list[Level], part: float) -> None:
+        fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **self._defines_of(levels))
+        inputs = self._parts_of(levels)
+        self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
+
+    def _drop_waiting(self) -> None:
+        for level in self._waiting:
+            level.field.release()
+        self._gathered = self._pending = None
+
+    def _level_in(self, state: State, name: str) -> Level | None:
+        """A copy of a level that a state holds."""
+        if (saved := state.fields.get(name)) is None:
+            return None
+        field = self.device.field(saved.size, 2, f"{name} submap")
+        field.copy_from(saved)
+        return Level(field, grid_in(state.values, SUBMAPS[name]))
 
     def _compose(self, target: Field, **defines: object) -> None:
         compose = self.device.pass_("warp/compose.frag", **self._defines() | defines)
         compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
 
+    @property
+    def _whole(self) -> int:
+        """`REMAP_STEPS` times the steps that the pending level is taken in over, if nothing waits."""
+        # Where something is frozen levels fade out towards it: none may be gathered, and each has to be soon over.
+        spread = math.ceil(self._tiles / MOST_TILES) if self._frozen.near is None else 0
+        return REMAP_STEPS * max(REMAP_STEPS, spread)
+
+    @property
+    def _waiting(self) -> list[Level]:
+        """What stands between the submap and the accumulated map."""
+        return [level for level in (self._gathered, self._pending) if level is not None]
+
+    @property
+    def _levels(self) -> list[Level]:
+        """All above the accumulated map."""
+        return [Level(self._submap.read, self.grid), *self._waiting]
+
     def _defines(self) -> dict[str, object]:
         """How the whole map is put together."""
         fine: dict[str, object] = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        return fine | self._chain_defines()
+        return fine | self._defines_of(self._levels)
 
-    def _chain_defines(self) -> dict[str, object]:
-        return self._held_defines() | ({} if self._pending is None else {"PENDING": 1})
+    def _defines_of(self, levels: list[Level]) -> dict[str, object]:
+        return self._held_defines() | ({"LEVELS": len(levels)} if len(levels) > 1 else {})
 
     def _held_defines(self) -> dict[str, object]:
         return {} if self._frozen.near is None else {"HELD": 1}
 
     def _parts(self) -> dict[str, Any]:
         """What `lib/warp.glsl` puts together."""
-        inputs = self._inputs() | {"submap": self._submap.read, "window": window_of(self.grid)}
-        if self._pending is not None:
-            inputs |= {"pending": self._pending, "pending_window": window_of(self._pending_grid)}
-        return inputs
+        return self._parts_of(self._levels)
 
-    def _inputs(self) -> dict[str, Any]:
-        """The same but for the submaps."""
-        inputs = {"accumulated": self._accumulated.now, "picture": self.extent, "limits": self._limits}
-        return inputs if self._frozen.near is None else inputs | {"near": self._frozen.near}
+    def _parts_of(self, levels: list[Level]) -> dict[str, Any]:
+        parts: dict[str, Any] = {"accumulated": self._accumulated.now, "picture": self.extent, "limits": self._limits}
+        for (name, window), level in zip(NAMES, levels, strict=False):
+            parts |= {name: level.field, window: window_of(level.grid)}
+        return parts if self._frozen.near is None else parts | {"near": self._frozen.near}
 
     @property
     def _cell(self) -> tuple[float, float]:

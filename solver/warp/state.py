@@ -12,11 +12,11 @@ from solver.gl.tiled import Kind, SavedTiles
 from solver.grid import Grid
 from solver.scheme import State
 
-SUBMAPS = {"submap": "grid", "pending": "pending grid"}  # and where their grids are
+SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 
 
 class MapState(State):
-    """The state of a warp map: of its submap and of the one that is pending, each on its grid, and of its tiles."""
+    """The state of a warp map: of its submap and of those that wait, each of a grid, and of its tiles."""
 
     def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> MapState:
         """A state of a map of the same picture, on whatever grid, that holds what `arrays()` gave.
@@ -29,9 +29,12 @@ class MapState(State):
             for name, place in SUBMAPS.items():
                 if name in rest:
                     grid, given = grid_in(arrays, place), rest.pop(name)
-                    if (given.shape, given.dtype) != ((grid.ny, grid.nx, 2), np.float32):
+                    times = 1 if name == "submap" or given.ndim != 3 else max(given.shape[1] // grid.nx, 1)
+                    if (given.shape, given.dtype) != ((grid.ny * times, grid.nx * times, 2), np.float32):
                         raise ValueError(f"its {name} is not of its grid")
                     made.fields[name] = device.upload(given, f"{name}, given")
+            if "gathered" in made.fields and "pending" not in made.fields:
+                raise ValueError("what its map has gathered waits for nothing")
             tiles = {name: saved for name, saved in self.tiles.items() if name != "frozen"}
             if "frozen kind" in rest:
                 tiles["frozen"] = SavedTiles.nothing(_kind_in(arrays))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
@@ -70,6 +70,13 @@ class Submap(DoubleField):
         super().release()
         for part in (self.trace, self._steepness, self._find_steepest):
             part.release()
+
+
+class Level(NamedTuple):
+    """A submap and the grid it moved on: with a texel, or a whole number both ways, for each of its cells."""
+
+    field: Field
+    grid: Grid
 
 
 def window_of(grid: Grid) -> tuple[float, float, float, float]:

@@ -10,12 +10,12 @@ from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import FieldError
-from solver.gl.tiled import TiledField
+from solver.gl.tiled import TILE, TiledField
 from solver.grid import Grid
 from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
 from solver.warp.frozen import Frozen
-from solver.warp.map import WarpMap
+from solver.warp.map import MOST_TILES, REMAP_STEPS, WarpMap
 from support import reference
 from support.flows import VORTEX_TIME, vortex, vortex_faces
 
@@ -130,8 +130,10 @@ def test_rest_is_the_identity_exactly(device: Device) -> None:
     assert warp.statistics().det_min == warp.statistics().det_max == 1.0
 
 
-@pytest.mark.parametrize("at", [5, 9, 13, 21, 24])
-def test_saved_state_goes_on_bit_for_bit(device: Device, at: int) -> None:
+@pytest.mark.parametrize(
+    ("at", "side"), [(5, 700), (9, 700), (13, 700), (21, 700), (24, 700), (12, 2560), (18, 2560), (26, 2560)]
+)
+def test_saved_state_goes_on_bit_for_bit(device: Device, at: int, side: int) -> None:
     """From anywhere between two remaps, and where one is half done; also off the GPU, into another map."""
     grid = Grid(48, 48)
     velocity = device.upload(vortex_faces(grid, 0.0))
@@ -140,16 +142,17 @@ def test_saved_state_goes_on_bit_for_bit(device: Device, at: int) -> None:
         for _ in range(steps):
             warp.advance(velocity, 0.02)
 
-    warp = WarpMap(device, grid, (700, 700))
+    warp = WarpMap(device, grid, (side, side))
     go(warp, at)
     state = warp.save()
     assert ("pending" in state.fields) == (at >= 8), "remaps begin at steps 8, 16 and 24"
+    assert ("gathered" in state.fields) == (side == 2560 and at > 16), "and 100 tiles take 13 steps"
     go(warp, 30)
     straight = warp.read()
     warp.restore(state)
     go(warp, 30)
     np.testing.assert_array_equal(warp.read(), straight)
-    other = WarpMap(device, grid, (700, 700))
+    other = WarpMap(device, grid, (side, side))
     other.advance(velocity, 0.3)
     template = other.save()
     resumed = template.with_arrays(device, state.arrays())
@@ -439,6 +442,38 @@ def test_moving_to_another_grid_keeps_the_map(device: Device) -> None:
     assert warp.statistics().folds == 0
     with pytest.raises(ValueError, match="picture"):
         warp.move_to(Grid(20, 20))
+
+
+def test_a_large_map_is_made_anew_a_little_in_each_step(device: Device) -> None:
+    """Also where the next remap is wanted long before, or another grid; and it is as exact as one made anew at once."""
+    whole = Grid(32, 32)
+    grids = [whole, window(whole.refined(2), 8, 8, 40, 40), whole]
+    flow, steps, dt = swirl((0.45, 0.45), 0.28), 26, 0.03
+    warp, small = WarpMap(device, whole, (2560, 2560)), WarpMap(device, whole, (1280, 1280))
+    most, gathered = [], 0
+    for grid in grids:
+        before = warp.read((100, 100))
+        warp.move_to(grid)
+        small.move_to(grid)
+        np.testing.assert_allclose(warp.read((100, 100)), before, atol=2e-3 * whole.h)
+        for step in range(steps):
+            device.timings.take()
+            with device.stage("step"):
+                warp.advance_prescribed(flow, dt, step * dt)
+            small.advance_prescribed(flow, dt, step * dt)
+            most.append(device.timings.texel_writes["step"] / TILE**2)
+            state = warp.save()
+            gathered += "gathered" in state.fields
+            state.release()
+    assert gathered > steps
+    assert max(most) < 100 / REMAP_STEPS + 5, "tiles of 100, and what is gathered"
+    assert np.median(most) < MOST_TILES + 2
+    found = warp.read((100, 100))
+    assert np.abs(found).max() > 5 * whole.h
+    assert np.abs(found - small.read((100, 100))).max() < 2e-3 * whole.h
+    assert warp.statistics().folds == 0
+    warp.remap()
+    np.testing.assert_allclose(warp.read((100, 100)), found, atol=2e-3 * whole.h)
 
 
 def test_restoring_under_a_brush_reaches_through_a_window(device: Device) -> None:
