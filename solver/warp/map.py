@@ -11,14 +11,15 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
+from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.grid import Grid
 from solver.scheme import State, check_field, check_step, on_faces
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
-from solver.warp.frozen import Frozen, saved_of
+from solver.warp.frozen import Frozen
 from solver.warp.inverse import ForwardMap
-from solver.warp.state import MapState, grid_in, kind_values, values_of
+from solver.warp.state import MapState, grid_in, values_of
 from solver.warp.submap import Submap, window_of
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ class WarpMap:
         self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
         self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last remap
+        self._is_settled = True  # the submap leads nowhere where the map is held
         self._limits = self._picture = (0.0, 0.0, *self.extent)  # of the places looked up: left, top, right, bottom
         self.version = 0
 
@@ -155,28 +157,28 @@ class WarpMap:
         if grid.picture != self.extent:
             raise ValueError(f"a map of a picture of {self.extent} cannot go on in one of {grid.picture}")
         self._begin_remap()
-        if self._frozen.near is not None:
-            self._take_in(1.0)  # it fades over the cells of its own grid
         self._submap.release()
         self._submap = Submap(self.device, grid)
-        self._frozen.fade_over(self._cell)
         self._steps = 0
         self._changed()
 
-    def hold(self, frozen: Field | None) -> None:
+    def hold(self, frozen: Field | None, changed: Region | None = None) -> None:
         """From now on, change nothing where a mask over the whole picture, of any size, is 1.
 
-        Nor within two texels of the accumulated map around it, or three where the mask has other texels: what is looked
-        up on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or
-        not. Over one cell from there the map goes over into what flows.
+        Nor within three texels of the accumulated map around it: what is looked up on a frozen pixel is interpolated
+        from there. What the map is there is kept to the bit, however it came about. Within two cells the submap stands
+        still, so that what is around goes on from it without a step.
+
+        Args:
+            frozen: the mask; None holds nothing.
+            changed: (x, y, width, height) in the mask's texels, outside of which it is as it was given before.
         """
-        saved = None if frozen is None else saved_of(frozen)
-        if self._frozen.differs(saved):
-            self.remap()
-            self._frozen.restore(saved, self._cell)
-            self._changed()
-        if saved is not None:
-            saved.release()
+        if frozen is None:
+            self._frozen.release()
+        else:
+            self._frozen.hold(frozen, changed or (0, 0, *frozen.size), self._keep)
+            self._is_settled &= not self._steps
+        self._changed()
 
     def restore_under(
         self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0
@@ -188,11 +190,15 @@ class WarpMap:
             hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
             amount: 0-1, the part of the displacement that is taken away at the centre.
         """
+        if not self._is_settled:
+            self._begin_remap()  # or what is around the held places would not go on from them
         self._take_in(1.0)
         restore = self.device.pass_("warp/restore.frag", **self._held_defines())
         inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
-        if self._frozen.near is not None:
-            inputs |= {"near": self._frozen.near, "picture": self.extent}
+        still = None
+        if self._frozen.held is not None:
+            still, window = self._still_under(center, radius)
+            inputs |= {"still": still, "still_window": window}
         submap, accumulated = self._submap, self._accumulated
         restore(submap.write, displacement=submap.read, window=window_of(self.grid), **inputs)
         submap.swap()
@@ -208,6 +214,8 @@ class WarpMap:
                     target, region=regions, displacement=accumulated.now, window=self._picture, **inputs
                 ),
             )
+        if still is not None:
+            still.release()
         self._changed()
 
     # -- its state --------------------------------------------------------------------------------------------------
@@ -218,7 +226,9 @@ class WarpMap:
         self._submap.read.clear()
         self._accumulated.clear()
         self._steps = 0
+        self._is_settled = True
         self._limits = self._picture
+        self._frozen.draw_anew(self._keep)
         self._changed()
 
     def set(self, displacement: np.ndarray) -> None:
@@ -247,18 +257,18 @@ class WarpMap:
         # Each of them in float32, as the shaders take them.
         lowest, highest = np.minimum(0, [across.min(), down.min()]), [across.max(), down.max()]
         self._limits = (*lowest.tolist(), *np.maximum(self.extent, highest).tolist())
+        self._frozen.draw_anew(self._keep)
 
     def save(self) -> MapState:
         """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._limits, "grid": values_of(self.grid)}
+        values["settled"] = self._is_settled
         if self._pending is not None:
             fields["pending"] = self._pending
             values |= {"remapping": self._remapping, "pending grid": values_of(self._pending_grid)}
         state = MapState.of(self.device, fields, **values)
-        if self._frozen.saved is not None:
-            state.tiles["frozen"] = self._frozen.saved.held()
-            state.values["frozen kind"] = kind_values(self._frozen.saved.kind)
+        state.tiles.update(self._frozen.save())
         return state
 
     def restore(self, state: State) -> None:
@@ -279,7 +289,8 @@ class WarpMap:
         self._steps = int(state.values["steps"])
         left, top, right, bottom = state.values["limits"].tolist()
         self._limits = left, top, right, bottom
-        self._frozen.restore(state.tiles.get("frozen"), self._cell)
+        self._is_settled = bool(state.values["settled"])
+        self._frozen.restore(state.tiles)
         self._drop_pending()
         if (pending := state.fields.get("pending")) is not None:
             self._pending = self.device.field(pending.size, 2, "pending submap")
@@ -312,7 +323,7 @@ class WarpMap:
         accumulated map for it.
         """
         size = size or self.size
-        if size == self.size and self._steps == 0 and self._pending is None:
+        if size == self.size and self._steps == 0 and self._pending is None and self._frozen.held is None:
             return self._accumulated.now
         key = size, exact
         if key not in self._composed:
@@ -329,7 +340,7 @@ class WarpMap:
         or two a cell. Where something is frozen it is the accumulated map's: what is looked up between coarser texels
         would reach beyond what is held.
         """
-        if self._frozen.near is not None:
+        if self._frozen.held is not None:
             return self.size
         sides = zip(self.size, result, picture, self.coarse_size, strict=True)
         times = max(1, min(own // min(wanted, max(given, 2 * cells)) for own, wanted, given, cells in sides))
@@ -393,6 +404,7 @@ class WarpMap:
             return
         self._take_in(1.0)
         self._steps = 0
+        self._is_settled = True
         if self._accumulated.begin(self._submap.read.get(), self.grid):
             self._pending, self._pending_grid = self._submap.replace(), self.grid
             self._remapping = 0
@@ -407,6 +419,28 @@ class WarpMap:
         self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
         if part >= 1:
             self._drop_pending()
+
+    def _keep(self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field) -> None:
+        """Draw the map where it is held now and was not before; see `Frozen`."""
+        fine = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
+        pending = {} if self._pending is None else {"PENDING": 1}
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **pending)
+        compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
+
+    def _still_under(
+        self, center: tuple[float, float], radius: float
+    ) -> tuple[Field, tuple[float, float, float, float]]:
+        """Cells, the submap's or larger, under a brush and around it, about what is held, and their window."""
+        sides, counts = [], []
+        for at, step, side in zip(center, self.grid.spacing, self.extent, strict=True):
+            step = max(step, radius / 32)
+            start, end = max(at - radius - 2 * step, 0.0), min(at + radius + 2 * step, side)
+            counts.append(max(math.ceil((end - start) / step), 1))
+            sides.append((start, end - start))
+        window = sides[0][0], sides[1][0], sides[0][1], sides[1][1]
+        still = self.device.field((counts[0], counts[1]), 1, "still under a brush", "f1")
+        self._frozen.widen(still, window, self.extent)
+        return still, window
 
     def _drop_pending(self) -> None:
         if self._pending is not None:
@@ -426,7 +460,7 @@ class WarpMap:
         return self._held_defines() | ({} if self._pending is None else {"PENDING": 1})
 
     def _held_defines(self) -> dict[str, object]:
-        return {} if self._frozen.near is None else {"HELD": 1}
+        return {} if self._frozen.held is None else {"HELD": 1}
 
     def _parts(self) -> dict[str, Any]:
         """What `lib/warp.glsl` puts together."""
@@ -438,13 +472,7 @@ class WarpMap:
     def _inputs(self) -> dict[str, Any]:
         """The same but for the submaps."""
         inputs = {"accumulated": self._accumulated.now, "picture": self.extent, "limits": self._limits}
-        return inputs if self._frozen.near is None else inputs | {"near": self._frozen.near}
-
-    @property
-    def _cell(self) -> tuple[float, float]:
-        """Texels of the accumulated map along a cell."""
-        (across, down), (hx, hy), (width, height) = self.size, self.grid.spacing, self.extent
-        return across * hx / width, down * hy / height
+        return inputs if self._frozen.held is None else inputs | {"held": self._frozen.held, "kept": self._frozen.kept}
 
     def _changed(self) -> None:
         self.version += 1
