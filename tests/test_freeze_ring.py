@@ -1,8 +1,9 @@
-"""A freeze stroke on a photograph of 6000 pixels: what its ring shows is what is frozen."""
+"""Freeze strokes: what the ring shows is what is frozen, and the picture beneath keeps every bit from then on."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from app.pictures import Picture
 from app.recipe import Recipe
@@ -44,5 +45,53 @@ def test_the_picture_beneath_a_frozen_stroke_keeps_every_bit_up_to_the_ring(devi
     frozen = replay.masks.frozen.get() >= 128
     assert frozen[ring < -1].all()
     assert not frozen[ring > 1].any()
+    sampler.release()
+    replay.release()
+
+
+def wandering(rng: np.random.Generator, tool: str, first: int, last: int, radius: float) -> Stroke:
+    """A straight stroke between two places about the middle."""
+    (x0, y0), (x1, y1) = rng.uniform(0.4, 0.6, (2, 2)).tolist()
+    parts = np.linspace(0, 1, last - first + 1).tolist()
+    samples = tuple((first + n, x0 + (x1 - x0) * p, y0 + (y1 - y0) * p, 1.0) for n, p in enumerate(parts))
+    return Stroke.model_validate({"tool": tool, "samples": samples, "radius": radius, "hardness": rng.uniform()})
+
+
+@pytest.mark.parametrize(
+    ("size", "seed", "grid"),
+    [((640, 480), 1, 48), ((640, 480), 2, 96), ((301, 193), 1, 48), ((97, 400), 1, 48), ((1500, 40), 2, 48)],
+)
+def test_what_is_frozen_while_it_moves_keeps_every_bit(
+    size: tuple[int, int], seed: int, grid: int, device: Device
+) -> None:
+    """Strokes at random: no pixel of the result, and no place of the map between the texels, changes by a bit."""
+    (width, height), rng = size, np.random.default_rng([*size, seed])
+    pixels = rng.integers(0, 256, (height, width, 3), np.uint8)
+    strokes = (
+        wandering(rng, "push", 0, 8, 0.15),
+        wandering(rng, "freeze", 6, 10, rng.uniform(0.03, 0.1)),
+        wandering(rng, "push", 9, 20, 0.15),
+        wandering(rng, "freeze", 14, 16, 0.05),
+        wandering(rng, "twirl", 20, 24, 0.12),
+    )
+    recipe = Recipe.parse(f'version = 1\npicture = "noise.png"\nduration = 1.0\n[fluid]\ngrid = {grid}')
+    replay = Replay(device, recipe.edited(stroke=strokes), Pictures(Picture(pixels)), budget=0)
+    sampler, points = Sampler(device), rng.random((4000, 2))
+    column, row = (points * size).astype(int).T
+    under = np.zeros(4000, bool)
+    frozen, before, there, kept = np.zeros((height, width), bool), pixels, np.zeros((4000, 2)), 0
+    for _ in range(30):
+        replay.advance()
+        now, at = sampler.apply(replay.warp, pixels), replay.warp.at(points * replay.grid.extent)
+        np.testing.assert_array_equal(now[frozen], before[frozen])
+        np.testing.assert_array_equal(at[under], there[under])
+        kept += np.count_nonzero((now != pixels).any(axis=-1) & frozen)
+        if replay.masks.frozen.size == replay.masks.canvas.size:
+            finer = replay.masks.canvas.nx // width
+            texels = replay.masks.frozen.get() >= 128
+            frozen = np.asarray(texels.reshape(height, finer, width, finer).all(axis=(1, 3)))
+            under = frozen[row, column]
+        before, there = now, at
+    assert kept > 1000, "what had moved before it was frozen"
     sampler.release()
     replay.release()

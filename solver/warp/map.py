@@ -78,6 +78,11 @@ class WarpMap:
     def grid(self) -> Grid:
         return self._submap.grid
 
+    @property
+    def held(self) -> Field | None:
+        """Where it is held, texel by texel, from 1/2 on; None if nothing is."""
+        return self._frozen.held
+
     # -- moving it --------------------------------------------------------------------------------------------------
 
     def follow(self, fluid: Fluid, dt: float) -> None:
