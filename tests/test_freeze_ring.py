@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from app.pictures import Picture
 from app.recipe import Recipe
@@ -94,4 +95,35 @@ def test_what_is_frozen_while_it_moves_keeps_every_bit(
         before, there = now, at
     assert kept > 1000, "what had moved before it was frozen"
     sampler.release()
+    replay.release()
+
+
+@pytest.mark.parametrize(("size", "seed"), [((640, 480), 5), ((301, 193), 3), ((600, 400), 7)])
+def test_the_map_goes_on_from_what_is_frozen_without_a_step(size: tuple[int, int], seed: int, device: Device) -> None:
+    """Frozen while it moves, pushed and restored around: neighbours differ across the border as they do beside it."""
+    rng = np.random.default_rng([*size, seed])
+    strokes = (
+        wandering(rng, "push", 0, 12, 0.15),
+        wandering(rng, "freeze", 8, 12, 0.06),
+        wandering(rng, "push", 16, 24, 0.12),
+        wandering(rng, "restore", 13, 36, 0.12),
+    )
+    recipe = Recipe.parse('version = 1\npicture = "none.png"\nduration = 1.5\n[fluid]\ngrid = 48')
+    pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
+    replay = Replay(device, recipe.edited(stroke=strokes), pictures, budget=0)
+    replay.seek(10)
+    frozen_before = replay.warp.read(replay.warp.size)
+    replay.seek(40)
+    displacement = replay.warp.read(replay.warp.size) * replay.warp.size[0]
+    assert replay.warp.held is not None
+    held = replay.warp.held.get() > 0
+    beside = np.asarray(ndimage.binary_dilation(held, iterations=12), bool) & ~held
+    border, around = 0.0, 0.0
+    for axis in (0, 1):
+        jump = np.abs(np.diff(displacement, axis=axis)).max(axis=-1)
+        first, second = (np.diff(mask.astype(int), axis=axis) for mask in (held, beside))
+        border = max(border, jump[first != 0].max())
+        around = max(around, jump[(second == 0) & np.delete(beside, 0, axis=axis)].max())
+    assert border < 1.2 * around
+    assert np.abs(frozen_before[held]).max() * replay.warp.size[0] > 0.3, "what had moved before it was frozen"
     replay.release()
