@@ -26,18 +26,9 @@ class Field:
         components: 1-4.
         label: its name in errors and in a frame debugger.
         dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1), "u4" (whole numbers) or "f2".
-        is_wiped: all 0 at first; else it holds anything, and takes no memory yet where that is given page by page.
     """
 
-    def __init__(
-        self,
-        device: Device,
-        size: tuple[int, int],
-        components: int,
-        label: str,
-        dtype: str = "f4",
-        is_wiped: bool = True,
-    ) -> None:
+    def __init__(self, device: Device, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
         width, height = size
         limit = device.limits.max_texture_size
         # A texture that is too large, or empty, is returned without an error and fails much later.
@@ -55,8 +46,7 @@ class Field:
         self.texture.label = label
         self.framebuffer: moderngl.Framebuffer = device.ctx.framebuffer([self.texture])
         self.framebuffer.label = label
-        if is_wiped:
-            self.clear()
+        self.clear()
 
     @property
     def width(self) -> int:

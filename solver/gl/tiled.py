@@ -138,7 +138,6 @@ class TiledField(Field):
 
     Args:
         blank: what all its components are at first, and where `clear` is not told another value.
-        is_wiped: if not, that is so in a tile only once it was `wipe`d.
         tile: texels along a tile; the other arguments are those of `Field`.
     """
 
@@ -151,16 +150,13 @@ class TiledField(Field):
         dtype: str = "f4",
         tile: int = TILE,
         blank: float = 0.0,
-        is_wiped: bool = True,
     ) -> None:
         self.kind = Kind(size, components, dtype, tile)
         self.tile = tile
         self.blank = blank
         # What each tile was last saved as or restored from; None where something was drawn since.
         self._same = np.full(self.kind.rows_and_columns, None, object)
-        super().__init__(device, size, components, label, dtype, is_wiped)
-        if not is_wiped:
-            self._same[...] = _Tile(None)
+        super().__init__(device, size, components, label, dtype)
 
     def drawn(self, region: Region | None = None) -> None:
         if region is None:
@@ -174,16 +170,6 @@ class TiledField(Field):
         super().clear(*(values or self._blank_values))
         if not values:
             self._same[...] = _Tile(None)
-
-    def wipe(self, region: Region) -> None:
-        """Make sure that tiles about a region which nothing was drawn into are blank."""
-        (x, y, width, height), side, same = region, self.kind.tile, self._same
-        rows, columns = same.shape
-        for row in range(y // side, min(-(-(y + height) // side), rows)):
-            for column in range(x // side, min(-(-(x + width) // side), columns)):
-                tile: _Tile | None = same[row, column]
-                if tile is not None and tile.field is None:
-                    self.framebuffer.clear(*self._blank_values, viewport=(column * side, row * side, side, side))
 
     def save(self) -> SavedTiles:
         """A copy of this moment, sharing with earlier ones what is the same."""

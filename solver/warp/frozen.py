@@ -59,8 +59,6 @@ class Frozen:
         along_y(now, frozen=rows, offset=(0.0, REACH), size=rows.size, **reach)
         new = (now.get() > 0) & (held.get(region) == 0)
         blocks = [(x + left, y + top, across, down) for left, top, across, down in _blocks_of(new)]
-        for block in blocks:
-            kept.wipe(block)
         draw(kept, blocks, now, (x, y), held)
         self.device.pass_("gl/copy.frag")(held, region=region, field=now, offset=(-x, -y))
         rows.release()
@@ -114,10 +112,10 @@ class Frozen:
         self.held = self.kept = None
 
     def _fields(self) -> tuple[TiledField, TiledField]:
-        """Both, made when they are wanted first; the displacement takes memory only where it is drawn."""
+        """Both, made when they are wanted first."""
         if self.held is None or self.kept is None:
             self.held = TiledField(self.device, self.size, 1, "held", "f1")
-            self.kept = TiledField(self.device, self.size, 2, "kept", is_wiped=False)
+            self.kept = TiledField(self.device, self.size, 2, "kept")
         return self.held, self.kept
 
 
