@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.passes import Region
 from solver.grid import Grid
 from solver.params import FluidParams
 from solver.scheme import Forces, Residuals, Scheme, Vector, check_shape, check_size, check_step
@@ -185,7 +186,7 @@ class PaperWarpMap(WarpMap):
     def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None) -> None:
         super().__init__(device, grid, grid.size)  # of whatever size it is wanted: it stays the identity
 
-    def hold(self, frozen: Field | None) -> None:
+    def hold(self, frozen: Field | None, changed: Region | None = None) -> None:
         """Nothing: the paper's map is what its scheme makes of it."""
 
     def follow(self, fluid: Scheme, dt: float) -> None:

@@ -42,8 +42,8 @@ class Stroke(Model):
         strength: 1 carries along at the pointer's speed (push), or works at the tool's own rate.
         reverse: the tool's opposite: push against the drag, twirl anticlockwise.
         detail: cells along the picture's longer side that the flow is solved with, in a window around the brush (see
-            `app.model.windows`), and then the brush takes back nearby the area and momentum that it gives (see `Tip`); 0: on
-            the grid of the whole picture.
+            `app.model.windows`), and then the brush takes back nearby the area and momentum that it gives (see `Tip`);
+            0: on the grid of the whole picture.
         local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 

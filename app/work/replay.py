@@ -352,7 +352,8 @@ class Replay:
 
     def _apply_masks(self) -> None:
         self.masks.apply(self.fluid)
-        self.warp.hold(self.masks.frozen_field)
+        if taken := self.masks.take_frozen():
+            self.warp.hold(*taken)
 
     def _forces(self, dt: float) -> list[tuple[Field, float]]:
         """The force fields and their impulses in this tick; sources go into the fluid's own, motions are kept."""

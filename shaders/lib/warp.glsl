@@ -6,8 +6,7 @@
 // u_submap, u_second, u_third, u_accumulated: displacements, longer sides; u_window, u_second_window, u_third_window: left,
 // top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
 // bottom, longer sides.
-// Define HELD if something is frozen: where u_near is 1, A is taken as it is, and the nearer to it, the less do the
-// submaps move, for along a wall the fluid may glide; over A's texels.
+// Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held.
 #include "lib/displacement.glsl"
 uniform sampler2D u_submap;
 uniform sampler2D u_accumulated;
@@ -26,10 +25,8 @@ uniform sampler2D u_third;
 uniform vec4 u_third_window;
 #endif
 #ifdef HELD
-uniform sampler2D u_near;
-float freedom(vec2 x) { return 1.0 - texture(u_near, x / u_picture).r; }
-#else
-float freedom(vec2 x) { return 1.0; }
+uniform sampler2D u_held;
+uniform sampler2D u_kept;
 #endif
 
 // Where nothing is beyond the limits, nothing is added, so that the identity stays one to the bit.
@@ -50,20 +47,32 @@ vec2 displacement_of(sampler2D submap, vec4 window, vec2 x) {
 
 // Where the submaps lead from x.
 vec2 displacement_of_submaps(vec2 x) {
-    vec2 moved = within_picture(x, freedom(x) * displacement_of(u_submap, u_window, x));
+    vec2 moved = within_picture(x, displacement_of(u_submap, u_window, x));
 #if LEVELS > 1
-    moved = within_picture(x, moved + freedom(x + moved) * displacement_of(u_second, u_second_window, x + moved));
+    moved = within_picture(x, moved + displacement_of(u_second, u_second_window, x + moved));
 #endif
 #if LEVELS > 2
-    moved = within_picture(x, moved + freedom(x + moved) * displacement_of(u_third, u_third_window, x + moved));
+    moved = within_picture(x, moved + displacement_of(u_third, u_third_window, x + moved));
 #endif
     return moved;
 }
 
-// A at a held place, in its texels, to the bit: on a texel its very value, however the place was rounded, and between
-// texels by the cubic both ways, which reaches none that moves.
-vec2 held_displacement(vec2 place) {
+#ifdef HELD
+// A place on a texel, however it was rounded, is on its middle.
+vec2 on_texel(vec2 place) {
     vec2 nearest = floor(place) + 0.5;
-    mat2 slope;
-    return cubic_displacement(u_accumulated, mix(place, nearest, lessThan(abs(place - nearest), vec2(1.0 / 512.0))), slope);
+    return mix(place, nearest, lessThan(abs(place - nearest), vec2(1.0 / 512.0)));
 }
+
+// Whether the map is held at a place, in A's texels: where u_held is 1; on a texel, where it is not 0.
+bool is_held(vec2 place) {
+    float held = texture(u_held, place / vec2(textureSize(u_held, 0))).r;
+    return held > (on_texel(place) == floor(place) + 0.5 ? 0.5 : 0.9);
+}
+
+// What it is there: u_kept on a texel, and between texels the cubic both ways, which reaches none that moves.
+vec2 held_displacement(vec2 place) {
+    mat2 slope;
+    return cubic_displacement(u_kept, on_texel(place), slope);
+}
+#endif

@@ -5,7 +5,9 @@
 // u_zoom: pixels of the picture to one of the result; u_longer: pixels of the picture to a longer side;
 // u_middle, u_half: middle and half sides, pixels, of the rectangle beyond which there is nothing.
 // Define SINGLE where one sample is enough anyway, EVERYWHERE where four or more are wanted as soon as one is not enough.
-// reads: 300
+// Define HELD if something is held (u_held, over the map's texels): blocks with some of that keep their kind whatever moves
+// around it, as no two kinds round alike: 2, but 0 where nothing moves and u_zoom is 1, which all kinds copy.
+// reads: 300, and 100 more with HELD
 #include "lib/footprint.glsl"
 uniform sampler2D u_displacement;
 uniform vec2 u_texel;
@@ -15,6 +17,9 @@ uniform vec2 u_zoom;
 uniform vec2 u_longer;
 uniform vec2 u_middle;
 uniform vec2 u_half;
+#ifdef HELD
+uniform sampler2D u_held;
+#endif
 layout(location = 0) out float out_class;
 
 const float ONE_SAMPLE = 0.05;  // as near each other as that they make less than a quarter of a level of 255
@@ -28,30 +33,38 @@ void main() {
     // A cubic reaches two texels beyond its place.
     vec2 first = clamp(floor(corner * u_scale - 1.5), vec2(0.0), count - 2.0);
     vec2 last = clamp(floor((corner + u_side) * u_scale + 1.5), first + 1.0, count - 1.0);
-    vec2 low = vec2(1e30), high = vec2(-1e30), most = vec2(0.0);
-    float farthest = 0.0, longest = 0.0;
+    vec2 low = vec2(1e30), high = vec2(-1e30), change = vec2(0.0);
+    float farthest = 0.0, longest = 0.0, held = 0.0;
     for (float j = first.y; j < last.y - 0.5; ++j) {
         vec2 here = displacement(vec2(first.x, j));
         for (float i = first.x; i < last.x - 0.5; ++i) {
             vec2 right = displacement(vec2(i + 1.0, j)), below = displacement(vec2(i, j + 1.0));
             low = min(low, min(here, min(right, below)));
             high = max(high, max(here, max(right, below)));
-            most = max(most, max(abs(right - here), abs(below - here)));
+            change = max(change, max(abs(right - here), abs(below - here)));
 #ifndef SINGLE
             vec2 a = (right - here) * u_scale.x + step_x, b = (below - here) * u_scale.y + step_y;
             farthest = max(farthest, footprint(a, b));
             longest = max(longest, max(length(a), length(b)));
 #endif
+#ifdef HELD
+            held = max(held, texture(u_held, (vec2(i, j) + 0.5) * u_texel).r);
+#endif
             here = right;
         }
     }
 #ifdef EVERYWHERE
-    float kind = farthest > ONE_SAMPLE ? float(EVERYWHERE) : 0.0;
+    const float most = float(EVERYWHERE), four = most;
 #else
-    float kind = farthest > ONE_SAMPLE ? (longest > FOUR_SAMPLES ? 2.0 : 1.0) : 0.0;
+    const float most = 2.0, four = 1.0;
+#endif
+    float kind = farthest > ONE_SAMPLE ? (longest > FOUR_SAMPLES ? most : four) : 0.0;
+#if defined(HELD) && !defined(SINGLE)
+    bool copies = u_zoom == vec2(1.0) && low == vec2(0.0) && high == vec2(0.0);
+    kind = held > 0.0 && !copies ? most : kind;
 #endif
     // Between texels, and beyond the outermost ones, the map is never farther than that from those around.
-    vec2 margin = 4.0 * most + 1.0;
+    vec2 margin = 4.0 * change + 1.0;
     vec2 from = corner * u_zoom + low - margin, to = (corner + u_side) * u_zoom + high + margin;
     bool inside = all(greaterThan(from, u_middle - u_half)) && all(lessThan(to, u_middle + u_half));
     out_class = (2.0 * kind + (inside ? 1.0 : 0.0)) / 255.0;

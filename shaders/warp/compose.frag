@@ -3,9 +3,16 @@
 // Define CUBIC to look into A by the cubic: where it has four texels a cell, or whoever looks between the texels of the
 // result will again.
 // Define GATHER for what the submaps alone add up to.
+// Define KEEP (with REMAP) to draw nothing but what is newly held: where u_now, whose first texel is u_corner, is not 0, and
+// u_before, over the picture, is.
 // reads: 48, and 24 with CUBIC, 12 with GATHER; 12 more for each of LEVELS above 1
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
+#ifdef KEEP
+uniform sampler2D u_now;
+uniform sampler2D u_before;
+uniform vec2 u_corner;
+#endif
 layout(location = 0) out vec2 out_displacement;
 
 void main() {
@@ -15,9 +22,13 @@ void main() {
 #else
     vec2 place = fragment_place() * size;
 #endif
+#ifdef KEEP
+    if (texture(u_now, (place - u_corner) / vec2(textureSize(u_now, 0))).r == 0.0 || texture(u_before, place / size).r > 0.0)
+        discard;
+#endif
     vec2 x = place * texel;
 #ifdef HELD
-    if (freedom(x) == 0.0) {
+    if (is_held(place)) {
         out_displacement = within(u_limits, x, held_displacement(place));
         return;
     }

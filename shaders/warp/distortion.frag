@@ -9,25 +9,14 @@
 layout(location = 0) out vec4 out_largest;
 layout(location = 1) out vec4 out_total;
 
-// Determinant of 1 + grad S of a submap, as far as it is free to move, at x + moved; S is added to `moved`.
+// Determinant of 1 + grad S of a submap at x + moved; S is added to `moved`.
 float stretch_of(sampler2D submap, vec4 window, vec2 x, inout vec2 moved) {
     vec2 place = x + moved, size = vec2(textureSize(submap, 0)), density = size / window.zw;
     vec3 at = in_window(window, place);
     mat2 slope;
     vec2 more = cubic_displacement(submap, at.xy * size, slope);
-    float free = at.z;
-#ifdef HELD
-    vec2 e = u_picture / vec2(textureSize(u_accumulated, 0)), fading = vec2(0.0);
-    free *= freedom(place);
-    fading.x = (freedom(place + vec2(e.x, 0.0)) - freedom(place - vec2(e.x, 0.0))) / (2.0 * e.x);
-    fading.y = (freedom(place + vec2(0.0, e.y)) - freedom(place - vec2(0.0, e.y))) / (2.0 * e.y);
-    mat2 jacobian = mat2(1.0) + at.z * outerProduct(more, fading);
-#else
-    mat2 jacobian = mat2(1.0);
-#endif
-    jacobian += free * mat2(slope[0] * density.x, slope[1] * density.y);
-    moved = within_picture(x, moved + more * free);
-    return determinant(jacobian);
+    moved = within_picture(x, moved + more * at.z);
+    return determinant(mat2(1.0) + at.z * mat2(slope[0] * density.x, slope[1] * density.y));
 }
 
 void main() {

@@ -1,9 +1,8 @@
 // Restore: D'(x) = (1 - amount falloff(|x - c|)) D(x), the map let go back to the identity under a brush.
 // u_displacement: longer sides; u_window: left, top, width and height that it covers, u_center, u_radius: longer sides;
 // u_hardness: the part of the radius that is fully under the brush, below 1; u_amount: 0-1.
-// Define HELD if something is frozen; the nearer to it (u_near over the picture, u_picture its width and height, longer
-// sides), the less does the map go back.
-// reads: 1
+// Define HELD if something is held: in cells of u_still, on the window u_still_window, not at all, over one cell more and more.
+// reads: 1, and 4 more with HELD
 uniform sampler2D u_displacement;
 uniform vec4 u_window;
 uniform vec2 u_center;
@@ -11,9 +10,17 @@ uniform float u_radius;
 uniform float u_hardness;
 uniform float u_amount;
 #ifdef HELD
-uniform sampler2D u_near;
-uniform vec2 u_picture;
-float freedom(vec2 x) { return 1.0 - texture(u_near, x / u_picture).r; }
+uniform sampler2D u_still;
+uniform vec4 u_still_window;
+// Bilinear: exactly 0 between four cells that are still.
+float freedom(vec2 x) {
+    vec2 size = vec2(textureSize(u_still, 0)), place = (x - u_still_window.xy) / u_still_window.zw * size - 0.5;
+    vec2 cell = floor(place), f = place - cell;
+    vec4 at = vec4(cell + 0.5, cell + 1.5) / size.xyxy;
+    vec4 free = 1.0 - vec4(texture(u_still, at.xy).r, texture(u_still, at.zy).r, texture(u_still, at.xw).r, texture(u_still, at.zw).r);
+    vec2 along = mix(free.xz, free.yw, f.x);
+    return smoothstep(0.0, 1.0, mix(along.x, along.y, f.y));
+}
 #else
 float freedom(vec2 x) { return 1.0; }
 #endif

@@ -55,6 +55,7 @@ class Masks:
         # The fluid that was told last, if it need not be told everything, and the texels of a mask changed since.
         self._applied_to: tuple[Scheme, Grid] | None = None
         self._changed: dict[str, Region] = {}
+        self._frozen_in: Region | None = None  # the texels frozen or thawed since that was asked last
 
     # -- what is painted over ---------------------------------------------------------------------------------------
 
@@ -72,6 +73,7 @@ class Masks:
         if frozen is not None and frozen.any():
             self._field("frozen").set(np.where(frozen, 255, 0).astype(np.uint8))
             self._frozen_before = self._field("frozen").save()
+        self._frozen_in = 0, 0, *self.canvas.size
         self._applied_to = None
 
     # -- painting ---------------------------------------------------------------------------------------------------
@@ -111,6 +113,7 @@ class Masks:
             self._clear("frozen")
         else:
             self._field("frozen").restore(self._frozen_before)
+        self._frozen_in = 0, 0, *self.canvas.size
         self._applied_to = None
 
     # -- what the fluid takes of them -------------------------------------------------------------------------------
@@ -178,10 +181,10 @@ class Masks:
         """What is frozen on the canvas, from 1/2 on, or one texel of nothing."""
         return self._painted.get("frozen", self._nothing["frozen"])
 
-    @property
-    def frozen_field(self) -> Field | None:
-        """What is frozen on the canvas, from 1/2 on; None if nothing ever was."""
-        return self._painted.get("frozen")
+    def take_frozen(self) -> tuple[Field, Region] | None:
+        """What is frozen on the canvas, from 1/2 on, and where that changed since this was asked last, if it did."""
+        region, self._frozen_in = self._frozen_in, None
+        return None if region is None or "frozen" not in self._painted else (self._painted["frozen"], region)
 
     # -- their state ------------------------------------------------------------------------------------------------
 
@@ -194,7 +197,7 @@ class Masks:
         return State({}, {}, tiles)
 
     def restore(self, state: State) -> None:
-        """Go back to a saved state; call `apply` after it.
+        """Go back to a saved state; call `apply` after it. What is frozen then, whoever took it knows already.
 
         Raises:
             ValueError: if it is of another canvas.
@@ -204,7 +207,8 @@ class Masks:
         for name, saved in state.tiles.items():
             if name in self._painted or not saved.is_blank:
                 for region in self._field(name).restore(saved):
-                    self._has_changed(name, region)
+                    self._changed[name] = _around(region, self._changed.get(name))
+        self._frozen_in = None
 
     @property
     def nbytes(self) -> int:
@@ -240,7 +244,9 @@ class Masks:
         if region[2] and region[3]:
             inputs |= tip.inputs(self.canvas)
             self.device.pass_(shader)(self._field(name), blend=blend, region=region, **inputs)
-            self._has_changed(name, region)
+            self._changed[name] = _around(region, self._changed.get(name))
+            if name == "frozen":
+                self._frozen_in = _around(region, self._frozen_in)
 
     def _region(self, tip: Tip) -> Region:
         """The texels of the canvas that a tip touches."""
@@ -249,17 +255,19 @@ class Masks:
         right, bottom = min(x + width, self.canvas.nx), min(y + height, self.canvas.ny)
         return left, top, max(right - left, 0), max(bottom - top, 0)
 
-    def _has_changed(self, name: str, region: Region) -> None:
-        x, y, width, height = region
-        if name in self._changed:
-            left, top, wide, high = self._changed[name]
-            x, right, y, bottom = min(x, left), max(x + width, left + wide), min(y, top), max(y + height, top + high)
-            width, height = right - x, bottom - y
-        self._changed[name] = x, y, width, height
-
     def _cells_over(self, region: Region, grid: Grid) -> Region:
         """The cells over texels of the canvas."""
         sides = zip(region[:2], region[2:], self.canvas.spacing, grid.origin, grid.spacing, strict=True)
         ends = [((first * texel - start) / h, ((first + n) * texel - start) / h) for first, n, texel, start, h in sides]
         (left, right), (top, bottom) = ((floor(a), ceil(b)) for a, b in ends)
         return left, top, right - left, bottom - top
+
+
+def _around(region: Region, other: Region | None) -> Region:
+    """The smallest region about two, or about the first."""
+    if other is None:
+        return region
+    (x, right), (y, bottom) = (
+        (min(region[k], other[k]), max(region[k] + region[k + 2], other[k] + other[k + 2])) for k in (0, 1)
+    )
+    return x, y, right - x, bottom - y

@@ -83,6 +83,7 @@ class Plan:
     """One picture, one map and one size, with what follows from them; see `plan_for`."""
 
     displacement: Field
+    held: Field | None
     extent: tuple[float, float]
     slack: float
     key: tuple[object, ...]
@@ -210,7 +211,7 @@ def plan_for(warp: WarpMap | GivenMap, picture: np.ndarray, size: tuple[int, int
     size = size or (picture.shape[1], picture.shape[0])
     if isinstance(warp, WarpMap):
         field = warp.composed(warp.size_for((picture.shape[1], picture.shape[0]), size))
-        slack = 0.5 * picture.shape[1] / field.width
+        held, slack = warp.held, 0.5 * picture.shape[1] / field.width
     else:
-        field, slack = warp.composed(), 0.01
-    return Plan(field, warp.extent, slack, (warp, warp.version), shaped, size, how)
+        field, held, slack = warp.composed(), None, 0.01
+    return Plan(field, held, warp.extent, slack, (warp, warp.version), shaped, size, how)

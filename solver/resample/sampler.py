@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import prod
+from typing import Any
 
 import numpy as np
 
@@ -214,6 +215,9 @@ class Sampler:
             defines: dict[str, object] = {"SINGLE": 1} if plan.is_single else {}
             if plan.how.samples != "auto":
                 defines["EVERYWHERE"] = min(plan.pairs[0], 2)
+            held: dict[str, Any] = {}
+            if plan.held is not None:
+                defines["HELD"], held["held"] = 1, plan.held
             self.device.pass_("resample/classify.frag", **defines)(
                 classes,
                 displacement=source,
@@ -224,6 +228,7 @@ class Sampler:
                 longer=plan.longer,
                 middle=plan.middle,
                 half=plan.half,
+                **held,
             )
             self._classes = classes.get()
         return self._classes

@@ -156,12 +156,6 @@ def overlap(a: Region, b: Region) -> bool:
     return all(a[k] < b[k] + b[k + 2] and b[k] < a[k] + a[k + 2] for k in (0, 1))
 
 
-def intersection(a: Region, b: Region) -> Region:
-    """What two regions that overlap have in common."""
-    (x, right), (y, bottom) = ((max(a[k], b[k]), min(a[k] + a[k + 2], b[k] + b[k + 2])) for k in (0, 1))
-    return x, y, right - x, bottom - y
-
-
 def tiles_of(size: tuple[int, int]) -> list[Region]:
     """The tiles of a field of `size` by rows."""
     width, height = size

@@ -1,8 +1,8 @@
-"""What of a picture is frozen, as the map knows it."""
+"""What of a picture is frozen, and what the map is there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable
 from math import ceil, floor
 from typing import Any
 
@@ -11,139 +11,120 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.gl.tiled import TILE, SavedTiles, TiledField
-from solver.warp.accumulated import intersection, overlap, tiles_of
+from solver.gl.tiled import SavedTiles, TiledField
+
+# Texels: a place in a frozen pixel may lie nearest to the next texel, and what is looked up there is interpolated from
+# two more to each side.
+INNER, REACH = 1, 3
+BLOCK = 64  # texels along a block that is drawn or not
+
+Draw = Callable[[Field, list[Region], Field, tuple[int, int], Field], None]
+"""Draws the map into regions of a field, where what is held now, from a corner on, is not 0 and what was held is."""
 
 
 class Frozen:
-    """A copy of a mask over the whole picture, of any size, 1 where it is frozen; none at first.
+    """Where the map is held, and its displacement there, texel by texel.
 
     Args:
         device: the device.
         size: (width, height) of the accumulated map in texels.
 
     Attributes:
-        near: how near each of those texels is to what is frozen, as `warp/near.frag` has it; None if nothing is.
-        saved: the mask as it was saved; None before any was given.
+        held: 1 where a place is held, 2/3 where only a texel's middle is, else 0; None as long as nothing was frozen.
+        kept: the displacement where it is held, longer sides.
     """
 
     def __init__(self, device: Device, size: tuple[int, int]) -> None:
         self.device = device
         self.size = size
-        self.near: Field | None = None
-        self.saved: SavedTiles | None = None
-        self._mask: TiledField | None = None
-        self._cell = (0.0, 0.0)
+        self.held: TiledField | None = None
+        self.kept: TiledField | None = None
 
-    def differs(self, saved: SavedTiles | None) -> bool:
-        """True if another place is frozen in what was saved."""
-        if self.saved and saved and self.saved.kind != saved.kind:
-            return True
-        return any(_changed(self.saved, saved))
-
-    def restore(self, saved: SavedTiles | None, cell: tuple[float, float]) -> None:
-        """Be what was saved, for submaps with `cell` texels along their cells; the caller may release that."""
-        before, self.saved = self.saved, None if saved is None else saved.held()
-        if before is not None and (saved is None or saved.kind != before.kind):
-            before.release()
-            before = None
-            self._let_go()
-        if saved is None or not any(_changed(None, saved)):
-            self._let_go()
-        else:
-            if self._mask is None:
-                size, components, dtype, tile = saved.kind
-                self._mask = TiledField(self.device, size, components, "frozen", dtype, tile)
-            self._mask.restore(saved)
-            if self.near is None:
-                self.near = self.device.field(self.size, 1, "near to what is frozen", "nu2")
-                self._find(_changed(None, saved), cell)
-            else:
-                self._find(_changed(before, saved), self._cell)
-                self.fade_over(cell)
-        if before is not None:
-            before.release()
-
-    def fade_over(self, cell: tuple[float, float]) -> None:
-        """From now on submaps have `cell` texels along their cells."""
-        if self.near is not None and cell != self._cell:
-            self.near.clear()
-            self._find(_changed(None, self.saved), cell)
-
-    def _find(self, regions: Iterable[Region], cell: tuple[float, float]) -> None:
-        """Find `near` anew about regions of the mask."""
-        assert self._mask is not None
-        assert self.near is not None
-        self._cell = cell
-        # The cubic at the corners of a frozen pixel reaches two texels beyond it, and another where the mask's edges
-        # are not the texels' own.
-        held = 2 if self._mask.size == self.size else 3
-        reach = ceil(max(cell)) + held + 1
-        across, down = (n / of for n, of in zip(self.size, self._mask.size, strict=True))
-        about = [
+    def hold(self, mask: Field, changed: Region, draw: Draw) -> None:
+        """Hold what a mask over the whole picture, of any size, has frozen in a region; let go of the rest of it."""
+        held, kept = self._fields()
+        (x, right), (y, bottom) = (
             (
-                floor(x * across) - reach,
-                floor(y * down) - reach,
-                ceil(width * across) + 2 * reach + 1,
-                ceil(height * down) + 2 * reach + 1,
+                max(floor(changed[k] * n / of) - REACH, 0),
+                min(ceil((changed[k] + changed[k + 2]) * n / of) + REACH, n),
             )
-            for x, y, width, height in regions
-        ]
-        rows = self.device.field((TILE, TILE + 2 * reach), 1, "frozen, along x")
-        draw, along = (self.device.pass_("warp/near.frag", **defines) for defines in ({}, {"ALONG_X": 1}))
-        for tile in tiles_of(self.size):
-            if parts := [intersection(tile, region) for region in about if overlap(tile, region)]:
-                x, y = min(part[0] for part in parts), min(part[1] for part in parts)
-                width, height = (max(part[k] + part[k + 2] for part in parts) - (x, y)[k] for k in (0, 1))
-                inputs: dict[str, Any] = {"size": self.size, "reach": float(held)}
-                above = (0, 0, width, height + 2 * reach)
-                along(rows, region=above, frozen=self._mask, offset=(x, y - reach), cell=cell[0], **inputs)
-                part = x, y, width, height
-                draw(self.near, region=part, frozen=rows, offset=(-x, reach - y), cell=cell[1], **inputs)
+            for k, n, of in zip((0, 1), self.size, mask.size, strict=True)
+        )
+        region = x, y, width, height = x, y, right - x, bottom - y
+        rows = self.device.field((width, height + 2 * REACH), 1, "frozen, along x", "f1")
+        now = self.device.field((width, height), 1, "held now", "f1")
+        along_x, along_y = (self.device.pass_("warp/hold.frag", **defines) for defines in ({"ALONG_X": 1}, {}))
+        reach: dict[str, Any] = {"inner": float(INNER), "reach": float(REACH)}
+        along_x(rows, frozen=mask, offset=(x, y - REACH), size=self.size, **reach)
+        along_y(now, frozen=rows, offset=(0.0, REACH), size=rows.size, **reach)
+        new = (now.get() > 0) & (held.get(region) == 0)
+        blocks = [(x + left, y + top, across, down) for left, top, across, down in _blocks_of(new)]
+        draw(kept, blocks, now, (x, y), held)
+        self.device.pass_("gl/copy.frag")(held, region=region, field=now, offset=(-x, -y))
         rows.release()
+        now.release()
+
+    def draw_anew(self, draw: Draw) -> None:
+        """Draw the displacement again wherever it is held."""
+        if self.held and self.kept:
+            nothing = self.device.field((1, 1), 1, "nothing held", "f1")
+            draw(self.kept, _blocks_of(self.held.get() > 0), self.held, (0, 0), nothing)
+            nothing.release()
+
+    def widen(self, target: Field, window: tuple[float, float, float, float], extent: tuple[float, float]) -> None:
+        """Draw 1 into cells with something held in them and those within two of them, else 0.
+
+        Args:
+            target: the cells.
+            window: left, top, width and height of what they cover, within the picture, longer sides.
+            extent: (width, height) of the picture.
+        """
+        cells = self.device.field(target.size, 1, "cells with something held", "f1")
+        origin = window[0] / extent[0], window[1] / extent[1]
+        cell = window[2] / extent[0] / target.width, window[3] / extent[1] / target.height
+        average = self.device.pass_("step/average_frozen.frag")
+        average(cells, frozen=self.held, enough=1e-6, origin=origin, cell=cell)
+        self.device.pass_("step/widen_solid.frag")(target, frozen=cells)
+        cells.release()
+
+    def save(self) -> dict[str, SavedTiles]:
+        """What is held, by name; nothing if nothing was frozen. Whoever has it releases it."""
+        return {"held": self.held.save(), "kept": self.kept.save()} if self.held and self.kept else {}
+
+    def restore(self, tiles: dict[str, SavedTiles]) -> None:
+        """Be what `save` gave."""
+        if "held" not in tiles:
+            self.release()
+        else:
+            for name, field in zip(("held", "kept"), self._fields(), strict=True):
+                field.restore(tiles[name])
 
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(field.nbytes for field in (self._mask, self.near) if field is not None)
+        return sum(field.nbytes for field in (self.held, self.kept) if field is not None)
 
     def release(self) -> None:
-        """Free the textures."""
-        self.restore(None, self._cell)
-
-    def _let_go(self) -> None:
-        for field in (self._mask, self.near):
+        """Let go of everything."""
+        for field in (self.held, self.kept):
             if field is not None:
                 field.release()
-        self._mask = self.near = None
+        self.held = self.kept = None
+
+    def _fields(self) -> tuple[TiledField, TiledField]:
+        """Both, made when they are wanted first."""
+        if self.held is None or self.kept is None:
+            self.held = TiledField(self.device, self.size, 1, "held", "f1")
+            self.kept = TiledField(self.device, self.size, 2, "kept")
+        return self.held, self.kept
 
 
-def saved_of(mask: Field) -> SavedTiles:
-    """A field's values as a tiled one would save them; whoever has it releases it."""
-    if isinstance(mask, TiledField):
-        return mask.save()
-    tiled = TiledField(mask.device, mask.size, mask.components, "mask", mask.dtype)
-    tiled.set(mask.get())
-    saved = tiled.save()
-    tiled.release()
-    return saved
-
-
-def _changed(before: SavedTiles | None, now: SavedTiles | None) -> Iterator[Region]:
-    """Regions about all that is frozen in one of two saves of a kind and not in the other, each within a tile."""
-    some = now or before
-    if some is None:
-        return
-
-    def frozen(saved: SavedTiles | None, place: int) -> np.ndarray | bool:
-        field = None if saved is None else saved.tiles.flat[place].field
-        return field is not None and field.get() > (127 if saved and saved.kind.dtype == "f1" else 0.5)
-
-    for place, (x, y, width, height) in enumerate(some.kind.regions):
-        if before and now and before.tiles.flat[place] is now.tiles.flat[place]:
-            continue
-        changed = np.full((height, width), frozen(before, place)) ^ frozen(now, place)
-        rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
-        if rows.size:
-            left, top = int(columns[0]), int(rows[0])
-            yield x + left, y + top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top
+def _blocks_of(wanted: np.ndarray) -> list[Region]:
+    """The blocks with something in them that is true."""
+    (height, width), sides = wanted.shape, (range(0, n, BLOCK) for n in wanted.shape)
+    rows, columns = sides
+    found = np.logical_or.reduceat(np.logical_or.reduceat(wanted, rows, axis=0), columns, axis=1)
+    return [
+        (columns[i], rows[j], min(BLOCK, width - columns[i]), min(BLOCK, height - rows[j]))
+        for j, i in np.argwhere(found).tolist()
+    ]

@@ -11,14 +11,15 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
+from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.grid import Grid
 from solver.scheme import State, check_field, check_step, on_faces
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
-from solver.warp.frozen import Frozen, saved_of
+from solver.warp.frozen import Frozen
 from solver.warp.inverse import ForwardMap
-from solver.warp.state import SUBMAPS, MapState, grid_in, kind_values, values_of
+from solver.warp.state import SUBMAPS, MapState, grid_in, values_of
 from solver.warp.submap import Level, Submap, window_of
 
 if TYPE_CHECKING:
@@ -74,12 +75,18 @@ class WarpMap:
         self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
         self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last remap
+        self._is_settled = True  # the submap leads nowhere where the map is held
         self._limits = self._picture = (0.0, 0.0, *self.extent)  # of the places looked up: left, top, right, bottom
         self.version = 0
 
     @property
     def grid(self) -> Grid:
         return self._submap.grid
+
+    @property
+    def held(self) -> Field | None:
+        """Where it is held, texel by texel, from 1/2 on; None if nothing is."""
+        return self._frozen.held
 
     # -- moving it --------------------------------------------------------------------------------------------------
 
@@ -162,28 +169,28 @@ class WarpMap:
         if grid.picture != self.extent:
             raise ValueError(f"a map of a picture of {self.extent} cannot go on in one of {grid.picture}")
         self._begin_remap()
-        if self._frozen.near is not None:
-            self._take_in_all()  # it fades over the cells of its own grid
         self._submap.release()
         self._submap = Submap(self.device, grid)
-        self._frozen.fade_over(self._cell)
         self._steps = 0
         self._changed()
 
-    def hold(self, frozen: Field | None) -> None:
+    def hold(self, frozen: Field | None, changed: Region | None = None) -> None:
         """From now on, change nothing where a mask over the whole picture, of any size, is 1.
 
-        Nor within two texels of the accumulated map around it, or three where the mask has other texels: what is looked
-        up on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or
-        not. Over one cell from there the map goes over into what flows.
+        Nor within three texels of the accumulated map around it: what is looked up on a frozen pixel is interpolated
+        from there. What the map is there is kept to the bit, however it came about. Within two cells the submap stands
+        still, so that what is around goes on from it without a step.
+
+        Args:
+            frozen: the mask; None holds nothing.
+            changed: (x, y, width, height) in the mask's texels, outside of which it is as it was given before.
         """
-        saved = None if frozen is None else saved_of(frozen)
-        if self._frozen.differs(saved):
-            self.remap()
-            self._frozen.restore(saved, self._cell)
-            self._changed()
-        if saved is not None:
-            saved.release()
+        if frozen is None:
+            self._frozen.release()
+        else:
+            self._frozen.hold(frozen, changed or (0, 0, *frozen.size), self._keep)
+            self._is_settled &= not self._steps
+        self._changed()
 
     def restore_under(
         self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0
@@ -195,11 +202,15 @@ class WarpMap:
             hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
             amount: 0-1, the part of the displacement that is taken away at the centre.
         """
+        if not self._is_settled:
+            self._begin_remap()  # or what is around the held places would not go on from them
         self._take_in_all()
         restore = self.device.pass_("warp/restore.frag", **self._held_defines())
         inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
-        if self._frozen.near is not None:
-            inputs |= {"near": self._frozen.near, "picture": self.extent}
+        still = None
+        if self._frozen.held is not None:
+            still, window = self._still_under(center, radius)
+            inputs |= {"still": still, "still_window": window}
         submap, accumulated = self._submap, self._accumulated
         restore(submap.write, displacement=submap.read, window=window_of(self.grid), **inputs)
         submap.swap()
@@ -215,6 +226,8 @@ class WarpMap:
                     target, region=regions, displacement=accumulated.now, window=self._picture, **inputs
                 ),
             )
+        if still is not None:
+            still.release()
         self._changed()
 
     # -- its state --------------------------------------------------------------------------------------------------
@@ -225,7 +238,9 @@ class WarpMap:
         self._submap.read.clear()
         self._accumulated.clear()
         self._steps = 0
+        self._is_settled = True
         self._limits = self._picture
+        self._frozen.draw_anew(self._keep)
         self._changed()
 
     def set(self, displacement: np.ndarray) -> None:
@@ -254,19 +269,19 @@ class WarpMap:
         # Each of them in float32, as the shaders take them.
         lowest, highest = np.minimum(0, [across.min(), down.min()]), [across.max(), down.max()]
         self._limits = (*lowest.tolist(), *np.maximum(self.extent, highest).tolist())
+        self._frozen.draw_anew(self._keep)
 
     def save(self) -> MapState:
         """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._limits, "grid": values_of(self.grid)}
+        values["settled"] = self._is_settled
         for name, level in (("gathered", self._gathered), ("pending", self._pending)):
             if level is not None:
                 fields[name] = level.field
                 values |= {SUBMAPS[name]: values_of(level.grid), "remapping": self._remapping}
         state = MapState.of(self.device, fields, **values)
-        if self._frozen.saved is not None:
-            state.tiles["frozen"] = self._frozen.saved.held()
-            state.values["frozen kind"] = kind_values(self._frozen.saved.kind)
+        state.tiles.update(self._frozen.save())
         return state
 
     def restore(self, state: State) -> None:
@@ -287,7 +302,8 @@ class WarpMap:
         self._steps = int(state.values["steps"])
         left, top, right, bottom = state.values["limits"].tolist()
         self._limits = left, top, right, bottom
-        self._frozen.restore(state.tiles.get("frozen"), self._cell)
+        self._is_settled = bool(state.values["settled"])
+        self._frozen.restore(state.tiles)
         self._drop_waiting()
         self._pending, self._gathered = self._level_in(state, "pending"), self._level_in(state, "gathered")
         if self._pending is not None:
@@ -318,7 +334,7 @@ class WarpMap:
         accumulated map for it.
         """
         size = size or self.size
-        if size == self.size and self._steps == 0 and self._pending is None:
+        if size == self.size and self._steps == 0 and self._pending is None and self._frozen.held is None:
             return self._accumulated.now
         key = size, exact
         if key not in self._composed:
@@ -335,7 +351,7 @@ class WarpMap:
         or two a cell. Where something is frozen it is the accumulated map's: what is looked up between coarser texels
         would reach beyond what is held.
         """
-        if self._frozen.near is not None:
+        if self._frozen.held is not None:
             return self.size
         sides = zip(self.size, result, picture, self.coarse_size, strict=True)
         times = max(1, min(own // min(wanted, max(given, 2 * cells)) for own, wanted, given, cells in sides))
@@ -389,7 +405,7 @@ class WarpMap:
             width, height = self.size
             apart = math.ceil(math.sqrt(width * height / MOST_PLACES))
             size = -(-width // apart), -(-height // apart)
-        return distortion(self.device, size, self._defines_of(self._levels), self._parts())
+        return distortion(self.device, size, self._held_defines() | _depth(self._levels), self._parts())
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
@@ -397,11 +413,12 @@ class WarpMap:
         """Let what has moved stand by to be taken in, and begin with a submap of nothing."""
         if not self._steps:
             return
-        if self._frozen.near is not None or (self._gathered is not None and self._gathered.grid != self.grid):
+        if self._gathered is not None and self._gathered.grid != self.grid:
             self._take_in_all()
         elif self._tiles * (1 - self._remapping / self._whole) <= MOST_TILES:
             self._take_in(1.0)  # which is less work than to gather
         self._steps = 0
+        self._is_settled = True
         if self._pending is not None:
             self._gather()
         elif self._stand_by(Level(self._submap.read, self.grid)):
@@ -421,7 +438,7 @@ class WarpMap:
         times = max(LEAST_TEXELS, min(math.isqrt(in_all // (nx * ny)), most))
         field = self.device.field((times * nx, times * ny), 2, "gathered submap")
         levels = [Level(self._submap.read, self.grid), *([] if self._gathered is None else [self._gathered])]
-        compose = self.device.pass_("warp/compose.frag", GATHER=1, **self._defines_of(levels))
+        compose = self.device.pass_("warp/compose.frag", GATHER=1, **_depth(levels))
         left, top, width, height = window_of(self.grid)
         step = width / field.width, height / field.height
         origin = left / step[0], top / step[1]
@@ -453,7 +470,8 @@ class WarpMap:
 
     def _draw_anew(self, levels: list[Level], part: float) -> None:
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **self._defines_of(levels))
+        # Also where the map is held: places beside that may look into it, and once it is thawed it goes on from there.
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **_depth(levels))
         inputs = self._parts_of(levels)
         self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
 
@@ -470,6 +488,27 @@ class WarpMap:
         field.copy_from(saved)
         return Level(field, grid_in(state.values, SUBMAPS[name]))
 
+    def _keep(self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field) -> None:
+        """Draw the map where it is held now and was not before; see `Frozen`."""
+        fine = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **_depth(self._levels))
+        compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
+
+    def _still_under(
+        self, center: tuple[float, float], radius: float
+    ) -> tuple[Field, tuple[float, float, float, float]]:
+        """Cells, the submap's or larger, under a brush and around it, about what is held, and their window."""
+        sides, counts = [], []
+        for at, step, side in zip(center, self.grid.spacing, self.extent, strict=True):
+            step = max(step, radius / 32)
+            start, end = max(at - radius - 2 * step, 0.0), min(at + radius + 2 * step, side)
+            counts.append(max(math.ceil((end - start) / step), 1))
+            sides.append((start, end - start))
+        window = sides[0][0], sides[1][0], sides[0][1], sides[1][1]
+        still = self.device.field((counts[0], counts[1]), 1, "still under a brush", "f1")
+        self._frozen.widen(still, window, self.extent)
+        return still, window
+
     def _compose(self, target: Field, **defines: object) -> None:
         compose = self.device.pass_("warp/compose.frag", **self._defines() | defines)
         compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
@@ -477,9 +516,7 @@ class WarpMap:
     @property
     def _whole(self) -> int:
         """`REMAP_STEPS` times the steps that the pending level is taken in over, if nothing waits."""
-        # Where something is frozen levels fade out towards it: none may be gathered, and each has to be soon over.
-        spread = math.ceil(self._tiles / MOST_TILES) if self._frozen.near is None else 0
-        return REMAP_STEPS * max(REMAP_STEPS, spread)
+        return REMAP_STEPS * max(REMAP_STEPS, math.ceil(self._tiles / MOST_TILES))
 
     @property
     def _waiting(self) -> list[Level]:
@@ -494,13 +531,10 @@ class WarpMap:
     def _defines(self) -> dict[str, object]:
         """How the whole map is put together."""
         fine: dict[str, object] = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        return fine | self._defines_of(self._levels)
-
-    def _defines_of(self, levels: list[Level]) -> dict[str, object]:
-        return self._held_defines() | ({"LEVELS": len(levels)} if len(levels) > 1 else {})
+        return fine | self._held_defines() | _depth(self._levels)
 
     def _held_defines(self) -> dict[str, object]:
-        return {} if self._frozen.near is None else {"HELD": 1}
+        return {} if self._frozen.held is None else {"HELD": 1}
 
     def _parts(self) -> dict[str, Any]:
         """What `lib/warp.glsl` puts together."""
@@ -510,17 +544,15 @@ class WarpMap:
         parts: dict[str, Any] = {"accumulated": self._accumulated.now, "picture": self.extent, "limits": self._limits}
         for (name, window), level in zip(NAMES, levels, strict=False):
             parts |= {name: level.field, window: window_of(level.grid)}
-        return parts if self._frozen.near is None else parts | {"near": self._frozen.near}
-
-    @property
-    def _cell(self) -> tuple[float, float]:
-        """Texels of the accumulated map along a cell."""
-        (across, down), (hx, hy), (width, height) = self.size, self.grid.spacing, self.extent
-        return across * hx / width, down * hy / height
+        return parts if self._frozen.held is None else parts | {"held": self._frozen.held, "kept": self._frozen.kept}
 
     def _changed(self) -> None:
         self.version += 1
         self._fresh.clear()
+
+
+def _depth(levels: list[Level]) -> dict[str, object]:
+    return {"LEVELS": len(levels)} if len(levels) > 1 else {}
 
 
 def _runge_kutta(

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from solver.gl.device import Device
-from solver.gl.field import DTYPES
-from solver.gl.tiled import Kind, SavedTiles
+from solver.gl.tiled import TILE, Kind, SavedTiles
 from solver.grid import Grid
 from solver.scheme import State
 
@@ -35,9 +34,11 @@ class MapState(State):
                     made.fields[name] = device.upload(given, f"{name}, given")
             if "gathered" in made.fields and "pending" not in made.fields:
                 raise ValueError("what its map has gathered waits for nothing")
-            tiles = {name: saved for name, saved in self.tiles.items() if name != "frozen"}
-            if "frozen kind" in rest:
-                tiles["frozen"] = SavedTiles.nothing(_kind_in(arrays))
+            accumulated = self.tiles["accumulated map"]
+            tiles = {"accumulated map": accumulated}
+            for name, kind in held_kinds(accumulated.kind.size).items():
+                if f"{name}/places" in rest:
+                    tiles[name] = SavedTiles.nothing(kind)
             for name, saved in tiles.items():
                 parts = {key.removeprefix(f"{name}/"): rest.pop(key) for key in arrays if key.startswith(f"{name}/")}
                 made.tiles[name] = saved.with_arrays(device, parts)
@@ -48,18 +49,9 @@ class MapState(State):
         return made
 
 
-def kind_values(kind: Kind) -> np.ndarray:
-    """The kind of a mask as numbers, for `MapState`, (5,)."""
-    return np.array([*kind.size, kind.components, kind.tile, np.dtype(DTYPES[kind.dtype]).num])
-
-
-def _kind_in(arrays: Mapping[str, np.ndarray]) -> Kind:
-    numbers = arrays["frozen kind"]
-    dtypes = {np.dtype(dtype).num: name for name, dtype in DTYPES.items()}
-    if numbers.shape != (5,) or min(numbers[:4]) < 1 or int(numbers[4]) not in dtypes:
-        raise ValueError("its mask is of no kind")
-    width, height, components, tile, dtype = numbers.tolist()
-    return Kind((width, height), components, dtypes[dtype], tile)
+def held_kinds(size: tuple[int, int]) -> dict[str, Kind]:
+    """Of the tiles of `Frozen`, by name, for a map of `size` texels."""
+    return {"held": Kind(size, 1, "f1", TILE), "kept": Kind(size, 2, "f4", TILE)}
 
 
 def values_of(grid: Grid) -> np.ndarray:

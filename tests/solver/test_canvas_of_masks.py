@@ -55,7 +55,7 @@ def test_nothing_is_kept_of_masks_that_are_not_painted(device: Device, masks: Ma
     assert (viscosity == np.float32(0.03)).all()
     assert not solid.any()
     assert masks.nbytes < 10 * GRID.nx * GRID.ny
-    assert masks.frozen_field is None
+    assert masks.take_frozen() is None
     masks.thicken(Tip((-1, -1), (-1, -1), 0.5), 1)
     masks.smooth(Tip((0.5, 0.3), (0.5, 0.3), 0.5), 1)
     assert masks.nbytes < 10 * GRID.nx * GRID.ny

@@ -322,38 +322,35 @@ def test_frozen_pixels_keep_every_bit(device: Device) -> None:
 
 
 @pytest.mark.parametrize("texels", [(700, 530), (350, 265)], ids=["the map's texels", "coarser ones"])
-def test_what_is_near_to_frozen_is_found_anew_where_the_mask_has_changed(
-    device: Device, texels: tuple[int, int]
-) -> None:
-    """Frozen and thawed piece by piece, to nothing and on: the same as found at once, and as a distance transform."""
+def test_what_is_held_is_found_where_the_mask_has_changed(device: Device, texels: tuple[int, int]) -> None:
+    """Frozen and thawed piece by piece: the same texels as found at once, each with the map as it was held first."""
     size, rng = (700, 530), np.random.default_rng(4)
-    mask = TiledField(device, texels, 1, "mask", "f1")
-    kept, values = Frozen(device, size), np.zeros(texels[::-1], np.uint8)
-    before = values > 127
+    grid = Grid(*size)
+    warp, mask = WarpMap(device, Grid(70, 53, grid.extent), size), TiledField(device, texels, 1, "mask", "f1")
+    frozen, values = Frozen(device, size), np.zeros(texels[::-1], np.uint8)
+    before, wanted = np.zeros(size[::-1], bool), np.zeros((*size[::-1], 2), np.float32)
+    scale = size[0] // texels[0]
+    inside = np.outer(np.sin(np.linspace(0, np.pi, 53)), np.sin(np.linspace(0, np.pi, 70)))
     for step in range(12):
-        x, y = rng.integers(0, texels)
-        values[y : y + 60, x : x + 40] = rng.choice([0, 100, 127, 128, 200])
+        x, y = (int(n) for n in rng.integers(0, texels))
+        width, height = min(40, texels[0] - x), min(60, texels[1] - y)
+        values[y : y + height, x : x + width] = rng.choice([0, 100, 127, 128, 200])
+        changed = x, y, width, height
         if step == 7:
-            values[:] = 100
+            values[:], changed = 100, (0, 0, *texels)
         mask.set(values)
-        saved, fresh, cell = mask.save(), Frozen(device, size), (11.0, 9.5) if step < 10 else (5.0, 6.0)
-        assert kept.differs(saved) == ((values > 127) != before).any()
-        kept.restore(saved, cell)
-        fresh.restore(saved, cell)
-        before = values > 127
-        assert (kept.near is None) == (fresh.near is None) == (not before.any())
-        if kept.near and fresh.near:
-            near = kept.near.get()
-            np.testing.assert_array_equal(near, fresh.near.get())
-            if texels == size:
-                held = np.asarray(ndimage.binary_dilation(before, np.ones((5, 5))), bool)
-                np.testing.assert_array_equal(near == near.max(), held)
-                far = np.asarray(ndimage.distance_transform_edt(~held, (1 / cell[1], 1 / cell[0])))
-                assert not near[far >= 1].any()
-                assert near[far < 0.9].all()
-        fresh.release()
-        saved.release()
-    for thing in (kept, mask):
+        warp.set(smooth(rng, (70, 53), 0.01) * inside[..., None])
+        frozen.hold(mask, changed, warp._keep)
+        fine = (values > 127).repeat(scale, axis=0).repeat(scale, axis=1)
+        assert frozen.held is not None
+        assert frozen.kept is not None
+        within, around = (np.asarray(ndimage.binary_dilation(fine, np.ones((n, n))), bool) for n in (3, 7))
+        np.testing.assert_array_equal(frozen.held.get(), np.where(within, 255, np.where(around, 170, 0)))
+        wanted[around & ~before] = warp.composed().get()[around & ~before]
+        np.testing.assert_array_equal(frozen.kept.get()[around], wanted[around])
+        before = around
+    assert np.abs(wanted).max() > 1e-3
+    for thing in (frozen, mask, warp):
         thing.release()
 
 
@@ -382,6 +379,26 @@ def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> N
     away = ~np.asarray(ndimage.binary_dilation(disc, np.ones((3, 3)), iterations=4), bool)
     assert np.abs(held_map - free_map)[away].max() < 0.02 * grid.h
     assert not held_map[disc].any()
+
+
+@pytest.mark.parametrize("steps", [7, 13])
+def test_what_is_frozen_while_the_map_is_made_anew_is_taken_in_once(device: Device, steps: int) -> None:
+    """Submaps that wait and one that has moved on, a disc frozen then: remaps leave the map as it is, also beside it."""
+    grid = Grid(48, 48)
+    warp = WarpMap(device, grid, (384, 384), remap_every=5)
+    for step in range(steps):
+        warp.advance_prescribed(swirl((0.7, 0.7), 0.28), 0.04, step * 0.04)
+    x, y = Grid(384, 384).centres()
+    disc = np.hypot(x - 0.78, y - 0.7) < 0.07
+    warp.hold(device.upload(disc.astype(np.uint8) * 255))
+    before = warp.read((384, 384))
+    assert np.abs(before[disc]).max() > 2 * grid.h
+    for _ in range(2):
+        warp.remap()
+        after = warp.read((384, 384))
+        np.testing.assert_array_equal(after[disc], before[disc])
+        assert np.abs(after - before).max() < 5e-3 * grid.h
+        warp.advance_prescribed(lambda x, y, t: (0 * x, 0 * y), 0.04)
 
 
 def window(whole: Grid, left: int, top: int, nx: int, ny: int) -> Grid:
@@ -507,20 +524,20 @@ def test_the_map_is_as_fine_as_the_picture(picture: tuple[int, int], cells: int,
 
 
 def test_freezing_a_place_of_a_large_picture_looks_only_about_it(device: Device) -> None:
-    """Also where the map goes over into what flows in another width, as it does with a brush of another size."""
+    """Also where the fluid moves everywhere: nothing is remapped for it, and nowhere does the map jump."""
+    grid = Grid(64, 64)
+    warp, mask = WarpMap(device, grid, (2048, 2048)), TiledField(device, (2048, 2048), 1, "mask", "f1")
+    for _ in range(4):
+        warp.advance_prescribed(lambda x, y, t: (0.3 * (y - 0.5), 0.3 * (0.5 - x)), 0.05)
+    before = warp.read((512, 512))
     values = np.zeros((2048, 2048), np.uint8)
     values[600:620, 800:840] = 255
-    mask = TiledField(device, (2048, 2048), 1, "mask", "f1")
-    mask.clear()
-    mask.copy_from(device.upload(values), (768, 512, 256, 256))
-    saved, frozen = mask.save(), Frozen(device, mask.size)
-    away = [np.maximum(np.abs(np.arange(2048) - middle) - half, 0) for middle, half in ((819.5, 21.5), (609.5, 11.5))]
-    distance = np.hypot(away[0][None, :], away[1][:, None])
-    for wide, find in ((40.0, lambda cell: frozen.restore(saved, cell)), (9.0, frozen.fade_over)):
-        device.timings.take()
-        with device.stage("near"):
-            find((wide, wide))
-        assert frozen.near is not None
-        step = np.clip(1 - distance / wide, 0, 1)
-        np.testing.assert_allclose(frozen.near.get() / 65535, step**2 * (3 - 2 * step), atol=1e-4)
-        assert device.timings.texel_writes["near"] < values.size / 8
+    mask.set(values)
+    device.timings.take()
+    with device.stage("hold"):
+        warp.hold(mask, (780, 590, 90, 40))
+    assert device.timings.texel_writes["hold"] < 5 * 100 * 60
+    assert np.abs(before).max() > 0.02
+    np.testing.assert_allclose(warp.read((512, 512)), before, atol=1e-6)
+    mask.release()
+    warp.release()

@@ -1,8 +1,10 @@
-"""A freeze stroke on a photograph of 6000 pixels: what its ring shows is what is frozen."""
+"""Freeze strokes: what the ring shows is what is frozen, and the picture beneath keeps every bit from then on."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from scipy import ndimage
 
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
@@ -45,4 +47,83 @@ def test_the_picture_beneath_a_frozen_stroke_keeps_every_bit_up_to_the_ring(devi
     assert frozen[ring < -1].all()
     assert not frozen[ring > 1].any()
     sampler.release()
+    replay.release()
+
+
+def wandering(rng: np.random.Generator, tool: str, first: int, last: int, radius: float) -> Stroke:
+    """A straight stroke between two places about the middle."""
+    (x0, y0), (x1, y1) = rng.uniform(0.4, 0.6, (2, 2)).tolist()
+    parts = np.linspace(0, 1, last - first + 1).tolist()
+    samples = tuple((first + n, x0 + (x1 - x0) * p, y0 + (y1 - y0) * p, 1.0) for n, p in enumerate(parts))
+    return Stroke.model_validate({"tool": tool, "samples": samples, "radius": radius, "hardness": rng.uniform()})
+
+
+@pytest.mark.parametrize(
+    ("size", "seed", "grid"),
+    [((640, 480), 1, 48), ((640, 480), 2, 96), ((301, 193), 1, 48), ((97, 400), 1, 48), ((1500, 40), 2, 48)],
+)
+def test_what_is_frozen_while_it_moves_keeps_every_bit(
+    size: tuple[int, int], seed: int, grid: int, device: Device
+) -> None:
+    """Strokes at random: no pixel of the result, and no place of the map between the texels, changes by a bit."""
+    (width, height), rng = size, np.random.default_rng([*size, seed])
+    pixels = rng.integers(0, 256, (height, width, 3), np.uint8)
+    strokes = (
+        wandering(rng, "push", 0, 8, 0.15),
+        wandering(rng, "freeze", 6, 10, rng.uniform(0.03, 0.1)),
+        wandering(rng, "push", 9, 20, 0.15),
+        wandering(rng, "freeze", 14, 16, 0.05),
+        wandering(rng, "twirl", 20, 24, 0.12),
+    )
+    recipe = Recipe.parse(f'version = 1\npicture = "noise.png"\nduration = 1.0\n[fluid]\ngrid = {grid}')
+    replay = Replay(device, recipe.edited(stroke=strokes), Pictures(Picture(pixels)), budget=0)
+    sampler, points = Sampler(device), rng.random((4000, 2))
+    column, row = (points * size).astype(int).T
+    under = np.zeros(4000, bool)
+    frozen, before, there, kept = np.zeros((height, width), bool), pixels, np.zeros((4000, 2)), 0
+    for _ in range(30):
+        replay.advance()
+        now, at = sampler.apply(replay.warp, pixels), replay.warp.at(points * replay.grid.extent)
+        np.testing.assert_array_equal(now[frozen], before[frozen])
+        np.testing.assert_array_equal(at[under], there[under])
+        kept += np.count_nonzero((now != pixels).any(axis=-1) & frozen)
+        if replay.masks.frozen.size == replay.masks.canvas.size:
+            finer = replay.masks.canvas.nx // width
+            texels = replay.masks.frozen.get() >= 128
+            frozen = np.asarray(texels.reshape(height, finer, width, finer).all(axis=(1, 3)))
+            under = frozen[row, column]
+        before, there = now, at
+    assert kept > 1000, "what had moved before it was frozen"
+    sampler.release()
+    replay.release()
+
+
+@pytest.mark.parametrize(("size", "seed"), [((640, 480), 5), ((301, 193), 3), ((600, 400), 7)])
+def test_the_map_goes_on_from_what_is_frozen_without_a_step(size: tuple[int, int], seed: int, device: Device) -> None:
+    """Frozen while it moves, pushed and restored around: neighbours differ across the border as they do beside it."""
+    rng = np.random.default_rng([*size, seed])
+    strokes = (
+        wandering(rng, "push", 0, 12, 0.15),
+        wandering(rng, "freeze", 8, 12, 0.06),
+        wandering(rng, "push", 16, 24, 0.12),
+        wandering(rng, "restore", 13, 36, 0.12),
+    )
+    recipe = Recipe.parse('version = 1\npicture = "none.png"\nduration = 1.5\n[fluid]\ngrid = 48')
+    pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
+    replay = Replay(device, recipe.edited(stroke=strokes), pictures, budget=0)
+    replay.seek(10)
+    frozen_before = replay.warp.read(replay.warp.size)
+    replay.seek(40)
+    displacement = replay.warp.read(replay.warp.size) * replay.warp.size[0]
+    assert replay.warp.held is not None
+    held = replay.warp.held.get() > 0
+    beside = np.asarray(ndimage.binary_dilation(held, iterations=12), bool) & ~held
+    border, around = 0.0, 0.0
+    for axis in (0, 1):
+        jump = np.abs(np.diff(displacement, axis=axis)).max(axis=-1)
+        first, second = (np.diff(mask.astype(int), axis=axis) for mask in (held, beside))
+        border = max(border, jump[first != 0].max())
+        around = max(around, jump[(second == 0) & np.delete(beside, 0, axis=axis)].max())
+    assert border < 1.2 * around
+    assert np.abs(frozen_before[held]).max() * replay.warp.size[0] > 0.3, "what had moved before it was frozen"
     replay.release()
