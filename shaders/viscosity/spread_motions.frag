@@ -1,8 +1,9 @@
-// Spread motions: every face moves with the part of the coarse space that it belongs to, Z times the motions.
+// Spread motions: every face moves with the part of the coarse space that it belongs to, Z times the motions; REST: a face
+// of no part moves as before, u_u, u_v.
 // u_motions: (a, b, w) by part, the velocity (a - w y, b + w x); part 0 does not move.
 // u_part_u, u_part_v: the part each belongs to; u_shear: (s_y, s_x), see operator.glsl. WIDE: texels of
 // a row of u_motions.
-// reads: 10
+// reads: 12
 #ifndef WIDE
 #define WIDE 64
 #endif
@@ -10,6 +11,10 @@ uniform sampler2D u_motions;
 uniform sampler2D u_part_u;
 uniform sampler2D u_part_v;
 uniform vec2 u_shear;
+#ifdef REST
+uniform sampler2D u_u;
+uniform sampler2D u_v;
+#endif
 in vec2 v_uv;
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -28,4 +33,8 @@ void main() {
         out_u[q] = of_u.x - of_u.z * y[q];
         out_v[q] = of_v.y + of_v.z * x[q];
     }
+#ifdef REST
+    out_u = mix(out_u, texture(u_u, v_uv), vec4(equal(part_u, vec4(0.0))));
+    out_v = mix(out_v, texture(u_v, v_uv), vec4(equal(part_v, vec4(0.0))));
+#endif
 }

@@ -48,10 +48,16 @@ class CoarseSpace:
         (row, column), (row_v, column_v) = np.nonzero(parts.of_u), np.nonzero(parts.of_v)
         faces_u, faces_v = (parts.of_u[row, column], self._y[row]), (parts.of_v[row_v, column_v], self._x[column_v])
         self.centres = np.stack([_means(*faces, parts.count) for faces in (faces_v, faces_u)], axis=1)
+        # Z' Z, which is diagonal: faces of u, of v, and of a core squares of their arms.
+        inertia = sum(
+            np.bincount(part, (at - self.centres[part, axis]) ** 2, parts.count + 1)
+            for axis, (part, at) in enumerate((faces_v, faces_u))
+        )
         number = np.arange(parts.count + 1)
         is_core = (number > 0) & (number <= parts.cores)
+        counts = (np.bincount(part, minlength=parts.count + 1) for part, _ in (faces_u, faces_v))
+        self.masses = np.stack([*counts, inertia * is_core], axis=1).astype(float)
         self._first = np.where(is_core, 3 * (number - 1), number - 1 + 2 * parts.cores)
-        self.count = int(self._first[-1]) + 1 if parts.count else 0
         # Of each unknown its part, and which of (across, down, turn) it is.
         self.part = np.repeat(number[1:], np.where(is_core, 3, 1)[1:])
         runs = np.where(np.arange(parts.count - parts.cores) < parts.runs_of_u, 0, 1)
@@ -60,7 +66,7 @@ class CoarseSpace:
         cluster = self._clusters(strains, threshold)
         along = 0 if columns >= rows else 1
         strip = parts.tile[self.part, along]
-        self._matrix = ClusterMatrix(cluster[self.part], strip, *self._entries(strains, faces_u, faces_v))
+        self._matrix = ClusterMatrix(cluster[self.part], strip, *self._entries(strains))
 
     def _strains(self, level: Coefficients) -> list[Any]:
         """Of each kind of strain that some part feels: K, and of its faces (part, sign, arm, whether it is of v)."""
@@ -105,9 +111,7 @@ class CoarseSpace:
                 other.append(parts[3][both])
         return connected(np.arange(self.parts.count + 1), np.concatenate(one), np.concatenate(other))
 
-    def _entries(
-        self, strains: list[Any], *faces_of: tuple[np.ndarray, np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _entries(self, strains: list[Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Entries (row, column, value), of which Z' A Z is the sum and its transpose."""
         count, cores, first = self.parts.count + 1, self.parts.cores, self._first
         is_core = np.arange(count) <= cores
@@ -120,11 +124,9 @@ class CoarseSpace:
             values.append(value.ravel()[there])
 
         # Masses: the identity.
-        for of_v, (part, at) in enumerate(faces_of):
-            arm = at - self.centres[part, 1 - of_v]
-            faces = np.bincount(part, minlength=count)
-            add(first + of_v * is_core, first + of_v * is_core, 0.5 * faces)
-            add(first + 2, first + 2, 0.5 * np.bincount(part, arm**2, count) * is_core)
+        for axis, mass in enumerate(self.masses.T):
+            at = first + axis * is_core
+            add(at, at, 0.5 * mass)
         for stiffness, faces in strains:
             # The unknowns that move a face, two of a core's three or a run's one, and what strain they make.
             unknown, felt = [], []
@@ -165,6 +167,7 @@ class Deflation:
         self.side = max(SMALLEST_TILE, 2 * -(-max(level.texels) // TILES))
         ringed = level.rhs.u.size
         self._part_of = tuple(device.field(ringed, 4, f"deflated part of {name}") for name in "uv")
+        self.averaged = PackedFaces(device, ringed, "averaged over parts")
         self._tables: list[Field] = []
         self._stiff: np.ndarray | None = None
         self._threshold = 0.0
@@ -204,24 +207,41 @@ class Deflation:
         if not self._tables or self._tables[0].height < height:
             for table in self._tables:
                 table.release()
-            names = "tiles", "loads", "motions"
+            names = "tiles", "loads", "motions", "masses"
             self._tables = [self.device.field((WIDE, height), 4, f"deflated {name}") for name in names]
         tiles = parts.tile * (self.side // 2) + region[:2]
         self._tables[0].set(self._rows_of(np.concatenate([tiles, self._space.centres], axis=1)))
+        self._tables[3].set(self._rows_of(self._space.masses))
 
     def correct(self, residual: PackedFaces, target: PackedFaces, add: bool = False) -> None:
         """Draw Z E^-1 Z' times the residual, or add it; waits for the GPU."""
         space = self.space
         assert space is not None
-        tiles, loads, motions = self._tables
-        part_of = {"part_u": self._part_of[0], "part_v": self._part_of[1], "shear": self.level.shear}
-        count = space.parts.count + 1
-        gather = self.device.pass_("viscosity/gather_loads.frag", SIDE=self.side // 2 + 1)
-        gather(loads, region=(0, 0, WIDE, -(-count // WIDE)), tiles=tiles, **residual.inputs(), **part_of)
-        found = space.solve(loads.get().reshape(-1, 4)[:count, :3].astype(np.float64))
-        motions.set(self._rows_of(found))
+        motions = self._tables[2]
+        loads = self._gather(residual).get().reshape(-1, 4)[: space.parts.count + 1, :3]
+        motions.set(self._rows_of(space.solve(loads.astype(np.float64))))
         spread = self.device.pass_("viscosity/spread_motions.frag", WIDE=WIDE)
-        spread(target.fields, add=add, region=self.level.region, motions=motions, **part_of)
+        spread(target.fields, add=add, region=self.level.region, motions=motions, **self._belonging)
+
+    def average(self, faces: PackedFaces, target: PackedFaces, add: bool = False) -> None:
+        """Draw S times the faces, or add it: each part moves as a whole, as near to them as it can."""
+        motions = self._gather(faces, MEANS=1)
+        spread = self.device.pass_("viscosity/spread_motions.frag", WIDE=WIDE, REST=1)
+        spread(target.fields, add=add, region=self.level.region, motions=motions, **faces.inputs(), **self._belonging)
+
+    def _gather(self, faces: PackedFaces, **defines: int) -> Field:
+        """The table of what the faces are for each part."""
+        tiles, loads, _, masses = self._tables
+        assert self._space is not None
+        gather = self.device.pass_("viscosity/gather_loads.frag", SIDE=self.side // 2 + 1, **defines)
+        rows = -(-(self._space.parts.count + 1) // WIDE)
+        inputs = {"masses": masses} if defines else {}
+        gather(loads, region=(0, 0, WIDE, rows), tiles=tiles, **inputs, **faces.inputs(), **self._belonging)
+        return loads
+
+    @property
+    def _belonging(self) -> dict[str, Any]:
+        return {"part_u": self._part_of[0], "part_v": self._part_of[1], "shear": self.level.shear}
 
     def _rows_of(self, values: np.ndarray) -> np.ndarray:
         table = self._tables[0]
@@ -232,9 +252,9 @@ class Deflation:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(field.nbytes for field in (*self._part_of, *self._tables))
+        return sum(field.nbytes for field in (*self._part_of, *self._tables, *self.averaged.fields))
 
     def release(self) -> None:
         """Free the textures."""
-        for field in (*self._part_of, *self._tables):
+        for field in (*self._part_of, *self._tables, *self.averaged.fields):
             field.release()

@@ -14,6 +14,9 @@ BARELY_VISCOUS = 0.05
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
+# Where all is viscous, parts move together through what lies between them, and the coarse levels must carry that. Above
+# this kappa, in those of the softest cell, they move them as a whole; below, what strains a little is theirs.
+RIGID_OF_SOFTEST = 40.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
 # fifths. Of one viscosity nothing is read and two sweeps cost a tenth more; a first step then leaves 1 % of its change.
 ONE_SWEEP = 4.0
@@ -41,7 +44,7 @@ class Plan:
         tolerance: of the conjugate gradients.
         iterations: of the conjugate gradients, at most.
         stiff: dt mu / h^2 above which cores and runs are deflated; 0: none are.
-        deflate_twice: once more after the cycle: what stiff parts have to do with each other through viscous fluid.
+        rigid: the coarse levels move each of these parts as a whole, and count no viscosity above `stiff`.
     """
 
     method: Literal["smooth", "direct", "cg"] = "cg"
@@ -49,7 +52,7 @@ class Plan:
     tolerance: float = TOLERANCE
     iterations: int = MOST_ITERATIONS
     stiff: float = 0.0
-    deflate_twice: bool = False
+    rigid: bool = False
 
 
 def plan_for(least: float, largest: float, cells: int) -> Plan:
@@ -58,10 +61,10 @@ def plan_for(least: float, largest: float, cells: int) -> Plan:
         return Plan("smooth", 2)
     is_soft = least <= ONE_SWEEP
     count = 1 if is_soft and least < largest else 2
-    stiff = max(STIFF, STIFF_OF_SOFTEST * least)
+    stiff = max(STIFF, STIFF_OF_SOFTEST * least) if is_soft else RIGID_OF_SOFTEST * least
     tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF[0 if is_soft else 1]
     if cells <= SMALL:
         tolerance /= 3
     if largest <= stiff:
         return Plan("cg", count, tolerance)
-    return Plan("cg", count, tolerance, stiff=stiff, deflate_twice=not is_soft)
+    return Plan("cg", count, tolerance, stiff=stiff, rigid=not is_soft)

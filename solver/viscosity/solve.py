@@ -105,13 +105,11 @@ class Viscosity:
         finest = self.multigrid.finest
         if self.deflation.space is None:
             return self.multigrid.precondition(residual, start=False)
+        if self.plan.rigid:
+            return self.multigrid.precondition(residual, start=False, rigid=self.deflation)
         self.deflation.correct(residual, finest.faces.write)
         finest.faces.swap()
-        self.multigrid.precondition(residual, start=True)
-        if self.plan.deflate_twice:
-            self.multigrid.residual(finest, finest.faces.read, residual, finest.faces.write)
-            self.deflation.correct(finest.faces.write, finest.faces.read, add=True)
-        return finest.faces.read
+        return self.multigrid.precondition(residual, start=True)
 
     def unpack(self, faces: PackedFaces, velocity: Field) -> None:
         """Packed faces as a velocity on MAC faces."""
