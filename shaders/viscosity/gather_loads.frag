@@ -1,8 +1,7 @@
-// Gather loads: force and torque of the residual on each part of the coarse space, Z' r; a texel for each part. MEANS: the
-// motion (a, b, w) of the part that is nearest to faces f, (Z' Z)^-1 Z' f, as spread_motions.frag takes it.
+// Gather loads: force and torque of the residual on each part of the coarse space, Z' r; a texel for each part.
 // u_tiles: (first texel x, y, centre x, centre y) by part, cells; u_u, u_v: the residual; u_part_u, u_part_v: the part
-// that each face belongs to, 0 for none; u_masses: faces of u, of v, and squares of their arms; u_shear: (s_y, s_x), see operator.glsl. SIDE: texels along a tile and one more.
-// reads: 102
+// that each face belongs to, 0 for none; u_shear: (s_y, s_x), see operator.glsl. SIDE: texels along a tile and one more.
+// reads: 101
 #ifndef SIDE
 #define SIDE 5
 #endif
@@ -12,9 +11,6 @@ uniform sampler2D u_v;
 uniform sampler2D u_part_u;
 uniform sampler2D u_part_v;
 uniform vec2 u_shear;
-#ifdef MEANS
-uniform sampler2D u_masses;
-#endif
 layout(location = 0) out vec4 out_load;
 
 void main() {
@@ -32,9 +28,4 @@ void main() {
             vec4 x = (corner.x + vec4(0.5, 1.5, 0.5, 1.5)) / u_shear.y - tile.z;
             out_load.xyz += vec3(dot(u, vec4(1.0)), dot(v, vec4(1.0)), dot(x, v) - dot(y, u));
         }
-#ifdef MEANS
-    vec3 mass = texelFetch(u_masses, ivec2(gl_FragCoord.xy), 0).xyz;
-    out_load.xyz *= vec3(greaterThan(mass, vec3(0.0))) / max(mass, vec3(1e-6));
-    out_load.xy += out_load.z * vec2(tile.w, -tile.z);
-#endif
 }

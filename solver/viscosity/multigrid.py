@@ -164,28 +164,26 @@ class Multigrid:
         self.smooth(level, rhs, weights[::-1])
 
     def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None) -> None:
-        """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts S P in place of P, between two deflations."""
+        """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts S P in place of P, between two corrections of these."""
         # The write side is free until the correction is added.
         faces, free = level.faces.read, level.faces.write
-        if rigid:
-            self._deflate(level, rhs, rigid)
         self.residual(level, faces, rhs, free)
         coarser = self.levels[level.depth + 1]
+        averaged = free
         if rigid:
-            rigid.average(free, rigid.averaged)
-        self.cycle(coarser, coarser.rhs, self._restrict(rigid.averaged if rigid else free, coarser))
+            moved = rigid.correct(free, faces, add=True)
+            self.residual(level, faces, rhs, free)
+            averaged = rigid.average(free, moved)
+        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser))
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"ALONE": 1} if rigid else {}))
         prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
                 **level.bounds)  # fmt: skip
         if rigid:
-            rigid.average(free, faces, add=True)
-            self._deflate(level, rhs, rigid)
+            means = rigid.add_others(free, faces)
+            self.residual(level, faces, rhs, free)
+            rigid.correct(free, faces, add=True, means=means)
         else:
             level.faces.swap()
-
-    def _deflate(self, level: Level, rhs: PackedFaces, deflation: Deflation) -> None:
-        self.residual(level, level.faces.read, rhs, level.faces.write)
-        deflation.correct(level.faces.write, level.faces.read, add=True)
 
     # -- its parts --------------------------------------------------------------------------------------------------
 

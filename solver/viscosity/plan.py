@@ -14,8 +14,9 @@ BARELY_VISCOUS = 0.05
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
-# Where all is viscous, parts move together through what lies between them, and the coarse levels must carry that. Above
-# this kappa, in those of the softest cell, they move them as a whole; below, what strains a little is theirs.
+# Where all is viscous, parts move together through what lies between them, and coarse levels must carry that; beside
+# solids coarse strains are not those of the fine level, which stiff cells feel most. In both cases coarse levels move
+# parts above this kappa, in those of the softest cell, as a whole; what is less stiff strains a little, and is theirs.
 RIGID_OF_SOFTEST = 40.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
 # fifths. Of one viscosity nothing is read and two sweeps cost a tenth more; a first step then leaves 1 % of its change.
@@ -24,7 +25,7 @@ ONE_SWEEP = 4.0
 # viscosity varies so much at most, and below 5 % beyond.
 MODERATE = 300.0
 TOLERANCE = 0.017
-TOLERANCE_STIFF = 0.07, 0.036  # for the softest kappa below and above ONE_SWEEP
+TOLERANCE_STIFF = 0.07
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
 # third of the tolerance is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
 # after 60 steps that moved 12, and is .06.
@@ -55,16 +56,16 @@ class Plan:
     rigid: bool = False
 
 
-def plan_for(least: float, largest: float, cells: int) -> Plan:
-    """The plan for kappa between `least` and `largest` on so many cells."""
+def plan_for(least: float, largest: float, cells: int, solids: bool) -> Plan:
+    """The plan for kappa between `least` and `largest` on so many cells, some of them solid or none."""
     if largest <= BARELY_VISCOUS:
         return Plan("smooth", 2)
-    is_soft = least <= ONE_SWEEP
-    count = 1 if is_soft and least < largest else 2
-    stiff = max(STIFF, STIFF_OF_SOFTEST * least) if is_soft else RIGID_OF_SOFTEST * least
-    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF[0 if is_soft else 1]
+    rigid = (least > ONE_SWEEP or solids) and largest > MODERATE * least
+    count = 1 if least <= ONE_SWEEP and least < largest and not rigid else 2
+    stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
+    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF
     if cells <= SMALL:
         tolerance /= 3
     if largest <= stiff:
         return Plan("cg", count, tolerance)
-    return Plan("cg", count, tolerance, stiff=stiff, rigid=not is_soft)
+    return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid)

@@ -62,7 +62,7 @@ class Viscosity:
             amount = np.minimum(amount, np.float32(MOST / kappa))
         fluid = amount[~frozen] if frozen.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
-        self.plan = plan_for(kappa * least, kappa * largest, self.size[0] * self.size[1])
+        self.plan = plan_for(kappa * least, kappa * largest, self.size[0] * self.size[1], bool(frozen.any()))
         self.deflation.set_stiff(None)
         if least == largest and not frozen.any():
             self.multigrid.set_uniform(least, dt, walls.no_slip)
