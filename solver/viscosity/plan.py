@@ -8,15 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 # kappa up to which two smoothing sweeps leave less than 0.1 %.
 BARELY_VISCOUS = 0.05
 # Deflated is what is stiffer than this: below, multigrid alone takes no more iterations. A node that touches the
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
-# Where all is viscous, parts move together through what lies between them, and coarse levels must carry that; beside
-# solids coarse strains are not those of the fine level, which stiff cells feel most. In both cases coarse levels move
-# parts above this kappa, in those of the softest cell, as a whole; what is less stiff strains a little, and is theirs.
+# Where all is viscous, stiff parts move together through what lies between them. If they have edges, the coarse levels,
+# which count strains in them that they do not have, cannot carry that; nor beside solids, where coarse strains are not
+# those of the fine level. There the coarse levels move parts above this kappa, in those of the softest cell, as a
+# whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without.
 RIGID_OF_SOFTEST = 40.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
 # fifths. Of one viscosity nothing is read and two sweeps cost a tenth more; a first step then leaves 1 % of its change.
@@ -56,11 +59,19 @@ class Plan:
     rigid: bool = False
 
 
-def plan_for(least: float, largest: float, cells: int, solids: bool) -> Plan:
-    """The plan for kappa between `least` and `largest` on so many cells, some of them solid or none."""
+def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
+    """True if coarse levels must move stiff parts as a whole, should there be any; see `RIGID_OF_SOFTEST`."""
+    if solid.any() or kappa.min() <= ONE_SWEEP:
+        return bool(solid.any())
+    pairs = (kappa[1:], kappa[:-1]), (kappa[:, 1:], kappa[:, :-1])
+    return any(bool((np.maximum(*pair) > MODERATE * np.minimum(*pair)).any()) for pair in pairs)
+
+
+def plan_for(least: float, largest: float, cells: int, is_sharp: bool) -> Plan:
+    """The plan for kappa between `least` and `largest` on so many cells; see `is_sharp`."""
     if largest <= BARELY_VISCOUS:
         return Plan("smooth", 2)
-    rigid = (least > ONE_SWEEP or solids) and largest > MODERATE * least
+    rigid = is_sharp and largest > MODERATE * least
     count = 1 if least <= ONE_SWEEP and least < largest and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
     tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF
