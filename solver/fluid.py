@@ -13,7 +13,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.reduction import Reduction
-from solver.grid import Grid
+from solver.grid import Grid, check_type
 from solver.packing import PackedFaces
 from solver.params import FluidParams
 from solver.pressure.projection import Projection
@@ -95,6 +95,8 @@ class Fluid(Scheme):
         See `Scheme.step`. Unconditionally stable: without forces the energy never grows (equation S6).
         """
         dt = check_step(dt)
+        if steer is not None:
+            check_type("what steers", steer, Callable)
         self.local.clear()
         w1 = self._add_force(forces, dt)
         w2 = self._advect(w1, dt)
@@ -226,6 +228,7 @@ class Fluid(Scheme):
 
         Valid until the velocity changes. The next step follows it.
         """
+        dt = check_step(dt)
         if self._traced != dt:
             self._traced, tracing = dt, self._tracing(self.faces(), dt)
             with self.device.stage("trace"):

@@ -10,9 +10,9 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.grid import Grid
+from solver.grid import Grid, check_type
 from solver.params import FluidParams
-from solver.scheme import Forces, Residuals, Scheme, Vector, check_shape, check_size, check_step
+from solver.scheme import Forces, Residuals, Scheme, Vector, check_shape, check_size, check_step, real_array
 from solver.warp.map import Velocity, WarpMap
 
 
@@ -42,6 +42,8 @@ class PaperFluid(Scheme):
 
     def step(self, dt: float, forces: Forces = (), steer: Callable[[Field], None] | None = None) -> None:
         dt = check_step(dt)
+        if steer is not None:
+            check_type("what steers", steer, Callable)
         self.local.clear()
         self.add_force(forces, dt)
         self.advect(dt)
@@ -119,7 +121,7 @@ class PaperFluid(Scheme):
         """Set the velocity at cell centres from (ny, nx, 2) or a function (x, y, t)."""
         if callable(velocity):
             velocity = np.stack(velocity(*self.grid.centres(), self.time), axis=-1)
-        array = np.asarray(velocity, np.float32)
+        array = real_array("a velocity", velocity).astype(np.float32)
         check_shape("a velocity", array, (self.grid.ny, self.grid.nx, 2))
         check_size("a velocity", array)
         self.velocity.read.set(array)

@@ -12,7 +12,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.tiled import SavedTiles, TiledField
-from solver.grid import Grid
+from solver.grid import Grid, check_type
 from solver.params import LARGEST_SPEED, FluidParams
 
 # Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below what float32 holds.
@@ -215,6 +215,7 @@ class Scheme(ABC):
 
         Raises:
             ValueError: for a step or a force that is not finite, negative, of another shape, or beyond all measure.
+            TypeError: for what is no number, no force or cannot steer.
         """
 
     # -- what is put in ---------------------------------------------------------------------------------------------
@@ -233,7 +234,7 @@ class Scheme(ABC):
         Raises:
             ValueError: on another shape, or if a value is negative, not finite or beyond all measure.
         """
-        array = np.asarray(viscosity, np.float32)
+        array = real_array("a viscosity", viscosity).astype(np.float32)
         if array.ndim:
             check_shape("a viscosity", array, (self.grid.ny, self.grid.nx))
         if not ((array >= 0).all() and (array <= LARGEST_VISCOSITY).all()):
@@ -260,6 +261,7 @@ class Scheme(ABC):
 
     def add_source(self, source: Field, amount: float = 1.0) -> None:
         """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
+        check_type("a source", source, Field)
         if source.size != self.grid.size or source.components != 1:
             raise ValueError(f"a source is {source}, {self.grid.nx} x {self.grid.ny} x 1 is wanted")
         check_finite("an amount of a source", amount)
@@ -268,6 +270,7 @@ class Scheme(ABC):
 
     def add_local(self, motion: Field, amount: float = 1.0) -> None:
         """Let `amount` times `motion` (MAC faces, lengths / s) carry the picture until the next step; see `local`."""
+        check_field("a motion", motion, self.grid)
         check_finite("an amount of a motion", amount)
         add = self.device.pass_("step/add_impulse.frag")
         self.local.add(lambda field: add(field, add=True, force=motion, impulse=amount))
@@ -350,6 +353,7 @@ class Scheme(ABC):
         Raises:
             ValueError: if the state is of another grid or of another scheme.
         """
+        check_type("what to go back to", state, State)
         state.write_to(self._live())
         self.time = float(state.values["time"])
         self.impulse.clear()
@@ -379,7 +383,9 @@ class Scheme(ABC):
     def _acting(self, forces: Forces, dt: float) -> tuple[list[tuple[Field, float]], np.ndarray | None]:
         """Forces as fields with their impulses, and the velocity, (ny, nx, 2), that all others make in `dt`."""
         fields, total = list[tuple[Field, float]](), None
-        for force in [forces] if isinstance(forces, np.ndarray) or callable(forces) else forces:
+        several = [forces] if isinstance(forces, np.ndarray) or callable(forces) else forces
+        check_type("what forces the fluid", several, Iterable)
+        for force in several:
             if isinstance(force, tuple):
                 field, impulse = force
                 check_field("a force", field, self.grid)
@@ -415,13 +421,27 @@ def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.nda
         shape = grid.ny, grid.nx
         array = np.stack([np.broadcast_to(parts[axis], shape) for axis, parts in enumerate(both)], axis=-1)
     else:
-        array = np.asarray(vector)
-    if array.dtype.kind not in "fiub":
-        raise ValueError(f"{what} is of {array.dtype}, real numbers are wanted")
+        array = vector
+    array = real_array(what, array)
     check_shape(what, array, (grid.ny, grid.nx, 2))
     if not np.isfinite(array).all():
         raise ValueError(f"{what} holds a value that is not finite")
     return array.astype(np.float32)
+
+
+def real_array(what: str, values: object) -> np.ndarray:
+    """Values as an array.
+
+    Raises:
+        ValueError: if they are no real numbers, or rows of them are of unequal length.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what} has rows of unequal length") from None
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{what} is of {array.dtype}, real numbers are wanted")
+    return array
 
 
 def check_step(dt: float) -> float:
@@ -429,7 +449,9 @@ def check_step(dt: float) -> float:
 
     Raises:
         ValueError: if it is not from 0 to `LONGEST_STEP` seconds.
+        TypeError: if it is no number.
     """
+    check_type("a step", dt)
     if not 0 <= dt <= LONGEST_STEP:
         raise ValueError(f"a step of {dt} s was asked for; it must be from 0 to {LONGEST_STEP:g} s")
     return float(dt)
@@ -437,6 +459,7 @@ def check_step(dt: float) -> float:
 
 def check_finite(what: str, value: float) -> None:
     """Make sure that a number is finite, and no larger than `LARGEST_SPEED`."""
+    check_type(what, value)
     if not abs(value) <= LARGEST_SPEED:
         raise ValueError(f"{what} of {value} was given; it must be finite and no larger than {LARGEST_SPEED:g}")
 
@@ -455,5 +478,6 @@ def check_shape(what: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
 
 def check_field(what: str, field: Field, grid: Grid) -> None:
     """Make sure that a field is a vector on the faces of a grid."""
+    check_type(what, field, Field)
     if field.size != grid.size or field.components != 2:
         raise ValueError(f"{what} is {field}, {grid.nx} x {grid.ny} x 2 is wanted")

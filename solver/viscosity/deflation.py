@@ -41,26 +41,34 @@ class CoarseSpace:
     def __init__(self, parts: Parts, level: Coefficients, threshold: float, first: tuple[int, int]) -> None:
         self.parts = parts
         s_y, s_x = level.shear
-        rows, columns = parts.of_u.shape
+        height, width = parts.of_u.shape
         # Arms of a turn, u = -turn y, v = turn x, without strain where cells are not square too.
-        self._y, self._x = (np.arange(rows) + first[1] + 0.5) / s_y, (np.arange(columns) + first[0] + 0.5) / s_x
+        self._y, self._x = (np.arange(height) + first[1] + 0.5) / s_y, (np.arange(width) + first[0] + 0.5) / s_x
         # Of the faces that belong to parts: the part, and the place across the way they move.
         (row, column), (row_v, column_v) = np.nonzero(parts.of_u), np.nonzero(parts.of_v)
         faces_u, faces_v = (parts.of_u[row, column], self._y[row]), (parts.of_v[row_v, column_v], self._x[column_v])
         self.centres = np.stack([_means(*faces, parts.count) for faces in (faces_v, faces_u)], axis=1)
+        # Z' Z, which is diagonal: faces of u, of v, and the squares of their arms.
+        masses = [np.bincount(part, minlength=parts.count + 1) for part, _ in (faces_u, faces_v)]
+        part = np.concatenate([faces_v[0], faces_u[0]])
+        arm = np.concatenate([at - self.centres[of, axis] for axis, (of, at) in enumerate((faces_v, faces_u))])
+        masses.append(np.bincount(part, arm**2, parts.count + 1))
         number = np.arange(parts.count + 1)
         is_core = (number > 0) & (number <= parts.cores)
         self._first = np.where(is_core, 3 * (number - 1), number - 1 + 2 * parts.cores)
-        self.count = int(self._first[-1]) + 1 if parts.count else 0
         # Of each unknown its part, and which of (across, down, turn) it is.
         self.part = np.repeat(number[1:], np.where(is_core, 3, 1)[1:])
         runs = np.where(np.arange(parts.count - parts.cores) < parts.runs_of_u, 0, 1)
         self.motion = np.concatenate([np.tile([0, 1, 2], parts.cores), runs])
+        self._masses = np.stack(masses, axis=1)[self.part, self.motion].astype(float)
         strains = self._strains(level)
-        cluster = self._clusters(strains, threshold)
-        along = 0 if columns >= rows else 1
+        cluster = self._clusters(strains, threshold)[self.part]
+        along = 0 if width >= height else 1
         strip = parts.tile[self.part, along]
-        self._matrix = ClusterMatrix(cluster[self.part], strip, *self._entries(strains, faces_u, faces_v))
+        entries = rows, columns, values = self._entries(strains)
+        self._matrix = ClusterMatrix(cluster, strip, *entries)
+        apart = cluster[rows] != cluster[columns]
+        self._between = rows[apart], columns[apart], values[apart]
 
     def _strains(self, level: Coefficients) -> list[Any]:
         """Of each kind of strain that some part feels: K, and of its faces (part, sign, arm, whether it is of v)."""
@@ -105,9 +113,7 @@ class CoarseSpace:
                 other.append(parts[3][both])
         return connected(np.arange(self.parts.count + 1), np.concatenate(one), np.concatenate(other))
 
-    def _entries(
-        self, strains: list[Any], *faces_of: tuple[np.ndarray, np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _entries(self, strains: list[Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Entries (row, column, value), of which Z' A Z is the sum and its transpose."""
         count, cores, first = self.parts.count + 1, self.parts.cores, self._first
         is_core = np.arange(count) <= cores
@@ -120,11 +126,8 @@ class CoarseSpace:
             values.append(value.ravel()[there])
 
         # Masses: the identity.
-        for of_v, (part, at) in enumerate(faces_of):
-            arm = at - self.centres[part, 1 - of_v]
-            faces = np.bincount(part, minlength=count)
-            add(first + of_v * is_core, first + of_v * is_core, 0.5 * faces)
-            add(first + 2, first + 2, 0.5 * np.bincount(part, arm**2, count) * is_core)
+        each = np.arange(len(self.part))
+        add(each, each, 0.5 * self._masses)
         for stiffness, faces in strains:
             # The unknowns that move a face, two of a core's three or a run's one, and what strain they make.
             unknown, felt = [], []
@@ -139,9 +142,23 @@ class CoarseSpace:
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
-        """What the loads (across, down, torque) of all parts move: (a, b, turn), u = a - turn y, v = b + turn x."""
+        """E^-1 times the loads on the unknowns, each cluster by itself."""
+        return self._matrix.solve(loads)
+
+    def coupled(self, unknowns: np.ndarray) -> np.ndarray:
+        """The loads by which other clusters hold back the unknowns, through what is less stiff."""
+        rows, columns, values = self._between
+        ends, loads = (rows, columns), (values * unknowns[columns], values * unknowns[rows])
+        return np.bincount(np.concatenate(ends), np.concatenate(loads), len(unknowns))
+
+    def means(self, loads: np.ndarray) -> np.ndarray:
+        """(Z' Z)^-1 times the loads on the unknowns."""
+        return loads / np.maximum(self._masses, 1e-12)
+
+    def motions(self, unknowns: np.ndarray) -> np.ndarray:
+        """(a, b, turn) of all parts, u = a - turn y, v = b + turn x."""
         motions = np.zeros((self.parts.count + 1, 3))
-        motions[self.part, self.motion] = self._matrix.solve(loads[self.part, self.motion])
+        motions[self.part, self.motion] = unknowns
         motions[:, 0] += motions[:, 2] * self.centres[:, 1]
         motions[:, 1] -= motions[:, 2] * self.centres[:, 0]
         return motions
@@ -165,6 +182,7 @@ class Deflation:
         self.side = max(SMALLEST_TILE, 2 * -(-max(level.texels) // TILES))
         ringed = level.rhs.u.size
         self._part_of = tuple(device.field(ringed, 4, f"deflated part of {name}") for name in "uv")
+        self._averaged = PackedFaces(device, ringed, "averaged over parts")
         self._tables: list[Field] = []
         self._stiff: np.ndarray | None = None
         self._threshold = 0.0
@@ -209,19 +227,59 @@ class Deflation:
         tiles = parts.tile * (self.side // 2) + region[:2]
         self._tables[0].set(self._rows_of(np.concatenate([tiles, self._space.centres], axis=1)))
 
-    def correct(self, residual: PackedFaces, target: PackedFaces, add: bool = False) -> None:
-        """Draw Z E^-1 Z' times the residual, or add it; waits for the GPU."""
-        space = self.space
-        assert space is not None
-        tiles, loads, motions = self._tables
-        part_of = {"part_u": self._part_of[0], "part_v": self._part_of[1], "shear": self.level.shear}
+    def correct(
+        self, residual: PackedFaces, target: PackedFaces, add: bool = False, means: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Draw Z E^-1 Z' times the residual, or add it; the unknowns. Waits for the GPU.
+
+        `means`: where the parts of other clusters are expected; at rest by default.
+        """
+        space, loads = self._made(), self._gather(residual)
+        unknowns = space.solve(loads if means is None else loads - space.coupled(means))
+        self._spread(target, unknowns, add)
+        return unknowns
+
+    def average(self, residual: PackedFaces, unknowns: np.ndarray) -> PackedFaces:
+        """S' times the residual that is left once the parts have moved by the unknowns: on each part its mean.
+
+        What it is there follows from these; between stiff parts a float32 would not tell it.
+        """
+        space = self._made()
+        self._spread(self._averaged, space.means(-space.coupled(unknowns)), others=residual)
+        return self._averaged
+
+    def add_others(self, faces: PackedFaces, target: PackedFaces) -> np.ndarray:
+        """Add the faces that belong to no part to the target; how the parts move in the mean. Waits for the GPU."""
+        self._spread(target, None, add=True, others=faces)
+        return self._made().means(self._gather(faces))
+
+    def _made(self) -> CoarseSpace:
+        assert self.space is not None
+        return self.space
+
+    def _gather(self, faces: PackedFaces) -> np.ndarray:
+        """Z' times the faces, in float64."""
+        space, (tiles, loads, _) = self._made(), self._tables
         count = space.parts.count + 1
         gather = self.device.pass_("viscosity/gather_loads.frag", SIDE=self.side // 2 + 1)
-        gather(loads, region=(0, 0, WIDE, -(-count // WIDE)), tiles=tiles, **residual.inputs(), **part_of)
-        found = space.solve(loads.get().reshape(-1, 4)[:count, :3].astype(np.float64))
-        motions.set(self._rows_of(found))
-        spread = self.device.pass_("viscosity/spread_motions.frag", WIDE=WIDE)
-        spread(target.fields, add=add, region=self.level.region, motions=motions, **part_of)
+        gather(loads, region=(0, 0, WIDE, -(-count // WIDE)), tiles=tiles, **faces.inputs(), **self._belonging)
+        return loads.get().reshape(-1, 4)[space.part, space.motion].astype(np.float64)
+
+    def _spread(
+        self, target: PackedFaces, unknowns: np.ndarray | None, add: bool = False, others: PackedFaces | None = None
+    ) -> None:
+        """Draw Z times the unknowns, and on faces of no part what `others` hold, or add it."""
+        motions = self._tables[2]
+        if unknowns is not None:
+            motions.set(self._rows_of(self._made().motions(unknowns)))
+        defines = ({"OTHERS": 1} if others else {}) | ({"STILL": 1} if unknowns is None else {})
+        inputs: dict[str, Any] = {"motions": motions, **self._belonging, **(others.inputs() if others else {})}
+        spread = self.device.pass_("viscosity/spread_motions.frag", WIDE=WIDE, **defines)
+        spread(target.fields, add=add, region=self.level.region, **inputs)
+
+    @property
+    def _belonging(self) -> dict[str, Any]:
+        return {"part_u": self._part_of[0], "part_v": self._part_of[1], "shear": self.level.shear}
 
     def _rows_of(self, values: np.ndarray) -> np.ndarray:
         table = self._tables[0]
@@ -232,9 +290,9 @@ class Deflation:
     @property
     def nbytes(self) -> int:
         """Bytes of texture memory."""
-        return sum(field.nbytes for field in (*self._part_of, *self._tables))
+        return sum(field.nbytes for field in (*self._part_of, *self._tables, *self._averaged.fields))
 
     def release(self) -> None:
         """Free the textures."""
-        for field in (*self._part_of, *self._tables):
+        for field in (*self._part_of, *self._tables, *self._averaged.fields):
             field.release()

@@ -13,6 +13,7 @@ from solver.gl.field import Field
 from solver.packing import PackedFaces
 from solver.params import NoSlip
 from solver.viscosity.changed import Box, changed
+from solver.viscosity.deflation import Deflation
 from solver.viscosity.operator import Coefficients, Level, inverse_matrix
 from solver.viscosity.plan import Plan
 from solver.viscosity.transform import SineCosineTransform
@@ -22,6 +23,9 @@ from solver.viscosity.transform import SineCosineTransform
 LARGEST_EIGENVALUE = 2.8, 4.0
 # The smoothed part of the spectrum, up from the largest eigenvalue over this; by the number of sweeps.
 SMOOTHED = {1: 3.8, 2: 5.0}
+
+# kappa that no cell has: the coarse levels count it all.
+UNBOUNDED = 1e30
 
 # Texels of a grid whose transform is less than the corrections around one.
 SMALL_GRID = 64
@@ -37,11 +41,12 @@ class TakenUp(NamedTuple):
     """What the coefficients in the textures were made from.
 
     Attributes:
-        basis: (time step, where the fluid sticks, depth of the last level): with others nothing can be kept.
+        basis: (time step, where the fluid sticks, depth of the last level, largest kappa that the coarse levels count):
+            with others nothing can be kept.
         viscosity, solid: of the cells.
     """
 
-    basis: tuple[float, NoSlip, int]
+    basis: tuple[float, NoSlip, int, float]
     viscosity: np.ndarray
     solid: np.ndarray
 
@@ -109,7 +114,8 @@ class Multigrid:
         """
         self.has_transform = False
         self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
-        taken_up, basis = self._taken_up, (dt, no_slip, self.last.depth)
+        most = self.plan.stiff if self.plan.rigid else UNBOUNDED
+        taken_up, basis = self._taken_up, (dt, no_slip, self.last.depth, most)
         self._taken_up = TakenUp(basis, amount, is_solid)
         box: Box | None = Box(0, amount.shape[0], 0, amount.shape[1])
         is_new = not taken_up or taken_up.basis != basis or not np.array_equal(taken_up.solid, is_solid)
@@ -120,7 +126,7 @@ class Multigrid:
         self.finest.set_masks(viscosity, solid, self._scale(dt), float(amount.max()), no_slip, box)
         for finer, level in pairwise(self.levels[: self.last.depth + 1]):
             box = box.coarser
-            level.coarsen(finer, no_slip, box, is_new)
+            level.coarsen(finer, no_slip, box, is_new, most)
         if self.last is self.levels[-1]:
             self._inverse.set(inverse_matrix(self.last.coefficients()))
 
@@ -144,22 +150,25 @@ class Multigrid:
 
     # -- cycles -----------------------------------------------------------------------------------------------------
 
-    def precondition(self, rhs: PackedFaces, start: bool) -> PackedFaces:
-        """About A^-1 rhs, by one cycle from rest, or from what the finest level's iterate holds if it is to `start`."""
+    def precondition(self, rhs: PackedFaces, start: bool, rigid: Deflation | None = None) -> PackedFaces:
+        """About A^-1 rhs, by one cycle from rest, or from what the finest level's iterate holds if it is to `start`.
+
+        With `rigid` parts: see `_coarse_correction`.
+        """
         if "UNIFORM" in self.finest.defines:
             self.sawtooth(self.finest, rhs)
         else:
-            self.cycle(self.finest, rhs, begun=0 if start else self._begin(self.finest, rhs))
+            self.cycle(self.finest, rhs, 0 if start else self._begin(self.finest, rhs), rigid)
         return self.finest.faces.read
 
-    def cycle(self, level: Level, rhs: PackedFaces, begun: int) -> None:
+    def cycle(self, level: Level, rhs: PackedFaces, begun: int, rigid: Deflation | None = None) -> None:
         """One multigrid cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`."""
         if level is self.direct_level:
             self.direct_solve(rhs)
             return
         weights = self.weights(level)
         self.smooth(level, rhs, weights[begun:])
-        self._coarse_correction(level, rhs)
+        self._coarse_correction(level, rhs, rigid)
         self.smooth(level, rhs, weights[::-1])
 
     def sawtooth(self, level: Level, rhs: PackedFaces) -> None:
@@ -175,20 +184,32 @@ class Multigrid:
         restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
         restrict(coarser.rhs.fields, region=coarser.region, **rhs.inputs(), **coarser.bounds)
         self.sawtooth(coarser, coarser.rhs)
-        prolong = self.device.pass_("viscosity/prolong.frag", FROM_REST=1, **level.defines)
+        prolong = self.device.pass_("viscosity/prolong.frag", ALONE=1, **level.defines)
         prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **level.bounds)
         level.faces.swap()
         self.smooth(level, rhs, self.weights(level))
 
-    def _coarse_correction(self, level: Level, rhs: PackedFaces) -> None:
+    def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None) -> None:
+        """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts S P in place of P, between two corrections of these."""
         # The write side is free until the correction is added.
-        self.residual(level, level.faces.read, rhs, level.faces.write)
+        faces, free = level.faces.read, level.faces.write
+        self.residual(level, faces, rhs, free)
         coarser = self.levels[level.depth + 1]
-        self.cycle(coarser, coarser.rhs, begun=self._restrict(level.faces.write, coarser))
-        prolong = self.device.pass_("viscosity/prolong.frag", **level.defines)
-        prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"),
-                **level.faces.read.inputs(), **level.bounds)  # fmt: skip
-        level.faces.swap()
+        averaged = free
+        if rigid:
+            moved = rigid.correct(free, faces, add=True)
+            self.residual(level, faces, rhs, free)
+            averaged = rigid.average(free, moved)
+        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser))
+        prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"ALONE": 1} if rigid else {}))
+        prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
+                **level.bounds)  # fmt: skip
+        if rigid:
+            means = rigid.add_others(free, faces)
+            self.residual(level, faces, rhs, free)
+            rigid.correct(free, faces, add=True, means=means)
+        else:
+            level.faces.swap()
 
     # -- its parts --------------------------------------------------------------------------------------------------
 

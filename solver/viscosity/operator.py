@@ -164,8 +164,11 @@ class Level:
         self.operator = {**self.packed, "shear": self.shear, "aspect": self.aspect, **self.walls}
         self.open, self.stencil = {"open": self.packed["open"]}, {}
 
-    def coarsen(self, finer: Level, no_slip: NoSlip, box: Box, is_open_new: bool) -> None:
-        """Take the Galerkin operator of the `finer` level, where a box of cells has changed, and maybe what is open."""
+    def coarsen(self, finer: Level, no_slip: NoSlip, box: Box, is_open_new: bool, most: float) -> None:
+        """Take the Galerkin operator of the `finer` level, where a box of cells has changed, and maybe what is open.
+
+        On the finest level kappa above `most` counts as that.
+        """
         packed, region = self.packed, self._around(box)
         if is_open_new:
             self.device.pass_("viscosity/coarsen_open.frag")(
@@ -180,6 +183,8 @@ class Level:
             draw = self.device.pass_(f"viscosity/coarsen_{kind}.frag", **defines)
             wanted = *names, "open", *(("aspect",) if kind == "cells" else ())
             read = {name: inputs[name] for name in wanted if name in inputs}
+            if not finer.depth:
+                read["most"] = most * 2.0 * self.shear[1] ** 2 if kind == "cells" else most
             draw([packed[name] for name in names], region=region, **read, **self.walls)
         draw = self.device.pass_("viscosity/inverse_diagonal.frag")
         read: dict[str, Any] = {name: packed[name] for name in ("xx0", "yy0", "node0", "node1", "node2", "open")}

@@ -8,12 +8,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 # kappa up to which two smoothing sweeps leave less than 0.1 %.
 BARELY_VISCOUS = 0.05
 # Deflated is what is stiffer than this: below, multigrid alone takes no more iterations. A node that touches the
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
+# Where all is viscous, stiff parts move together through what lies between them. If they have edges, the coarse levels,
+# which count strains in them that they do not have, cannot carry that; nor beside solids, where coarse strains are not
+# those of the fine level. There the coarse levels move parts above this kappa, in those of the softest cell, as a
+# whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without.
+RIGID_OF_SOFTEST = 40.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
 # fifths. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
@@ -22,7 +29,7 @@ ONE_SWEEP = 4.0
 MODERATE = 300.0
 TOLERANCE = 0.017
 TOLERANCE_UNIFORM = 0.008  # for one viscosity, whose cycle leaves more: of noise between sticky sides 1.8 % with .017
-TOLERANCE_STIFF = 0.07, 0.036  # for the softest kappa below and above ONE_SWEEP
+TOLERANCE_STIFF = 0.07
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
 # third of the tolerance is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
 # after 60 steps that moved 12, and is .06.
@@ -43,7 +50,7 @@ class Plan:
         tolerance: of the conjugate gradients.
         iterations: of the conjugate gradients, at most.
         stiff: dt mu / h^2 above which cores and runs are deflated; 0: none are.
-        deflate_twice: once more after the cycle: what stiff parts have to do with each other through viscous fluid.
+        rigid: the coarse levels move each of these parts as a whole, and count no viscosity above `stiff`.
     """
 
     method: Literal["smooth", "direct", "cg"] = "cg"
@@ -51,21 +58,29 @@ class Plan:
     tolerance: float = TOLERANCE
     iterations: int = MOST_ITERATIONS
     stiff: float = 0.0
-    deflate_twice: bool = False
+    rigid: bool = False
 
 
-def plan_for(least: float, largest: float, cells: int) -> Plan:
-    """The plan for kappa between `least` and `largest` on so many cells."""
+def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
+    """True if coarse levels must move stiff parts as a whole, should there be any; see `RIGID_OF_SOFTEST`."""
+    if solid.any() or kappa.min() <= ONE_SWEEP:
+        return bool(solid.any())
+    pairs = (kappa[1:], kappa[:-1]), (kappa[:, 1:], kappa[:, :-1])
+    return any(bool((np.maximum(*pair) > MODERATE * np.minimum(*pair)).any()) for pair in pairs)
+
+
+def plan_for(least: float, largest: float, cells: int, is_sharp: bool) -> Plan:
+    """The plan for kappa between `least` and `largest` on so many cells; see `is_sharp`."""
     if largest <= BARELY_VISCOUS:
         return Plan("smooth", 2)
-    is_soft = least <= ONE_SWEEP
-    count = 1 if is_soft and least < largest else 2
-    stiff = max(STIFF, STIFF_OF_SOFTEST * least)
-    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF[0 if is_soft else 1]
-    if least == largest:
+    rigid = is_sharp and largest > MODERATE * least
+    count = 1 if least <= ONE_SWEEP and least < largest and not rigid else 2
+    stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
+    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF
+    if least == largest and not is_sharp:  # which it is beside solids: they are no case of one viscosity
         tolerance = TOLERANCE_UNIFORM
     if cells <= SMALL:
         tolerance /= 3
     if largest <= stiff:
         return Plan("cg", count, tolerance)
-    return Plan("cg", count, tolerance, stiff=stiff, deflate_twice=not is_soft)
+    return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid)

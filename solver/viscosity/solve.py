@@ -13,7 +13,7 @@ from solver.params import Walls
 from solver.viscosity.conjugate_gradients import ConjugateGradients
 from solver.viscosity.deflation import Deflation
 from solver.viscosity.multigrid import Multigrid
-from solver.viscosity.plan import Plan, plan_for
+from solver.viscosity.plan import Plan, is_sharp, plan_for
 
 # Largest dt mu / h^2 that is reckoned with. With more, a float64 loses the mass of a stiff part beside its strains, and
 # a float32 does not tell the flows apart.
@@ -67,7 +67,9 @@ class Viscosity:
             amount = np.minimum(amount, np.float32(MOST / kappa))
         fluid = amount[~frozen] if frozen.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
-        self.plan = plan_for(kappa * least, kappa * largest, self.size[0] * self.size[1])
+        self.plan = plan_for(
+            kappa * least, kappa * largest, self.size[0] * self.size[1], is_sharp(kappa * amount, frozen)
+        )
         self.deflation.set_stiff(None)
         if least == largest and not frozen.any():
             self.multigrid.set_uniform(least, dt, walls.no_slip)
@@ -110,13 +112,11 @@ class Viscosity:
         finest = self.multigrid.finest
         if self.deflation.space is None:
             return self.multigrid.precondition(residual, start=False)
+        if self.plan.rigid:
+            return self.multigrid.precondition(residual, start=False, rigid=self.deflation)
         self.deflation.correct(residual, finest.faces.write)
         finest.faces.swap()
-        self.multigrid.precondition(residual, start=True)
-        if self.plan.deflate_twice:
-            self.multigrid.residual(finest, finest.faces.read, residual, finest.faces.write)
-            self.deflation.correct(finest.faces.write, finest.faces.read, add=True)
-        return finest.faces.read
+        return self.multigrid.precondition(residual, start=True)
 
     def unpack(self, faces: PackedFaces, velocity: Field) -> None:
         """Packed faces as a velocity on MAC faces."""

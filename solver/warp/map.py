@@ -13,8 +13,8 @@ from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
-from solver.grid import Grid
-from solver.scheme import State, check_field, check_step, on_faces
+from solver.grid import Grid, check_type
+from solver.scheme import Scheme, State, check_field, check_step, on_faces, real_array
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen
@@ -92,6 +92,7 @@ class WarpMap:
 
     def follow(self, fluid: Fluid, dt: float) -> None:
         """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
+        check_type("what the map is to follow", fluid, Scheme)
         check_field("a velocity", fluid.faces(), self.grid)
         if tracing := fluid.begin_trace(check_step(dt)):
             self._submap.advance_tracing(tracing.target, tracing.defines, tracing.inputs)
@@ -146,6 +147,8 @@ class WarpMap:
             self.advance(field, dt)
             field.release()
             return
+        check_type("a velocity", velocity, Callable)
+        check_type("a time", time)
         x, y = self.grid.centres()
         back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
         left, top, width, height = window_of(self.grid)
@@ -290,6 +293,7 @@ class WarpMap:
         Raises:
             ValueError: if it is of another picture.
         """
+        check_type("what to go back to", state, State)
         grid = grid_in(state.values, "grid")
         tiles = state.tiles.get("accumulated map")
         if grid.picture != self.extent or tiles is None or tiles.kind != self._accumulated.now.kind:
@@ -369,6 +373,8 @@ class WarpMap:
         Returns:
             float32 (height, width, 2), longer sides.
         """
+        if size is not None and np.shape(size) != (2,):
+            raise ValueError(f"a size of {size!r} was given, (width, height) is wanted")
         field = self.device.field(size or self.coarse_size, 2, "warp map, to read")
         self._compose(field)
         displacement = field.get()
@@ -377,6 +383,9 @@ class WarpMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
+        points = real_array("places", points)
+        if points.shape[-1:] != (2,):
+            raise ValueError(f"places of shape {points.shape} were given, (n, 2) is wanted")
         return draw_at(self.device, points, self.extent, "warp/compose.frag", self._defines(), **self._parts())
 
     def draw(self, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:

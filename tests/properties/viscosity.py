@@ -227,7 +227,7 @@ def textures(solver: Viscosity) -> dict[str, np.ndarray]:
         found |= {field.label: field.get() for field in solver.deflation._part_of}
         # A table that more parts once needed stays as long.
         found["tiles"] = solver.deflation._tables[0].get().reshape(-1, 4)[: space.parts.count + 1]
-        found["motions"] = space.solve(np.random.default_rng(0).normal(size=(space.parts.count + 1, 3)))
+        found["motions"] = space.solve(np.random.default_rng(0).normal(size=len(space.part)))
     return found
 
 

@@ -209,3 +209,45 @@ def test_forces_as_fields_arrays_and_functions_do_the_same(device: Device) -> No
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], atol=1e-5)
     assert np.abs(found[0]).max() > 1e-3
+
+
+@pytest.mark.parametrize("kind", [Fluid, PaperFluid])
+def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Fluid | PaperFluid]) -> None:
+    """Nothing at all or a word where something else is wanted: an error of ours."""
+    grid = Grid(16, 12)
+    fluid, warp, own = kind(device, grid), WarpMap(device, grid), Fluid(device, grid)
+    still, nothing = np.zeros((12, 16, 2)), cast(Any, None)
+    calls: list[Callable[[Any], object]] = [
+        fluid.step,
+        lambda wrong: fluid.step(0.1, [wrong]),
+        lambda wrong: fluid.step(0.1, wrong),
+        lambda wrong: fluid.step(0.1, (), wrong or cast(Any, 3)),
+        lambda wrong: fluid.add_force(still, wrong),
+        fluid.advect,
+        fluid.diffuse,
+        fluid.set_velocity,
+        fluid.set_viscosity,
+        fluid.set_solid,
+        fluid.restore,
+        fluid.add_source,
+        fluid.add_local,
+        lambda wrong: fluid.add_source(fluid.solid, wrong),
+        own.trace,
+        lambda wrong: warp.follow(wrong, 0.1),
+        lambda wrong: warp.follow(own, wrong),
+        lambda wrong: warp.advance(wrong, 0.1),
+        lambda wrong: warp.advance_prescribed(wrong, 0.1),
+        lambda wrong: warp.advance_prescribed(still, wrong),
+        warp.set,
+        warp.restore,
+        warp.at,
+        lambda wrong: warp.read(wrong or cast(Any, (3, 4, 5))),
+        lambda wrong: Grid(wrong, 16),
+    ]
+    for call in calls:
+        for wrong in (nothing, cast(Any, "x")):
+            with pytest.raises((TypeError, ValueError), match=r"wanted|must be"):
+                call(wrong)
+    assert np.array_equal(fluid.velocity_at_centres(), still)
+    for item in (fluid, warp, own):
+        item.release()

@@ -383,7 +383,7 @@ def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> N
 
 @pytest.mark.parametrize("steps", [7, 13])
 def test_what_is_frozen_while_the_map_is_made_anew_is_taken_in_once(device: Device, steps: int) -> None:
-    """Submaps that wait and one that has moved on, a disc frozen then: remaps leave the map as it is, also beside it."""
+    """A submap that waits and one that has moved on, a disc frozen then: remaps leave the map as it is around too."""
     grid = Grid(48, 48)
     warp = WarpMap(device, grid, (384, 384), remap_every=5)
     for step in range(steps):
