@@ -30,6 +30,7 @@ from app.animation import (
 from app.checkpoints import DEFAULT_BUDGET
 from app.errors import UserError
 from app.files import cannot_write, is_sequence, replacing, writable
+from app.handles import ARRIVED
 from app.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.opening import check_picture
 from app.pictures import MAX_PIXELS, Picture, picture_format, unheld, write_picture
@@ -300,6 +301,8 @@ class _Export:
         """What the user should know of the last warp, and of what the output cannot hold."""
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
+        for said in self.replay.unmet(ARRIVED):
+            self.pictures.notice(said)
         output, clip = self.job.output, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture)):
             self.pictures.notice(said)

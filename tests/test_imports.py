@@ -34,7 +34,7 @@ SOLVER = {
     "resample": {"gl", "warp"},
 }
 TOOLKITS = {"glfw", "imgui_bundle"}
-MODEL = ("recipe", "schema", "strokes", "forces", "masks", "timelaws", "timeline", "history", "document")
+MODEL = ("recipe", "schema", "strokes", "forces", "handles", "masks", "timelaws", "timeline", "history", "document")
 
 
 def sources(folder: str) -> list[Path]:

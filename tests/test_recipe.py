@@ -100,15 +100,16 @@ def test_round_trip_loses_nothing():
 
 
 def test_defaults_are_not_written():
-    assert Recipe().text() == "version = 2\n"
+    assert Recipe().text() == "version = 3\n"
     assert Recipe.parse("") == Recipe()
 
 
-def test_what_version_1_said_is_said_in_version_2():
+def test_what_older_versions_said_is_said_in_this_one():
     old = Recipe.parse('version = 1\npicture = "a.png"\n[[stroke]]\ntool = "push"\nsamples = [[0, 0.1, 0.2, 1.0]]\n')
     assert old.stroke[0].detail == 0
-    assert old.text().startswith("version = 2\n")
-    assert Recipe.parse(old.text()) == old == Recipe.parse(old.text().replace("version = 2", "version = 1"))
+    assert old.text().startswith("version = 3\n")
+    for version in (1, 2, 3):
+        assert Recipe.parse(old.text().replace("version = 3", f"version = {version}")) == old
     fine = old.edited(stroke=(old.stroke[0].model_copy(update={"detail": 1400}),))
     assert Recipe.parse(fine.text()) == fine
     assert fine.agrees_until(old) == 0
