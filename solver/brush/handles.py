@@ -22,11 +22,13 @@ FARTHEST_STEP = 0.25
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
-# Of the map around a handle: det J, and how many times farther apart in the original two neighbours on a lattice over
-# the brush lie, from which on it goes slower, and where it stops: before anything folds.
-SLOWING, STOPPED = 0.4, 0.22
-STRETCHING, TORN = 3.5, 5.5
-LATTICE = 13  # places along the brush's box where that is looked at
+# Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
+# and how many times farther apart in the original two neighbours on a lattice over the brush lie. From the first of
+# each on it goes slower, at the second it stops: before anything folds.
+SLOWING, STOPPED = 0.92, 0.8
+SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
+STRETCHING, TORN = 5.0, 7.5
+LATTICE = 33  # places along the brush's box where that is looked at
 # Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
 FOUND, LOST = 1e-7, 1e-4
 MOST_ROUNDS = 8
@@ -266,7 +268,10 @@ class Handles:
             apart, far = (np.linalg.norm(np.diff(places, axis=axis), axis=-1) for places in (original, points))
             ratio = np.divide(apart, far, out=np.zeros_like(far), where=far > 1e-6)
             most = np.maximum(most, ratio.reshape(count, -1).max(axis=1))
-        return _smoothstep((least - STOPPED) / (SLOWING - STOPPED)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
+        local = float(self._local.max())
+        slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
+        stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
+        return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
 
     # -- what they do to the fluid ----------------------------------------------------------------------------------
 
@@ -293,7 +298,7 @@ class Handles:
         return push, local
 
     def _solved(self, influence: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        """The forces F that together make the wanted velocities: least |A F - V|^2 + F's own part by ridge."""
+        """The forces that together make the wanted velocities, as far as the ridge and stiffness let them: (H3)."""
         count = 2 * len(wanted)
         matrix = influence.transpose(0, 2, 1, 3).reshape(count, count)
         soft = [1 / self.handles[number].stiffness - 1 + RIDGE for number in self._active for _ in (0, 1)]
