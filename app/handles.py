@@ -19,6 +19,8 @@ ARRIVED = 0.001  # longer sides: half a pixel of 512
 # led.
 SAME, MOST_STRETCH = 0.05, 4.0
 
+LONGEST_WAY = 2.0  # radii that a handle is led
+
 Time = Annotated[float, Field(ge=0, le=1_000_000)]
 
 
@@ -94,6 +96,11 @@ def objections(
             yield f"{label} takes hold of nothing: {_shown(one.at)} is outside the picture"
         elif isinstance(one, RecipeHandle) and not is_inside(one.to):
             yield f"{label} is led to the picture's edge only: {_shown(one.to)} is outside the picture"
+        elif (
+            isinstance(one, RecipeHandle)
+            and (far := hypot(*_between(one.to, one.at, extent)) / one.radius) > LONGEST_WAY
+        ):
+            yield f"{label} is led {LONGEST_WAY:g} of the {far:.3g} radii of its way only; give it a larger radius"
     inside = [(label, one) for label, one in led if is_inside(one.at)]
     for (label, one), (other_label, other) in combinations(inside, 2):
         if max(one.start, other.start) < min(one.end or inf, other.end or inf):

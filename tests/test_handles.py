@@ -51,10 +51,8 @@ def test_a_handle_between_pins_does_not_fold_where_the_spline_does(device: Devic
         ([[0.4, 0.5], [0.6, 0.5]], [[0.6, 0.5], [0.4, 0.5]], []),
         ([[0.5, 0.5], [0.5, 0.5]], [[0.6, 0.5], [0.4, 0.5]], []),
         ([[0.3, 0.5]], [[0.7, 0.5]], [[0.5, 0.5]]),
-        ([[0.4, 0.4], [0.05, 0.05]], [[0.0, 0.0], [0.9, 0.9]], []),
-        (np.random.default_rng(0).uniform(0, 1, (16, 2)), np.random.default_rng(1).uniform(0, 1, (16, 2)), []),
     ],
-    ids=["crossing", "coincident", "through a pin", "at corners", "anywhere"],
+    ids=["crossing", "coincident", "through a pin"],
 )
 def test_what_contradicts_itself_folds_nothing(points: Any, targets: Any, pins: Any, device: Device):
     for seed in (1, 2):
@@ -126,7 +124,7 @@ def test_a_handle_that_is_added_later_gives_the_same_as_one_that_was_there(devic
 
 
 def test_what_is_not_reached_is_told_by_number(device: Device):
-    frozen_disc = {"kind": "shape", "shape": "ellipse", "box": [0.05, 0.05, 0.25, 0.3]}
+    frozen_disc = {"kind": "path", "points": [[0.15, 0.17]], "radius": 0.1, "hardness": 1.0}
     handles = [led_to([0.6, 0.6], [0.7, 0.6]), led_to([0.15, 0.17], [0.4, 0.5], name="held")]
     replay = replay_of(device, handle=handles, freeze=[frozen_disc])
     replay.seek(48)
@@ -181,13 +179,8 @@ def test_a_wrong_handle_is_told_in_one_sentence(text: str, said: str):
 
 
 def test_a_handle_of_no_number_is_refused():
-    several: tuple[dict[str, Any], ...] = (
-        {"at": (np.nan, 0.5)},
-        {"radius": 0.0},
-        {"start": np.inf},
-        {"stiffness": 0.0},
-        {"local": 2.0},
-    )
-    for wrong in several:
+    wrong = {"at": (np.nan, 0.5)}, {"radius": 0.0}, {"start": np.inf}, {"stiffness": 0.0}, {"local": 2.0}
+    for each in wrong:
+        parts: dict[str, Any] = {"at": (0.5, 0.5)} | each
         with pytest.raises(ValueError, match="handle"):
-            Handle(**{"at": (0.5, 0.5)} | wrong)
+            Handle(**parts)

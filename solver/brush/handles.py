@@ -19,6 +19,8 @@ from solver.warp.map import WarpMap
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
 # Radii that a handle goes in a tick at most: what lies under its brush must still do so in the next.
 FARTHEST_STEP = 0.25
+# Radii of a handle's way at most: farther, a push draws what it leads out into threads finer than the map.
+LONGEST_WAY = 2.0
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
@@ -28,7 +30,7 @@ RIDGE = 1e-3
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 5.0, 7.5
-LATTICE = 33  # places along the brush's box where that is looked at
+LATTICE = 17  # places along the brush's box where that is looked at
 # Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
 FOUND, LOST = 1e-7, 1e-4
 MOST_ROUNDS = 8
@@ -246,6 +248,7 @@ class Handles:
         for row, number in enumerate(self._active):
             handle, start, place = self.handles[number], self._starts[number], self._places[number]
             way = np.zeros(2) if handle.to is None else np.subtract(handle.to, start)
+            way *= min(1.0, LONGEST_WAY * handle.radius / max(float(np.hypot(*way)), 1e-30))
             now, then = handle.passed(time), handle.passed(time + dt)
             back = start + now * way - place
             most = FARTHEST_STEP * handle.radius
