@@ -269,7 +269,7 @@ class Handles:
         original, most = points + self._warp.at(listed).reshape(points.shape), np.zeros(count)
         for axis in (1, 2):
             apart, far = (np.linalg.norm(np.diff(places, axis=axis), axis=-1) for places in (original, points))
-            ratio = np.divide(apart, far, out=np.zeros_like(far), where=far > 1e-6)
+            ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
             most = np.maximum(most, ratio.reshape(count, -1).max(axis=1))
         local = float(self._local.max())
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
