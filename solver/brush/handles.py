@@ -248,11 +248,11 @@ class Handles:
         for row, number in enumerate(self._active):
             handle, start, place = self.handles[number], self._starts[number], self._places[number]
             way = np.zeros(2) if handle.to is None else np.subtract(handle.to, start)
-            way *= min(1.0, LONGEST_WAY * handle.radius / max(float(np.hypot(*way)), 1e-30))
+            way = way * min(1.0, LONGEST_WAY * handle.radius / max(float(np.hypot(*way)), 1e-30))
             now, then = handle.passed(time), handle.passed(time + dt)
             back = start + now * way - place
             most = FARTHEST_STEP * handle.radius
-            back *= -math.expm1(-RATE * dt) * min(1.0, most / max(float(np.hypot(*back)), 1e-30))
+            back = back * -math.expm1(-RATE * dt) * min(1.0, most / max(float(np.hypot(*back)), 1e-30))
             step = slower[row] * ((then - now) * way + back)
             wanted[row] = step * min(1.0, most / max(float(np.hypot(*step)), 1e-30)) / dt
         return wanted
