@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from solver.brush.brush import Brush
+    from solver.brush.handles import Handle, Handles
     from solver.brush.masks import Masks
     from solver.brush.tip import Tip
     from solver.fluid import Fluid
@@ -30,6 +31,8 @@ __all__ = [
     "Fluid",
     "FluidParams",
     "Grid",
+    "Handle",
+    "Handles",
     "Masks",
     "PaperFluid",
     "PaperWarpMap",
@@ -41,6 +44,7 @@ __all__ = [
 # Loaded when first asked for: a recipe needs `solver.grid` and must not bring all of GL along.
 _MODULES = {
     "brush.brush": ("Brush",),
+    "brush.handles": ("Handle", "Handles"),
     "brush.masks": ("Masks",),
     "brush.tip": ("Tip",),
     "fluid": ("Fluid",),

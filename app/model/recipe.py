@@ -10,11 +10,12 @@ from pydantic import Field, ValidationError, model_validator
 from app.errors import UserError
 from app.model import toml
 from app.model.forces import Force
+from app.model.handles import MOST_HANDLES, RecipeHandle, RecipePin
 from app.model.masks import FreezeLayer, ViscosityLayer
 from app.model.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
 from app.model.strokes import Change, Stroke
 
-VERSION = 2
+VERSION = 3
 MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
@@ -92,6 +93,7 @@ class Stop(Model):
         speed_below: largest speed, in longer sides per second, once it has been above.
         displacement_above: largest displacement of the warp map, in longer sides.
         det_below: smallest det J of the warp map: 0 is a fold.
+        handles_within: all handles are this near to where they are led, in longer sides; 0.001 is half a pixel of 512.
         watch: points of the picture.
     """
 
@@ -99,6 +101,7 @@ class Stop(Model):
     speed_below: Annotated[float, Field(gt=0)] | None = None
     displacement_above: Annotated[float, Field(gt=0)] | None = None
     det_below: Annotated[float, Field(lt=1)] | None = None
+    handles_within: Annotated[float, Field(gt=0, le=1)] | None = None
     watch: Several[Watch] = ()
 
 
@@ -149,7 +152,8 @@ class Recipe(Model):
     """Everything that makes a warp; see the modules of its parts for the units.
 
     Attributes:
-        version: of this format. In version 1 strokes had no `detail`; one that is read becomes one of this version.
+        version: of this format. In version 1 strokes had no `detail`, in version 2 there were no handles; one that is
+            older becomes one of this version when it is read.
         name: a title.
         picture: the source, relative to the recipe's own folder.
         map: a warp map to begin with instead of the picture as it is, in any format of `app.media.maps`.
@@ -157,9 +161,10 @@ class Recipe(Model):
         edges: what lies beyond the picture's edge.
         mode: "coordinates" warps the picture's coordinates, "density" moves its values (see `Density`).
         viscosity, freeze, force, stroke, change: applied in the order they are written in.
+        handle, pin: in force all at once.
     """
 
-    version: Literal[2] = VERSION
+    version: Literal[3] = VERSION
     name: str = ""
     picture: FileName | None = None
     map: FileName | None = None
@@ -174,6 +179,8 @@ class Recipe(Model):
     viscosity: Several[ViscosityLayer] = ()
     freeze: Several[FreezeLayer] = ()
     force: Several[Force] = ()
+    handle: Several[RecipeHandle] = ()
+    pin: Several[RecipePin] = ()
     change: Several[Change] = ()
     stroke: Several[Stroke] = ()
 
@@ -191,6 +198,12 @@ class Recipe(Model):
             raise ValueError(f"'duration' / 'fluid.dt' is more than {MOST_TICKS} ticks; make dt larger")
         if self.map is not None and self.mode == "density":
             raise ValueError("a 'map' warps coordinates, and mode \"density\" has none; remove one of them")
+        if len(self.handle) + len(self.pin) > MOST_HANDLES:
+            raise ValueError(
+                f"there are {len(self.handle) + len(self.pin)} handles and pins; at most {MOST_HANDLES} work"
+            )
+        if self.stop.handles_within is not None and not self.handle:
+            raise ValueError("'stop.handles_within' waits for handles, and there is no [[handle]]")
         ticks = [change.tick for change in self.change]
         if any(later < earlier for earlier, later in pairwise(ticks)):
             raise ValueError("the ticks of [[change]] must not go backwards")
@@ -253,6 +266,11 @@ class Recipe(Model):
         """The whole number of steps nearest to the duration, at least 1."""
         return max(1, round(self.duration / self.fluid.dt))
 
+    @property
+    def leads(self) -> bool:
+        """True if it has handles or pins."""
+        return bool(self.handle or self.pin)
+
     def fluid_at(self, tick: int) -> FluidSettings:
         """The fluid's settings in force during `tick`, with all changes up to it."""
         changed: dict[str, Any] = {}
@@ -296,18 +314,24 @@ class Recipe(Model):
                 both = [stroke for stroke in (mine, theirs) if stroke is not None]
                 until = both[0].agrees_until(both[1]) if len(both) == 2 else both[0].first_tick
                 agreed = min(agreed, until)
+        for mine, theirs in zip_longest(self.handle, other.handle):
+            if mine != theirs or self.pin != other.pin:
+                agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (mine, theirs) if led is not None)])
+        if self.pin != other.pin:
+            agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (*self.pin, *other.pin))])
         for mine, theirs in zip_longest(self.change, other.change):
             if mine != theirs:
                 agreed = min([agreed, *(change.tick for change in (mine, theirs) if change is not None)])
         return agreed
 
     def is_set_up_as(self, other: Recipe) -> bool:
-        """True if both are the same simulation but for strokes and changes."""
+        """True if both are the same simulation but for strokes, changes, handles and pins."""
         return self._set_up() == other._set_up()
 
     def _set_up(self) -> tuple[object, ...]:
         """What is in force from the first tick on."""
-        return self.picture, self.map, self.mode, self.density, self.fluid, self.viscosity, self.freeze, self.force
+        layers = self.viscosity, self.freeze, self.force
+        return self.picture, self.map, self.mode, self.density, self.fluid, *layers, self.leads
 
 
 def _inline(value: Any) -> Any:

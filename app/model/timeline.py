@@ -74,6 +74,7 @@ class Observation:
         speed: largest speed, longer sides per second.
         displacement: largest displacement, longer sides.
         det: smallest det J of the warp map.
+        away: how far the handle is that is farthest from where it is led, longer sides.
         points: where the watched points are now, as (x, y) in longer sides.
         extent: (width, height) of the picture, the longer of them 1.
     """
@@ -82,6 +83,7 @@ class Observation:
     speed: float | None = None
     displacement: float | None = None
     det: float | None = None
+    away: float | None = None
     points: tuple[tuple[float, float], ...] = ()
     extent: tuple[float, float] = (1.0, 1.0)
 
@@ -106,13 +108,17 @@ class Sentinel:
         return self.stop.displacement_above is not None or self.stop.det_below is not None
 
     @property
+    def needs_handles(self) -> bool:
+        return self.stop.handles_within is not None
+
+    @property
     def needs_points(self) -> bool:
         return bool(self.stop.watch)
 
     @property
     def is_idle(self) -> bool:
         """True if there is nothing to watch."""
-        return not (self.needs_motion or self.needs_map or self.needs_points)
+        return not (self.needs_motion or self.needs_map or self.needs_handles or self.needs_points)
 
     def verdict(self, tick: int, seen: Observation) -> str | None:
         """Which condition fired at this tick and when, or None."""
@@ -134,6 +140,8 @@ class Sentinel:
             yield f"largest displacement {seen.displacement:.3g} is above {most:g}"
         if stop.det_below is not None and seen.det is not None and seen.det < stop.det_below:
             yield f"smallest det J {seen.det:.3g} is below {stop.det_below:g}"
+        if stop.handles_within is not None and seen.away is not None and seen.away <= stop.handles_within:
+            yield f"all handles have arrived ({seen.away:.3g} away at most, within {stop.handles_within:g})"
         width, height = seen.extent
         for number, (watch, (x, y)) in enumerate(zip(stop.watch, seen.points, strict=False), 1):
             if watch.distance is not None:

@@ -52,8 +52,12 @@ def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
 
 
 def may_have_windows(recipe: Recipe) -> bool:
-    """True if nothing in it acts on the whole picture at once, as its forces and a density do."""
-    return not recipe.force and recipe.mode == "coordinates" and recipe.fluid.solver == "mac"
+    """True if nothing in it acts on the whole picture at once, as its forces, handles and a density do."""
+    return (
+        not (recipe.force or recipe.handle or recipe.pin)
+        and recipe.mode == "coordinates"
+        and recipe.fluid.solver == "mac"
+    )
 
 
 class Window(NamedTuple):

@@ -28,6 +28,7 @@ from app.media.auxiliary import Pictures
 from app.media.files import replacing
 from app.media.maps import Displacement, map_writer, write_map
 from app.media.pictures import picture_format, unheld, write_picture
+from app.model.handles import ARRIVED
 from app.model.recipe import Recipe
 from app.model.timeline import Sentinel, Timeline, frame_positions
 from app.progress import Progress
@@ -169,6 +170,8 @@ class _Export:
         """What the user should know of the last warp, and of what the output cannot hold."""
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
+        for said in self.replay.unmet(ARRIVED):
+            self.pictures.notice(said)
         output, clip = self.outputs.file, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture)):
             self.pictures.notice(said)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from math import ceil, hypot
+from math import ceil, hypot, inf
 
 import numpy as np
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.forces import BuiltForce, build
+from app.model.handles import RecipeHandle, RecipePin, is_inside, labelled, objections
 from app.model.masks import FINEST, solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import channels
@@ -21,6 +23,7 @@ from app.model.timeline import Observation, Sentinel
 from app.model.windows import FLOWING, Window, may_have_windows
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from solver.brush.brush import Brush, Motion
+from solver.brush.handles import Handle, Handles
 from solver.brush.masks import Masks
 from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
 from solver.brush.tip import Tip
@@ -112,6 +115,7 @@ class Replay:
         window: where the flow is solved on finer cells instead, None if nowhere; `fluid.grid` are its cells.
         fluid, warp, masks, density: the simulation at this moment; `density` only in density mode.
         forces: the recipe's own.
+        handles: the recipe's pins and handles, those that are in the picture.
         steps: made in all, whichever way; for measuring.
     """
 
@@ -172,8 +176,11 @@ class Replay:
             # What is left behind may be wanted again: by redo.
             self._keep(before)
             tick = self.tick
+            self.handles.replace(self._handles_in_picture())
             self._load(self.checkpoints.nearest(recipe, tick))
             self.seek(tick)
+        else:
+            self.handles.replace(self._handles_in_picture())
 
     def checkpoint(self) -> None:
         """Keep this moment, so that going back to it costs nothing."""
@@ -241,9 +248,23 @@ class Replay:
             speed=motion and motion.largest_speed,
             displacement=distortion and distortion.displacement_max,
             det=distortion and distortion.det_min,
+            away=self._farthest_handle() if sentinel.needs_handles else None,
             points=tuple(self.whereabouts(watch.point) for watch in sentinel.stop.watch),
             extent=self.grid.extent,
         )
+
+    def unmet(self, within: float) -> Iterator[str]:
+        """Which handles are farther than `within` from where they are led at this moment, and how far."""
+        if not self.handles.handles:
+            return
+        solid = self.fluid.solid.get()
+        for (label, _), far, (x, y) in zip(self._in_picture(), self.handles.away, self.handles.places, strict=True):
+            if not far <= within:
+                (nx, ny), (hx, hy) = self.grid.size, self.grid.spacing
+                frozen = solid[min(int(y / hy), ny - 1), min(int(x / hx), nx - 1)] > 0
+                why = ": what it holds is frozen" if frozen else ""
+                pixels = far * max(self.pictures.source.width, self.pictures.source.height)
+                yield f"{label} is {far:.3g} longer sides ({pixels:.3g} pixels) away from where it is led{why}"
 
     def whereabouts(self, point: tuple[float, float]) -> tuple[float, float]:
         """Where a point of the original (fractions of width and height) is now, in longer sides.
@@ -271,6 +292,7 @@ class Replay:
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
+        leads = any(handle.start <= (self.tick + 0.5) * dt for handle in self.handles.handles)
         at_work = [(stroke, dabs) for stroke in self.recipe.stroke if (dabs := stroke.at(self.tick))]
         self._follow([(stroke, dabs) for stroke, dabs in at_work if stroke.tool in FLOWING])
         self._set_parameters()
@@ -281,7 +303,9 @@ class Replay:
                 painted |= self._draw(stroke, dabs, dt, part)
             if painted:
                 self._apply_masks()
-        self.fluid.step(dt, self._forces(dt), self._steer if self._leading else None)
+            if leads:
+                self.handles.lead(dt, self.tick * dt)
+        self.fluid.step(dt, self._forces(dt), self._steer if self._leading or leads else None)
         self._carry()
         with self.device.stage("warp map"):
             self.warp.follow(self.fluid, dt * part)
@@ -415,6 +439,7 @@ class Replay:
         with self.device.stage("brush"):
             for motion in self._leading:
                 self._brush.make_up(self.fluid, motion, velocity, self.warp)
+            self.handles.make_up(velocity)
 
     def _carry(self) -> None:
         """Let what is local of brushes and forces carry the picture besides the fluid."""
@@ -422,6 +447,7 @@ class Replay:
             for motion in self._leading:
                 if isinstance(motion, Push):
                     self._brush.carry(self.fluid, motion, self.warp)
+            self.handles.carry()
             for field, amount in self._motions:
                 self.fluid.add_local(field, amount)
 
@@ -463,12 +489,40 @@ class Replay:
         self.masks = Masks(self.device, canvas)
         if recipe.freeze:
             self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
+        for said in objections(recipe.handle, recipe.pin, self.grid.extent):
+            self.pictures.notice(said)
+        self.handles = Handles(self.fluid, self.warp, self._handles_in_picture())
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
         self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters()
+
+    def _in_picture(self) -> list[tuple[str, RecipeHandle | RecipePin]]:
+        """The recipe's pins and handles that take hold of something, with what messages call them; pins come first."""
+        led = labelled(self.recipe.handle, self.recipe.pin)
+        return sorted(
+            (each for each in led if is_inside(each[1].at)), key=lambda each: isinstance(each[1], RecipeHandle)
+        )
+
+    def _handles_in_picture(self) -> list[Handle]:
+        made, extent = [], self.grid.extent
+        for _, led in self._in_picture():
+            at = led.at[0] * extent[0], led.at[1] * extent[1]
+            end = inf if led.end is None else led.end
+            if isinstance(led, RecipeHandle):
+                x, y = (min(max(part, 0.0), 1.0) * side for part, side in zip(led.to, extent, strict=True))
+                way = {"to": (x, y), "duration": led.duration, "local": led.local}
+            else:
+                way = {}
+            made.append(Handle(at, radius=led.radius, start=led.start, end=end, stiffness=led.stiffness, **way))
+        return made
+
+    def _farthest_handle(self) -> float | None:
+        """How far the handle that is farthest from where it is led is from there; None if there is none."""
+        led = [isinstance(led, RecipeHandle) for _, led in self._in_picture()]
+        return float(self.handles.away[led].max()) if any(led) else None
 
     def _begin_with(self, name: str) -> None:
         try:
@@ -502,13 +556,14 @@ class Replay:
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence, force.motion)]
-        for thing in (self._on_whole, self._in_window, self.warp, self.masks, self.density, *fields):
+        for thing in (self._on_whole, self._in_window, self.warp, self.masks, self.density, self.handles, *fields):
             if thing is not None:
                 thing.release()
 
-    def _parts(self) -> dict[str, Fluid | PaperFluid | Masks | Density | WarpMap]:
+    def _parts(self) -> dict[str, Fluid | PaperFluid | Masks | Density | WarpMap | Handles]:
         """All that has a state, by name."""
         parts = {"fluid": self.fluid, "masks": self.masks, "density": self.density, "warp": self.warp}
+        parts |= {"handles": self.handles if self.recipe.leads else None}
         return {name: part for name, part in parts.items() if part is not None}
 
     def _save(self) -> Moment:
@@ -548,6 +603,7 @@ class Replay:
         events = (
             *(stroke.first_tick for stroke in self.recipe.stroke),
             *(change.tick for change in self.recipe.change),
+            *(led.first_tick(self.recipe.fluid.dt) for led in (*self.recipe.handle, *self.recipe.pin)),
         )
         return self.tick in events
 

@@ -99,7 +99,8 @@ class Session:
     def end(self) -> int:
         """Ticks recorded; 0 where nothing has been yet."""
         recipe = self._live if hasattr(self, "_live") else self.project.recipe
-        return recipe.ticks if recipe.stroke or recipe.change or recipe.force else 0
+        acts = recipe.stroke or recipe.change or recipe.force or recipe.handle
+        return recipe.ticks if acts else 0
 
     @property
     def dt(self) -> float:

@@ -388,6 +388,17 @@ class WarpMap:
             raise ValueError(f"places of shape {points.shape} were given, (n, 2) is wanted")
         return draw_at(self.device, points, self.extent, "warp/compose.frag", self._defines(), **self._parts())
 
+    def determinants(self, points: np.ndarray) -> np.ndarray:
+        """det J at points (n, 2) of the result, in longer sides, by the chain rule: float32 (n,)."""
+        return draw_at(
+            self.device,
+            points,
+            self.extent,
+            "warp/distortion.frag",
+            self._held_defines() | _depth(self._levels),
+            **self._parts(),
+        )[:, 1]
+
     def draw(self, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
         """Draw the displacement at (fragment + origin) step, 0-1 of the picture, to be looked at between its texels."""
         compose = self.device.pass_("warp/compose.frag", **self._defines() | {"CUBIC": 1})

@@ -1,0 +1,381 @@
+"""Handles and pins: points of the picture that feedback leads to where they shall be, and holds there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from solver.brush.tip import FARTHEST, Point, Tip
+from solver.gl.field import Field
+from solver.grid import Grid
+from solver.scheme import Forces, Scheme, State, check_step
+from solver.warp.map import WarpMap
+
+RATE = 8.0  # 1 / s: at which what is left of a way is gone
+# Radii that a handle goes in a tick at most: what lies under its brush must still do so in the next.
+FARTHEST_STEP = 0.25
+# Radii of a handle's way at most: farther, a push draws what it leads out into threads finer than the map.
+LONGEST_WAY = 2.0
+# Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
+# finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
+RIDGE = 1e-3
+# Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
+# and how many times farther apart in the original two neighbours on a lattice over the brush lie. From the first of
+# each on it goes slower, at the second it stops: before anything folds.
+SLOWING, STOPPED = 0.92, 0.8
+SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
+STRETCHING, TORN = 5.0, 7.5
+LATTICE = 17  # places along the brush's box where that is looked at
+# Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
+FOUND, LOST = 1e-7, 1e-4
+MOST_ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A point of the picture on its way; longer sides and seconds, y down.
+
+    Attributes:
+        at: the place in the original of what is led.
+        to: where to; None for a pin, which stays where it is at its start.
+        radius: how far its brush reaches.
+        start: when it begins.
+        duration: of the way, which begins and ends softly.
+        end: when it lets go; until then it stays where it has arrived.
+        stiffness: 1 is led exactly; with less it gives way to the fluid and to the others.
+        local: the part of its motion, 0-1, that carries what is under it alone; see `Push`.
+
+    Raises:
+        ValueError: if a number is not finite (but for `end`) or out of its range.
+    """
+
+    at: Point
+    to: Point | None = None
+    radius: float = 0.25
+    start: float = 0.0
+    duration: float = 1.0
+    end: float = math.inf
+    stiffness: float = 1.0
+    local: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(abs(place) <= FARTHEST for place in (*self.at, *(self.to or ()))):
+            raise ValueError(f"a handle from {self.at} to {self.to} is off the picture by more than {FARTHEST:g} sides")
+        if not 1e-6 <= self.radius <= 1:
+            raise ValueError(f"a handle of radius {self.radius} was given; it must be from 1e-06 to 1")
+        if not (0 <= self.start < math.inf and 0 <= self.duration < math.inf and self.start <= self.end):
+            raise ValueError("a handle's start and duration must be finite and not negative, and its end not before")
+        if not 0.001 <= self.stiffness <= 1:
+            raise ValueError(f"a handle of stiffness {self.stiffness} was given; it must be from 0.001 to 1")
+        if not 0 <= self.local <= 1:
+            raise ValueError("the local part of a handle must be from 0 to 1")
+
+    def passed(self, time: float) -> float:
+        """The part of its way, 0-1, that it shall have gone at a time."""
+        if time >= self.start + self.duration:
+            return 1.0
+        part = max(time - self.start, 0.0) / self.duration
+        return part * part * (3 - 2 * part)
+
+
+class Handles:
+    """Leads handles together through a fluid: see *Handles* in solver/README.md.
+
+    Where they are is found in every step by inverting the map, so that no error adds up.
+
+    Args:
+        fluid: what they move.
+        warp: the map of the picture that the fluid carries.
+        handles: their number is that in the list, from 0.
+    """
+
+    def __init__(self, fluid: Scheme, warp: WarpMap, handles: Sequence[Handle]) -> None:
+        self._fluid, self._warp = fluid, warp
+        self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
+        self._one = fluid.device.field((1, 1), 1, "slip of handles")
+        self._one.clear(1.0)
+        self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
+        # Where those that have begun are, and were then; NaN for the others.
+        self._places = self._starts = np.zeros((0, 2))
+        self._active = np.zeros(0, int)
+        self._carrying = np.zeros((0, 2))
+        self.replace(handles)
+
+    def replace(self, handles: Sequence[Handle]) -> None:
+        """Go on with other handles; those that have begun keep their number."""
+        self.handles = tuple(handles)
+        self._at = np.array([handle.at for handle in handles], np.float64).reshape(-1, 2)
+        self._radii = np.array([handle.radius for handle in handles])
+        self._local = np.array([handle.local for handle in handles])
+        self._places, self._starts = (self._fitted(kept) for kept in (self._places, self._starts))
+
+    # -- a step -----------------------------------------------------------------------------------------------------
+
+    def advance(self, dt: float, forces: Forces = ()) -> None:
+        """Make a step of the fluid, with forces if there are any, and of its map, led by the handles.
+
+        Raises:
+            ValueError: as `Scheme.step`.
+        """
+        self.lead(dt, self._fluid.time)
+        self._fluid.step(dt, forces, self.make_up)
+        self.carry()
+        self._warp.follow(self._fluid, dt)  # pyright: ignore[reportArgumentType]
+
+    def lead(self, dt: float, time: float) -> None:
+        """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
+        check_step(dt)
+        active = [handle.start <= time + dt / 2 < handle.end for handle in self.handles]
+        self._places = self._located()
+        begun = np.array([handle.start <= time + dt / 2 for handle in self.handles], bool)
+        if (new := begun & np.isnan(self._starts[:, 0])).any():
+            self._places[new] = self._at[new] + self._warp.forward.at(self._at[new])
+            self._starts[new] = self._places[new]
+        self._active = np.flatnonzero(active)
+        self._wanted = self._wanted_velocities(time, dt)
+        push, local = self._influences()
+        share = self._local[self._active]
+        # What is local is shared out first: the fluid would else do all of it, going on by itself.
+        both = (1 - share[:, None, None]) * push + share[:, None, None] * local
+        self._carrying = share[:, None] * self._solved(both, self._wanted)
+        self._wanted = self._wanted - np.einsum("ijab,jb->ia", local, self._carrying)
+        self._influence = push
+        self._fluid.impulse.add(lambda faces: self._give(faces))
+
+    def make_up(self, velocity: Field) -> None:
+        """After viscosity, before the projection: add to a velocity on MAC faces what is still lacking.
+
+        For `steer` of `Scheme.step`. Spares what is thicker than at each handle, as `Brush.make_up`.
+        """
+        self._give(velocity, ATTENUATED=1)
+
+    def carry(self) -> None:
+        """After a step: let what is local carry the picture until the fluid's next one."""
+        fluid, grid = self._fluid, self._fluid.grid
+        if not self._carrying.any():
+            return
+        viscosity, shader = self._probed(fluid.faces())[:, 3], fluid.device.pass_("brush/carry.frag")
+        for place, radius, motion, here in zip(*self._brushes(), self._carrying, viscosity, strict=True):
+            tip = Tip(place, place, radius)
+            self._motion.clear(0.0, 0.0, 0.0, here)
+            inputs = tip.inputs(grid) | {"brush_velocity": tuple(motion.tolist()), "viscosity": fluid.viscosity}
+            inputs |= {"motion": self._motion, "slip": self._one}
+            fluid.local.add(lambda field, i=inputs, t=tip: shader(field, add=True, region=t.region(grid), **i))
+
+    # -- what it looks at -------------------------------------------------------------------------------------------
+
+    @property
+    def places(self) -> np.ndarray:
+        """Where they are now, (n, 2) in longer sides, or will begin; looking changes nothing."""
+        found, waiting = self._located(), np.isnan(self._starts[:, 0])
+        if waiting.any():
+            found[waiting] = self._at[waiting] + self._warp.forward.at(self._at[waiting])
+        return found
+
+    @property
+    def away(self) -> np.ndarray:
+        """How far each is from where it shall be in the end, (n,) in longer sides; 0 of pins that have not begun."""
+        places = self.places
+        starts = np.where(np.isnan(self._starts), places, self._starts)
+        ends = [start if handle.to is None else handle.to for handle, start in zip(self.handles, starts, strict=True)]
+        return np.hypot(*(places - np.reshape(ends, (-1, 2))).T)
+
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def save(self) -> State:
+        """A copy of this moment."""
+        return State({}, {"places": self._places.copy(), "starts": self._starts.copy()})
+
+    def restore(self, state: State) -> None:
+        """Go back to a moment, perhaps with other handles than then among those that had not begun.
+
+        Raises:
+            ValueError: if it is of none.
+        """
+        for name in ("places", "starts"):
+            kept = state.values.get(name)
+            if kept is None or kept.dtype != np.float64 or kept.ndim != 2 or kept.shape[1] != 2:
+                raise ValueError("the state of handles is missing")
+        self._places, self._starts = (self._fitted(state.values[name]) for name in ("places", "starts"))
+
+    def release(self) -> None:
+        """Free the textures."""
+        for field in (self._stream, self._one, self._motion):
+            field.release()
+
+    # -- where they are ---------------------------------------------------------------------------------------------
+
+    def _fitted(self, kept: np.ndarray) -> np.ndarray:
+        rows = np.full((len(self.handles), 2), np.nan)
+        count = min(len(rows), len(kept))
+        rows[:count] = kept[:count]
+        return rows
+
+    def _located(self) -> np.ndarray:
+        """Where the handles that have begun are: x with x + D(x) = at, by Newton's method from where they were."""
+        places, begun = self._places.copy(), np.flatnonzero(~np.isnan(self._starts[:, 0]))
+        if not len(begun):
+            return places
+        wanted, extent, step = self._at[begun], np.array(self._warp.extent), np.array(self._fluid.grid.spacing) / 4
+        around = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]) * step
+        found = best = places[begun]
+        least = np.full(len(begun), np.inf)
+        for _ in range(MOST_ROUNDS):
+            points = found[:, None] + around
+            moved = self._warp.at(points.reshape(-1, 2)).astype(np.float64).reshape(-1, 5, 2)
+            rest = found + moved[:, 0] - wanted
+            far = np.hypot(*rest.T)
+            best, least = np.where((far < least)[:, None], found, best), np.minimum(far, least)
+            if (least < FOUND).all():
+                break
+            slopes = np.stack([moved[:, 1] - moved[:, 2], moved[:, 3] - moved[:, 4]], axis=-1) / (2 * step)
+            back = (np.linalg.pinv(np.eye(2) + slopes) @ rest[..., None])[..., 0]
+            back *= np.minimum(1.0, FARTHEST_STEP * self._radii[begun] / np.maximum(np.hypot(*back.T), 1e-30))[:, None]
+            found = np.clip(found - back, 0.0, extent)
+        if (lost := least > LOST).any():  # the map has been changed by something else than the flow
+            best[lost] = wanted[lost] + self._warp.forward.at(wanted[lost])
+        places[begun] = best
+        return places
+
+    def _wanted_velocities(self, time: float, dt: float) -> np.ndarray:
+        """How the active handles shall move in this step, longer sides / s."""
+        wanted, slower = np.zeros((len(self._active), 2)), self._slower()
+        for row, number in enumerate(self._active):
+            handle, start, place = self.handles[number], self._starts[number], self._places[number]
+            way = np.zeros(2) if handle.to is None else np.subtract(handle.to, start)
+            way = way * min(1.0, LONGEST_WAY * handle.radius / max(float(np.hypot(*way)), 1e-30))
+            now, then = handle.passed(time), handle.passed(time + dt)
+            back = start + now * way - place
+            most = FARTHEST_STEP * handle.radius
+            back = back * -math.expm1(-RATE * dt) * min(1.0, most / max(float(np.hypot(*back)), 1e-30))
+            step = slower[row] * ((then - now) * way + back)
+            wanted[row] = step * min(1.0, most / max(float(np.hypot(*step)), 1e-30)) / dt
+        return wanted
+
+    def _slower(self) -> np.ndarray:
+        """The part of its speed, 0-1, that the map around each active handle still allows."""
+        if not len(self._active):
+            return np.zeros(0)
+        along, count = np.linspace(-1, 1, LATTICE), len(self._active)
+        lattice = np.stack(np.meshgrid(along, along), axis=-1) * self._radii[self._active, None, None, None]
+        points = np.clip(self._places[self._active, None, None] + lattice, 0.0, self._warp.extent)
+        listed = points.reshape(-1, 2)
+        least = self._warp.determinants(listed).reshape(count, -1).min(axis=1)
+        original, most = points + self._warp.at(listed).reshape(points.shape), np.zeros(count)
+        for axis in (1, 2):
+            apart, far = (np.linalg.norm(np.diff(places, axis=axis), axis=-1) for places in (original, points))
+            ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
+            most = np.maximum(most, ratio.reshape(count, -1).max(axis=1))
+        local = float(self._local.max())
+        slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
+        stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
+        return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
+
+    # -- what they do to the fluid ----------------------------------------------------------------------------------
+
+    def _brushes(self) -> tuple[list[Point], list[float]]:
+        """Places and radii of the active handles."""
+        return [(x, y) for x, y in self._places[self._active].tolist()], self._radii[self._active].tolist()
+
+    def _influences(self) -> tuple[np.ndarray, np.ndarray]:
+        """How the push and the local brush of each active handle move each: velocities (i, a) for forces (j, b)."""
+        places, radii = self._places[self._active], self._radii[self._active]
+        push = np.zeros((len(places), len(places), 2, 2))
+        local = np.zeros_like(push)
+        for mirror, shift in _images(self._fluid.grid):
+            r = (places[:, None] - (mirror * places + shift)) / radii[:, None]
+            q = np.hypot(r[..., 0], r[..., 1])
+            far = np.maximum(1 - q, 0.0)[..., None, None]
+            across = np.stack([-r[..., 1], r[..., 0]], axis=-1)
+            # The curl of (1 - q)^5 (1 + 5 q) (F x r).
+            outer = across[..., :, None] * across[..., None, :]
+            push += (far**5 * (1 + 5 * q[..., None, None]) * np.eye(2) - 30 * far**4 * outer) * mirror
+            if mirror.sum() >= 0:  # carry.frag takes images beyond one wall, and off the component across it
+                sign = np.ones(2) if mirror.sum() > 0 else np.minimum(mirror, 0.0)
+                local += (np.maximum(1 - q**2, 0.0) ** 3)[..., None, None] * np.diag(sign)
+        return push, local
+
+    def _solved(self, influence: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        """The forces that together make the wanted velocities, as far as the ridge and stiffness let them: (H3)."""
+        count = 2 * len(wanted)
+        matrix = influence.transpose(0, 2, 1, 3).reshape(count, count)
+        soft = [1 / self.handles[number].stiffness - 1 + RIDGE for number in self._active for _ in (0, 1)]
+        dual = np.linalg.solve(matrix @ matrix.T + np.diag(soft), wanted.reshape(count))
+        return (matrix.T @ dual).reshape(-1, 2)
+
+    def _probed(self, velocity: Field) -> np.ndarray:
+        """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
+        fluid, device = self._fluid, self._fluid.device
+        listed = np.column_stack([self._places - fluid.grid.origin, self._radii])[self._active]
+        handles = device.upload(listed[None].astype(np.float32), "handles")
+        found = device.field(handles.size, 4, "fluid at the handles")
+        inputs: dict[str, Any] = {
+            "viscosity": fluid.viscosity,
+            "solid": fluid.solid,
+            "velocity": velocity,
+            "handles": handles,
+        }
+        probe = device.pass_("brush/probe_handles.frag")
+        probe(found, impulse=fluid.impulse.field, spacing=fluid.grid.spacing, **inputs)
+        values = found.get()[0].astype(np.float64)
+        handles.release()
+        found.release()
+        return values
+
+    def _give(self, faces: Field, **attenuated: Any) -> None:
+        """Add to a velocity on MAC faces what the active handles lack of the wanted one."""
+        if not len(self._active):
+            return
+        fluid, grid = self._fluid, self._fluid.grid
+        found = self._probed(faces)
+        lacking = self._solved(self._influence, self._wanted - found[:, :2])
+        masks: dict[str, Any] = {}
+        if attenuated:
+            lacking *= found[:, 2:3]
+            masks["viscosity"] = fluid.viscosity
+        draw, size = fluid.device.pass_("brush/handle_stream.frag", **attenuated), self._stream.size
+        self._stream.clear()
+        for mirror, shift in _images(grid):
+            for (x, y), radius, force, here in zip(*self._brushes(), lacking, found[:, 3], strict=True):
+                place = float(mirror[0] * x + shift[0]), float(mirror[1] * y + shift[1])
+                region = Tip(place, place, radius).region(grid)
+                if (
+                    region[0] >= size[0]
+                    or region[1] >= size[1]
+                    or region[0] + region[2] <= 0
+                    or region[1] + region[3] <= 0
+                ):
+                    continue
+                from_corner = place[0] - grid.origin[0], place[1] - grid.origin[1]
+                inputs: dict[str, Any] = {
+                    "place": from_corner,
+                    "radius": radius,
+                    "force": tuple((mirror * force).tolist()),
+                    **masks,
+                }
+                if attenuated:
+                    inputs["tip_viscosity"] = here
+                draw(self._stream, add=True, region=region, spacing=grid.spacing, **inputs)
+        fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
+
+
+def _smoothstep(part: np.ndarray) -> np.ndarray:
+    part = np.clip(part, 0.0, 1.0)
+    return part * part * (3 - 2 * part)
+
+
+def _images(grid: Grid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The images (mirror, shift) of a brush in the picture's edges, itself first: x -> mirror x + shift.
+
+    With them no push crosses an edge, so that the projection takes nothing of it.
+    """
+    left, right, top, bottom = grid.at_edge
+    across = [(1.0, 0.0)] + [(-1.0, 0.0)] * left + [(-1.0, 2 * grid.picture[0])] * right
+    down = [(1.0, 0.0)] + [(-1.0, 0.0)] * top + [(-1.0, 2 * grid.picture[1])] * bottom
+    for (mirror_x, shift_x), (mirror_y, shift_y) in product(across, down):
+        yield np.array([mirror_x, mirror_y]), np.array([shift_x, shift_y])
