@@ -57,8 +57,9 @@ CIRCLES_OF_TYPES = [
     {"solver.warp.inverse", "solver.warp.map"},
     {
         "app.ui.actions", "app.ui.browser", "app.ui.dialogs", "app.ui.editor", "app.ui.exporting", "app.ui.files",
-        "app.ui.hand", "app.ui.panels", "app.ui.panels.bar", "app.ui.panels.hud", "app.ui.panels.inspector",
-        "app.ui.panels.strip", "app.ui.panels.timebar", "app.ui.quality", "app.ui.recovering", "app.ui.saving",
+        "app.ui.panels", "app.ui.panels.bar", "app.ui.panels.hud", "app.ui.panels.inspector",
+        "app.ui.panels.strip", "app.ui.panels.timebar", "app.ui.pointer", "app.ui.quality",
+        "app.ui.recovering", "app.ui.saving",
     },
 ]  # fmt: skip
 TOOLKITS = {"glfw", "imgui_bundle"}

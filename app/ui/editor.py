@@ -23,19 +23,19 @@ from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.canvas import Canvas
 from app.ui.clock import PACE, Clock
 from app.ui.dialogs import Dialog, Preferring, Shortcuts, Unsaved
+from app.ui.editor_state import LARGEST, SMALLEST, EditorState
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Wheel
 from app.ui.exporting import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
-from app.ui.hand import Hand
-from app.ui.host import Host
+from app.ui.imgui_backend import ImGuiBackend
 from app.ui.layout import NARROW, Layout
 from app.ui.messages import Messages
 from app.ui.numbers import Numbers
 from app.ui.panels.strip import GROUP_ENDS
+from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
 from app.ui.recovering import Recovery
-from app.ui.state import LARGEST, SMALLEST, State
 from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
 from app.work.recovery import Found
@@ -70,15 +70,15 @@ class Editor:
     ) -> None:
         self.device = device
         self.preferences = preferences or Preferences()
-        self.state = State(
+        self.state = EditorState(
             inspector=self.preferences.inspector,
             auto_quality=self.preferences.auto_quality,
         )
-        self.host = Host(device)
-        self.ui = Ui(theme.PALETTES[self.preferences.theme], self.host.fonts, self.preferences.scale)
+        self.backend = ImGuiBackend(device)
+        self.ui = Ui(theme.PALETTES[self.preferences.theme], self.backend.fonts, self.preferences.scale)
         self.clock = Clock()
         self.messages = Messages(self.clock.stir)
-        self.hand = Hand(self)
+        self.pointer = PointerController(self)
         self.files = Files(self)
         self.exports = Exports(self.messages)
         self.quality = Quality(self)
@@ -119,7 +119,7 @@ class Editor:
     def open(self, project: Project, pixels: np.ndarray | None = None, found: Found | None = None) -> None:
         """Work on another project; Undo at its very start comes back to this one.
 
-        `pixels`: the picture as the canvas shows it, if it is at hand. `found`: what the project was restored from.
+        `pixels`: the picture as the canvas shows it, if it is at pointer. `found`: what the project was restored from.
         """
         canvas = Canvas(self.device, project.picture, pixels)
         try:
@@ -209,7 +209,7 @@ class Editor:
         self.messages.elapse(dt)
         with self.clock.measure("frame"):
             self._lay_out((size[0] / density, size[1] / density), density, scale)
-            self._hear(events)
+            self._handle(events)
             self.recovery.keep()
             with self.clock.measure("simulate"):
                 self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
@@ -253,15 +253,15 @@ class Editor:
         inspector = self.state.over_narrow if self._is_narrow else self.state.inspector
         return Layout.of(width, height, self.ui.scale, inspector, len(TOOLS), len(GROUP_ENDS) + 1)
 
-    def _hear(self, events: Sequence[Event]) -> None:
+    def _handle(self, events: Sequence[Event]) -> None:
         for event in events:
             self.clock.stir()
             try:
-                self._hear_one(event)
+                self._handle_one(event)
             except UserError as error:
                 self.messages.warn(error.in_window)
 
-    def _hear_one(self, event: Event) -> None:
+    def _handle_one(self, event: Event) -> None:
         match event:
             case Key(key, down, mods, repeat):
                 if key == "\\":
@@ -269,11 +269,11 @@ class Editor:
                 if down and not self.dialogs:
                     self._key(key, mods.chord(key), repeat)
                 if not self.dialogs and not self._is_typing:
-                    self.hand.hear(event)
+                    self.pointer.handle(event)
             case Move() | Button() | Wheel():
-                self.hand.hear(event)
+                self.pointer.handle(event)
             case Focus(False):
-                self.hand.let_go()
+                self.pointer.release_all()
                 self.state.before = False
             # A dialog is about the work that is open, and is answered before there is another one.
             case Drop(paths) if paths and not self.dialogs:
@@ -308,7 +308,7 @@ class Editor:
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         points, by_keys = (size[0] / self.ui.density, size[1] / self.ui.density), bool(self.dialogs) or self._popup_open
-        self.host.begin(points, self.ui.density, dt, events, by_keys)
+        self.backend.begin(points, self.ui.density, dt, events, by_keys)
         if self._once_typed:
             # The field is left, as if by Enter, so that what was typed is taken before it is saved.
             internal.clear_active_id()
@@ -334,7 +334,7 @@ class Editor:
         anywhere = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
         self._popup_open = imgui.is_popup_open("", anywhere)
         with self.clock.measure("interface"):
-            self.host.end(target)
+            self.backend.end(target)
 
     def _draw_dialog(self) -> None:
         self.files.poll()
@@ -360,7 +360,9 @@ class Editor:
     def shows_ring(self) -> bool:
         """The brush's ring is drawn where the pointer is."""
         tool = self.state.tool
-        return tool.gesture is not None and self.hand.is_over_canvas and self.hand.drag in (None, "paint", "brush")
+        return (
+            tool.gesture is not None and self.pointer.is_over_canvas and self.pointer.drag in (None, "paint", "brush")
+        )
 
     def choose_tool(self, name: str, opposite: bool) -> None:
         self.state.tool_name = name
@@ -386,8 +388,10 @@ class Editor:
 
     def zoom_step(self, up: bool) -> None:
         canvas = self.layout.canvas
-        over = canvas.contains(self.hand.x, self.hand.y)
-        middle = (self.hand.x, self.hand.y) if over else (canvas.x + canvas.width / 2, canvas.y + canvas.height / 2)
+        over = canvas.contains(self.pointer.x, self.pointer.y)
+        middle = (
+            (self.pointer.x, self.pointer.y) if over else (canvas.x + canvas.width / 2, canvas.y + canvas.height / 2)
+        )
         self.view = self.view.stepped(up, *middle)
 
     def zoom_fit(self) -> None:
@@ -486,4 +490,4 @@ class Editor:
         self.recovery.release(discard=self.closed)
         for work in self._sessions:
             self._close(*work)
-        self.host.release()
+        self.backend.release()

@@ -53,7 +53,7 @@ class _Loader:
         pass
 
 
-class Window:
+class GlfwWindow:
     """A window of the system with a GL, and the events that happen in it."""
 
     def __init__(self) -> None:
@@ -127,7 +127,7 @@ class Window:
             editor.frame(screen, self.size, dt, events, self.density, self.scale)
             self._must_draw = False
             self._show_title(editor)
-            self._show_cursor(editor.hand.cursor)
+            self._show_cursor(editor.pointer.cursor)
             glfw.swap_buffers(self.handle)
             spare = FASTEST - (time.perf_counter() - now)
             if spare > 0:
@@ -223,7 +223,7 @@ def run(file: Path | None = None) -> None:
     """
     if file is not None and not os.path.exists(file):
         load_any(file)
-    window = Window()
+    window = GlfwWindow()
     try:
         editor = Editor(window.device, load_any(sample()), Preferences.load(), default_folder())
         if file is not None:

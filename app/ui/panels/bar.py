@@ -12,7 +12,7 @@ from imgui_bundle.imgui import ImVec2
 from app.model.presets import FEELS
 from app.model.tools import BrushSettings
 from app.ui.actions import ACTIONS
-from app.ui.state import LARGEST, SMALLEST
+from app.ui.editor_state import LARGEST, SMALLEST
 from app.ui.units import PERCENT, Unit
 from app.ui.widgets import Ui, keys_shown
 

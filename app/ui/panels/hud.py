@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.ui.state import Overlay
+from app.ui.editor_state import Overlay
 from app.ui.theme import Colour, packed, rgb
 from app.ui.widgets import Ui
 
@@ -49,8 +49,8 @@ def _ring(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
 
     What is frozen is so as far as the brush reaches, however hard it is.
     """
-    hand, brush = editor.hand, editor.state.brush
-    x, y = hand._start if hand.drag == "brush" else (hand.x, hand.y)
+    pointer, brush = editor.pointer, editor.state.brush
+    x, y = pointer._start if pointer.drag == "brush" else (pointer.x, pointer.y)
     reach = brush.radius * editor.view.longer
     core = 1.0 if editor.state.tool_name == "freeze" else 0.9 * brush.hardness
     # Where the brush is half as strong as in its middle: (1 - q^2)^3 = 1/2, between the core and the reach.
@@ -63,7 +63,7 @@ def _ring(ui: Ui, editor: Editor, lines: imgui.ImDrawList) -> None:
     lines.add_circle(middle, half, packed(WHITE, 0.95), count, ui.px(1.3))
     lines.add_circle_filled(middle, ui.px(2.2), packed(soft), 12)
     lines.add_circle_filled(middle, ui.px(1.4), packed(WHITE), 12)
-    opposite = editor.state.opposite.get(editor.state.tool_name, False) != hand.mods.alt
+    opposite = editor.state.opposite.get(editor.state.tool_name, False) != pointer.mods.alt
     if opposite:
         reach = ui.px(5)
         lines.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), packed(soft), ui.px(3.2))

@@ -1,4 +1,4 @@
-"""The hand on the canvas: what the pointer does to the picture, the view, the brush and the split."""
+"""The pointer on the canvas: what it does to the picture, the view, the brush and the split."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from math import exp
 from typing import TYPE_CHECKING
 
 from app.model.tools import Press
+from app.ui.editor_state import LARGEST, SMALLEST
 from app.ui.events import LEFT, MIDDLE, RIGHT, Button, Event, Key, Mods, Move, Wheel
-from app.ui.state import LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     from app.ui.editor import Editor
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 SPLIT_REACH = 8.0  # points from the split's line at which it is taken hold of
 
 
-class Hand:
+class PointerController:
     """Turns events on the canvas into what they mean; at most one drag is under way.
 
     Attributes:
@@ -41,7 +41,7 @@ class Hand:
     def is_over_canvas(self) -> bool:
         return self.drag is not None or self.editor.is_canvas_at(self.x, self.y)
 
-    def hear(self, event: Event) -> None:
+    def handle(self, event: Event) -> None:
         """Take part in an event, if it is about the canvas."""
         match event:
             case Move(x, y, pressure, mods):
@@ -73,7 +73,7 @@ class Hand:
             if not self._space_used and self.drag is None:
                 self.editor.do("play")
 
-    def let_go(self) -> None:
+    def release_all(self) -> None:
         """The window lost the keyboard: nothing is held any more."""
         self.space = False
         if self.drag is not None:

@@ -32,11 +32,11 @@ def _overlays() -> dict[str, Overlay]:
 
 
 @dataclass
-class State:
+class EditorState:
     """The window's own state.
 
     Attributes:
-        tool_name: the tool in hand.
+        tool_name: the tool in pointer.
         brush: shared by all tools, so that changing the tool does not change its size.
         opposite: tools that are switched to their other direction.
         overlays: by name, in the order of their keys.

@@ -21,7 +21,7 @@ _LETTERS = {letter: getattr(imgui.Key, letter) for letter in "acvxyz"}
 _KEYS = _NAMED | _LETTERS
 
 
-class Host:
+class ImGuiBackend:
     """The one imgui context of the process.
 
     Args:
