@@ -55,12 +55,6 @@ SOLVER = {
 CIRCLES_OF_TYPES = [
     {"solver.gl.device", "solver.gl.field", "solver.gl.passes"},
     {"solver.warp.inverse", "solver.warp.map"},
-    {
-        "app.ui.actions", "app.ui.browser", "app.ui.dialogs", "app.ui.editor", "app.ui.exporting", "app.ui.files",
-        "app.ui.panels", "app.ui.panels.bar", "app.ui.panels.hud", "app.ui.panels.inspector",
-        "app.ui.panels.strip", "app.ui.panels.timebar", "app.ui.pointer", "app.ui.quality",
-        "app.ui.recovering", "app.ui.saving",
-    },
 ]  # fmt: skip
 TOOLKITS = {"glfw", "imgui_bundle"}
 CODECS = {"imageio", "imageio_ffmpeg", "av", "PIL", "tifffile", "imagecodecs", "OpenEXR"}

@@ -45,6 +45,11 @@ class ImGuiBackend:
         self.fonts = theme.load_fonts()
         imgui.backends.opengl3_init("#version 330")
 
+    @property
+    def is_typing(self) -> bool:
+        """Text is being typed into a field, as of the last frame."""
+        return imgui.get_io().want_text_input
+
     def begin(
         self, size: tuple[float, float], density: float, dt: float, events: Iterable[Event], by_keys: bool = False
     ) -> None:

@@ -86,9 +86,9 @@ def paint(offscreen: OffscreenEditor) -> None:
     editor.state.brush = replace(editor.state.brush, radius=0.11)
     offscreen.stroke(line((0.53, 0.19), (0.47, 0.31), 0.0), 12)
     offscreen.stroke(line((0.86, 0.15), (0.80, 0.25), 0.0), 12)
-    editor.choose_tool("twirl", False)
+    editor.state.choose_tool("twirl", False)
     offscreen.stroke(lambda part: (0.19 + 0.002 * cos(part), 0.15), 20)
-    editor.choose_tool("push", False)
+    editor.state.choose_tool("push", False)
     editor.state.brush = replace(editor.state.brush, radius=0.15)
     offscreen.stroke(line((0.30, 0.82), (0.42, 0.78), 0.04), 16)
 
@@ -127,7 +127,7 @@ def export(offscreen: OffscreenEditor) -> np.ndarray:
     paint(offscreen)
     offscreen.editor.preferences.folder = ""
     offscreen.key("e", Mods(ctrl=True))
-    offscreen.editor.dialogs[-1].folder = Path("pictures")  # pyright: ignore[reportAttributeAccessIssue]
+    offscreen.editor.dialogs.shown[-1].folder = Path("pictures")  # pyright: ignore[reportAttributeAccessIssue]
     offscreen.frame()
     offscreen.frame()
     return offscreen.picture()

@@ -44,6 +44,7 @@ class Ui:
 
     Attributes:
         covers: where the canvas is covered by something that can be clicked, as of the last frame.
+        has_popup: a menu or a dialog is open, as of then.
     """
 
     palette: Palette
@@ -51,6 +52,7 @@ class Ui:
     scale: float
     density: float = 1.0
     covers: list[Rect] = field(default_factory=list)
+    has_popup: bool = False
     _covering: list[Rect] = field(default_factory=list)  # the same of the frame that is being drawn
     _slid: tuple[str, float] = ("", -1.0)  # the slider that was let go of last, and when
     _untyped: dict[str, float] = field(default_factory=dict)  # values of sliders before one is typed
@@ -103,6 +105,12 @@ class Ui:
     def end_frame(self) -> None:
         """Everything has been drawn: what covers the canvas is known."""
         self.covers, self._covering = self._covering, []
+        anywhere = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
+        self.has_popup = imgui.is_popup_open("", anywhere)
+
+    def is_covered(self, x: float, y: float) -> bool:
+        """Something that can be clicked lies at a point of the screen, or might."""
+        return self.has_popup or any(rect.contains(x, y) for rect in self.covers)
 
     @contextmanager
     def enabled(self, condition: bool) -> Iterator[None]:

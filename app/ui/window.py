@@ -108,16 +108,16 @@ class GlfwWindow:
     def show(self, editor: Editor) -> None:
         """Run the editor until the person leaves."""
         last = time.perf_counter()
-        editor.clipboard = lambda text: glfw.set_clipboard_string(self.handle, text)
-        editor.files.native = True
+        editor.commands.clipboard = lambda text: glfw.set_clipboard_string(self.handle, text)
+        editor.chooser.native = True
         screen = self.device.ctx.detect_framebuffer(0)
-        while not editor.closed:
+        while not editor.commands.closed:
             self._wait(editor)
             if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
                 if any(isinstance(event, CloseWish) for event in self.events):
-                    if editor.asks_before_quitting:
+                    if editor.commands.asks_before_quitting:
                         glfw.restore_window(self.handle)
-                elif not any(dialog.is_busy for dialog in editor.dialogs):
+                elif not editor.dialogs.is_busy:
                     # What has happened waits too.
                     glfw.wait_events_timeout(0.1)
                     continue
@@ -227,7 +227,7 @@ def run(file: Path | None = None) -> None:
     try:
         editor = Editor(window.device, load_any(sample()), Preferences.load(), default_folder())
         if file is not None:
-            editor.placeholder = editor.session
+            editor.workspace.placeholder = editor.session
             window.events.append(Drop((str(file),)))
         try:
             window.show(editor)
