@@ -118,11 +118,11 @@ class Frozen:
         self._mask = self.near = None
 
 
-def saved_of(mask: Field) -> SavedTiles:
+def saved_of(device: Device, mask: Field) -> SavedTiles:
     """A field's values as a tiled one would save them; whoever has it releases it."""
     if isinstance(mask, TiledField):
         return mask.save()
-    tiled = TiledField(mask.device, mask.size, mask.components, "mask", mask.dtype)
+    tiled = TiledField(device, mask.size, mask.components, "mask", mask.dtype)
     tiled.set(mask.get())
     saved = tiled.save()
     tiled.release()

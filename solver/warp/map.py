@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from solver.scheme import State, check_field, check_step, on_faces
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen, saved_of
-from solver.warp.inverse import ForwardMap
 from solver.warp.state import MapState, grid_in, kind_values, values_of
 from solver.warp.submap import Submap, window_of
 
@@ -170,7 +168,7 @@ class WarpMap:
         up on a frozen pixel is interpolated from there. So frozen pixels stay as they are to the bit, moved before or
         not. Over one cell from there the map goes over into what flows.
         """
-        saved = None if frozen is None else saved_of(frozen)
+        saved = None if frozen is None else saved_of(self.device, frozen)
         if self._frozen.differs(saved):
             self.remap()
             self._frozen.restore(saved, self._cell)
@@ -300,8 +298,6 @@ class WarpMap:
         self._drop_pending()
         for thing in (self._submap, self._accumulated, self._frozen, *self._composed.values()):
             thing.release()
-        if "forward" in self.__dict__:
-            self.forward.release()
 
     # -- reading it -------------------------------------------------------------------------------------------------
 
@@ -367,11 +363,6 @@ class WarpMap:
         origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
         compose = self.device.pass_("warp/compose.frag", **self._defines())
         compose(target, **self._parts(), origin=origin, step=step)
-
-    @cached_property
-    def forward(self) -> ForwardMap:
-        """The inverse: where points of the original go."""
-        return ForwardMap(self)
 
     def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
         """How the whole map distorts, looked at on a lattice of `size`; waits for the GPU.
