@@ -125,7 +125,8 @@ def _ask(module: str) -> dict:
 def _probe_headless() -> dict:
     from dataclasses import asdict
 
-    from solver.gl.device import ContextError, Device
+    from solver.gl.context import ContextError
+    from solver.gl.device import Device
 
     try:
         with Device.headless() as device:

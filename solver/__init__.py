@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from solver.brush.masks import Masks
     from solver.brush.tip import Tip
     from solver.fluid import Fluid
-    from solver.gl.device import ContextError, Device
+    from solver.gl.context import ContextError
+    from solver.gl.device import Device
     from solver.grid import Grid
     from solver.paper import PaperFluid, PaperWarpMap
     from solver.params import FluidParams, Walls
@@ -48,7 +49,8 @@ _MODULES = {
     "brush.masks": ("Masks",),
     "brush.tip": ("Tip",),
     "fluid": ("Fluid",),
-    "gl.device": ("ContextError", "Device"),
+    "gl.context": ("ContextError",),
+    "gl.device": ("Device",),
     "grid": ("Grid",),
     "paper": ("PaperFluid", "PaperWarpMap"),
     "params": ("FluidParams", "Walls"),

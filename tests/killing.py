@@ -152,12 +152,12 @@ def _strokes(entries: tuple[Entry, ...]) -> int:
 
 def tell_states() -> None:
     """Let editors of this process print their states."""
-    from app.ui.recovering import Recovery
+    from app.ui.workspace import Workspace
 
-    keep, seen = Recovery.keep, [""]
+    keep, seen = Workspace.keep, [""]
 
-    def tell_and_keep(self: Recovery) -> None:
-        history = self.editor.session.document.history
+    def tell_and_keep(self: Workspace) -> None:
+        history = self.session.document.history
         told = digest(history.entries, history.index)
         is_new = told != seen[0] and _strokes(history.entries) > 0
         seen[0] = told
@@ -167,7 +167,7 @@ def tell_states() -> None:
         if is_new:
             print("made", time.monotonic(), _strokes(history.entries), flush=True)
 
-    Recovery.keep = tell_and_keep
+    Workspace.keep = tell_and_keep
 
 
 def paint(folder: Path, root: Path, seed: int) -> None:

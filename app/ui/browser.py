@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
@@ -15,9 +14,6 @@ from app.ui import icons
 from app.ui.dialogs import Dialog
 from app.ui.theme import packed
 from app.ui.widgets import Ui
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
 
 
 class Browser(Dialog):
@@ -29,6 +25,9 @@ class Browser(Dialog):
         endings: the files that are shown, by how their names end.
         chosen: is told the file.
         name: proposes a name; None chooses among what there is.
+
+    Attributes:
+        inside: what is listed.
     """
 
     width, height = 640, 460
@@ -60,9 +59,9 @@ class Browser(Dialog):
             self._problem, inside = error.strerror or "it cannot be read", []
         folders = [path for path in inside if path.is_dir()]
         files = [path for path in inside if path.suffix.lower() in self.endings and path.is_file()]
-        self._inside = sorted(folders, key=_by_name) + sorted(files, key=_by_name)
+        self.inside = sorted(folders, key=_by_name) + sorted(files, key=_by_name)
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
+    def body(self, ui: Ui) -> bool:
         if ui.icon_button("up", "up", "The folder above", size=30):
             self.go(self.folder.parent)
         imgui.same_line()
@@ -80,9 +79,9 @@ class Browser(Dialog):
         imgui.begin_child("files", ImVec2(0, -foot))
         going: Path | None = None
         done = False
-        for path in self._inside:
+        for path in self.inside:
             going, done = self._row(ui, path, going, done)
-        if not self._inside:
+        if not self.inside:
             ui.dim(self._problem or "Nothing here that can be opened.")
         imgui.end_child()
         if going is not None:

@@ -8,7 +8,7 @@ from PIL import Image
 
 from app.media.pictures import to_bits
 from app.model.picture import Picture
-from app.ui.state import State
+from app.ui.editor_state import EditorState
 from app.ui.theme import Palette
 from app.ui.viewport import Rect, Viewport
 from app.work.session import Session
@@ -71,7 +71,7 @@ class Canvas:
         height: int,
         viewport: Viewport,
         session: Session,
-        state: State,
+        state: EditorState,
         palette: Palette,
         scale: float,
     ) -> None:
@@ -189,7 +189,7 @@ class Canvas:
         self._texture.filter = (small, moderngl.NEAREST if zoom >= 6 else moderngl.LINEAR)
 
     def _add_overlays(
-        self, defines: dict[str, object], inputs: dict[str, object], session: Session, state: State, scale: float
+        self, defines: dict[str, object], inputs: dict[str, object], session: Session, state: EditorState, scale: float
     ) -> None:
         if state.before:
             return

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError
-from app.ui.actions import ACTIONS
+from app.ui.editor_state import EditorState
+from app.ui.preferences import Preferences
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui, keys_shown
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
+from app.ui.workspace import Workspace
 
 
 class Dialog(ABC):
@@ -57,10 +55,13 @@ class Dialog(ABC):
         return not self.problem
 
     @abstractmethod
-    def body(self, ui: Ui, editor: Editor) -> bool:
+    def body(self, ui: Ui) -> bool:
         """Draw what is in it; False once it is done with."""
 
-    def draw(self, ui: Ui, editor: Editor) -> bool:
+    def release(self) -> None:  # noqa: B027
+        """Free what it holds, if anything; it is not drawn any more."""
+
+    def draw(self, ui: Ui, dialogs: Dialogs) -> bool:
         """Draw it; False once it is done with."""
         name = f"###dialog{id(self)}"
         if not imgui.is_popup_open(name):
@@ -86,20 +87,17 @@ class Dialog(ABC):
             if self.problem:
                 ui.wrapped(self.problem, ui.palette.accent, 14)
                 imgui.dummy(ImVec2(0, ui.px(4)))
-            self._take_note(imgui.get_window_pos(), imgui.get_window_size(), editor)
+            self._take_note(imgui.get_window_pos(), imgui.get_window_size(), dialogs.changed)
             # A field that is being typed in is left by Escape first.
             escaped = imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active()
-            going_on = self.body(ui, editor) and self._open
+            going_on = self.body(ui) and self._open
             # Only the topmost dialog hears Escape; it may just have opened another one.
-            if escaped and editor.dialogs[-1] is self:
-                going_on = False
-            if not going_on or editor.dialogs[-1] is not self:
+            is_topmost = dialogs.shown[-1] is self
+            going_on = going_on and not (escaped and is_topmost)
+            if not (going_on and is_topmost):
                 imgui.close_current_popup()
         finally:
             imgui.end_popup()
-        if not going_on and editor.dialogs[-1] is not self:
-            editor.dialogs.remove(self)
-            return True
         return going_on
 
     def _place(self, ui: Ui, display: ImVec2, edge: float) -> None:
@@ -114,14 +112,62 @@ class Dialog(ABC):
             top = max(min(self._top, display.y - edge - self.rect.height), edge)
             imgui.set_next_window_pos(ImVec2(display.x / 2, top), imgui.Cond_.always, ImVec2(0.5, 0.0))
 
-    def _take_note(self, corner: ImVec2, size: ImVec2, editor: Editor) -> None:
+    def _take_note(self, corner: ImVec2, size: ImVec2, changed: Callable[[], None]) -> None:
         """Remember where it is; its size follows what is in it a frame later."""
         rect = Rect(corner.x, corner.y, size.x, size.y)
         if (rect.width, rect.height) != (self.rect.width, self.rect.height):
-            editor.clock.stir()
+            changed()
         elif self._top is None:
             self._top = rect.y
         self.rect = rect
+
+
+class Dialogs:
+    """The dialogs that are open, the last of which is drawn and answered first.
+
+    Args:
+        changed: called when the size of one does, as that of messages.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        self.shown: list[Dialog] = []
+        self.changed = changed
+        self._done: list[Dialog] = []  # with which the frame that is being drawn may still hold pictures
+
+    @property
+    def is_busy(self) -> bool:
+        """Something is going on in one, so that frames have to be drawn."""
+        return any(dialog.is_busy for dialog in self.shown)
+
+    def show(self, dialog: Dialog) -> None:
+        self.shown.append(dialog)
+
+    def ask(self, question: Dialog) -> None:
+        """Show one; of the same kind the last one counts, as where a person closes the window once more."""
+        for other in [other for other in self.shown if type(other) is type(question)]:
+            self._remove(other)
+        self.shown.append(question)
+
+    def draw(self, ui: Ui) -> None:
+        """Draw the topmost one."""
+        self._release_done()
+        if self.shown and not (dialog := self.shown[-1]).draw(ui, self):
+            self._remove(dialog)
+
+    def release(self) -> None:
+        self._done += self.shown
+        self.shown = []
+        self._release_done()
+
+    def _remove(self, dialog: Dialog) -> None:
+        if dialog in self.shown:  # it may be gone, for another of its kind
+            self.shown.remove(dialog)
+            self._done.append(dialog)
+
+    def _release_done(self) -> None:
+        for dialog in self._done:
+            dialog.release()
+        self._done.clear()
 
 
 def beside(ui: Ui, left: float, right: float) -> None:
@@ -134,15 +180,30 @@ def beside(ui: Ui, left: float, right: float) -> None:
 
 
 class Unsaved(Dialog):
-    """Asks what shall become of unsaved work."""
+    """Asks what shall become of unsaved work.
 
-    def __init__(self, what: str, then: Callable[[], None]) -> None:
+    Args:
+        workspace: whose work it is.
+        what: the person is about to do.
+        save: saves, and then does what it is given.
+        then: does what the person is about to do.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        what: str,
+        save: Callable[[Callable[[], None]], None],
+        then: Callable[[], None],
+    ) -> None:
         super().__init__("Save your changes first?")
+        self._workspace = workspace
         self._what = what
+        self._save = save
         self._then = then
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
-        name = editor.session.project.name
+    def body(self, ui: Ui) -> bool:
+        name = self._workspace.session.project.name
         ui.wrapped(f"What you have done to “{name}” is lost if you {self._what} without saving.", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(8)))
         if ui.button("Don't save", width=108):
@@ -153,10 +214,7 @@ class Unsaved(Dialog):
             return False
         imgui.same_line()
         if ui.button("Save", primary=True, width=96):
-            if editor.session.project.path is None:
-                editor.files.ask_save(self._then)
-            elif editor.files.save():
-                self._then()
+            self._save(self._then)
             return False
         return True
 
@@ -170,7 +228,7 @@ class PictureOrMap(Dialog):
         self._picture = picture
         self._use = use
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
+    def body(self, ui: Ui) -> bool:
         about = f"“{self._name}” holds floating-point colours, or the places of an ST map."
         ui.wrapped(about, ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(8)))
@@ -192,18 +250,20 @@ class PictureOrMap(Dialog):
 
 
 class Shortcuts(Dialog):
-    """The sheet of all keys."""
+    """The sheet of all keys.
+
+    Args:
+        keys: for each group, what can be done and the chord that does it.
+    """
 
     width, height = 880, 672
 
-    def __init__(self) -> None:
+    def __init__(self, keys: dict[str, list[tuple[str, str]]]) -> None:
         super().__init__("Keyboard and mouse")
+        self._keys = keys
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
-        groups: dict[str, list[tuple[str, str]]] = {}
-        for action in ACTIONS.values():
-            if action.keys:
-                groups.setdefault(action.group, []).append((action.label, keys_shown(action.key)))
+    def body(self, ui: Ui) -> bool:
+        groups = {name: [(label, keys_shown(key)) for label, key in rows] for name, rows in self._keys.items()}
         groups["Mouse"] = [
             ("Paint", "Drag"),
             ("The other direction", "Alt + drag"),
@@ -252,11 +312,13 @@ class Preferring(Dialog):
 
     width = 420
 
-    def __init__(self) -> None:
+    def __init__(self, preferences: Preferences, state: EditorState) -> None:
         super().__init__("Preferences")
+        self._preferences = preferences
+        self._state = state
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
-        likes = editor.preferences
+    def body(self, ui: Ui) -> bool:
+        likes = self._preferences
         ui.dim("Theme")
         themes = ("dark", "light")
         likes.theme = themes[ui.segmented("theme", ("Dark", "Light"), themes.index(likes.theme), -1)]
@@ -267,8 +329,8 @@ class Preferring(Dialog):
         likes.scale = scales[ui.segmented("scale", names, nearest, -1)]
         imgui.dummy(ImVec2(0, ui.px(2)))
         likes.embed = ui.check("Keep the picture inside the project", likes.embed)
-        automatic = ui.check("Choose the quality automatically", editor.state.auto_quality)
-        editor.state.auto_quality = likes.auto_quality = automatic
+        automatic = ui.check("Choose the quality automatically", self._state.auto_quality)
+        self._state.auto_quality = likes.auto_quality = automatic
         imgui.dummy(ImVec2(0, ui.px(8)))
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
         if ui.button("Done", primary=True, width=96):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import moderngl
 from imgui_bundle import imgui
@@ -16,8 +16,10 @@ from imgui_bundle.imgui import ImVec2
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
 from app.ui.canvas import shown_pixels
+from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialog, beside
 from app.ui.messages import Messages
+from app.ui.preferences import Preferences
 from app.ui.theme import packed
 from app.ui.units import SECONDS, Unit
 from app.ui.viewport import Rect
@@ -25,9 +27,7 @@ from app.ui.widgets import Ui
 from app.work.export_process import ExportProcess
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.session import Session
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
+from solver.gl.device import Device
 
 PICTURES = (("PNG", ".png"), ("JPEG", ".jpg"), ("TIFF", ".tif"))
 ANIMATIONS = (("MP4", ".mp4"), ("GIF", ".gif"), ("PNG sequence", ".%04d.png"))
@@ -41,6 +41,12 @@ FINER = (("As seen", 1), ("2 x", 2))
 class ExportDialog(Dialog):
     """What is to be written: picture, animation or warp map, size, rate, part.
 
+    Args:
+        session: what is exported.
+        exports: does it.
+        chooser: lets the person look for another place.
+        preferences: where it was exported to last.
+
     Attributes:
         kind: PICTURE, ANIMATION or MAP.
         format: which of its formats, for each kind.
@@ -50,9 +56,12 @@ class ExportDialog(Dialog):
 
     width, tallest = 500, 560
 
-    def __init__(self, session: Session, folder: str) -> None:
+    def __init__(self, session: Session, exports: Exports, chooser: FileChooser, preferences: Preferences) -> None:
         super().__init__("Export")
         self.session = session
+        self._exports = exports
+        self._chooser = chooser
+        self._preferences = preferences
         self.kind = PICTURE
         self.format = [0 for _ in KINDS]
         self.forward = self.offsets = False
@@ -63,7 +72,7 @@ class ExportDialog(Dialog):
         seconds = session.end * session.dt
         self.start, self.end = 0.0, seconds
         self.finer = 0
-        self.folder = Path(folder) if folder and os.path.isdir(folder) else Path.home()
+        self.folder = preferences.export_to
         self.name = f"{session.project.name} warped"
         self._named = self.name
         self._preview: ExportProcess | None = None
@@ -73,6 +82,14 @@ class ExportDialog(Dialog):
     @property
     def is_busy(self) -> bool:
         return self._preview is not None
+
+    def release(self) -> None:
+        if self._image is not None:
+            self._image.release()
+        if self._folder is not None:
+            # Elsewhere, since a process takes a while to stop, and nobody is kept waiting for it.
+            threading.Thread(target=_clean_up, args=(self._preview, self._folder)).start()
+        self._image = self._folder = self._preview = None
 
     @property
     def animation(self) -> bool:
@@ -110,7 +127,7 @@ class ExportDialog(Dialog):
             return Job(recipe, self.picture, session.project.folder, Outputs(None, maps=maps))
         return Job(recipe, self.picture, session.project.folder, Outputs(self.output))
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
+    def body(self, ui: Ui) -> bool:
         # Enter belongs to the field that is being typed in, or to what the arrows have gone to.
         entered = imgui.is_key_pressed(imgui.Key.enter, False)
         entered = entered and not imgui.is_any_item_active() and not imgui.get_io().nav_visible
@@ -138,14 +155,14 @@ class ExportDialog(Dialog):
         self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
         if self.finer and self.kind != MAP:
             ui.dim("Finer detail, longer work; it may look a little different from what you see.")
-            self._show_preview(ui, editor)
+            self._show_preview(ui)
         imgui.dummy(ImVec2(0, ui.px(2)))
         ui.dim("File")
         imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
         _, self.name = imgui.input_text("##name", self.name)
         imgui.same_line()
         if ui.button("Browse", width=96, height=27):
-            editor.files.ask_where("Export to", self.output, (self.ending,), self._chosen)
+            self._chooser.ask_where("Export to", self.output, (self.ending,), self._chosen)
         ui.dim(str(self.output))
         if os.path.exists(self.output):
             ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
@@ -154,9 +171,9 @@ class ExportDialog(Dialog):
         if ui.button("Cancel", width=96):
             return False
         imgui.same_line()
-        with ui.enabled(self._can_start(editor)):
-            if ui.button("Export", primary=True, width=96) or (entered and self._can_start(editor)):
-                return not self.attempt(lambda: self._start(editor))
+        with ui.enabled(self._can_start):
+            if ui.button("Export", primary=True, width=96) or (entered and self._can_start):
+                return not self.attempt(self._start)
         return True
 
     def _choose(self, kind: int) -> None:
@@ -177,7 +194,7 @@ class ExportDialog(Dialog):
         if self.ending in (".exr", ".tif"):
             self.offsets = bool(ui.segmented("values", ("ST map, 0 to 1", "Offsets in pixels"), int(self.offsets), -1))
 
-    def _show_preview(self, ui: Ui, editor: Editor) -> None:
+    def _show_preview(self, ui: Ui) -> None:
         """What the finer grid makes of it, small, beside what is seen; made in a process of its own."""
         process = self._preview
         if process is None:
@@ -195,19 +212,20 @@ class ExportDialog(Dialog):
                 self._preview = None
                 self.problem = process.error
                 if not process.error:
-                    self._image = _texture(editor, process.job.target)
+                    self._image = _texture(self.session.device, process.job.target)
         if self._image is not None:
             width = imgui.get_content_region_avail().x
             height = min(width * self._image.height / self._image.width, ui.px(240))
             across = height * self._image.width / self._image.height
             imgui.image(imgui.ImTextureRef(self._image.glo), ImVec2(across, height))
 
-    def _can_start(self, editor: Editor) -> bool:
-        return bool(self.name.strip()) and not editor.exports.is_running
+    @property
+    def _can_start(self) -> bool:
+        return bool(self.name.strip()) and not self._exports.is_running
 
-    def _start(self, editor: Editor) -> None:
-        editor.exports.start(self.job())
-        editor.preferences.exported(self.output)
+    def _start(self) -> None:
+        self._exports.start(self.job())
+        self._preferences.exported(self.output)
 
     def _chosen(self, path: Path) -> None:
         name = path.name
@@ -215,9 +233,15 @@ class ExportDialog(Dialog):
         self.name = name[: -len(self.ending)] if name.endswith(self.ending) else path.stem
 
 
-def _texture(editor: Editor, path: Path) -> moderngl.Texture:
+def _clean_up(preview: ExportProcess | None, folder: tempfile.TemporaryDirectory[str]) -> None:
+    if preview is not None:
+        preview.stop()
+    folder.cleanup()
+
+
+def _texture(device: Device, path: Path) -> moderngl.Texture:
     pixels = shown_pixels(read_picture(path), PREVIEW)
-    texture = editor.device.ctx.texture((pixels.shape[1], pixels.shape[0]), 4, pixels.tobytes())
+    texture = device.ctx.texture((pixels.shape[1], pixels.shape[0]), 4, pixels.tobytes())
     texture.filter = moderngl.LINEAR, moderngl.LINEAR
     return texture
 
@@ -235,7 +259,7 @@ class StillExporting(Dialog):
     def is_busy(self) -> bool:
         return True
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
+    def body(self, ui: Ui) -> bool:
         if not self._exports.is_running:
             # It has ended by itself: well, or with a message that should be read.
             if self._exports.went_well:

@@ -21,18 +21,23 @@ class Stats:
 
 
 class Numbers:
-    """The latest numbers."""
+    """The latest numbers.
 
-    def __init__(self) -> None:
+    Args:
+        every: seconds between two looks.
+    """
+
+    def __init__(self, every: float = EVERY) -> None:
+        self._every = every
         self._stats = Stats()
         self._last = 0.0
         self._seen = -1
         self._steps = 0
 
     def take(self, session: Session) -> Stats:
-        """The numbers, at most `EVERY` old while something changes."""
+        """The numbers, at most `every` seconds old while something changes."""
         now = time.perf_counter()
-        if session.changes != self._seen and now - self._last > EVERY:
+        if session.changes != self._seen and now - self._last > self._every:
             taken, steps = session.device.timings.take(), session.replay.steps - self._steps
             self._steps += steps
             stages = self._stats.stages

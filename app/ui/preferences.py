@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -84,3 +85,28 @@ class Preferences:
         """Take note of where something was exported to."""
         self.export_folder = str(path.resolve().parent)
         self.save()
+
+    def dismiss_hint(self) -> None:
+        """The first hint has been followed or closed, and does not come again."""
+        if self.hint:
+            self.hint = False
+            self.save()
+
+    def toggle_theme(self) -> None:
+        self.theme = "light" if self.theme == "dark" else "dark"
+        self.save()
+
+    @property
+    def open_from(self) -> Path:
+        """The folder in which to look for files."""
+        return _first_of(self.folder)
+
+    @property
+    def export_to(self) -> Path:
+        """The folder to export to."""
+        return _first_of(self.export_folder, self.folder)
+
+
+def _first_of(*folders: str) -> Path:
+    """The first of the folders that is there, or the person's own."""
+    return next((Path(name) for name in folders if name and os.path.isdir(name)), Path.home())

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import median_low
-from typing import TYPE_CHECKING
 
 from app.model.strokes import Stroke
-from app.ui.files import fresh_recipe, settings_of
+from app.ui.editor_state import EditorState
+from app.ui.exporting import Exports
+from app.ui.files import Files, fresh_recipe, settings_of
+from app.ui.messages import Messages
+from app.ui.workspace import Workspace
+from app.work.recovery import Found
 from app.work.replay import Replay
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
-    from app.work.recovery import Found
-    from app.work.session import Session
+from app.work.session import Session
 
 GRIDS = (96, 128, 160, 192, 256, 384)
 PATIENCE = 1.5  # seconds below the wanted rate, or with time to spare, before something is done about it
@@ -61,39 +61,50 @@ class Speed:
         return max((grid for grid in GRIDS if self.tick(grid) <= room), default=GRIDS[0])
 
 
+@dataclass
 class Quality:
     """Chooses the grid when a picture is opened, and another one where painting is slow or has time to spare.
 
     Only as long as the person has not chosen one; and what is seen and the history stay as they are: another grid is
     prepared while nothing moves, and takes the place of this one when it is where this one is.
+
+    Attributes:
+        files, exports: what is read and written has the machine first.
+        speed: of this machine, once it has been measured.
+        grid: that painting has been well on.
     """
 
-    def __init__(self, editor: Editor) -> None:
-        self.editor = editor
-        self._session: Session | None = None  # that is watched
-        self._wanted: int | None = None
-        self._slow_for = self._spare_for = 0.0
-        self._steps, self._has_stepped = 0, False
-        self._grid: int | None = None  # that painting has been well on
-        self._frames = 0
-        self._speed: Speed | None = None
-        self._trial: Replay | None = None
-        self._spent: list[list[float]] = []  # milliseconds of the ticks on each grid of `TRIALS` so far
-        self._drawing: list[float] = []
+    workspace: Workspace
+    state: EditorState
+    files: Files
+    exports: Exports
+    messages: Messages
+    speed: Speed | None = None
+    grid: int | None = None
+    _session: Session | None = field(default=None, init=False)  # that is watched
+    _wanted: int | None = field(default=None, init=False)
+    _slow_for: float = field(default=0.0, init=False)
+    _spare_for: float = field(default=0.0, init=False)
+    _steps: int = field(default=0, init=False)
+    _has_stepped: bool = field(default=False, init=False)
+    _frames: int = field(default=0, init=False)
+    _trial: Replay | None = field(default=None, init=False)
+    _spent: list[list[float]] = field(default_factory=list, init=False)  # ms of the ticks on each grid of `TRIALS`
+    _drawing: list[float] = field(default_factory=list, init=False)
 
     @property
     def is_on(self) -> bool:
         """The grid of what is open follows the machine."""
-        return self.editor.state.auto_quality and self.editor.session.is_grid_automatic
+        return self.state.auto_quality and self.workspace.session.is_grid_automatic
 
     def turn_on(self) -> None:
         """Let the grid of what is open follow the machine, whoever has chosen it."""
-        self.editor.state.auto_quality = self.editor.session.is_grid_automatic = True
+        self.state.auto_quality = self.workspace.session.is_grid_automatic = True
         self._begin()
 
     def opened(self, found: Found | None) -> None:
         """Something new is open; of an untouched picture, nobody has chosen the grid. `found`: what was restored."""
-        session = self.editor.session
+        session = self.workspace.session
         recipe = session.recipe
         fresh = recipe.edited(picture=None) == fresh_recipe(settings_of(recipe.fluid))
         session.is_grid_automatic = fresh if found is None else found.work.is_grid_automatic
@@ -101,15 +112,15 @@ class Quality:
 
     def _begin(self) -> None:
         """Take the grid that this machine does well on, as far as that is known."""
-        session = self.editor.session
+        session = self.workspace.session
         self._watch(session)
-        if self._speed is None or self._grid is None or not self.is_on:
+        if self.speed is None or self.grid is None or not self.is_on:
             return
         # Who has undone everything may want it back: what can be redone was made with the ticks as they are.
         if session.end == 0 and len(session.document.history.entries) == 1:
-            session.begin_with(grid=self._grid, dt=1 / 60 if self._speed.tick(self._grid) < FAST else 1 / 30)
-        elif session.recipe.fluid.grid != self._grid:
-            self._wanted = self._grid
+            session.begin_with(grid=self.grid, dt=1 / 60 if self.speed.tick(self.grid) < FAST else 1 / 30)
+        elif session.recipe.fluid.grid != self.grid:
+            self._wanted = self.grid
 
     def _watch(self, session: Session) -> None:
         """Begin to watch the rate anew."""
@@ -117,9 +128,15 @@ class Quality:
         self._steps, self._has_stepped = session.replay.steps, False
         self._slow_for = self._spare_for = 0.0
 
+    def release(self) -> None:
+        """Give up what is being measured."""
+        if self._trial is not None:
+            self._trial.release()
+            self._trial = None
+
     @property
     def is_measuring(self) -> bool:
-        return self.editor.state.auto_quality and self._speed is None
+        return self.state.auto_quality and self.speed is None
 
     def warm_up(self, begun: float) -> None:
         """After the first frames, a tick a frame: compile what the first stroke needs, and measure this machine.
@@ -127,7 +144,8 @@ class Quality:
         `begun`: when the frame was, on `time.perf_counter`.
         """
         self._frames += 1
-        session, finish = self.editor.session, self.editor.device.ctx.finish
+        session = self.workspace.session
+        finish = session.device.ctx.finish
         if self._frames < 2 or session.is_moving:
             return
         finish()
@@ -142,29 +160,28 @@ class Quality:
         self._spent[-1].append((time.perf_counter() - start) * 1e3)
         if len(self._spent[-1]) < TICKS:
             return
-        self._trial.release()
-        self._trial = None
+        self.release()
         if len(self._spent) == len(TRIALS):
             # The first ones compile.
             fine, coarse = (median_low(ticks[2:]) for ticks in self._spent)
-            self._speed = Speed.of(fine, coarse, median_low(self._drawing[2:]))
-            self._grid = self._speed.best_grid
+            self.speed = Speed.of(fine, coarse, median_low(self._drawing[2:]))
+            self.grid = self.speed.best_grid
             self._begin()
 
     def _new_trial(self, grid: int) -> Replay:
         """A push of which the picture on the canvas knows nothing."""
-        session = self.editor.session
+        session = self.workspace.session
         stroke = Stroke(tool="push", radius=0.15, samples=((0, 0.4, 0.5, 1.0), (TICKS, 0.52, 0.5, 1.0)))
         fluid = session.recipe.fluid.model_copy(update={"grid": grid})
         recipe = session.recipe.edited(stroke=(stroke,), change=(), fluid=fluid)
-        return Replay(self.editor.device, recipe, session.pictures, budget=0)
+        return Replay(session.device, recipe, session.pictures, budget=0)
 
     def look(self, dt: float) -> None:
         """Watch the rate while the person paints; another grid is prepared when nothing moves.
 
         `dt`: seconds since the last frame.
         """
-        editor, session = self.editor, self.editor.session
+        session = self.workspace.session
         if session is not self._session:
             self._watch(session)
         if not self.is_on:
@@ -176,24 +193,23 @@ class Quality:
             assert self._wanted is not None
             before = session.recipe.fluid.grid
             if session.prepare_grid(self._wanted, AT_ONCE):
-                self._grid = self._wanted
+                self.grid = self._wanted
                 self._watch(session)
-                if self._grid < before:
-                    editor.messages.say(
-                        f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {self._grid} cells "
+                if self.grid < before:
+                    self.messages.say(
+                        f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {self.grid} cells "
                         f"instead of {before}. Quality in the inspector changes it."
                     )
 
     @property
     def is_preparing(self) -> bool:
         """Another grid is wanted, and there is time for it."""
-        editor = self.editor
-        busy = editor.session.is_moving or editor.files.is_loading or editor.exports.is_running
+        busy = self.workspace.session.is_moving or self.files.is_loading or self.exports.is_running
         return self._wanted is not None and self.is_on and not busy
 
     def _judge(self, dt: float) -> None:
         """Learn from a frame while the person paints what grid would be better."""
-        session = self.editor.session
+        session = self.workspace.session
         # A hiccup, such as a shader that is compiled, is no slow machine.
         dt = min(dt, HICCUP)
         # `dt` is what the frame before took, so what was done in that one counts.
@@ -204,8 +220,8 @@ class Quality:
         finer = min((grid for grid in GRIDS if grid > now), default=None)
         slow = dt > 1.1 / WANTED
         self._slow_for = min(max(self._slow_for + (dt if slow else -dt), 0.0), 2 * PATIENCE)
-        if has_stepped and finer is not None and self._speed is not None:
-            more = (self._speed.tick(finer) - self._speed.tick(now)) * 1e-3
+        if has_stepped and finer is not None and self.speed is not None:
+            more = (self.speed.tick(finer) - self.speed.tick(now)) * 1e-3
             spare = dt + more < (1 - SPARE) / WANTED
             self._spare_for = min(max(self._spare_for + (dt if spare else -dt), 0.0), 2 * PATIENCE)
         if self._slow_for > PATIENCE:
@@ -217,4 +233,4 @@ class Quality:
 
     def _takes(self, grid: int) -> float:
         """Seconds to simulate all that has been done on a grid."""
-        return 0.0 if self._speed is None else self.editor.session.tick * self._speed.tick(grid) * 1e-3
+        return 0.0 if self.speed is None else self.workspace.session.tick * self.speed.tick(grid) * 1e-3

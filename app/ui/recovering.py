@@ -1,88 +1,55 @@
-"""Offering work that was not saved when fluidwarp ended, and keeping journals of what is open now."""
+"""Offering work that was not saved when fluidwarp ended."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from datetime import date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.ui.dialogs import Dialog
+from app.ui.dialogs import Dialog, Dialogs
+from app.ui.journals import Journals
+from app.ui.messages import Messages
 from app.ui.widgets import Ui
 from app.work import recovery
-from app.work.recovery import Found, Journal
-from app.work.session import Session
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
+from app.work.recovery import Found
 
 ROWS = 4  # works that are seen without scrolling
 HEIGHT = 74  # of a row
 
 
 class Recovery:
-    """The journals of the works that are open, and those that were found.
+    """Works that were not saved when fluidwarp ended; looked for in another thread.
 
     Args:
-        editor: whose works.
-        root: the folder of journals; None keeps none, for tests.
+        journals: of the works that are open; the others are beside them.
+        dialogs, messages: ask and tell the person.
+        restore: opens one.
     """
 
-    def __init__(self, editor: Editor, root: Path | None) -> None:
-        self.editor = editor
-        self._root = root
-        self._journals: dict[Session, Journal] = {}
-        self._ended: list[Journal] = []
-        self._has_warned = False
+    def __init__(
+        self, journals: Journals, dialogs: Dialogs, messages: Messages, restore: Callable[[Found], None]
+    ) -> None:
+        self._journals = journals
+        self._dialogs = dialogs
+        self._messages = messages
+        self._restore = restore
         self._offered: list[Found] = []
         self._notices: list[str] = []
         self._search: threading.Thread | None = None
-        if root is not None:
-            self._search = threading.Thread(target=self._find, args=(root,), name="finding journals", daemon=True)
+        if journals.root is not None:
+            self._search = threading.Thread(
+                target=self._find, args=(journals.root,), name="finding journals", daemon=True
+            )
             self._search.start()
 
     @property
     def is_busy(self) -> bool:
         """Something goes on in another thread, of which there will be something to see."""
-        return self._search is not None or any(journal.is_behind for journal in self._journals.values())
-
-    # -- what is open -----------------------------------------------------------------------------------------------
-
-    def opened(self, session: Session, found: Found | None) -> None:
-        """A work has been opened; `found` where it was restored."""
-        if self._root is not None:
-            self._journals[session] = Journal(self._root, found and found.held)
-
-    def keep(self) -> None:
-        """Take note of what has been done to the work that is open."""
-        session = self.editor.session
-        journal = self._journals.get(session)
-        if journal is None:
-            return
-        journal.keep(session.project, session.document, session.is_grid_automatic)
-        if journal.trouble is not None and not self._has_warned:
-            self._has_warned = True
-            self.editor.messages.warn(journal.trouble)
-
-    def closed(self, session: Session) -> None:
-        """A work that was open is given up."""
-        if session in self._journals:
-            self._ended.append(self._journals.pop(session))
-            self._ended[-1].end(discard=True)
-
-    def release(self, discard: bool) -> None:
-        """Stop; `discard` if the person has left, and not where the program fails."""
-        for journal in self._journals.values():
-            journal.end(discard)
-        for journal in (*self._ended, *self._journals.values()):
-            journal.join()
-        self._journals.clear()
-        self.later()
-
-    # -- what was found ---------------------------------------------------------------------------------------------
+        return self._search is not None or self._journals.are_behind
 
     def _find(self, root: Path) -> None:
         self._offered, self._notices = recovery.find(root)
@@ -93,9 +60,9 @@ class Recovery:
             return
         self._search = None
         for notice in self._notices:
-            self.editor.messages.warn(notice)
+            self._messages.warn(notice)
         if self._offered:
-            self.editor.dialogs.append(Offer(self))
+            self._dialogs.show(Offer(self))
 
     @property
     def offered(self) -> list[Found]:
@@ -106,7 +73,7 @@ class Recovery:
         """Open one of them, and keep the others for another start."""
         self._offered.remove(found)
         self.later()
-        self.editor.files.restore(found)
+        self._restore(found)
 
     def discard(self, found: Found) -> None:
         """Remove one of them for good."""
@@ -130,7 +97,7 @@ class Offer(Dialog):
         self._recovery = recovery
         self._doubted: Found | None = None  # its Discard has been pressed once
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
+    def body(self, ui: Ui) -> bool:
         offered = self._recovery.offered
         ui.wrapped("fluidwarp ended before this was saved. It is here up to the last stroke.", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(4)))

@@ -5,41 +5,52 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.media.project import SUFFIX
+from app.media.project import SUFFIX, Project
+from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialog
+from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
 
 
 class SaveDialog(Dialog):
     """The name of a project, and the choice between keeping its picture and referring to it.
 
     Args:
-        editor: whose work is saved.
+        project: what is saved.
         path: proposed.
+        preferences: say whether the picture goes into it, and are told.
+        chooser: lets the person look for another place.
+        write: saves it at a path, with its picture or without.
         then: what is done once it is saved.
     """
 
     width = 500
 
-    def __init__(self, editor: Editor, path: Path, then: Callable[[], None] | None) -> None:
+    def __init__(
+        self,
+        project: Project,
+        path: Path,
+        preferences: Preferences,
+        chooser: FileChooser,
+        write: Callable[[Path, bool], None],
+        then: Callable[[], None] | None,
+    ) -> None:
         super().__init__("Save the project")
-        project = editor.session.project
         self.folder = path.parent
         self.name = path.name.removesuffix(SUFFIX)
         # A picture that is only inside a project has no file to refer to.
         self.must_embed = project.keeper is not None
-        self.embed = self.must_embed or editor.preferences.embed
+        self.embed = self.must_embed or preferences.embed
         self._picture = project.folder / (project.recipe.picture or "")
         self._bytes = len(project.data)
         self._own = project.path
+        self._preferences = preferences
+        self._chooser = chooser
+        self._write = write
         self._then = then
         self._is_new = True
 
@@ -47,7 +58,7 @@ class SaveDialog(Dialog):
     def path(self) -> Path:
         return self.folder / (self.name.strip().removesuffix(SUFFIX) + SUFFIX)
 
-    def body(self, ui: Ui, editor: Editor) -> bool:
+    def body(self, ui: Ui) -> bool:
         imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
         if self._is_new:
             imgui.set_keyboard_focus_here()
@@ -56,7 +67,7 @@ class SaveDialog(Dialog):
         entered, self.name = imgui.input_text("##name", self.name, flags)
         imgui.same_line()
         if ui.button("Browse", width=96, height=27):
-            editor.files.ask_where("Save", self.path, (SUFFIX,), self._chosen)
+            self._chooser.ask_where("Save", self.path, (SUFFIX,), self._chosen)
         ui.dim(str(self.path))
         if os.path.exists(self.path) and self.path != self._own:
             ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
@@ -77,13 +88,13 @@ class SaveDialog(Dialog):
         imgui.same_line()
         with ui.enabled(bool(self.name.strip())):
             if (ui.button("Save", primary=True, width=96) or entered) and self.name.strip():
-                return not self._save(editor)
+                return not self._save()
         return True
 
-    def _save(self, editor: Editor) -> bool:
+    def _save(self) -> bool:
         if not self.must_embed:
-            editor.preferences.embed = self.embed
-        saved = self.attempt(lambda: editor.files.write(self.path, self.embed))
+            self._preferences.embed = self.embed
+        saved = self.attempt(lambda: self._write(self.path, self.embed))
         if saved and self._then is not None:
             self._then()
         return saved

@@ -24,7 +24,7 @@ TICK = 1 / 30
 Place = tuple[float, float]
 
 
-class Studio:
+class OffscreenEditor:
     """An editor without a window that is photographed.
 
     Args:
@@ -79,81 +79,81 @@ def line(start: Place, end: Place, bow: float = 0.0) -> Callable[[float], Place]
     return path
 
 
-def paint(studio: Studio) -> None:
+def paint(offscreen: OffscreenEditor) -> None:
     """What the pictures show: the billiard table and the lamps, drawn out like honey."""
-    editor = studio.editor
-    studio.stroke(line((0.52, 0.52), (0.64, 0.46), -0.03), 16)
+    editor = offscreen.editor
+    offscreen.stroke(line((0.52, 0.52), (0.64, 0.46), -0.03), 16)
     editor.state.brush = replace(editor.state.brush, radius=0.11)
-    studio.stroke(line((0.53, 0.19), (0.47, 0.31), 0.0), 12)
-    studio.stroke(line((0.86, 0.15), (0.80, 0.25), 0.0), 12)
-    editor.choose_tool("twirl", False)
-    studio.stroke(lambda part: (0.19 + 0.002 * cos(part), 0.15), 20)
-    editor.choose_tool("push", False)
+    offscreen.stroke(line((0.53, 0.19), (0.47, 0.31), 0.0), 12)
+    offscreen.stroke(line((0.86, 0.15), (0.80, 0.25), 0.0), 12)
+    editor.state.choose_tool("twirl", False)
+    offscreen.stroke(lambda part: (0.19 + 0.002 * cos(part), 0.15), 20)
+    editor.state.choose_tool("push", False)
     editor.state.brush = replace(editor.state.brush, radius=0.15)
-    studio.stroke(line((0.30, 0.82), (0.42, 0.78), 0.04), 16)
+    offscreen.stroke(line((0.30, 0.82), (0.42, 0.78), 0.04), 16)
 
 
-def editor(studio: Studio) -> np.ndarray:
+def editor(offscreen: OffscreenEditor) -> np.ndarray:
     """The window after a few strokes."""
-    paint(studio)
-    studio.frame(Move(*studio.editor.view.to_screen(0.64, 0.46)))
-    return studio.picture()
+    paint(offscreen)
+    offscreen.frame(Move(*offscreen.editor.view.to_screen(0.64, 0.46)))
+    return offscreen.picture()
 
 
-def overlays(studio: Studio) -> np.ndarray:
+def overlays(offscreen: OffscreenEditor) -> np.ndarray:
     """A frozen figure, the grid and the velocity while a stroke goes past it."""
-    studio.editor.state.brush = replace(studio.editor.state.brush, radius=0.07, hardness=0.6)
-    studio.key("f")
-    studio.stroke(line((0.67, 0.37), (0.675, 0.50)), 8)
-    studio.editor.state.brush = replace(studio.editor.state.brush, radius=0.15, hardness=0.0)
-    studio.key("p")
+    offscreen.editor.state.brush = replace(offscreen.editor.state.brush, radius=0.07, hardness=0.6)
+    offscreen.key("f")
+    offscreen.stroke(line((0.67, 0.37), (0.675, 0.50)), 8)
+    offscreen.editor.state.brush = replace(offscreen.editor.state.brush, radius=0.15, hardness=0.0)
+    offscreen.key("p")
     for key in ("1", "3", "4"):
-        studio.key(key)
-    studio.stroke(line((0.42, 0.62), (0.58, 0.50), -0.03), 12, finish=False)
-    return studio.picture()
+        offscreen.key(key)
+    offscreen.stroke(line((0.42, 0.62), (0.58, 0.50), -0.03), 12, finish=False)
+    return offscreen.picture()
 
 
-def compare(studio: Studio) -> np.ndarray:
+def compare(offscreen: OffscreenEditor) -> np.ndarray:
     """Before and after in the light theme."""
-    paint(studio)
-    studio.editor.preferences.theme = "light"
-    studio.key("y")
-    studio.frame(Move(640, 20))
-    return studio.picture()
+    paint(offscreen)
+    offscreen.editor.preferences.theme = "light"
+    offscreen.key("y")
+    offscreen.frame(Move(640, 20))
+    return offscreen.picture()
 
 
-def export(studio: Studio) -> np.ndarray:
+def export(offscreen: OffscreenEditor) -> np.ndarray:
     """The export dialog."""
-    paint(studio)
-    studio.editor.preferences.folder = ""
-    studio.key("e", Mods(ctrl=True))
-    studio.editor.dialogs[-1].folder = Path("pictures")  # pyright: ignore[reportAttributeAccessIssue]
-    studio.frame()
-    studio.frame()
-    return studio.picture()
+    paint(offscreen)
+    offscreen.editor.preferences.folder = ""
+    offscreen.key("e", Mods(ctrl=True))
+    offscreen.editor.dialogs.shown[-1].folder = Path("pictures")  # pyright: ignore[reportAttributeAccessIssue]
+    offscreen.frame()
+    offscreen.frame()
+    return offscreen.picture()
 
 
 SCENES = {"editor": editor, "overlays": overlays, "compare": compare, "export": export}
 
 
-def film(studio: Studio, path: Path) -> None:
+def film(offscreen: OffscreenEditor, path: Path) -> None:
     """A stroke as it is made, at half the size."""
     from PIL import Image
 
     frames = []
 
     def take() -> None:
-        picture = Image.fromarray(studio.picture())
+        picture = Image.fromarray(offscreen.picture())
         frames.append(picture.resize((SIZE[0] // 2, SIZE[1] // 2), Image.Resampling.LANCZOS))
 
-    editor, way = studio.editor, line((0.50, 0.52), (0.64, 0.44), -0.03)
+    editor, way = offscreen.editor, line((0.50, 0.52), (0.64, 0.44), -0.03)
     for step in range(21):
-        studio.frame(Move(*editor.view.to_screen(*way(step / 20))))
+        offscreen.frame(Move(*editor.view.to_screen(*way(step / 20))))
         if step == 0:
             take()
-            studio.frame(Button(LEFT, True))
+            offscreen.frame(Button(LEFT, True))
         take()
-    studio.frame(Button(LEFT, False))
+    offscreen.frame(Button(LEFT, False))
     for _ in range(18):
         take()
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=50, loop=0, quality=80, method=4)
@@ -164,12 +164,12 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with Device.headless() as device:
         for name, scene in SCENES.items():
-            studio = Studio(device)
-            write_picture(folder / f"{name}.webp", Picture(scene(studio)))
-            studio.close()
-        studio = Studio(device)
-        film(studio, folder / "stroke.webp")
-        studio.close()
+            offscreen = OffscreenEditor(device)
+            write_picture(folder / f"{name}.webp", Picture(scene(offscreen)))
+            offscreen.close()
+        offscreen = OffscreenEditor(device)
+        film(offscreen, folder / "stroke.webp")
+        offscreen.close()
 
 
 if __name__ == "__main__":

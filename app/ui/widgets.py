@@ -1,4 +1,7 @@
-"""Our own widgets on imgui: buttons with icons, sliders that say what they are, choices, sections."""
+"""Our own widgets on imgui: buttons with icons, sliders that say what they are, choices, sections.
+
+One long class: each widget is a method of what it draws with, and there is nothing else between them.
+"""
 
 from __future__ import annotations
 
@@ -44,6 +47,7 @@ class Ui:
 
     Attributes:
         covers: where the canvas is covered by something that can be clicked, as of the last frame.
+        has_popup: a menu or a dialog is open, as of then.
     """
 
     palette: Palette
@@ -51,6 +55,7 @@ class Ui:
     scale: float
     density: float = 1.0
     covers: list[Rect] = field(default_factory=list)
+    has_popup: bool = False
     _covering: list[Rect] = field(default_factory=list)  # the same of the frame that is being drawn
     _slid: tuple[str, float] = ("", -1.0)  # the slider that was let go of last, and when
     _untyped: dict[str, float] = field(default_factory=dict)  # values of sliders before one is typed
@@ -103,6 +108,12 @@ class Ui:
     def end_frame(self) -> None:
         """Everything has been drawn: what covers the canvas is known."""
         self.covers, self._covering = self._covering, []
+        anywhere = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
+        self.has_popup = imgui.is_popup_open("", anywhere)
+
+    def is_covered(self, x: float, y: float) -> bool:
+        """Something that can be clicked lies at a point of the screen, or might."""
+        return self.has_popup or any(rect.contains(x, y) for rect in self.covers)
 
     @contextmanager
     def enabled(self, condition: bool) -> Iterator[None]:
@@ -207,19 +218,6 @@ class Ui:
         if icon:
             icons.draw(draw, icon, x, corner.y + (size.y - self.px(16)) / 2, self.px(16), packed(ink, alpha))
         draw.add_text(ImVec2(x + room, corner.y + (size.y - text.y) / 2), packed(ink, alpha), words)
-        imgui.pop_font()
-        return clicked
-
-    def link(self, label: str) -> bool:
-        """A small button that looks like words."""
-        words = label.split("##")[0]
-        imgui.push_font(self.fonts.regular, 13.0)
-        size = imgui.calc_text_size(words)
-        corner = imgui.get_cursor_screen_pos()
-        clicked = imgui.invisible_button(label, ImVec2(size.x + self.px(4), size.y + self.px(4)))
-        hovered = imgui.is_item_hovered()
-        colour = self.palette.accent if hovered else self.palette.dim
-        imgui.get_window_draw_list().add_text(corner + ImVec2(self.px(2), self.px(2)), packed(colour), words)
         imgui.pop_font()
         return clicked
 
@@ -333,15 +331,15 @@ class Ui:
             flags |= imgui.SliderFlags_.logarithmic
         imgui.push_font(self.fonts.regular, 14.0)
         # It holds the number that is shown, so that this is what Ctrl+click offers; a unit typed after it is ignored.
-        changed, told = imgui.slider_float(ident, unit.number(value), low * unit.per, high * unit.per, "%.6g", flags)
+        changed, number = imgui.slider_float(ident, unit.number(value), low * unit.per, high * unit.per, "%.6g", flags)
         new = value
         if not typing:
             self._untyped[name] = value
-            new = unit.value(unit.number(told / unit.per)) if changed else value
-        elif changed and isfinite(told):
+            new = unit.value(unit.number(number / unit.per)) if changed else value
+        elif changed and isfinite(number):
             # The number that was offered, as after Escape, is the value from before, with all its digits.
             before = self._untyped.get(name, value)
-            new = before if unit.value(told) == unit.value(unit.number(before)) else unit.value(told)
+            new = before if unit.value(number) == unit.value(unit.number(before)) else unit.value(number)
         done = imgui.is_item_deactivated_after_edit()
         hovered, held, again = imgui.is_item_hovered(), imgui.is_item_active(), False
         if hovered and default is not None and imgui.is_mouse_double_clicked(0) and not typing:

@@ -53,7 +53,7 @@ class _Loader:
         pass
 
 
-class Window:
+class GlfwWindow:
     """A window of the system with a GL, and the events that happen in it."""
 
     def __init__(self) -> None:
@@ -108,16 +108,16 @@ class Window:
     def show(self, editor: Editor) -> None:
         """Run the editor until the person leaves."""
         last = time.perf_counter()
-        editor.clipboard = lambda text: glfw.set_clipboard_string(self.handle, text)
-        editor.files.native = True
+        editor.commands.clipboard = lambda text: glfw.set_clipboard_string(self.handle, text)
+        editor.chooser.native = True
         screen = self.device.ctx.detect_framebuffer(0)
-        while not editor.closed:
+        while not editor.commands.closed:
             self._wait(editor)
             if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
                 if any(isinstance(event, CloseWish) for event in self.events):
-                    if editor.asks_before_quitting:
+                    if editor.commands.asks_before_quitting:
                         glfw.restore_window(self.handle)
-                elif not any(dialog.is_busy for dialog in editor.dialogs):
+                elif not editor.dialogs.is_busy:
                     # What has happened waits too.
                     glfw.wait_events_timeout(0.1)
                     continue
@@ -127,7 +127,7 @@ class Window:
             editor.frame(screen, self.size, dt, events, self.density, self.scale)
             self._must_draw = False
             self._show_title(editor)
-            self._show_cursor(editor.hand.cursor)
+            self._show_cursor(editor.pointer.cursor)
             glfw.swap_buffers(self.handle)
             spare = FASTEST - (time.perf_counter() - now)
             if spare > 0:
@@ -223,11 +223,11 @@ def run(file: Path | None = None) -> None:
     """
     if file is not None and not os.path.exists(file):
         load_any(file)
-    window = Window()
+    window = GlfwWindow()
     try:
         editor = Editor(window.device, load_any(sample()), Preferences.load(), default_folder())
         if file is not None:
-            editor.placeholder = editor.session
+            editor.workspace.placeholder = editor.session
             window.events.append(Drop((str(file),)))
         try:
             window.show(editor)

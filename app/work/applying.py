@@ -28,6 +28,7 @@ from solver.gl.field import FieldError
 from solver.grid import Grid
 from solver.resample.plan import Edges, GivenMap, Sampling, SamplingError
 from solver.resample.sampler import Sampler
+from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 MOST_CELLS = 1024  # along the longer side, for turning a map round
@@ -236,7 +237,8 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     warp = WarpMap(device, grid, (width, height))
     try:
         warp.set(values)
-        found = warp.forward.read((width, height))
+        with ForwardMap(warp) as forward:
+            found = forward.read((width, height))
     except FieldError as error:
         raise UserError(f"the map cannot be turned round: {error}") from None
     finally:

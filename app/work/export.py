@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import json
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import chain, count, groupby, islice, pairwise, repeat
@@ -40,6 +40,7 @@ from app.work.threads import ahead, behind
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling, SamplingError
 from solver.resample.sampler import Sampler
+from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 POINTS_AT_ONCE = 1_000_000  # of a map
@@ -438,19 +439,19 @@ def displacement(
     """
     # A size in whole pixels has nearly the picture's aspect.
     fit = np.divide(size, max(size)) / replay.grid.extent
-    warp = replay.warp.forward if forward else replay.warp
-    if not overscan and max(size) <= replay.device.limits.max_texture_size:
-        return Displacement((warp.read(size) * fit).astype(np.float32), 0, forward)
-    (width, height), (right, bottom) = size, replay.grid.extent
-    x = np.clip((np.arange(-overscan, width + overscan) + 0.5) / width, 0, 1) * right
-    y = np.clip((np.arange(-overscan, height + overscan) + 0.5) / height, 0, 1) * bottom
-    values = np.empty((len(y), len(x), 2), np.float32)
-    rows = max(1, POINTS_AT_ONCE // len(x))
-    for top in range(0, len(y), rows):
-        check()
-        points = np.stack(np.meshgrid(x, y[top : top + rows]), axis=-1).reshape(-1, 2)
-        values[top : top + rows] = (warp.at(points) * fit).reshape(-1, len(x), 2)
-    return Displacement(values, overscan, forward)
+    with ForwardMap(replay.warp) if forward else nullcontext(replay.warp) as warp:
+        if not overscan and max(size) <= replay.device.limits.max_texture_size:
+            return Displacement((warp.read(size) * fit).astype(np.float32), 0, forward)
+        (width, height), (right, bottom) = size, replay.grid.extent
+        x = np.clip((np.arange(-overscan, width + overscan) + 0.5) / width, 0, 1) * right
+        y = np.clip((np.arange(-overscan, height + overscan) + 0.5) / height, 0, 1) * bottom
+        values = np.empty((len(y), len(x), 2), np.float32)
+        rows = max(1, POINTS_AT_ONCE // len(x))
+        for top in range(0, len(y), rows):
+            check()
+            points = np.stack(np.meshgrid(x, y[top : top + rows]), axis=-1).reshape(-1, 2)
+            values[top : top + rows] = (warp.at(points) * fit).reshape(-1, len(x), 2)
+        return Displacement(values, overscan, forward)
 
 
 def looked_up(

@@ -14,6 +14,7 @@ from solver.brush.tip import FARTHEST, Point, Tip
 from solver.gl.field import Field
 from solver.grid import Grid
 from solver.scheme import Forces, Scheme, State, check_step
+from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
@@ -95,7 +96,7 @@ class Handles:
     """
 
     def __init__(self, fluid: Scheme, warp: WarpMap, handles: Sequence[Handle]) -> None:
-        self._fluid, self._warp = fluid, warp
+        self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
         self._one = fluid.device.field((1, 1), 1, "slip of handles")
         self._one.clear(1.0)
@@ -134,7 +135,7 @@ class Handles:
         self._places = self._located()
         begun = np.array([handle.start <= time + dt / 2 for handle in self.handles], bool)
         if (new := begun & np.isnan(self._starts[:, 0])).any():
-            self._places[new] = self._at[new] + self._warp.forward.at(self._at[new])
+            self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
         self._active = np.flatnonzero(active)
         self._wanted = self._wanted_velocities(time, dt)
@@ -174,7 +175,7 @@ class Handles:
         """Where they are now, (n, 2) in longer sides, or will begin; looking changes nothing."""
         found, waiting = self._located(), np.isnan(self._starts[:, 0])
         if waiting.any():
-            found[waiting] = self._at[waiting] + self._warp.forward.at(self._at[waiting])
+            found[waiting] = self._at[waiting] + self._forward.at(self._at[waiting])
         return found
 
     @property
@@ -205,7 +206,7 @@ class Handles:
 
     def release(self) -> None:
         """Free the textures."""
-        for field in (self._stream, self._one, self._motion):
+        for field in (self._stream, self._one, self._motion, self._forward):
             field.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -238,7 +239,7 @@ class Handles:
             back *= np.minimum(1.0, FARTHEST_STEP * self._radii[begun] / np.maximum(np.hypot(*back.T), 1e-30))[:, None]
             found = np.clip(found - back, 0.0, extent)
         if (lost := least > LOST).any():  # the map has been changed by something else than the flow
-            best[lost] = wanted[lost] + self._warp.forward.at(wanted[lost])
+            best[lost] = wanted[lost] + self._forward.at(wanted[lost])
         places[begun] = best
         return places
 

@@ -1,109 +1,21 @@
-"""The GPU as the solver sees it: one GL 3.3 context, its limits, its compiled passes and its float textures."""
+"""The GPU as the solver sees it: one GL 3.3 context, its compiled passes and its float textures."""
 
 from __future__ import annotations
-
-import ctypes.util
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
 
+from solver.gl.context import Context
 from solver.gl.field import DoubleField, Field
-from solver.gl.timing import Timings
-
-if TYPE_CHECKING:
-    from solver.gl.passes import Pass
-
-INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
+from solver.gl.passes import Pass
 
 
-class ContextError(RuntimeError):
-    """No usable OpenGL 3.3; the message says why and what to install."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What this GL can do: names, version and the sizes that bound us."""
-
-    vendor: str
-    renderer: str
-    version: str
-    max_texture_size: int
-    max_draw_buffers: int
-    max_texture_units: int
-
-    @property
-    def is_software(self) -> bool:
-        """True on a software rasteriser, where instructions cost more than passes."""
-        return any(name in self.renderer.lower() for name in ("llvmpipe", "softpipe", "swiftshader"))
-
-
-def _standalone_contexts() -> Iterator[dict[str, Any]]:
-    """How a context without a window can be asked for on this system, the best first."""
-    if not sys.platform.startswith("linux"):
-        yield {}  # WGL on Windows, CGL on macOS
-        return
-    yield {"backend": "egl"}
-    if ctypes.util.find_library("EGL"):
-        # Without the -dev packages only the versioned names exist.
-        yield {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1"}
-    if os.environ.get("DISPLAY"):
-        yield {"libgl": "libGL.so.1", "libx11": "libX11.so.6"}  # GLX
-
-
-class Device:
-    """One GL context and everything made in it.
-
-    Args:
-        ctx: a moderngl context, GL 3.3 core or later; use `Device.headless()` where there is no window.
-    """
+class Device(Context):
+    """One GL context and everything made in it."""
 
     def __init__(self, ctx: moderngl.Context, owns_context: bool = False) -> None:
-        self.ctx = ctx
-        self._owns_context = owns_context
-        info = ctx.info
-        self.limits = Limits(
-            vendor=str(info["GL_VENDOR"]),
-            renderer=str(info["GL_RENDERER"]),
-            version=str(info["GL_VERSION"]),
-            max_texture_size=int(info["GL_MAX_TEXTURE_SIZE"]),
-            max_draw_buffers=int(info["GL_MAX_DRAW_BUFFERS"]),
-            max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
-        )
-        self.timings = Timings(ctx)
+        super().__init__(ctx, owns_context)
         self._passes: dict[tuple[str, frozenset[tuple[str, object]]], Pass] = {}
-        self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
-        self._rest = ctx.simple_framebuffer((1, 1))
-        # Reads a field between its texels, where a look is enough.
-        self.linear = ctx.sampler(repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR))
-        # Python may collect garbage on any thread, and while another context is current: see `collect`.
-        ctx.gc_mode = "context_gc"
-        ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-
-    @classmethod
-    def headless(cls) -> Device:
-        """A device of its own, with no window: through EGL on Linux, through the system's own way elsewhere.
-
-        Raises:
-            ContextError: if there is no OpenGL 3.3 driver; the message says what was tried and what to install.
-        """
-        reasons: list[str] = []
-        for settings in _standalone_contexts():
-            try:
-                ctx = moderngl.create_context(require=330, standalone=True, **settings)
-            except Exception as error:  # glcontext raises plain Exception
-                reasons.append(str(error))
-            else:
-                return cls(ctx, owns_context=True)
-        hint = f"; {INSTALL_HINT}" if sys.platform.startswith("linux") else ""
-        raise ContextError(f"no OpenGL 3.3 without a window ({', '.join(dict.fromkeys(reasons))}){hint}")
-
-    # -- what is made in it -----------------------------------------------------------------------------------------
 
     def field(self, size: tuple[int, int], components: int = 1, label: str = "field", dtype: str = "f4") -> Field:
         """A zeroed texture that can be drawn into; see `solver.gl.field.Field`."""
@@ -124,54 +36,7 @@ class Device:
 
     def pass_(self, shader: str, **defines: object) -> Pass:
         """The pass of fragment shader `shader` (a path below `shaders/`), compiled once for each set of defines."""
-        from solver.gl.passes import Pass
-
         key = shader, frozenset(defines.items())
         if key not in self._passes:
             self._passes[key] = Pass(self, shader, defines)
         return self._passes[key]
-
-    def framebuffer(self, *fields: Field) -> moderngl.Framebuffer:
-        """The framebuffer that draws into `fields` at once, kept until one of them is released."""
-        if len(fields) == 1:
-            return fields[0].framebuffer
-        key = tuple(field.texture.glo for field in fields)
-        if key not in self._targets:
-            self._targets[key] = self.ctx.framebuffer([field.texture for field in fields])
-        return self._targets[key]
-
-    def forget_targets(self, field: Field) -> None:
-        """Drop the framebuffers that hold `field`, because it is being released."""
-        # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
-        self._rest.use()
-        for key in [key for key in self._targets if field.texture.glo in key]:
-            self._targets.pop(key).release()
-
-    def collect(self) -> None:
-        """Free the GL objects that Python has dropped; the context must be current, as for any drawing."""
-        objects = self.ctx.objects
-        if objects:
-            self._rest.use()
-        while objects:
-            item = objects.popleft()
-            if not isinstance(item, moderngl.InvalidObject):  # released before
-                item.release()
-
-    # -- its life ---------------------------------------------------------------------------------------------------
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Count and, when `timings.enabled`, time everything drawn inside under the stage's name."""
-        with self.timings.stage(name):
-            yield
-
-    def release(self) -> None:
-        """Give the context back, if it is ours; nothing made in it can be used afterwards."""
-        if self._owns_context:
-            self.ctx.release()
-
-    def __enter__(self) -> Device:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.release()

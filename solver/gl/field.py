@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import moderngl
 import numpy as np
 
-if TYPE_CHECKING:
-    from solver.gl.device import Device
+from solver.gl.context import Context
 
 DTYPES = {"f1": np.uint8, "nu2": np.uint16, "u4": np.uint32, "f2": np.float16, "f4": np.float32}
 
@@ -28,7 +25,7 @@ class Field:
         dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1), "u4" (whole numbers) or "f2".
     """
 
-    def __init__(self, device: Device, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
+    def __init__(self, device: Context, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
         width, height = size
         limit = device.limits.max_texture_size
         # A texture that is too large, or empty, is returned without an error and fails much later.
@@ -113,7 +110,7 @@ class Field:
 
     def release(self) -> None:
         """Free the texture; the field can no longer be used."""
-        self.device.forget_targets(self)
+        self.device.forget_targets(self.texture)
         self.framebuffer.release()
         self.texture.release()
 
@@ -124,7 +121,7 @@ class Field:
 class DoubleField:
     """A ping-pong pair: a pass reads `read`, draws into `write`, then `swap()` makes the result the one to read."""
 
-    def __init__(self, device: Device, size: tuple[int, int], components: int, label: str) -> None:
+    def __init__(self, device: Context, size: tuple[int, int], components: int, label: str) -> None:
         self.read = Field(device, size, components, f"{label} a")
         self.write = Field(device, size, components, f"{label} b")
 
@@ -144,7 +141,7 @@ class FieldPool:
         label: what their names begin with.
     """
 
-    def __init__(self, device: Device, label: str) -> None:
+    def __init__(self, device: Context, label: str) -> None:
         self.device = device
         self.label = label
         self._fields: dict[str, Field] = {}
@@ -163,7 +160,7 @@ class FieldPool:
         if kept is None or (kept.size, kept.components, kept.dtype) != (size, components, dtype):
             if kept is not None:
                 kept.release()
-            self._fields[role] = self.device.field(size, components, f"{self.label}, {role}", dtype)
+            self._fields[role] = Field(self.device, size, components, f"{self.label}, {role}", dtype)
         return self._fields[role]
 
     def release(self) -> None:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import moderngl
 
+from solver.gl.context import Context
 from solver.gl.field import Field
 from solver.gl.program import ShaderError, assemble, compile_program, declared_reads
-
-if TYPE_CHECKING:
-    from solver.gl.device import Device
 
 GL_SAMPLERS = 0x8B5E, 0x8DD2  # sampler2D, usampler2D
 
@@ -30,7 +28,7 @@ class Pass:
         ShaderError: if the shader does not compile, or an input is none of its uniforms.
     """
 
-    def __init__(self, device: Device, shader: str, defines: dict[str, object]) -> None:
+    def __init__(self, device: Context, shader: str, defines: dict[str, object]) -> None:
         self.device = device
         self.shader = shader
         self.reads = declared_reads(shader)
@@ -72,9 +70,10 @@ class Pass:
             vertices: of the triangles, where the pass has a vertex shader of its own.
             inputs: the shader's uniforms without their `u_`.
         """
-        fields = (target,) if isinstance(target, Field) else tuple(target)
+        fields = [target] if isinstance(target, Field) else list(target)
         self._bind(inputs)
-        framebuffer = self.device.framebuffer(*fields)
+        several = len(fields) > 1
+        framebuffer = self.device.framebuffer([f.texture for f in fields]) if several else fields[0].framebuffer
         regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
         if not regions:
             return

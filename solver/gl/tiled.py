@@ -156,6 +156,7 @@ class TiledField(Field):
         self.blank = blank
         # What each tile was last saved as or restored from; None where something was drawn since.
         self._same = np.full(self.kind.rows_and_columns, None, object)
+        self._pass = device.pass_
         super().__init__(device, size, components, label, dtype)
 
     def drawn(self, region: Region | None = None) -> None:
@@ -177,7 +178,7 @@ class TiledField(Field):
             same: _Tile | None = self._same.flat[place]
             if same is None or (same.field is not None and same.holders == 0):
                 copy = Field(self.device, (width, height), self.components, f"{self.label}, saved tile", self.dtype)
-                self.device.pass_("gl/copy.frag")(copy, field=self, offset=(x, y))
+                self._pass("gl/copy.frag")(copy, field=self, offset=(x, y))
                 self._same.flat[place] = _Tile(copy)
         return _held(SavedTiles(self.kind, self._same.copy(), self.blank))
 
@@ -218,7 +219,7 @@ class TiledField(Field):
         return self.blank, self.blank, self.blank, self.blank
 
     def _copy(self, other: Field, region: Region | None, offset: tuple[int, int]) -> None:
-        self.device.pass_("gl/copy.frag")(self, region=region, field=other, offset=offset)
+        self._pass("gl/copy.frag")(self, region=region, field=other, offset=offset)
 
 
 def _held(saved: SavedTiles) -> SavedTiles:

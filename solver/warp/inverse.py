@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.gl.points import draw_at
-
-if TYPE_CHECKING:
-    from solver.warp.map import WarpMap
+from solver.warp.map import WarpMap
 
 MOST_ALONG = 1024  # texels along a side of the first guess
 
@@ -44,14 +42,15 @@ class ForwardMap:
         """The displacement F at points (n, 2) of the original, in longer sides: float32 (n, 2)."""
         return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **self._inputs())
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return self._guess.nbytes
-
     def release(self) -> None:
         """Free the texture."""
         self._guess.release()
+
+    def __enter__(self) -> ForwardMap:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
 
     def _inputs(self) -> dict[str, Any]:
         warp = self._warp

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +17,6 @@ from solver.scheme import Scheme, State, check_field, check_step, on_faces, real
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen
-from solver.warp.inverse import ForwardMap
 from solver.warp.state import SUBMAPS, MapState, grid_in, values_of
 from solver.warp.submap import Level, Submap, window_of
 
@@ -326,8 +324,6 @@ class WarpMap:
         self._drop_waiting()
         for thing in (self._submap, self._accumulated, self._frozen, *self._composed.values()):
             thing.release()
-        if "forward" in self.__dict__:
-            self.forward.release()
 
     # -- reading it -------------------------------------------------------------------------------------------------
 
@@ -409,11 +405,6 @@ class WarpMap:
         origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
         compose = self.device.pass_("warp/compose.frag", **self._defines())
         compose(target, **self._parts(), origin=origin, step=step)
-
-    @cached_property
-    def forward(self) -> ForwardMap:
-        """The inverse: where points of the original go."""
-        return ForwardMap(self)
 
     def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
         """How the whole map distorts, looked at on a lattice of `size`; waits for the GPU.

@@ -31,7 +31,7 @@ from rich.table import Table
 
 from app.ui.clock import Clock
 from app.ui.events import LEFT, Button, Move
-from app.ui.screenshots import TICK, Studio, line
+from app.ui.screenshots import TICK, OffscreenEditor, line
 from solver import Device
 
 ROOT = Path(__file__).parent.parent.parent
@@ -58,23 +58,23 @@ class Waiting(Clock):
         self.spent[name] += (time.perf_counter() - start) * 1e3
 
 
-def stroke(studio: Studio, each: Callable[[Callable[[], None]], None]) -> None:
+def stroke(offscreen: OffscreenEditor, each: Callable[[Callable[[], None]], None]) -> None:
     """One stroke, each frame of it by `each`; then everything as before it."""
-    editor, path = studio.editor, line((0.45, 0.55), (0.65, 0.45), -0.03)
+    editor, path = offscreen.editor, line((0.45, 0.55), (0.65, 0.45), -0.03)
     for move in range(MOVES + 1):
         events = [Move(*editor.view.to_screen(*path(move / MOVES))), *([Button(LEFT, True)] if move == 0 else [])]
-        each(lambda events=events: editor.frame(studio.target, studio.size, TICK, events, studio.density))
-    studio.frame(Button(LEFT, False))
+        each(lambda events=events: editor.frame(offscreen.target, offscreen.size, TICK, events, offscreen.density))
+    offscreen.frame(Button(LEFT, False))
     editor.session.pause()
     editor.do("undo")
     for _ in range(3):
-        studio.frame()
+        offscreen.frame()
 
 
 def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
     """The rows of one grid."""
-    studio = Studio(device, grid=cells)
-    jacobi = Jacobi(device, studio.editor.session.replay.grid, pairs=1)
+    offscreen = OffscreenEditor(device, grid=cells)
+    jacobi = Jacobi(device, offscreen.editor.session.replay.grid, pairs=1)
     walls: list[float] = []
     works: list[float] = []
     units: list[float] = []
@@ -91,16 +91,16 @@ def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
         device.ctx.finish()
         units.append((time.perf_counter() - start) * 1e2)
 
-    stroke(studio, lambda frame: frame())
+    stroke(offscreen, lambda frame: frame())
     for _ in range(rounds):
-        stroke(studio, whole)
+        stroke(offscreen, whole)
     wall, unit = statistics.median(walls), statistics.median(units)
     late = sorted(walls)[int(0.95 * len(walls))]
     work = statistics.median(works)
     table.add_row(f"{cells}", "frame, median", f"{wall:.1f}", f"{wall / unit:.0f}", "", f"{work:.1f} of processor time")
     table.add_row("", "frame, 95 of 100", f"{late:.1f}", f"{late / unit:.0f}")
 
-    clock = studio.editor.clock = Waiting(device)
+    clock = offscreen.editor.clock = Waiting(device)
     device.timings.take()
     device.timings.enabled = True
     count = 0
@@ -115,7 +115,7 @@ def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
     for _ in range(rounds):
         clock.spent.clear()
         device.timings.take()
-        session = studio.editor.session
+        session = offscreen.editor.session
 
         def last(frame: Callable[[], None]) -> None:
             part(frame)
@@ -125,7 +125,7 @@ def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
                 for name, number in device.timings.passes.items():
                     passes[name] += number
 
-        stroke(studio, last)
+        stroke(offscreen, last)
         assert not session.is_painting
     device.timings.enabled = False
     spent["keeping, recording"] = spent["simulate"] - sum(spent[name] for name in STAGES)
@@ -138,7 +138,7 @@ def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
         row = f"{'    ' if inner else '  '}{name}", f"{mean:.2f}", f"{mean / unit:.1f}"
         table.add_row("", *row, f"{spent[name] / whole_frame:.0%}", number)
     jacobi.release()
-    studio.close()
+    offscreen.close()
 
 
 # The real window ------------------------------------------------------------------------------------------------------

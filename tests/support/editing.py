@@ -14,6 +14,7 @@ from app.media.project import Project, from_picture
 from app.model.picture import Picture
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
+from app.ui.exporting import ExportDialog
 from app.ui.files import fresh_recipe
 from app.ui.preferences import Preferences
 from solver.gl.device import Device
@@ -165,3 +166,9 @@ class Robot:
         self.editor.release()
         self.target.release()
         self.texture.release()
+
+
+def export_dialog(robot: Robot, folder: Path) -> ExportDialog:
+    """What a person who exports into a folder is asked."""
+    editor = robot.editor
+    return ExportDialog(editor.session, editor.exports, editor.chooser, Preferences(export_folder=str(folder)))

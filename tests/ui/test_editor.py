@@ -28,13 +28,14 @@ from app.ui.dialogs import PictureOrMap, Preferring, Shortcuts, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
+from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS, Speed
 from app.ui.saving import SaveDialog
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
 from solver.gl.device import Device
-from support.editing import Robot, command_line, pattern, small_project, write_foreign_map
+from support.editing import Robot, command_line, export_dialog, pattern, small_project, write_foreign_map
 
 
 @pytest.fixture
@@ -219,7 +220,7 @@ def test_a_gesture_can_be_given_up(robot: Robot) -> None:
 def test_honey_comes_to_rest_by_itself_and_putty_stops_with_the_brush(robot: Robot) -> None:
     moved = {}
     for feel, (viscosity, drag) in {"honey": (0.03, 2.0), "putty": (0.3, 0.0)}.items():
-        robot.editor.change(feel, viscosity=viscosity, drag=drag)
+        robot.editor.workspace.change(feel, viscosity=viscosity, drag=drag)
         robot.drag((0.4, 0.4), (0.5, 0.4), steps=6)
         released = robot.warp()
         ticks = 0
@@ -416,7 +417,7 @@ def test_undo_and_redo_give_the_same_bytes(robot: Robot) -> None:
 def test_settings_are_undone_too(robot: Robot) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
-    robot.editor.change("Putty", viscosity=0.3, drag=0.0)
+    robot.editor.workspace.change("Putty", viscosity=0.3, drag=0.0)
     assert robot.editor.session.recipe.fluid_at(robot.editor.session.tick).viscosity == 0.3
     robot.key("ctrl+z")
     assert robot.editor.session.recipe.fluid_at(robot.editor.session.tick).viscosity == pytest.approx(0.03)
@@ -446,7 +447,7 @@ def test_opening_pictures_can_be_undone(robot: Robot, tmp_path: Path) -> None:
     sizes = [(240, 180), (100, 60), (90, 70), (64, 64)]
     for number, size in enumerate(sizes[1:]):
         write_picture(tmp_path / f"{number}.png", pattern(*size))
-        if robot.editor.is_dirty:
+        if robot.editor.workspace.is_dirty:
             assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
         robot.drop(tmp_path / f"{number}.png")
         assert robot.editor.canvas.size == size
@@ -479,7 +480,7 @@ def test_a_session_saved_and_rendered_is_the_same_picture(device: Device, robot:
     robot.rest()
     warp = robot.warp()
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
-    assert not robot.editor.is_dirty
+    assert not robot.editor.workspace.is_dirty
     loaded = projects.load(tmp_path / "work.fluidwarp")
     assert loaded.recipe == robot.editor.session.recipe
     robot.editor.open(loaded)
@@ -488,7 +489,7 @@ def test_a_session_saved_and_rendered_is_the_same_picture(device: Device, robot:
     out = tmp_path / "out.png"
     run(device, Job(loaded.recipe, loaded.picture, loaded.folder, Outputs(out)), Progress())
     seen = robot.editor.exports
-    job = ExportDialog(robot.editor.session, str(tmp_path)).job()
+    job = export_dialog(robot, tmp_path).job()
     run(device, job, Progress())
     assert not seen.is_running
     assert job.outputs.file is not None
@@ -520,7 +521,7 @@ def test_saving_where_it_cannot_be_says_so(robot: Robot, tmp_path: Path) -> None
     robot.drag((0.3, 0.4), (0.45, 0.4))
     assert not robot.editor.files.save_as(tmp_path / "nowhere" / "work.fluidwarp")
     assert "nowhere" in robot.editor.messages.shown[-1].text
-    assert robot.editor.is_dirty
+    assert robot.editor.workspace.is_dirty
 
 
 def test_a_picture_that_is_gone_is_still_saved(robot: Robot, tmp_path: Path) -> None:
@@ -533,7 +534,7 @@ def test_a_picture_that_is_gone_is_still_saved(robot: Robot, tmp_path: Path) -> 
 
 def test_the_recipe_can_be_copied(robot: Robot) -> None:
     copied: list[str] = []
-    robot.editor.clipboard = copied.append
+    robot.editor.commands.clipboard = copied.append
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
     robot.key("ctrl+shift+c")
@@ -551,14 +552,14 @@ def test_dialogs_open_and_close(robot: Robot, key: str, dialog: type) -> None:
     plain = robot.pixels().astype(int)
     robot.key(key)
     robot.frame(count=3)
-    assert isinstance(robot.editor.dialogs[-1], dialog)
+    assert isinstance(robot.editor.dialogs.shown[-1], dialog)
     assert np.abs(robot.pixels() - plain).mean() > 5
     # Nothing under a dialog hears the pointer or the keys.
     robot.drag((0.05, 0.05), (0.1, 0.05), steps=2)
     assert robot.editor.session.recipe.stroke == ()
     robot.key("escape")
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
 
 
 def test_unsaved_work_is_asked_about(robot: Robot, tmp_path: Path) -> None:
@@ -566,14 +567,14 @@ def test_unsaved_work_is_asked_about(robot: Robot, tmp_path: Path) -> None:
     robot.rest()
     robot.frame(CloseWish())
     robot.frame(count=2)
-    assert isinstance(robot.editor.dialogs[-1], Unsaved)
-    assert not robot.editor.closed
+    assert isinstance(robot.editor.dialogs.shown[-1], Unsaved)
+    assert not robot.editor.commands.closed
     robot.key("escape")
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     robot.key("ctrl+q")
-    assert robot.editor.closed
+    assert robot.editor.commands.closed
 
 
 def test_a_question_is_not_asked_twice(robot: Robot, tmp_path: Path) -> None:
@@ -586,15 +587,15 @@ def test_a_question_is_not_asked_twice(robot: Robot, tmp_path: Path) -> None:
     robot.frame(count=2)
     robot.key("escape")
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     for number in range(2):
         robot.frame(Drop((str(tmp_path / f"{number}.png"),)))
         robot.frame(count=2)
-    asked = robot.editor.dialogs[-1]
+    asked = robot.editor.dialogs.shown[-1]
     robot.click(asked.rect.x + 60, asked.rect.bottom - 36)
     robot.until(lambda: not robot.editor.files.is_loading)
     assert robot.editor.canvas.size == (100, 60)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
 
 
 def test_a_file_that_has_been_read_waits_for_the_answer_to_a_dialog(robot: Robot, tmp_path: Path) -> None:
@@ -604,7 +605,7 @@ def test_a_file_that_has_been_read_waits_for_the_answer_to_a_dialog(robot: Robot
     for _ in range(20):
         robot.frame()
         time.sleep(0.02)
-    assert isinstance(robot.editor.dialogs[-1], ExportDialog)
+    assert isinstance(robot.editor.dialogs.shown[-1], ExportDialog)
     assert robot.editor.canvas.size == (240, 180)
     robot.key("escape")
     robot.until(lambda: not robot.editor.files.is_loading)
@@ -632,21 +633,21 @@ def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_pat
     robot.editor.preferences.folder = str(tmp_path)
     robot.key("ctrl+s")
     robot.frame(count=3)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, SaveDialog)
     # The name is marked: what is typed takes its place.
     robot.type("kept")
     robot.frame()
     robot.key("enter")
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     kept = projects.load(tmp_path / "kept.fluidwarp")
     assert kept.embedded
     assert robot.editor.preferences.recent[0].endswith("kept.fluidwarp")
 
     robot.key("ctrl+shift+s")
     robot.frame(count=3)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, SaveDialog)
     robot.type("small")
     rect = dialog.rect
@@ -654,7 +655,7 @@ def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_pat
     assert not dialog.embed
     robot.click(dialog.rect.right - 60, dialog.rect.bottom - 36)
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     small = projects.load(tmp_path / "small.fluidwarp")
     assert not small.embedded
     assert (tmp_path / "small.fluidwarp").stat().st_size < (tmp_path / "kept.fluidwarp").stat().st_size
@@ -672,7 +673,7 @@ def test_a_picture_that_is_only_in_a_project_stays_there(robot: Robot, tmp_path:
     robot.editor.preferences.embed = False
     robot.key("ctrl+shift+s")
     robot.frame(count=2)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, SaveDialog)
     assert dialog.must_embed
     assert dialog.embed
@@ -680,22 +681,22 @@ def test_a_picture_that_is_only_in_a_project_stays_there(robot: Robot, tmp_path:
 
 def test_the_browser_chooses_where(robot: Robot, tmp_path: Path) -> None:
     chosen: list[Path] = []
-    robot.editor.files.ask_where("Save", tmp_path / "a.fluidwarp", (".fluidwarp",), chosen.append)
+    robot.editor.chooser.ask_where("Save", tmp_path / "a.fluidwarp", (".fluidwarp",), chosen.append)
     robot.frame(count=2)
-    browser = robot.editor.dialogs[-1]
+    browser = robot.editor.dialogs.shown[-1]
     assert isinstance(browser, Browser)
     browser.name = "saved.fluidwarp"
     width, height = robot.size
     robot.click(width / 2 + 640 / 2 - 24 - 44 - 8, height / 2 + 460 / 2 - 36)
     robot.frame(count=2)
     assert chosen == [tmp_path / "saved.fluidwarp"]
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
 
 
 def test_a_folder_that_is_not_there_is_told_in_the_browser(robot: Robot) -> None:
     robot.key("ctrl+o")
     robot.frame(count=2)
-    browser = robot.editor.dialogs[-1]
+    browser = robot.editor.dialogs.shown[-1]
     assert isinstance(browser, Browser)
     robot.click(browser.rect.x + 200, browser.rect.y + 72)
     robot.key("ctrl+a")
@@ -704,7 +705,7 @@ def test_a_folder_that_is_not_there_is_told_in_the_browser(robot: Robot) -> None
     robot.key("enter")
     robot.frame(count=2)
     assert browser.problem == "There is no /nonesuch."
-    assert robot.editor.dialogs == [browser]
+    assert robot.editor.dialogs.shown == [browser]
 
 
 @pytest.mark.parametrize("helper", ["absent", "failing", "working"])
@@ -721,18 +722,18 @@ def test_without_a_system_s_file_dialog_there_is_ours(
         (programs / "zenity").write_text(f"#!/bin/sh\nsleep 0.1\n{answer}\n")
         (programs / "zenity").chmod(0o755)
         monkeypatch.setenv("PATH", f"{programs}:{os.environ['PATH']}")
-    robot.editor.files.native = True
+    robot.editor.chooser.native = True
     robot.key("ctrl+o")
-    robot.until(lambda: not robot.editor.files.is_waiting)
+    robot.until(lambda: not robot.editor.chooser.is_waiting)
     if helper == "working":
         robot.until(lambda: not robot.editor.files.is_loading)
     else:
         assert "zenity" in robot.editor.messages.shown[-1].text
-        browser = robot.editor.dialogs[-1]
+        browser = robot.editor.dialogs.shown[-1]
         assert isinstance(browser, Browser)
         browser.go(tmp_path)
         robot.frame(count=2)
-        row = [path.name for path in browser._inside].index("other.png")
+        row = [path.name for path in browser.inside].index("other.png")
         robot.frame(count=20)
         for _ in range(2):
             robot.click(browser.rect.x + 120, browser.rect.y + 115 + row * 34)
@@ -776,7 +777,7 @@ def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
     robot.rest()
     painted = robot.warp()
     files = [tmp_path / "window.png", tmp_path / "line.png"]
-    job = ExportDialog(robot.editor.session, str(tmp_path)).job()
+    job = export_dialog(robot, tmp_path).job()
     run(device, replace(job, outputs=Outputs(files[0])), Progress())
     run(device, Job(loaded.recipe, loaded.picture, loaded.folder, Outputs(files[1])), Progress())
     assert files[0].read_bytes() == files[1].read_bytes()
@@ -791,18 +792,18 @@ def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
 def test_a_file_that_may_be_a_picture_or_a_map_is_asked_about(robot: Robot, tmp_path: Path) -> None:
     write_foreign_map(tmp_path / "st.exr", 240, 180)
     robot.drop(tmp_path / "st.exr")
-    asked = robot.editor.dialogs[-1]
+    asked = robot.editor.dialogs.shown[-1]
     assert isinstance(asked, PictureOrMap)
     robot.frame(count=2)
     robot.click(asked.rect.right - 24 - 144 - 8 - 56, asked.rect.bottom - 36)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     assert names(robot) == ["Open", "Start from a map"]
     robot.rest()
     assert np.allclose(robot.warp()[:, :-6], (0.1, 0.0), atol=1e-4)
     robot.key("ctrl+z")
 
     robot.drop(tmp_path / "st.exr")
-    asked = robot.editor.dialogs[-1]
+    asked = robot.editor.dialogs.shown[-1]
     robot.frame(count=2)
     robot.click(asked.rect.right - 24 - 72, asked.rect.bottom - 36)
     robot.until(lambda: not robot.editor.files.is_loading)
@@ -812,7 +813,7 @@ def test_a_file_that_may_be_a_picture_or_a_map_is_asked_about(robot: Robot, tmp_
     robot.drop(tmp_path / "st.exr")
     robot.frame(count=2)
     robot.key("escape")
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     assert names(robot) == ["Open"]
 
 
@@ -827,11 +828,11 @@ def test_two_channels_of_floats_are_a_map(robot: Robot, tmp_path: Path) -> None:
 def test_a_map_that_was_asked_about_and_does_not_fit_is_told_of(robot: Robot, tmp_path: Path) -> None:
     write_foreign_map(tmp_path / "wide.exr", 240, 80)
     robot.drop(tmp_path / "wide.exr")
-    asked = robot.editor.dialogs[-1]
+    asked = robot.editor.dialogs.shown[-1]
     robot.frame(count=2)
     robot.click(asked.rect.right - 24 - 144 - 8 - 56, asked.rect.bottom - 36)
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     assert "proportions" in robot.editor.messages.shown[-1].text
     assert names(robot) == ["Open"]
 
@@ -866,7 +867,7 @@ def test_a_map_exported_from_the_window_is_the_command_line_s(
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
-    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog = export_dialog(robot, tmp_path)
     dialog.kind, dialog.name, dialog.forward, dialog.size = MAP, "m", forward, 120
     dialog.format[MAP] = [ending for _, ending in KINDS[MAP][1]].index(Path(name).suffix)
     robot.editor.exports.start(dialog.job())
@@ -883,7 +884,7 @@ def test_a_map_exported_from_the_window_is_the_command_line_s(
 def test_export_runs_beside_the_window(robot: Robot, tmp_path: Path) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
-    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog = export_dialog(robot, tmp_path)
     robot.editor.exports.start(dialog.job())
     frames = 0
     while robot.editor.exports.is_running and frames < 6000:
@@ -897,7 +898,7 @@ def test_export_runs_beside_the_window(robot: Robot, tmp_path: Path) -> None:
 def test_an_export_can_be_cancelled(robot: Robot, tmp_path: Path) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
-    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog = export_dialog(robot, tmp_path)
     dialog.kind = ANIMATION
     robot.editor.exports.start(dialog.job())
     robot.frame(count=2)
@@ -969,9 +970,9 @@ def test_random_doings_never_break_anything(robot: Robot, seed: int) -> None:
                 robot.wheel(dice.choice((-2, 1, 3)))
             case 5:
                 robot.frame(Key("space", dice.random() < 0.5))
-        if robot.editor.dialogs and dice.random() < 0.5:
+        if robot.editor.dialogs.shown and dice.random() < 0.5:
             robot.key("escape")
-    robot.editor.dialogs.clear()
+    robot.editor.dialogs.shown.clear()
     session = robot.editor.session
     session.release()
     session.pause()
@@ -993,24 +994,24 @@ def test_leaving_asks_about_an_export_that_is_running(robot: Robot, tmp_path: Pa
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
-    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog = export_dialog(robot, tmp_path)
     dialog.kind, dialog.fps = ANIMATION, 60
     for answer in ("cancel", "wait"):
         robot.editor.exports.start(dialog.job())
         robot.frame(CloseWish())
         robot.frame(count=2)
-        asked = robot.editor.dialogs[-1]
+        asked = robot.editor.dialogs.shown[-1]
         assert isinstance(asked, StillExporting)
-        assert not robot.editor.closed
+        assert not robot.editor.commands.closed
         if answer == "cancel":
             robot.key("escape")
             robot.frame(count=2)
-            assert not robot.editor.dialogs
+            assert not robot.editor.dialogs.shown
             assert robot.editor.exports.is_running
             robot.editor.exports.cancel()
         else:
             robot.click(asked.rect.right - 60, asked.rect.bottom - 36)
-            robot.until(lambda: robot.editor.closed)
+            robot.until(lambda: robot.editor.commands.closed)
             assert dialog.output.exists()
 
 
@@ -1022,7 +1023,7 @@ def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
         assert goes_on.wait(60)
         return load_any(tmp_path / "other.png")
 
-    files._open(tmp_path / "other.png", load)
+    files.read(tmp_path / "other.png", load)
     plain = robot.pixels().astype(int)
     robot.frame(count=2)
     # A note lies over the picture, and the picture can be worked on.
@@ -1035,7 +1036,7 @@ def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
     # What has been done meanwhile is not lost without a word.
     assert robot.editor.canvas.size == (240, 180)
     robot.frame(count=2)
-    asked = robot.editor.dialogs[-1]
+    asked = robot.editor.dialogs.shown[-1]
     assert isinstance(asked, Unsaved)
     robot.click(asked.rect.x + 60, asked.rect.bottom - 36)
     assert robot.editor.canvas.size == (100, 60)
@@ -1045,15 +1046,15 @@ def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
 
 def test_what_is_only_there_until_a_file_has_been_read_is_replaced(robot: Robot, tmp_path: Path) -> None:
     write_picture(tmp_path / "other.png", pattern(100, 60))
-    robot.editor.placeholder = robot.editor.session
+    robot.editor.workspace.placeholder = robot.editor.session
     robot.drop(tmp_path / "other.png")
     assert robot.editor.canvas.size == (100, 60)
-    assert not robot.editor.can_undo
-    robot.editor.placeholder = robot.editor.session
+    assert not robot.editor.workspace.can_undo
+    robot.editor.workspace.placeholder = robot.editor.session
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
     robot.drop(tmp_path / "pattern.png")
-    robot.click(robot.editor.dialogs[-1].rect.x + 60, robot.editor.dialogs[-1].rect.bottom - 36)
+    robot.click(robot.editor.dialogs.shown[-1].rect.x + 60, robot.editor.dialogs.shown[-1].rect.bottom - 36)
     robot.until(lambda: not robot.editor.files.is_loading)
     assert robot.editor.canvas.size == (240, 180)
     robot.key("ctrl+z")
@@ -1062,7 +1063,7 @@ def test_what_is_only_there_until_a_file_has_been_read_is_replaced(robot: Robot,
 
 def test_reading_a_file_can_be_given_up(robot: Robot, tmp_path: Path) -> None:
     files, goes_on = robot.editor.files, Event()
-    files._open(tmp_path / "pattern.png", lambda: load_any(tmp_path / "pattern.png") if goes_on.wait(60) else None)  # pyright: ignore[reportArgumentType]
+    files.read(tmp_path / "pattern.png", lambda: load_any(tmp_path / "pattern.png") if goes_on.wait(60) else None)  # pyright: ignore[reportArgumentType]
     robot.frame(count=2)
     canvas = robot.editor.layout.canvas
     for dx in range(0, 260, 20):
@@ -1071,7 +1072,7 @@ def test_reading_a_file_can_be_given_up(robot: Robot, tmp_path: Path) -> None:
     assert not files.is_loading
     goes_on.set()
     robot.frame(count=5)
-    assert robot.editor._index == 0
+    assert not robot.editor.workspace.can_undo
 
 
 def test_the_forces_of_a_recipe_are_shown(robot: Robot, tmp_path: Path) -> None:
@@ -1118,10 +1119,9 @@ def test_the_time_of_each_stage_is_that_of_one_step(robot: Robot) -> None:
     robot.key("ctrl+i")
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.frame(count=3)
-    timings, replay, numbers = robot.device.timings, robot.editor.session.replay, robot.editor.numbers
-    numbers._last = 0.0
-    timings.take()
-    steps = numbers._steps = replay.steps
+    timings, replay, numbers = robot.device.timings, robot.editor.session.replay, Numbers(every=0.0)
+    numbers.take(robot.editor.session)
+    steps = replay.steps
     robot.editor.session.pause()
     for _ in range(4):
         robot.editor.session.step()
@@ -1176,7 +1176,7 @@ def type_viscosity(robot: Robot, number: str) -> None:
     robot.key("ctrl+a")
     robot.type(number)
     robot.frame(count=2)
-    assert robot.editor._is_typing
+    assert robot.editor.backend.is_typing
 
 
 def test_saving_takes_the_number_that_is_being_typed(robot: Robot, tmp_path: Path) -> None:
@@ -1188,20 +1188,20 @@ def test_saving_takes_the_number_that_is_being_typed(robot: Robot, tmp_path: Pat
     robot.frame(count=3)
     assert load_any(path).recipe.fluid.viscosity == pytest.approx(0.75)
     assert names(robot) == ["Open", "Viscosity"]
-    assert not robot.editor.is_dirty
-    assert not robot.editor._is_typing
+    assert not robot.editor.workspace.is_dirty
+    assert not robot.editor.backend.is_typing
 
 
 def test_shortcuts_of_files_work_while_a_number_is_typed_and_undo_stays_the_fields_own(robot: Robot) -> None:
     type_viscosity(robot, "0.75")
     robot.key("ctrl+z")
     robot.frame(count=2)
-    assert robot.editor._is_typing
+    assert robot.editor.backend.is_typing
     assert "Viscosity" not in names(robot)
     robot.key("p")
     robot.key("ctrl+e")
     robot.frame(count=3)
-    assert isinstance(robot.editor.dialogs[-1], ExportDialog)
+    assert isinstance(robot.editor.dialogs.shown[-1], ExportDialog)
 
 
 # Automatic quality ----------------------------------------------------------------------------------------------------
@@ -1222,7 +1222,7 @@ def test_the_grid_is_chosen_from_the_machine_measured(automatic: Robot) -> None:
     automatic.until(lambda: not automatic.editor.quality.is_measuring)
     assert automatic.editor.session.recipe.fluid.grid in GRIDS
     assert names(automatic) == ["Open"]
-    assert not automatic.editor.is_dirty
+    assert not automatic.editor.workspace.is_dirty
 
 
 def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> None:
@@ -1286,13 +1286,13 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(automatic:
     for _ in range(2):
         automatic.key("ctrl+z")
     assert session.recipe.fluid.grid == 96
-    assert not automatic.editor.is_dirty
+    assert not automatic.editor.workspace.is_dirty
 
 
 def test_the_grid_is_finer_again_where_there_is_time(automatic: Robot) -> None:
     automatic.until(lambda: not automatic.editor.quality.is_measuring)
     quality, session = automatic.editor.quality, automatic.editor.session
-    quality._speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
+    quality.speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
     session.begin_with(grid=128, dt=1 / 60)
     paint_at(automatic, 0.1)
     until_on(automatic, 96)
@@ -1312,7 +1312,7 @@ def test_a_grid_that_was_chosen_stays(automatic: Robot) -> None:
     assert names(automatic)[-2:] == ["Grid of 128", "Push"]
     assert not automatic.editor.wants_frame() or automatic.editor.clock.settling
     # Until it is left to the machine again.
-    quality._grid = 96
+    quality.grid = 96
     quality.turn_on()
     until_on(automatic, 96)
 
@@ -1350,7 +1350,7 @@ def test_what_of_a_file_is_lost_is_told_when_it_is_opened_and_not_again(robot: R
     line = "pages.tif: of its 2 pages the first is taken"
     assert [message.text for message in robot.editor.messages.shown] == [line]
     robot.editor.messages.shown.clear()
-    robot.editor.exports.start(ExportDialog(robot.editor.session, str(tmp_path)).job())
+    robot.editor.exports.start(export_dialog(robot, tmp_path).job())
     robot.until(lambda: not robot.editor.exports.is_running)
     assert [message.text for message in robot.editor.messages.shown] == [f"Exported pages warped.png to {tmp_path}"]
 
@@ -1361,7 +1361,7 @@ def test_what_an_export_tells_is_shown(robot: Robot, tmp_path: Path) -> None:
     write_map(tmp_path / "m.npy", Displacement(values))
     robot.editor.files.start_from_map(tmp_path / "m.npy")
     robot.editor.messages.shown.clear()
-    robot.editor.exports.start(ExportDialog(robot.editor.session, str(tmp_path)).job())
+    robot.editor.exports.start(export_dialog(robot, tmp_path).job())
     robot.until(lambda: not robot.editor.exports.is_running)
     said = [message.text for message in robot.editor.messages.shown]
     assert any("the warp folds over itself" in text for text in said), said

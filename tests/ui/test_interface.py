@@ -23,7 +23,7 @@ from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
 from solver.gl.device import Device
-from support.editing import Robot, pattern, small_project
+from support.editing import Robot, export_dialog, pattern, small_project
 
 
 @pytest.fixture
@@ -174,7 +174,7 @@ def test_the_size_of_an_export_is_typed_as_it_is_shown(
     robot = Robot(device, load_any(tmp_path / "a.png"))
     robot.key("ctrl+e")
     robot.frame(count=3)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 146, f"{typed} pixels")
     assert dialog.size == 120
@@ -188,7 +188,7 @@ def test_tab_opens_and_closes_the_inspector_and_nothing_else(robot: Robot) -> No
     for _ in range(4):
         robot.key("tab")
         robot.frame(count=2)
-        assert not robot.editor._is_typing
+        assert not robot.editor.backend.is_typing
     robot.key("f")
     assert robot.editor.state.tool_name == "freeze"
 
@@ -197,7 +197,7 @@ def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robo
     robot.editor.preferences.export_folder = str(tmp_path)
     robot.key("ctrl+e")
     robot.frame(count=3)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 146, "100")
     assert dialog.size == 100
@@ -209,11 +209,11 @@ def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robo
     robot.key("enter")
     robot.frame(count=2)
     assert dialog.name.endswith("2")
-    assert robot.editor.dialogs == [dialog]
+    assert robot.editor.dialogs.shown == [dialog]
     assert not robot.editor.exports.is_running
     # Nothing is being typed now.
     robot.key("enter")
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     robot.until(lambda: not robot.editor.exports.is_running)
     assert (tmp_path / f"{dialog.name}.png").exists()
 
@@ -246,7 +246,7 @@ def test_closing_a_message_does_not_paint(robot: Robot) -> None:
     rect = robot.editor.ui.covers[-1]
     x, y = rect.right - 14 - 11, rect.y + 10 + 9
     robot.move(x, y)
-    assert not robot.editor.shows_ring
+    assert not robot.editor.pointer.shows_ring
     robot.press()
     robot.frame(count=2)
     robot.release()
@@ -254,7 +254,7 @@ def test_closing_a_message_does_not_paint(robot: Robot) -> None:
     assert not robot.editor.messages.shown
     assert is_untouched(robot)
     robot.frame(count=2)
-    assert robot.editor.shows_ring
+    assert robot.editor.pointer.shows_ring
 
 
 def test_the_ring_is_not_drawn_around_a_pointer_on_a_message(robot: Robot) -> None:
@@ -271,12 +271,12 @@ def test_the_ring_is_not_drawn_around_a_pointer_on_a_message(robot: Robot) -> No
 
 
 def test_cancelling_an_export_does_not_paint(robot: Robot, tmp_path: Path) -> None:
-    dialog = ExportDialog(robot.editor.session, str(tmp_path))
+    dialog = export_dialog(robot, tmp_path)
     robot.editor.exports.start(dialog.job())
     robot.frame(count=3)
     rect = robot.editor.ui.covers[-1]
     robot.move(rect.right - 40, rect.y + 20)
-    assert not robot.editor.shows_ring
+    assert not robot.editor.pointer.shows_ring
     robot.press()
     robot.frame(count=2)
     robot.release()
@@ -303,7 +303,7 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
     robot.rest()
     robot.key("ctrl+e")
     robot.frame(count=5)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     top, heights = dialog.rect.y, set()
     for kind in (1, 2, 0, 1):
@@ -320,14 +320,14 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
 def test_what_goes_wrong_in_a_dialog_is_told_in_it(robot: Robot, tmp_path: Path) -> None:
     robot.key("ctrl+e")
     robot.frame(count=3)
-    export = robot.editor.dialogs[-1]
+    export = robot.editor.dialogs.shown[-1]
     assert isinstance(export, ExportDialog)
     export.folder = tmp_path / "nowhere"
     robot.frame(count=2)
     before = export.rect.height
     robot.key("enter")
     robot.frame(count=3)
-    assert robot.editor.dialogs == [export]
+    assert robot.editor.dialogs.shown == [export]
     assert "nowhere" in export.problem
     assert not robot.editor.messages.shown
     assert export.rect.height > before
@@ -336,7 +336,7 @@ def test_what_goes_wrong_in_a_dialog_is_told_in_it(robot: Robot, tmp_path: Path)
 
     robot.key("ctrl+s")
     robot.frame(count=3)
-    save = robot.editor.dialogs[-1]
+    save = robot.editor.dialogs.shown[-1]
     assert isinstance(save, SaveDialog)
     save.folder = tmp_path / "nowhere"
     robot.key("enter")
@@ -346,7 +346,7 @@ def test_what_goes_wrong_in_a_dialog_is_told_in_it(robot: Robot, tmp_path: Path)
     save.folder = tmp_path
     robot.click(save.rect.right - 60, save.rect.bottom - 36)
     robot.frame(count=3)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     assert (tmp_path / "pattern.fluidwarp").exists()
 
 
@@ -363,7 +363,7 @@ def test_opening_a_picture_keeps_the_feel_and_the_export_folder(robot: Robot, tm
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     robot.key("ctrl+e")
     robot.frame(count=3)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     assert dialog.folder == tmp_path
     dialog.folder = out
@@ -372,11 +372,11 @@ def test_opening_a_picture_keeps_the_feel_and_the_export_folder(robot: Robot, tm
     robot.drop(pictures / "other.png")
     assert robot.editor.canvas.size == (100, 60)
     assert WATER.fits(robot.editor.session.recipe.fluid)
-    assert not robot.editor.can_redo
-    assert not robot.editor.is_dirty
+    assert not robot.editor.workspace.can_redo
+    assert not robot.editor.workspace.is_dirty
     robot.key("ctrl+e")
     robot.frame(count=3)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     assert dialog.folder == out
 
@@ -387,7 +387,7 @@ def test_the_grid_is_chosen_for_a_picture_with_another_feel_too(device: Device, 
     write_picture(tmp_path / "other.png", pattern(100, 60))
     robot = Robot(device, small_project(tmp_path), preferences=Preferences(auto_quality=True))
     quality, speed = robot.editor.quality, Speed(1.0, 1000.0, 1.0)
-    quality._speed, quality._grid = speed, speed.best_grid  # as if it had been measured
+    quality.speed, quality.grid = speed, speed.best_grid  # as if it had been measured
     robot.editor.session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     robot.drop(tmp_path / "other.png")
@@ -411,7 +411,7 @@ def test_messages_of_the_window_name_no_options_of_the_command_line(robot: Robot
 def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
     robot.key("ctrl+e")
     robot.frame(count=3)
-    dialog = robot.editor.dialogs[-1]
+    dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     robot.click(dialog.rect.x + 100, dialog.rect.y + 268)
     robot.key("end")
@@ -420,15 +420,15 @@ def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
     assert dialog.name.endswith("2")
     robot.key("escape")
     robot.frame(count=2)
-    assert robot.editor.dialogs == [dialog]
+    assert robot.editor.dialogs.shown == [dialog]
     ctrl_click(robot, dialog.rect.x + 250, dialog.rect.y + 146)
     robot.frame(count=2)
     robot.key("escape")
     robot.frame(count=2)
-    assert robot.editor.dialogs == [dialog]
+    assert robot.editor.dialogs.shown == [dialog]
     robot.key("escape")
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
 
 
 def test_the_first_hint_does_not_come_back_after_a_kill(device: Device, tmp_path: Path) -> None:
@@ -447,7 +447,7 @@ def test_what_cannot_be_opened_asks_nothing_about_unsaved_work(robot: Robot, tmp
     robot.rest()
     robot.drop(tmp_path / "junk.png")
     robot.frame(count=2)
-    assert not robot.editor.dialogs
+    assert not robot.editor.dialogs.shown
     (message,) = robot.editor.messages.shown
     assert "junk.png" in message.text
 
@@ -534,11 +534,11 @@ def test_everything_about_the_brush_can_be_set_in_a_small_window(small: Robot) -
         small.click(x * scale, 24 * scale)
         changed |= differing(small, before)
         small.frame(count=2)
-        if small.editor._popup_open:
+        if small.editor.ui.has_popup:
             for y in range(60, 240, 12):
                 small.editor.state.brush = before
                 small.click((x + 30) * scale, y * scale)
-                if small.editor._popup_open:
+                if small.editor.ui.has_popup:
                     changed |= differing(small, before)
             small.key("escape")
             small.frame(count=2)
@@ -553,7 +553,7 @@ def differing(robot: Robot, before: object) -> set[str]:
 def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> None:
     small.key("ctrl+e")
     small.frame(count=4)
-    dialog = small.editor.dialogs[-1]
+    dialog = small.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     dialog.kind = ANIMATION
     small.frame(count=4)
@@ -567,7 +567,7 @@ def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> N
     # Cancel, left of Export in the lower right corner.
     small.click(dialog.rect.right - (24 + 96 + 8 + 48) * scale, dialog.rect.bottom - 36 * scale)
     small.frame(count=2)
-    assert not small.editor.dialogs
+    assert not small.editor.dialogs.shown
 
 
 def test_waking_lasts_longer_than_the_hover_delays(robot: Robot) -> None:

@@ -57,7 +57,7 @@ def export(robot: Robot) -> None:
     robot.drag((0.35, 0.5), (0.5, 0.45))
     robot.rest()
     robot.key("ctrl+e")
-    robot.editor.dialogs[-1].folder = Path("folder")  # pyright: ignore[reportAttributeAccessIssue]
+    robot.editor.dialogs.shown[-1].folder = Path("folder")  # pyright: ignore[reportAttributeAccessIssue]
     robot.move(5, 5)
     robot.frame(count=3)
 

@@ -545,7 +545,7 @@ def before(starter: Starter, tmp_path: Path) -> Project:
 
 
 def offer_of(robot: Robot) -> Offer:
-    (dialog,) = robot.editor.dialogs
+    (dialog,) = robot.editor.dialogs.shown
     assert isinstance(dialog, Offer)
     return dialog
 
@@ -566,7 +566,7 @@ def test_restored_work_is_as_it_was_and_unsaved(
     answer(robot, "Restore")
     robot.rest()
     session = robot.editor.session
-    assert robot.editor.dialogs == []
+    assert robot.editor.dialogs.shown == []
     assert session.document.recipe == before.recipe
     assert repr(session.document.recipe) == repr(before.recipe)
     assert robot.editor.title == "pattern * - fluidwarp"
@@ -611,17 +611,17 @@ def test_work_that_is_put_off_is_offered_again_until_it_is_discarded(
     robot = starter.start(tmp_path)
     assert find(root) == ([], [])  # another fluidwarp that starts now asks nothing
     answer(robot, "Later")
-    assert robot.editor.dialogs == []
+    assert robot.editor.dialogs.shown == []
     robot = starter.start(tmp_path)
     robot.key("escape")
     robot.frame()
-    assert robot.editor.dialogs == []
+    assert robot.editor.dialogs.shown == []
     robot = starter.start(tmp_path)
     answer(robot, "Discard")
     assert offer_of(robot)  # is still there, and asks once more
     answer(robot, "Discard")
     robot.frame()
-    assert robot.editor.dialogs == []
+    assert robot.editor.dialogs.shown == []
     starter.kill()
     assert files_in(root) == []
 
@@ -637,7 +637,7 @@ def test_who_leaves_or_saves_is_offered_nothing(starter: Starter, tmp_path: Path
     robot.until(lambda: not robot.editor.recovery.is_busy)
     assert files_in(root) == []
     robot.drag((0.4, 0.5), (0.55, 0.5))
-    robot.editor.closed = True  # as after "Don't save"
+    robot.editor.commands.closed = True  # as after "Don't save"
     starter.kill()
     assert files_in(root) == []
 
@@ -697,7 +697,7 @@ def test_a_kill_at_any_moment_loses_no_stroke(device: Device, starter: Starter, 
             robot.rest()
             assert digest_of_warp(robot.warp()) == painter.shown[digest_of(entries[number].recipe)]
             compared += 1
-        robot.editor.closed = True
+        robot.editor.commands.closed = True
         starter.kill()
         assert files_in(starter.root) == []
     assert compared

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.model.presets import FEELS
-from app.model.tools import BrushSettings
-from app.ui.actions import ACTIONS
-from app.ui.state import LARGEST, SMALLEST
+from app.model.tools import BrushSettings, Tool
+from app.ui.actions import ACTIONS, Do
+from app.ui.editor_state import LARGEST, SMALLEST, EditorState
+from app.ui.layout import Layout
+from app.ui.panels import feels
 from app.ui.units import PERCENT, Unit
 from app.ui.widgets import Ui, keys_shown
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
+from app.ui.workspace import Workspace
 
 MENU = (
     "open", "recent", "import_map", "", "save", "save_as", "apply_to", "copy_recipe", "", "export", "", "preferences",
@@ -52,24 +51,36 @@ DEFAULTS = BrushSettings()
 RIGHT = 4 * 32 + 3 * 4 + 17 + 96 + 8  # points, of what is at the right end of the bar
 
 
-def draw(ui: Ui, editor: Editor) -> None:
-    """The whole bar."""
-    with ui.panel("bar", editor.layout.bar, (8, 8)):
+def draw(
+    ui: Ui,
+    layout: Layout,
+    workspace: Workspace,
+    state: EditorState,
+    recent: list[str],
+    open_file: Callable[[Path], None],
+    do: Do,
+) -> None:
+    """The whole bar.
+
+    Args:
+        recent: paths of what was opened lately.
+        open_file: opens one of them.
+    """
+    with ui.panel("bar", layout.bar, (8, 8)):
         if ui.icon_button("menu", "menu", "Menu"):
             imgui.open_popup("main menu")
-        _menu(ui, editor)
+        _menu(ui, layout.bar.height, recent, open_file, do)
         ui.divider()
         room = imgui.get_window_width() - ui.px(RIGHT)
-        has_brush = editor.state.tool.gesture is not None
-        _title(ui, editor, room - ui.px(48) * has_brush)
+        has_brush = state.tool.gesture is not None
+        _title(ui, state.tool, room - ui.px(48) * has_brush)
         if has_brush:
-            _brush(ui, editor, room)
-        _right(ui, editor)
+            _brush(ui, layout, workspace, state, room)
+        _right(ui, layout, workspace, state, do)
 
 
-def _title(ui: Ui, editor: Editor, room: float) -> None:
+def _title(ui: Ui, tool: Tool, room: float) -> None:
     """The tool's name, if there is room for it, and what a tool without a brush does."""
-    tool = editor.state.tool
     start = imgui.get_cursor_pos_x()
     imgui.push_font(ui.fonts.bold, 0)
     width = imgui.calc_text_size(tool.label).x
@@ -85,17 +96,18 @@ def _title(ui: Ui, editor: Editor, room: float) -> None:
     imgui.end_group()
 
 
-def _brush(ui: Ui, editor: Editor, room: float) -> None:
+def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, room: float) -> None:
     """What can be set about the brush, up to `room`; for the rest there is a button."""
     across = 148 if imgui.get_window_width() > ui.px(1080) else 112
-    own = editor.state.tool.own
+    own = state.tool.own
     settings = [setting for setting in SETTINGS if setting.name in ("radius", "hardness", "strength", *own)]
     parts: list[tuple[float, Callable[[float], None]]] = [
-        (ui.px(across), lambda width, setting=setting: _slider(ui, editor, setting, width)) for setting in settings
+        (ui.px(across), lambda width, setting=setting: _slider(ui, workspace, state, setting, width))
+        for setting in settings
     ]
-    if editor.state.tool.directions:
-        width = ui.segmented_width(editor.state.tool.directions)
-        parts.insert(0, (width, lambda width: _directions(ui, editor, width)))
+    if state.tool.directions:
+        width = ui.segmented_width(state.tool.directions)
+        parts.insert(0, (width, lambda width: _directions(ui, state, width)))
     button, gap = ui.px(32), ui.px(16)
     for number, (width, draw) in enumerate(parts):
         imgui.same_line(0, gap)
@@ -106,10 +118,10 @@ def _brush(ui: Ui, editor: Editor, room: float) -> None:
         imgui.set_cursor_pos_y(ui.px(10))
         draw(across)
         gap = ui.px(16 if number == 0 and len(parts) > len(settings) else 8)
-    if imgui.get_window_width() > ui.px(1180) and editor.layout.inspector is None:
+    if imgui.get_window_width() > ui.px(1180) and layout.inspector is None:
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(10))
-        feels(ui, editor, "bar feel")
+        feels.choose(ui, "bar feel", workspace.session, state)
 
 
 def _more(ui: Ui, parts: list[Callable[[float], None]]) -> None:
@@ -127,65 +139,54 @@ def _more(ui: Ui, parts: list[Callable[[float], None]]) -> None:
     imgui.pop_style_var()
 
 
-def _directions(ui: Ui, editor: Editor, width: float) -> None:
-    state, tool = editor.state, editor.state.tool
+def _directions(ui: Ui, state: EditorState, width: float) -> None:
+    tool = state.tool
     assert tool.directions is not None
     imgui.begin_group()
-    back = state.opposite.get(tool.name, False)
-    state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(back)))
+    state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(state.is_opposite)))
     imgui.end_group()
     ui.tooltip("Direction", f"shift+{tool.key}", "Hold Alt for the other one.")
 
 
-def _slider(ui: Ui, editor: Editor, setting: Setting, width: float) -> None:
-    brush, is_size = editor.state.brush, setting.name == "radius"
+def _slider(ui: Ui, workspace: Workspace, state: EditorState, setting: Setting, width: float) -> None:
+    brush, is_size = state.brush, setting.name == "radius"
     value: float = getattr(brush, setting.name)
-    unit = Unit(" px", 2 * max(editor.canvas.size)) if is_size else PERCENT
+    unit = Unit(" px", 2 * max(workspace.canvas.size)) if is_size else PERCENT
     slid = ui.slider(
         setting.name, setting.label, value, setting.low, setting.high, unit, getattr(DEFAULTS, setting.name),
         logarithmic=is_size, width=width, title=setting.title, key=setting.key, more=setting.more,
     )  # fmt: skip
     if slid.changed:
-        editor.state.brush = replace(brush, **{setting.name: slid.value})
+        state.brush = replace(brush, **{setting.name: slid.value})
 
 
-def feels(ui: Ui, editor: Editor, name: str, width: float = 0.0) -> None:
-    """The choice between the feels."""
-    session = editor.session
-    fluid = session.recipe.fluid_at(session.target)
-    now = next((number for number, feel in enumerate(FEELS) if feel.fits(fluid)), -1)
-    chosen = ui.segmented(name, [feel.name for feel in FEELS], now, width)
-    if chosen != now:
-        editor.choose_feel(FEELS[chosen])
-
-
-def _right(ui: Ui, editor: Editor) -> None:
+def _right(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, do: Do) -> None:
     imgui.same_line()
     imgui.set_cursor_pos(ImVec2(max(imgui.get_window_width() - ui.px(RIGHT), imgui.get_cursor_pos_x()), ui.px(8)))
-    history = editor.session.document.history
+    history = workspace.session.document.history
     undo, redo = history.undo_name, history.redo_name
-    if ui.icon_button("undo", "undo", f"Undo {undo}" if undo else "Undo", "ctrl+z", enabled=editor.can_undo):
-        editor.do("undo")
+    if ui.icon_button("undo", "undo", f"Undo {undo}" if undo else "Undo", "ctrl+z", enabled=workspace.can_undo):
+        do("undo")
     imgui.same_line(0, ui.px(4))
     title = f"Redo {redo}" if redo else "Redo"
-    if ui.icon_button("redo", "redo", title, "ctrl+shift+z", enabled=editor.can_redo):
-        editor.do("redo")
+    if ui.icon_button("redo", "redo", title, "ctrl+shift+z", enabled=workspace.can_redo):
+        do("redo")
     imgui.same_line(0, ui.px(4))
     more = "Drag the line. Or hold \\ to see the picture as it was."
-    if ui.icon_button("split", "compare", "Compare", "y", more, active=editor.state.split is not None):
-        editor.do("split")
+    if ui.icon_button("split", "compare", "Compare", "y", more, active=state.split is not None):
+        do("split")
     imgui.same_line(0, ui.px(4))
-    if ui.icon_button("inspector", "inspector", "Inspector", "tab", active=editor.layout.inspector is not None):
-        editor.do("inspector")
+    if ui.icon_button("inspector", "inspector", "Inspector", "tab", active=layout.inspector is not None):
+        do("inspector")
     ui.divider()
     if ui.button("Export", primary=True, width=92, icon="export"):
-        editor.do("export")
+        do("export")
     ui.tooltip("Export a picture, an animation or the warp map", "ctrl+e")
 
 
-def _menu(ui: Ui, editor: Editor) -> None:
-    imgui.set_next_window_pos(ImVec2(ui.px(8), editor.layout.bar.height))
-    below = imgui.get_io().display_size.y - editor.layout.bar.height - ui.px(8)
+def _menu(ui: Ui, top: float, recent: list[str], open_file: Callable[[Path], None], do: Do) -> None:
+    imgui.set_next_window_pos(ImVec2(ui.px(8), top))
+    below = imgui.get_io().display_size.y - top - ui.px(8)
     imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(imgui.get_io().display_size.x, below))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(7)))
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(8), ui.px(8)))
@@ -194,25 +195,22 @@ def _menu(ui: Ui, editor: Editor) -> None:
             if not name:
                 imgui.separator()
             elif name == "recent":
-                _recent(ui, editor)
+                _recent(recent, open_file)
             else:
                 action = ACTIONS[name]
                 keys = keys_shown(action.key) + "   "
-                if imgui.menu_item(f"{action.label}    ", keys, False, action.enabled(editor))[0]:
-                    editor.do(name)
+                if imgui.menu_item(f"{action.label}    ", keys, False)[0]:
+                    do(name)
         imgui.end_popup()
     imgui.pop_style_var(2)
 
 
-def _recent(ui: Ui, editor: Editor) -> None:
-    from pathlib import Path
-
-    recent = editor.preferences.recent
+def _recent(recent: list[str], open_file: Callable[[Path], None]) -> None:
     if imgui.begin_menu("Open recent", bool(recent)):
         for name in list(recent):
             path = Path(name)
             if imgui.menu_item(f"{path.name}##{name}", "", False)[0]:
-                editor.files.open_work(path)
+                open_file(path)
             if imgui.is_item_hovered():
                 imgui.set_tooltip(str(path.parent))
         imgui.end_menu()

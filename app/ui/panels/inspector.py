@@ -3,56 +3,52 @@
 from __future__ import annotations
 
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.model.presets import DEFAULT, FEELS
+from app.model.presets import DEFAULT
+from app.ui.actions import Do
+from app.ui.clock import Clock
+from app.ui.editor_state import EditorState
+from app.ui.panels import feels
+from app.ui.quality import Quality
 from app.ui.theme import packed
 from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS
+from app.ui.viewport import Rect
 from app.ui.widgets import Slid, Ui
+from app.ui.workspace import Workspace
 from app.work.session import Session
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
 
 GRIDS = (128, 160, 192, 256, 384)
 EDGES = ("clamp", "mirror", "wrap", "transparent", "black")
 WALLS = ("free-slip", "no-slip")
 
 
-def draw(ui: Ui, editor: Editor) -> None:
+def draw(ui: Ui, rect: Rect, workspace: Workspace, state: EditorState, quality: Quality, clock: Clock, do: Do) -> None:
     """All sections, one below the other."""
-    rect = editor.layout.inspector
-    if rect is None:
-        return
+    session = workspace.session
     with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none):
         imgui.begin_child("sections")
         for name, label, section, opened in (
-            ("fluid", "Fluid", _fluid, True),
-            ("view", "Overlays", _view, True),
-            ("quality", "Picture and quality", _quality, False),
-            ("masks", "Masks and motion", _masks, False),
-            ("history", "History", _history, True),
-            ("numbers", "Statistics", _numbers, False),
+            ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
+            ("view", "Overlays", lambda: _view(ui, state), True),
+            ("quality", "Picture and quality", lambda: _quality(ui, workspace, quality), False),
+            ("masks", "Masks and motion", lambda: _masks(ui, session, do), False),
+            ("history", "History", lambda: _history(ui, session, state), True),
+            ("numbers", "Statistics", lambda: _numbers(ui, session, state, clock, do), False),
         ):
-            sections = editor.state.sections
-            sections[name] = ui.section(label, sections.get(name, opened))
-            if sections[name]:
-                section(ui, editor)
+            state.sections[name] = ui.section(label, state.sections.get(name, opened))
+            if state.sections[name]:
+                section()
                 imgui.dummy(ImVec2(0, 0))
             ui.line()
         imgui.end_child()
 
 
-def _fluid(ui: Ui, editor: Editor) -> None:
-    session = editor.session
+def _fluid(ui: Ui, session: Session, state: EditorState) -> None:
     fluid = session.recipe.fluid_at(session.target)
-    now = next((feel for feel in FEELS if feel.fits(fluid)), None)
-    chosen = ui.segmented("feel", [feel.name for feel in FEELS], FEELS.index(now) if now else -1, -1)
-    if chosen >= 0 and FEELS[chosen] is not now:
-        editor.choose_feel(FEELS[chosen])
+    now = feels.choose(ui, "feel", session, state, -1)
     ui.dim(f"{now.line}." if now else "Your own mixture.")
     viscosity = max(fluid.viscosity, 1e-5)
     slid = ui.slider(
@@ -83,9 +79,9 @@ def _set(session: Session, name: str, slid: Slid, **setting: float) -> None:
         session.commit(name)
 
 
-def _view(ui: Ui, editor: Editor) -> None:
+def _view(ui: Ui, state: EditorState) -> None:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(4)))
-    for overlay in editor.state.overlays.values():
+    for overlay in state.overlays.values():
         overlay.shown = ui.check(f"{overlay.label}##overlay", overlay.shown, overlay.key)
         if overlay.shown:
             slid = ui.slider(f"opacity {overlay.name}", "Opacity", overlay.opacity, 0, 1, PERCENT, 0.7)
@@ -93,12 +89,12 @@ def _view(ui: Ui, editor: Editor) -> None:
     imgui.pop_style_var()
 
 
-def _quality(ui: Ui, editor: Editor) -> None:
-    session = editor.session
-    width, height = editor.canvas.size
+def _quality(ui: Ui, workspace: Workspace, quality: Quality) -> None:
+    session = workspace.session
+    width, height = workspace.canvas.size
     grid = session.recipe.fluid.grid
     ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits; grid of {grid}")
-    automatic = editor.quality.is_on
+    automatic = quality.is_on
     # What saved work or a recipe is simulated on may be none of those that are offered.
     grids = GRIDS if automatic else sorted({*GRIDS, grid})
     index = 0 if automatic else 1 + grids.index(grid)
@@ -106,7 +102,7 @@ def _quality(ui: Ui, editor: Editor) -> None:
     more = "More is finer and slower. Auto is as many as this machine can paint on. What is seen is what is exported."
     ui.tooltip("Cells along the longer side", more=more)
     if chosen == 0 and not automatic:
-        editor.quality.turn_on()
+        quality.turn_on()
     elif chosen > 0 and chosen != index:
         session.set_grid(grids[chosen - 1], f"Grid of {grids[chosen - 1]}")
     if session.recipe.map is not None:
@@ -121,21 +117,21 @@ def _quality(ui: Ui, editor: Editor) -> None:
         session.edit("Edges of the picture", edges=EDGES[number])
 
 
-def _masks(ui: Ui, editor: Editor) -> None:
+def _masks(ui: Ui, session: Session, do: Do) -> None:
     for name, label in (
         ("clear_masks", "Clear the masks"),
         ("clear_velocity", "Stop all motion"),
         ("reset_warp", "Reset the warp"),
     ):
-        with ui.enabled(editor.session.end > 0):
+        with ui.enabled(session.end > 0):
             if ui.button(label, width=-1, height=30):
-                editor.do(name)
+                do(name)
     if ui.button("Copy as recipe", width=-1, height=30):
-        editor.do("copy_recipe")
+        do("copy_recipe")
 
 
-def _history(ui: Ui, editor: Editor) -> None:
-    history, palette = editor.session.document.history, ui.palette
+def _history(ui: Ui, session: Session, state: EditorState) -> None:
+    history, palette = session.document.history, ui.palette
     entries, present = history.entries, history.index
     # As much as is in sight without scrolling the inspector, the header of the section below included.
     room = imgui.get_content_region_avail().y - ui.px(60)
@@ -161,20 +157,20 @@ def _history(ui: Ui, editor: Editor) -> None:
             draw.add_text(ImVec2(corner.x + ui.px(8), corner.y + ui.px(5)), packed(ink), entries[number].name)
             imgui.pop_font()
     clipper.end()
-    if editor.state.sections.get("seen", -1) != present:
-        editor.state.sections["seen"] = present  # pyright: ignore[reportArgumentType]
+    if state.history_seen != present:
+        state.history_seen = present
         imgui.set_scroll_y(max(present * ui.px(26) - height / 2, 0))
     imgui.pop_style_var()
     imgui.end_child()
     if chosen is not None and chosen != present:
-        editor.session.go_to(chosen)
+        session.go_to(chosen)
 
 
-def _numbers(ui: Ui, editor: Editor) -> None:
-    before = editor.state.statistics
+def _numbers(ui: Ui, session: Session, state: EditorState, clock: Clock, do: Do) -> None:
+    before = state.statistics
     after = ui.check("Show over the picture", before, "ctrl+i")
     if after != before:
-        editor.do("statistics")
-    for name, value in editor.clock.milliseconds.items():
+        do("statistics")
+    for name, value in clock.milliseconds.items():
         ui.dim(f"{name.capitalize()}: {value:.1f} ms")
-    ui.dim(f"{editor.device.limits.renderer.split('(')[0]}")
+    ui.dim(f"{session.device.limits.renderer.split('(')[0]}")

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.model.tools import TOOLS
-from app.ui.layout import BETWEEN, GROUP, TOOL
+from app.ui.editor_state import EditorState
+from app.ui.layout import BETWEEN, GROUP, TOOL, Layout
 from app.ui.widgets import Ui
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
 
 GROUP_ENDS = ("bloat", "smooth", "restore")
 
 
-def draw(ui: Ui, editor: Editor) -> None:
+def draw(ui: Ui, layout: Layout, state: EditorState) -> None:
     """One button for each tool."""
-    rect, columns = editor.layout.strip, editor.layout.columns
+    rect, columns = layout.strip, layout.columns
     if rect is None:
         return
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(BETWEEN), ui.px(BETWEEN)))
@@ -27,12 +23,12 @@ def draw(ui: Ui, editor: Editor) -> None:
         for number, tool in enumerate(TOOLS):
             if number % columns:
                 imgui.same_line()
-            active = editor.state.tool_name == tool.name
+            active = state.tool_name == tool.name
             more = tool.hint
             if tool.directions:
                 more += f". Alt: {tool.directions[1].lower()}."
             if ui.icon_button(tool.name, tool.name, tool.label, tool.key, more, active, size=TOOL, icon_size=22):
-                editor.choose_tool(tool.name, editor.state.opposite.get(tool.name, False))
+                state.choose_tool(tool.name, state.opposite.get(tool.name, False))
             if tool.name in GROUP_ENDS and columns == 1:
                 corner, width = imgui.get_cursor_screen_pos(), ui.px(TOOL)
                 ui.rule(corner + ImVec2(ui.px(8), ui.px(3)), corner + ImVec2(width - ui.px(8), ui.px(4)))

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.ui.actions import Do
 from app.ui.theme import Colour, blend, packed, rgb
 from app.ui.units import PERCENT
+from app.ui.viewport import Rect
 from app.ui.widgets import Ui
-
-if TYPE_CHECKING:
-    from app.ui.editor import Editor
+from app.work.session import Session
 
 # Blocks on the track, by what the stroke does; told apart without red against green.
 KINDS: dict[str, Colour] = {
@@ -22,28 +20,27 @@ KINDS: dict[str, Colour] = {
 MASKS = rgb("0f86c9")
 
 
-def draw(ui: Ui, editor: Editor) -> None:
+def draw(ui: Ui, rect: Rect, session: Session, do: Do) -> None:
     """Buttons, the time, the track, and how much of the warp is seen."""
-    session = editor.session
-    with ui.panel("timeline", editor.layout.timebar, (8, 12)):
+    with ui.panel("timeline", rect, (8, 12)):
         some = session.end > 0
         if ui.icon_button("start", "back", "To the start", "home", enabled=some):
-            editor.do("start")
+            do("start")
         imgui.same_line(0, ui.px(2))
         moving = session.playing or session.coasting
         title = "Pause" if moving else "Play"
         if ui.icon_button("play", "pause" if moving else "play", title, "space", "Tap Space.", enabled=some):
-            editor.do("play")
+            do("play")
         imgui.same_line(0, ui.px(2))
         if ui.icon_button("step", "step", "One step on", ".", enabled=some):
-            editor.do("step")
+            do("step")
         imgui.same_line(0, ui.px(10))
         if imgui.get_window_width() > ui.px(560):
             _time(ui, session.target * session.dt, session.end * session.dt)
             imgui.same_line(0, ui.px(16))
         across = min(168, 0.3 * imgui.get_window_width() / ui.scale)
         amount = ui.px(across)
-        _track(ui, editor, imgui.get_content_region_avail().x - amount - ui.px(16))
+        _track(ui, session, imgui.get_content_region_avail().x - amount - ui.px(16))
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(14))
         part = session.target / session.end if some else 1.0
@@ -69,8 +66,8 @@ def _time(ui: Ui, now: float, end: float) -> None:
     imgui.dummy(ImVec2(ui.px(108), ui.px(32)))
 
 
-def _track(ui: Ui, editor: Editor, width: float) -> None:
-    session, palette = editor.session, ui.palette
+def _track(ui: Ui, session: Session, width: float) -> None:
+    palette = ui.palette
     width = max(width, ui.px(40))
     corner, height = imgui.get_cursor_screen_pos(), ui.px(32)
     imgui.invisible_button("track", ImVec2(width, height))

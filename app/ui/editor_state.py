@@ -1,8 +1,8 @@
-"""What the window remembers between frames, apart from the work itself."""
+"""What the editor remembers between frames, apart from the work itself."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from app.model.tools import TOOL, BrushSettings, Tool
 
@@ -32,17 +32,19 @@ def _overlays() -> dict[str, Overlay]:
 
 
 @dataclass
-class State:
-    """The window's own state.
+class EditorState:
+    """What the tools, the panels and the keys set about the window.
 
     Attributes:
-        tool_name: the tool in hand.
+        tool_name: the tool in pointer.
         brush: shared by all tools, so that changing the tool does not change its size.
         opposite: tools that are switched to their other direction.
         overlays: by name, in the order of their keys.
+        is_narrow: the window has no room for the inspector beside the picture.
         inspector: the inspector is open, in a window that has room for it.
         over_narrow: it is open in one that has not.
         sections: which of its sections are open.
+        history_seen: the entry of the history that was scrolled to last.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
         statistics: numbers are shown over the canvas.
@@ -53,9 +55,11 @@ class State:
     brush: BrushSettings = field(default_factory=BrushSettings)
     opposite: dict[str, bool] = field(default_factory=dict)
     overlays: dict[str, Overlay] = field(default_factory=_overlays)
+    is_narrow: bool = False
     inspector: bool = True
     over_narrow: bool = False
     sections: dict[str, bool] = field(default_factory=dict)
+    history_seen: int = -1
     before: bool = False
     split: float | None = None
     statistics: bool = False
@@ -64,3 +68,31 @@ class State:
     @property
     def tool(self) -> Tool:
         return TOOL[self.tool_name]
+
+    @property
+    def is_opposite(self) -> bool:
+        """The tool in hand is switched to its other direction."""
+        return self.opposite.get(self.tool_name, False)
+
+    def choose_tool(self, name: str, opposite: bool) -> None:
+        self.tool_name = name
+        if self.tool.directions:
+            self.opposite[name] = opposite
+
+    def resize_brush(self, factor: float) -> None:
+        self._set_brush(radius=min(max(self.brush.radius * factor, SMALLEST), LARGEST))
+
+    def harden_brush(self, by: float) -> None:
+        self._set_brush(hardness=round(min(max(self.brush.hardness + by, 0.0), 1.0), 3))
+
+    def strengthen_brush(self, by: float) -> None:
+        self._set_brush(strength=round(min(max(self.brush.strength + by, 0.05), 1.0), 3))
+
+    def _set_brush(self, **settings: float) -> None:
+        self.brush = replace(self.brush, **settings)
+
+    def toggle_split(self) -> None:
+        self.split = 0.5 if self.split is None else None
+
+    def toggle_overlay(self, name: str) -> None:
+        self.overlays[name].shown = not self.overlays[name].shown

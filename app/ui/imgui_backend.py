@@ -21,7 +21,7 @@ _LETTERS = {letter: getattr(imgui.Key, letter) for letter in "acvxyz"}
 _KEYS = _NAMED | _LETTERS
 
 
-class Host:
+class ImGuiBackend:
     """The one imgui context of the process.
 
     Args:
@@ -44,6 +44,11 @@ class Host:
         io.config_input_text_cursor_blink = False
         self.fonts = theme.load_fonts()
         imgui.backends.opengl3_init("#version 330")
+
+    @property
+    def is_typing(self) -> bool:
+        """Text is being typed into a field, as of the last frame."""
+        return imgui.get_io().want_text_input
 
     def begin(
         self, size: tuple[float, float], density: float, dt: float, events: Iterable[Event], by_keys: bool = False

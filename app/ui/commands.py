@@ -1,0 +1,93 @@
+"""What a person can do that is more than a call of one of the window's parts; `actions.py` says by which key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from app.ui.chooser import FileChooser
+from app.ui.dialogs import Dialogs, Preferring
+from app.ui.editor_state import EditorState
+from app.ui.exporting import ExportDialog, Exports, StillExporting
+from app.ui.files import Files
+from app.ui.messages import Messages
+from app.ui.pointer import PointerController
+from app.ui.preferences import Preferences
+from app.ui.workspace import Workspace
+
+
+@dataclass
+class Commands:
+    """The window's parts, and what takes several of them.
+
+    Attributes:
+        clipboard: puts a text on the clipboard; the window sets it.
+        closed: the person has left.
+    """
+
+    workspace: Workspace
+    state: EditorState
+    pointer: PointerController
+    files: Files
+    chooser: FileChooser
+    exports: Exports
+    dialogs: Dialogs
+    messages: Messages
+    preferences: Preferences
+    clipboard: Callable[[str], None] = imgui.set_clipboard_text
+    closed: bool = False
+
+    def zoom_fit(self) -> None:
+        self.workspace.view = self.workspace.view.fitted()
+
+    def zoom_to(self, zoom: float) -> None:
+        view = self.workspace.view
+        self.workspace.view = view.zoomed(zoom, *view.canvas.middle)
+
+    def step_back(self) -> None:
+        self.workspace.session.seek(self.workspace.session.target - 1)
+
+    def toggle_inspector(self) -> None:
+        state = self.state
+        if state.is_narrow:
+            state.over_narrow = not state.over_narrow
+            return
+        state.inspector = self.preferences.inspector = not state.inspector
+        self.preferences.save()
+
+    def toggle_statistics(self) -> None:
+        self.state.statistics = not self.state.statistics
+        self.workspace.session.device.timings.enabled = self.state.statistics
+
+    def copy_recipe(self) -> None:
+        self.clipboard(self.workspace.session.recipe.text())
+        self.messages.done("The recipe is on the clipboard, as TOML.")
+
+    def ask_preferences(self) -> None:
+        self.dialogs.show(Preferring(self.preferences, self.state))
+
+    def ask_export(self) -> None:
+        session = self.workspace.session
+        session.release()
+        self.dialogs.show(ExportDialog(session, self.exports, self.chooser, self.preferences))
+
+    def ask_quit(self) -> None:
+        """Leave, after having asked about what is not saved and what is being exported."""
+        self.files.unless_unsaved("quit", self._quit_unless_exporting)
+
+    @property
+    def asks_before_quitting(self) -> bool:
+        """Who leaves now is asked something first."""
+        return self.workspace.is_dirty or self.workspace.session.is_painting or self.exports.is_running
+
+    def _quit_unless_exporting(self) -> None:
+        if self.exports.is_running:
+            self.dialogs.ask(StillExporting(self.exports, self._quit))
+        else:
+            self._quit()
+
+    def _quit(self) -> None:
+        self.exports.cancel()
+        self.closed = True

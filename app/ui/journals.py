@@ -1,0 +1,59 @@
+"""The journals of the works that are open: what has been done outlasts a crash."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.ui.messages import Messages
+from app.work.recovery import Found, Journal
+from app.work.session import Session
+
+
+class Journals:
+    """One journal for each work that is open.
+
+    Args:
+        root: their folder; None keeps none, for tests.
+        messages: are told, once, of a journal that cannot be written.
+    """
+
+    def __init__(self, root: Path | None, messages: Messages) -> None:
+        self.root = root
+        self._messages = messages
+        self._journals: dict[Session, Journal] = {}
+        self._ended: list[Journal] = []
+        self._has_warned = False
+
+    @property
+    def are_behind(self) -> bool:
+        """Something is still to be written, in another thread."""
+        return any(journal.is_behind for journal in self._journals.values())
+
+    def open(self, session: Session, found: Found | None) -> None:
+        """A work has been opened; `found` where it was restored."""
+        if self.root is not None:
+            self._journals[session] = Journal(self.root, found and found.held)
+
+    def keep(self, session: Session) -> None:
+        """Take note of what has been done to a work."""
+        journal = self._journals.get(session)
+        if journal is None:
+            return
+        journal.keep(session.project, session.document, session.is_grid_automatic)
+        if journal.trouble is not None and not self._has_warned:
+            self._has_warned = True
+            self._messages.warn(journal.trouble)
+
+    def close(self, session: Session) -> None:
+        """A work that was open is given up."""
+        if session in self._journals:
+            self._ended.append(self._journals.pop(session))
+            self._ended[-1].end(discard=True)
+
+    def release(self, discard: bool) -> None:
+        """Stop; `discard` if the person has left, and not where the program fails."""
+        for journal in self._journals.values():
+            journal.end(discard)
+        for journal in (*self._ended, *self._journals.values()):
+            journal.join()
+        self._journals.clear()

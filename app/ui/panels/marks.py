@@ -1,0 +1,132 @@
+"""What is drawn over the picture: the brush's ring, the split, and where strokes are, push and wait."""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import Any
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.ui.editor_state import EditorState, Overlay
+from app.ui.pointer import PointerController
+from app.ui.theme import Colour, packed, rgb
+from app.ui.viewport import Viewport
+from app.ui.widgets import Ui
+from app.work.session import Session
+
+BEHIND = 12  # ticks from which on it is told that the simulation is behind
+MOST_WAITING = 100  # strokes that are drawn
+WHITE, BLACK = rgb("ffffff"), rgb("000000")
+
+
+def draw(ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: PointerController) -> None:
+    """Everything that is drawn over the picture."""
+    canvas = view.canvas
+    lines = imgui.get_background_draw_list()
+    lines.push_clip_rect(ImVec2(canvas.x, canvas.y), ImVec2(canvas.right, canvas.bottom), True)
+    if (forces := state.overlays["forces"]).shown:
+        _forces(ui, view, session, forces, lines)
+    if state.split is not None and not state.before:
+        _split(ui, view, state.split, lines)
+    _path(ui, view, session, lines)
+    _waiting(ui, view, session, lines)
+    if pointer.shows_ring:
+        _ring(ui, view, state, pointer, lines)
+    lines.pop_clip_rect()
+
+
+def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList) -> None:
+    """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard.
+
+    What is frozen is so as far as the brush reaches, however hard it is.
+    """
+    brush, (x, y) = state.brush, pointer.ring_at
+    reach = brush.radius * view.longer
+    core = 1.0 if state.tool_name == "freeze" else 0.9 * brush.hardness
+    # Where the brush is half as strong as in its middle: (1 - q^2)^3 = 1/2, between the core and the reach.
+    half = reach * (core + 0.4542 * (1 - core))
+    middle, count = ImVec2(x, y), max(32, min(int(reach), 96))
+    soft = rgb("000000", 0.45)
+    lines.add_circle(middle, reach, packed(soft, 0.5), count, ui.px(2.0))
+    lines.add_circle(middle, reach, packed(WHITE, 0.55), count, ui.px(1.0))
+    lines.add_circle(middle, half, packed(soft), count, ui.px(2.6))
+    lines.add_circle(middle, half, packed(WHITE, 0.95), count, ui.px(1.3))
+    lines.add_circle_filled(middle, ui.px(2.2), packed(soft), 12)
+    lines.add_circle_filled(middle, ui.px(1.4), packed(WHITE), 12)
+    if pointer.is_opposite:
+        reach = ui.px(5)
+        lines.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), packed(soft), ui.px(3.2))
+        lines.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), packed(WHITE), ui.px(1.6))
+
+
+def _path(ui: Ui, view: Viewport, session: Session, lines: imgui.ImDrawList) -> None:
+    """The path of a curve that is being drawn."""
+    if session.stroke is not None or len(session.path) < 2:
+        return
+    points: list[Any] = [ImVec2(*view.to_screen(*place)) for place in session.path]
+    lines.add_polyline(points, packed(BLACK, 0.45), ui.px(5), 0)
+    lines.add_polyline(points, packed(ui.palette.accent), ui.px(2.4), 0)
+    _arrow_head(lines, points[max(len(points) - 6, 0)], points[-1], ui.px(10), ui.palette.accent)
+
+
+def _waiting(ui: Ui, view: Viewport, session: Session, lines: imgui.ImDrawList) -> None:
+    """Where strokes will act that are drawn already, while the simulation is clearly behind them."""
+    if session.target - session.tick < BEHIND:
+        return
+    for stroke in session.waiting[:MOST_WAITING]:
+        step = max(len(stroke.samples) // 40, 1)
+        places = [*(sample[1:3] for sample in stroke.samples[::step]), stroke.samples[-1][1:3]]
+        points: list[Any] = [ImVec2(*view.to_screen(*place)) for place in places]
+        lines.add_polyline(points, packed(BLACK, 0.3), ui.px(3.5), 0)
+        lines.add_polyline(points, packed(WHITE, 0.7), ui.px(1.5), 0)
+
+
+def _arrow_head(lines: imgui.ImDrawList, start: ImVec2, end: ImVec2, size: float, colour: Colour) -> None:
+    dx, dy = end.x - start.x, end.y - start.y
+    length = hypot(dx, dy)
+    if length < 1e-3:
+        return
+    dx, dy = dx / length * size, dy / length * size
+    left = ImVec2(end.x - dx - dy * 0.6, end.y - dy + dx * 0.6)
+    right = ImVec2(end.x - dx + dy * 0.6, end.y - dy - dx * 0.6)
+    lines.add_triangle_filled(end, left, right, packed(colour))
+
+
+def _forces(ui: Ui, view: Viewport, session: Session, overlay: Overlay, lines: imgui.ImDrawList) -> None:
+    """Where strokes push, up to the playhead; older ones fainter."""
+    for stroke in session.recipe.stroke[-60:]:
+        if stroke.first_tick > session.tick or stroke.tool not in ("push", "curve"):
+            continue
+        step = max(len(stroke.samples) // 40, 1)
+        places = [sample[1:3] for sample in stroke.samples[::step]]
+        points: list[Any] = [ImVec2(*view.to_screen(*place)) for place in places]
+        active = stroke.last_tick >= session.tick - 1
+        alpha = overlay.opacity * (1.0 if active else 0.6)
+        lines.add_polyline(points, packed(BLACK, 0.5 * alpha), ui.px(4.5), 0)
+        colour = (*ui.palette.accent[:3], alpha)
+        lines.add_polyline(points, packed(colour), ui.px(2), 0)
+        if len(points) > 1:
+            _arrow_head(lines, points[-2], points[-1], ui.px(9), colour)
+
+
+def _split(ui: Ui, view: Viewport, split: float, lines: imgui.ImDrawList) -> None:
+    rect, canvas = view.rect, view.canvas
+    x = rect.x + split * rect.width
+    top, bottom = max(rect.y, canvas.y), min(rect.bottom, canvas.bottom)
+    lines.add_line(ImVec2(x, top), ImVec2(x, bottom), packed(BLACK, 0.4), ui.px(4))
+    lines.add_line(ImVec2(x, top), ImVec2(x, bottom), packed(WHITE), ui.px(1.6))
+    middle, radius = ImVec2(x, (top + bottom) / 2), ui.px(13)
+    lines.add_circle_filled(middle, radius, packed(WHITE), 28)
+    for side in (-1, 1):
+        tip = ImVec2(x + side * ui.px(8), middle.y)
+        low, high = ImVec2(x + side * ui.px(3), middle.y - ui.px(4)), ImVec2(x + side * ui.px(3), middle.y + ui.px(4))
+        lines.add_triangle_filled(tip, low, high, packed(rgb("222222")))
+    imgui.push_font(ui.fonts.bold, 12.0)
+    for label, left in (("Before", True), ("After", False)):
+        size = imgui.calc_text_size(label)
+        at = ImVec2(x - size.x - ui.px(18) if left else x + ui.px(18), top + ui.px(14))
+        box = ImVec2(ui.px(7), ui.px(3))
+        lines.add_rect_filled(at - box, at + size + box, packed(BLACK, 0.5), ui.px(5))
+        lines.add_text(at, packed(WHITE), label)
+    imgui.pop_font()

@@ -1,0 +1,191 @@
+"""The pointer on the canvas: what it does to the picture, the view, the brush and the split."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import exp
+
+from app.model.tools import Press
+from app.ui.dialogs import Dialogs
+from app.ui.editor_state import LARGEST, SMALLEST, EditorState
+from app.ui.events import LEFT, MIDDLE, RIGHT, Button, Event, Key, Mods, Move, Wheel
+from app.ui.preferences import Preferences
+from app.ui.widgets import Ui
+from app.ui.workspace import Workspace
+
+SPLIT_REACH = 8.0  # points from the split's line at which it is taken hold of
+
+
+@dataclass
+class PointerController:
+    """Turns events on the canvas into what they mean; at most one drag is under way.
+
+    Attributes:
+        play: called where Space was tapped.
+        x, y: where the pointer is, in points.
+        drag: what the button that is down does: "paint", "pan", "zoom", "brush", "split", or None.
+        space: Space is held, so that any tool pans.
+    """
+
+    workspace: Workspace
+    state: EditorState
+    ui: Ui
+    dialogs: Dialogs
+    preferences: Preferences
+    play: Callable[[], None]
+    x: float = -1e6
+    y: float = -1e6
+    pressure: float = 1.0
+    mods: Mods = field(default_factory=Mods)
+    drag: str | None = None
+    space: bool = False
+    _button: int = field(default=LEFT, init=False)
+    _space_used: bool = field(default=False, init=False)
+    _start: tuple[float, float] = field(default=(0.0, 0.0), init=False)
+    _moved: bool = field(default=False, init=False)
+
+    @property
+    def is_over_canvas(self) -> bool:
+        """A drag that began on the canvas is under way, or nothing lies over the canvas where the pointer is."""
+        return self.drag is not None or self._could_begin
+
+    @property
+    def _could_begin(self) -> bool:
+        is_free = not self.dialogs.shown and not self.ui.is_covered(self.x, self.y)
+        return is_free and self.workspace.view.canvas.contains(self.x, self.y)
+
+    @property
+    def shows_ring(self) -> bool:
+        """The brush's ring is drawn where the pointer is."""
+        has_ring = self.state.tool.gesture is not None and self.drag in (None, "paint", "brush")
+        return has_ring and self.is_over_canvas
+
+    @property
+    def ring_at(self) -> tuple[float, float]:
+        """The middle of the ring, which stays where it is while the brush is made larger."""
+        return self._start if self.drag == "brush" else (self.x, self.y)
+
+    @property
+    def is_opposite(self) -> bool:
+        """The tool works in its other direction, by the switch or by Alt."""
+        return self.state.is_opposite != self.mods.alt
+
+    def handle(self, event: Event) -> None:
+        """Take part in an event, if it is about the canvas."""
+        match event:
+            case Move(x, y, pressure, mods):
+                self._move(x, y, pressure, mods)
+            case Button(button, True, mods):
+                self.mods = mods
+                if self.drag is None and self._could_begin:
+                    self._press(button)
+            case Button(button, False, mods):
+                self.mods = mods
+                if self.drag is not None and button == self._button:
+                    self._release()
+            case Wheel(dx, dy, mods):
+                if self._could_begin:
+                    self._wheel(dx, dy, mods)
+            case Key(key, down, mods, repeat):
+                self.mods = mods
+                if key == "space":
+                    self._hold_space(down, repeat)
+
+    # -- what is held -----------------------------------------------------------------------------------------------
+
+    def _hold_space(self, down: bool, repeat: bool) -> None:
+        """Space held pans; Space tapped plays."""
+        if down and not repeat:
+            self.space, self._space_used = True, False
+        elif not down and self.space:
+            self.space = False
+            if not self._space_used and self.drag is None:
+                self.play()
+
+    def release_all(self) -> None:
+        """The window lost the keyboard: nothing is held any more."""
+        self.space = False
+        if self.drag is not None:
+            self._release()
+
+    # -- the pointer ------------------------------------------------------------------------------------------------
+
+    def _press(self, button: int) -> None:
+        tool = self.state.tool
+        self._button, self._start, self._moved = button, (self.x, self.y), False
+        if button == MIDDLE or (button == LEFT and (self.space or tool.name == "pan")):
+            self.drag, self._space_used = "pan", True
+        elif button == RIGHT:
+            self.drag = "brush"
+        elif button == LEFT and self._is_on_split():
+            self.drag = "split"
+        elif button == LEFT and tool.name == "zoom":
+            self.drag = "zoom"
+        elif button == LEFT:
+            self.drag = "paint"
+            self.preferences.dismiss_hint()
+            session, place = self.workspace.session, self.workspace.view.to_picture(self.x, self.y)
+            press = Press(self.state.brush, self.is_opposite, session.extent, session.dt)
+            session.press(tool, press, *place, self.pressure, self.mods.shift)
+
+    def _move(self, x: float, y: float, pressure: float, mods: Mods) -> None:
+        dx, dy = x - self.x, y - self.y
+        self.x, self.y, self.pressure, self.mods = x, y, pressure, mods
+        workspace, view, brush = self.workspace, self.workspace.view, self.state.brush
+        if abs(x - self._start[0]) + abs(y - self._start[1]) > 3:
+            self._moved = True
+        match self.drag:
+            case "paint":
+                workspace.session.move(*view.to_picture(x, y), pressure, mods.shift)
+            case "pan":
+                workspace.view = view.panned(dx, dy)
+            case "zoom":
+                workspace.view = view.zoomed((view.zoom or view.fit_zoom) * exp(0.008 * dx), *self._start)
+            case "brush":
+                radius = min(max(brush.radius + dx / view.longer, SMALLEST), LARGEST)
+                hardness = min(max(brush.hardness - dy * 0.004, 0.0), 1.0)
+                self.state.brush = replace(brush, radius=radius, hardness=hardness)
+            case "split":
+                self.state.split = min(max(view.to_picture(x, y)[0], 0.0), 1.0)
+
+    def _release(self) -> None:
+        drag, self.drag = self.drag, None
+        if drag == "paint":
+            self.workspace.session.release()
+        elif drag == "zoom" and not self._moved:
+            self.workspace.view = self.workspace.view.stepped(not self.mods.alt, self.x, self.y)
+
+    def _wheel(self, dx: float, dy: float, mods: Mods) -> None:
+        view = self.workspace.view
+        if mods.shift:
+            self.workspace.view = view.panned(48 * (dx or dy), 0)
+        elif mods.alt:
+            self.state.resize_brush(1.1**dy)
+        else:
+            self.workspace.view = view.zoomed((view.zoom or view.fit_zoom) * 1.15**dy, self.x, self.y)
+
+    def _is_on_split(self) -> bool:
+        split = self.state.split
+        if split is None:
+            return False
+        return abs(self.workspace.view.to_screen(split, 0)[0] - self.x) <= self.ui.px(SPLIT_REACH)
+
+    def zoom_step(self, up: bool) -> None:
+        """The next round zoom where the pointer is, or in the middle."""
+        view = self.workspace.view
+        at = (self.x, self.y) if view.canvas.contains(self.x, self.y) else view.canvas.middle
+        self.workspace.view = view.stepped(up, *at)
+
+    @property
+    def cursor(self) -> str:
+        """The pointer's shape: "none" where the brush's ring takes its place."""
+        if not self.is_over_canvas:
+            return "arrow"
+        if self.drag == "pan" or self.space or self.state.tool_name == "pan":
+            return "hand"
+        if self.drag == "split" or (self.drag is None and self._is_on_split()):
+            return "resize_ew"
+        if self.state.tool_name == "zoom":
+            return "crosshair"
+        return "none" if self.shows_ring else "arrow"

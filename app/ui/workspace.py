@@ -1,0 +1,131 @@
+"""The works that are open in the window, and the one that is worked on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from app.media.project import Project
+from app.ui.canvas import Canvas
+from app.ui.journals import Journals
+from app.ui.viewport import Viewport
+from app.work.recovery import Found
+from app.work.session import Session
+from solver.gl.device import Device
+
+# Bytes of pixels of the pictures that were open before, to which Undo comes back.
+OPENED_BUDGET = 2**30
+
+
+class Workspace:
+    """The works that have been opened one after another, as a history: Undo at the start of one is back in the last.
+
+    Args:
+        device: the GL of the window.
+        journals: of the works.
+        view: the canvas on the screen.
+
+    Attributes:
+        view: where the picture lies on the canvas.
+        placeholder: work that is only there until something else has been read: untouched, it is nothing to go back to.
+    """
+
+    def __init__(self, device: Device, journals: Journals, view: Viewport) -> None:
+        self.view = view
+        self.placeholder: Session | None = None
+        self._device = device
+        self._journals = journals
+        self._works: list[tuple[Session, Canvas]] = []
+        self._index = -1
+
+    @property
+    def session(self) -> Session:
+        return self._works[self._index][0]
+
+    @property
+    def canvas(self) -> Canvas:
+        return self._works[self._index][1]
+
+    @property
+    def is_dirty(self) -> bool:
+        return self.session.document.is_dirty
+
+    def open(self, project: Project, pixels: np.ndarray | None = None, found: Found | None = None) -> None:
+        """Work on another project; Undo at its very start comes back to this one.
+
+        `pixels`: the picture as the canvas shows it, if it is at hand. `found`: what the project was restored from.
+        """
+        canvas = Canvas(self._device, project.picture, pixels)
+        try:
+            session = Session(self._device, project)
+        except Exception:
+            canvas.release()
+            raise
+        if found is not None:
+            session.document.restore(found.work.history, found.work.saved)
+        self._journals.open(session, found)
+        for old in self._works[self._index + 1 :]:
+            self._close(*old)
+        kept = self._works[: self._index + 1]
+        replaced = kept.pop() if kept and kept[-1][0] is self.placeholder and not self.is_dirty else None
+        # Those further back keep what makes them, and replay it when they are wanted.
+        for old, _ in kept[:-1]:
+            old.replay.checkpoints.clear()
+        while len(kept) > 1 and sum(old.project.picture.pixels.nbytes for old, _ in kept) > OPENED_BUDGET:
+            self._close(*kept.pop(0))
+        self._leave()
+        self._works = [*kept, (session, canvas)]
+        self._turn_to(len(self._works) - 1)
+        if replaced is not None:
+            self._close(*replaced)
+
+    def undo(self) -> None:
+        if self.session.document.history.can_undo:
+            self.session.undo()
+        elif self._index > 0:
+            self._leave()
+            self._turn_to(self._index - 1)
+
+    def redo(self) -> None:
+        if self.session.document.history.can_redo:
+            self.session.redo()
+        elif self._index < len(self._works) - 1:
+            self._leave()
+            self._turn_to(self._index + 1)
+
+    @property
+    def can_undo(self) -> bool:
+        return self.session.document.history.can_undo or self._index > 0 or self.session.is_painting
+
+    @property
+    def can_redo(self) -> bool:
+        return self.session.document.history.can_redo or self._index < len(self._works) - 1
+
+    def change(self, name: str, **settings: Any) -> None:
+        """Change the fluid from the playhead on."""
+        if self.session.end or settings.keys() <= {"viscosity", "drag", "walls"}:
+            self.session.change(name, **settings)
+
+    def keep(self) -> None:
+        """Take note in the journal of what has been done."""
+        self._journals.keep(self.session)
+
+    def release(self) -> None:
+        for work in self._works:
+            self._close(*work)
+
+    def _leave(self) -> None:
+        if self._index >= 0:
+            self.session.stop_recording()
+            self.session.forget_grid()
+            self.keep()
+
+    def _turn_to(self, index: int) -> None:
+        self._index = index
+        self.view = Viewport(self.view.canvas, self.canvas.size, self.view.density)
+
+    def _close(self, session: Session, canvas: Canvas) -> None:
+        self._journals.close(session)
+        session.release_gpu()
+        canvas.release()
