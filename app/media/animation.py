@@ -16,6 +16,7 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media import ffmpeg
+from app.media.depth import to_bits
 from app.media.files import (
     NUMBER,
     cannot_write,
@@ -25,7 +26,9 @@ from app.media.files import (
     temporary_beside,
     temporary_file,
 )
-from app.media.pictures import FORMATS, WEBP, check_picture_output, lost, to_bits, write_picture
+from app.media.formats import FORMATS, check_picture_output
+from app.media.losses import lost
+from app.media.pictures import write_picture
 from app.media.video import Clip, sound_codec
 from app.model.picture import Picture
 from app.progress import never
@@ -125,7 +128,7 @@ class Container:
 # The widest and highest picture that an encoder, or what holds it, takes.
 LARGEST = {
     "h264": (16384, 16384), "vp9": (65536, 65536), "av1": (16384, 8704), "prores-4444": (65534, 65534),
-    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (WEBP.longest, WEBP.longest),
+    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (FORMATS[".webp"].longest,) * 2,
 }  # fmt: skip
 
 ANIMATIONS = {

@@ -14,8 +14,8 @@ import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.inputs import open_input, read_start
-from app.media.pictures import MAX_PIXELS, check_size, lost
+from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
+from app.media.losses import lost
 from app.progress import never
 
 CHANGED = 65  # exit status when a clip changes under the job

@@ -15,9 +15,11 @@ from app.errors import UserError
 from app.media import maps
 from app.media.animation import animation_writer, check_output, is_animation, passes, unheld_of_clip
 from app.media.files import check_kept, is_sequence, number_in, writable
+from app.media.formats import picture_format, unheld
+from app.media.inputs import MAX_PIXELS
 from app.media.maps import Displacement, Kind, cropped, folds, read_map
 from app.media.opening import Source, open_source
-from app.media.pictures import MAX_PIXELS, picture_format, unheld, write_picture
+from app.media.pictures import write_picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
 from app.work.export import longer_side, looked_up, steps_for

@@ -30,9 +30,11 @@ from app.media.animation import (
 )
 from app.media.auxiliary import Pictures
 from app.media.files import cannot_write, is_sequence, replacing, writable
+from app.media.formats import picture_format, unheld
+from app.media.inputs import MAX_PIXELS
 from app.media.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.media.opening import check_picture
-from app.media.pictures import MAX_PIXELS, picture_format, unheld, write_picture
+from app.media.pictures import write_picture
 from app.media.video import Clip
 from app.model.picture import Picture
 from app.model.recipe import Recipe

@@ -27,7 +27,8 @@ from app.media.animation import (
     order_length,
     reordered,
 )
-from app.media.pictures import read_picture, to_bits
+from app.media.depth import to_bits
+from app.media.pictures import read_picture
 from app.media.video import read_clip
 from app.model.picture import Picture
 
