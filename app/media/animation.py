@@ -183,9 +183,7 @@ def check_animation(
         if suffix in ANIMATIONS and suffix not in FORMATS:
             mend = f"end in one of {' '.join(FORMATS)}, or leave out the number for one {suffix}"
             raise UserError(f"Cannot write {path}: a sequence's files are pictures; {mend}.")
-        check_picture_output(path, size=size)
-        if codec is not None:
-            raise UserError(f"Cannot write {path}: a sequence of pictures has no codec; leave out --codec.")
+        check_picture_output(path, size=size, codec=codec)
         return
     suffix = Path(path).suffix.lower()
     if suffix not in ANIMATIONS:
@@ -244,9 +242,7 @@ def check_output(
     if Path(path).suffix.lower() not in FORMATS:
         endings = f"a picture's name must end in one of {' '.join(FORMATS)}, an animation's in {' '.join(ANIMATIONS)}"
         raise UserError(f"Cannot write {path}: {endings}.")
-    check_picture_output(path, bits, size)
-    if codec is not None:
-        raise UserError(f"Cannot write {path}: a picture has no codec; leave out --codec, or write a video.")
+    check_picture_output(path, bits, size, codec)
 
 
 @contextmanager
@@ -285,7 +281,7 @@ def animation_writer(
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
         def write_one(file: Path, frame: np.ndarray) -> None:
-            write_picture(file, template.with_pixels(frame), bits=bits, quality=quality)
+            write_picture(file, template.with_pixels(frame), bits=bits, quality=quality, codec=codec)
 
         with sequence_writer(path, write_one, first, cancel) as write:
             yield write

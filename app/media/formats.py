@@ -13,7 +13,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.codecs import avif, exr, jpeg, other, pillow, png, tiff, webp
-from app.media.losses import REC709
+from app.media.losses import REC709, counted
 from app.model.picture import Picture
 
 
@@ -24,18 +24,20 @@ class Format:
     read: from a file, with the most pixels it may have. write: a picture with a quality of 1-100; None where we do not.
     signature: a pattern that such a file begins with; None where the ending must tell.
     bits: a channel of what is written, deepest last. alpha, grey: whether it has them. longest: its longest side.
+    codecs: ways to compress, the usual one first, that can be asked for.
     keeps: the fields of a `Picture` besides its pixels that come back from a written file.
     """
 
     name: str
     endings: tuple[str, ...]
     read: Callable[[Path, int], Picture]
-    write: Callable[[Path, Picture, int], None] | None = None
+    write: Callable[..., None] | None = None
     signature: bytes | None = None
     bits: tuple[int, ...] = ()
     alpha: bool = True
     grey: bool = True
     longest: int = 2**31 - 1
+    codecs: tuple[str, ...] = ()
     keeps: frozenset[str] = frozenset()
 
 
@@ -44,6 +46,7 @@ ONLY_READ = {
     "PGM": (".pgm",), "PNM": (".pnm",), "PPM": (".ppm",), "QOI": (".qoi",), "SGI": (".sgi",), "TGA": (".tga",),
 }  # fmt: skip
 EMBEDDED = frozenset({"icc", "exif", "xmp"})
+HEADER = frozenset({"chromaticities", "texts", "attributes"})
 TABLE = (
     Format(
         "PNG", (".png",), png.read, png.write, rb"\x89PNG\r\n\x1a\n",
@@ -67,7 +70,7 @@ TABLE = (
     ),
     Format(
         "OpenEXR", (".exr",), exr.read, exr.write, rb"v/1\x01",
-        bits=(32,), keeps=frozenset({"chromaticities", "texts", "attributes", "premultiplied"}),
+        bits=(16, 32), codecs=exr.COMPRESSIONS, keeps=HEADER | {"layers", "parts", "group", "half", "premultiplied"},
     ),
     Format("GIF", (".gif",), partial(pillow.read, "GIF"), signature=rb"GIF8[79]a"),
     Format("BMP", (".bmp",), partial(pillow.read, "BMP"), signature=rb"BM"),
@@ -101,14 +104,23 @@ def picture_format(path: str | os.PathLike[str]) -> Format:
 
 
 def check_picture_output(
-    path: str | os.PathLike[str], bits: int | None = None, size: tuple[int, int] | None = None
+    path: str | os.PathLike[str],
+    bits: int | None = None,
+    size: tuple[int, int] | None = None,
+    codec: str | None = None,
 ) -> None:
-    """Raise `UserError` if `path` has no ending of a picture we write, or its format not these bits or this size."""
+    """Raise `UserError` if `path` has no ending of a picture we write, or its format not these bits, size or codec."""
     chosen = picture_format(path)
     if bits is not None and bits not in chosen.bits:
         raise UserError(
             f"Cannot write {path}: {chosen.name} holds {' or '.join(map(str, chosen.bits))} bits a channel, not {bits}."
         )
+    if codec is not None and codec not in chosen.codecs:
+        if chosen.codecs:
+            why = f"{chosen.name} is compressed as {' '.join(chosen.codecs)}, not {codec}; change --codec"
+        else:
+            why = "a picture has no codec; leave out --codec, or write a video"
+        raise UserError(f"Cannot write {path}: {why}.")
     if size is not None and max(size) > chosen.longest:
         raise UserError(
             f"Cannot write {path}: the result is {size[0]} x {size[1]} pixels, and {chosen.name} holds no side longer "
@@ -116,9 +128,15 @@ def check_picture_output(
         )
 
 
-def unheld(path: str | os.PathLike[str], picture: Picture) -> str:
-    """What a picture's colours mean and the format of `path` cannot tell, in a sentence; "" if nothing."""
+def unheld(path: str | os.PathLike[str], picture: Picture, *, with_layers: bool = True) -> str:
+    """What of a picture the file `path` does not hold, in a sentence; "" if nothing.
+
+    with_layers: whether the picture's layers were warped, as they are for a still that shows its own pixels.
+    """
     own, kind = picture.chromaticities, FORMATS.get(Path(path).suffix.lower())
-    if own is None or np.allclose(own, REC709, atol=1e-3) or (kind and "chromaticities" in kind.keeps):
-        return ""
-    return f"{Path(path).name} cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709"
+    keeps, losses = kind.keeps if kind else frozenset[str](), []
+    if own is not None and not np.allclose(own, REC709, atol=1e-3) and "chromaticities" not in keeps:
+        losses.append("cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709")
+    if picture.layers and not (with_layers and "layers" in keeps):
+        losses.append(f"is without the picture's {counted('channel', [layer.name for layer in picture.layers])}")
+    return f"{Path(path).name} {'; it '.join(losses)}" if losses else ""

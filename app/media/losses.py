@@ -23,9 +23,14 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(shown) + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
 
 
+def counted(kind: str, names: Sequence[str]) -> str:
+    """Some parts of a file, as "channels A, B"."""
+    return f"{kind}{'s' * (len(names) > 1)} {_few(names)}"
+
+
 def not_kept(kind: str, names: Sequence[str]) -> str:
     """That parts of a file are lost, as "its channels A, B are not kept"."""
-    return f"its {kind}{'s' * (len(names) > 1)} {_few(names)} {'are' if len(names) > 1 else 'is'} not kept"
+    return f"its {counted(kind, names)} {'are' if len(names) > 1 else 'is'} not kept"
 
 
 def unusual_colours(primaries: int, transfer: int) -> str:

@@ -38,27 +38,32 @@ def write_picture(
     quality: int = 95,
     strip: bool = False,
     background: tuple[int, int, int] = (0, 0, 0),
+    codec: str | None = None,
 ) -> None:
     """Write a picture in the format of the ending of `path`, whole or not at all.
 
-    bits: 8, 16 or 32 a channel; None keeps the picture's own, or the deepest below it that the format has.
+    bits: 8, 16 or 32 a channel; None keeps the picture's own, or the deepest below it that the format has. An EXR's 16
+        are half floats; None keeps those of a picture that had them, and makes 32 of all else.
     quality: 1-100 for JPEG, WebP and AVIF; WebP is lossless at 100.
     strip: leave out EXIF, XMP, resolution and texts; the colour profile stays.
+    codec: the compression of an EXR; None is zip.
     background: what shows through where the format has no alpha.
     Raises `UserError`.
     """
-    check_picture_output(path, bits, (picture.width, picture.height))
+    check_picture_output(path, bits, (picture.width, picture.height), codec)
     chosen = picture_format(path)
     if strip:
         picture = picture.stripped()
     depth = bits or max((held for held in chosen.bits if held <= picture.bits), default=chosen.bits[0])
+    if "half" in chosen.keeps:
+        picture, depth = replace(picture, half=picture.half if bits is None else bits == 16), 32
     if depth != picture.bits or "premultiplied" not in chosen.keeps:
         picture = picture.straight()
-    picture = picture.with_pixels(to_bits(picture.pixels, depth))
+    picture = replace(picture, pixels=to_bits(picture.pixels, depth))
     if picture.has_alpha and not chosen.alpha:
-        picture = picture.with_pixels(over(picture.pixels, background))
+        picture = replace(picture, pixels=over(picture.pixels, background))
     if picture.icc and picture.icc[16:20] != (b"GRAY" if picture.pixels.shape[2] < 3 and chosen.grey else b"RGB "):
         picture = replace(picture, icc=None)  # a profile of the other kind is not allowed, and readers complain
     assert chosen.write is not None
     with replacing(path) as temporary:
-        chosen.write(temporary, picture, quality)
+        chosen.write(temporary, picture, quality, **({} if codec is None else {"codec": codec}))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
 from pathlib import Path
@@ -22,12 +22,13 @@ from app.media.opening import Source, open_source
 from app.media.pictures import write_picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
+from app.work.along import along
 from app.work.export import longer_side, looked_up, steps_for
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
-from solver.resample.plan import Edges, GivenMap, Sampling, SamplingError
+from solver.resample.plan import Edges, GivenMap, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.warp.map import WarpMap
 
@@ -112,7 +113,7 @@ class Application:
         progress.enter("reading")
         animated = is_animation(self.output)
         source = open_source(self.source, self.maps.max_pixels)
-        notices = [source.picture.note, unheld(self.output, source.picture)]
+        notices = [source.picture.note, unheld(self.output, source.picture, with_layers=not animated)]
         notices += [unheld_of_clip(self.output, self.codec, source.clip)] if source.clip else []
         check_output(self.output, size=self._size(source))
         if animated != (self.maps.is_sequence or source.clip is not None):
@@ -132,8 +133,13 @@ class Application:
                 picture = source.picture.with_pixels(
                     applier.warped(given, source.picture.pixels, size, self._alpha, heard)
                 )
+                if "layers" in picture_format(self.output).keeps:
+                    look_up = partial(applier.looked_up, given, size, lambda rows: progress.check())
+                    picture = replace(picture, layers=along(source.picture.layers, look_up))
                 progress.enter("writing")
-                write_picture(self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip)
+                write_picture(
+                    self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip, codec=self.codec
+                )
                 progress.count(steps)
             notices.extend(applier.notices(self.maps.path))
         return tuple(filter(None, notices))
@@ -201,6 +207,29 @@ class Applier:
         self, given: Displacement, pixels: np.ndarray, size: tuple[int, int], alpha: bool, heard: Callable[[int], None]
     ) -> np.ndarray:
         """The pixels looked up through the map, in another size; for `alpha` and `heard` see `looked_up`."""
+        return self._looked_up(given, pixels, size, self._how, alpha, heard)
+
+    def looked_up(
+        self,
+        given: Displacement,
+        size: tuple[int, int],
+        heard: Callable[[int], None],
+        pixels: np.ndarray,
+        quality: Quality,
+    ) -> np.ndarray:
+        """The same of a layer's pixels, in a quality of its own."""
+        how = replace(self._how, quality=quality, premultiplied=False)
+        return self._looked_up(given, pixels, size, how, False, heard)
+
+    def _looked_up(
+        self,
+        given: Displacement,
+        pixels: np.ndarray,
+        size: tuple[int, int],
+        how: Sampling,
+        alpha: bool,
+        heard: Callable[[int], None],
+    ) -> np.ndarray:
         try:
             if given is not self._given or self._map is None:
                 if self._map is not None:
@@ -210,7 +239,7 @@ class Applier:
                 if folded := folds(values):
                     self._folds.append(folded)
                 self._map, self._given = GivenMap(self._device, values), given
-            return looked_up(self._sampler, self._map, pixels, size, self._how, alpha, heard)
+            return looked_up(self._sampler, self._map, pixels, size, how, alpha, heard)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
 

@@ -36,16 +36,17 @@ from app.media.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.media.opening import check_picture
 from app.media.pictures import write_picture
 from app.media.video import Clip
-from app.model.picture import Picture
+from app.model.picture import Layer, Picture
 from app.model.recipe import Recipe
 from app.model.timeline import Sentinel, Timeline, frame_positions, frame_rate
 from app.progress import Progress
+from app.work.along import along
 from app.work.checkpoints import DEFAULT_BUDGET
 from app.work.replay import Replay
 from app.work.states import StoredStates
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
-from solver.resample.plan import GivenMap, Sampling, SamplingError
+from solver.resample.plan import GivenMap, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.warp.map import WarpMap
 
@@ -271,9 +272,11 @@ class _Export:
             if job.output is not None:
                 steps = steps_for(self.size)
                 frame = self._frame(job.picture.pixels, self.progress.parts(steps, self.size[1]))
-                picture = self.like.with_pixels(frame)
+                picture = replace(self.like.with_pixels(frame), layers=self._layers())
                 self.progress.enter("writing")
-                write_picture(job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip)
+                write_picture(
+                    job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip, codec=job.codec
+                )
                 self.progress.count(steps)
             self._note(0, Fraction(end))
             count = 1
@@ -304,7 +307,7 @@ class _Export:
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
         output, clip = self.job.output, self.job.clip
-        if output is not None and (said := unheld(output, self.job.picture)):
+        if output is not None and (said := unheld(output, self.job.picture, with_layers=self._has_layers)):
             self.pictures.notice(said)
         if output is not None and clip is not None and (said := unheld_of_clip(output, self.job.codec, clip)):
             self.pictures.notice(said)
@@ -442,12 +445,32 @@ class _Export:
         # The frames of an animation are all of one kind, and most of its formats have no alpha.
         alpha = not self.job.is_animation and self.job.output is not None and picture_format(self.job.output).alpha
         with self.device.stage("sample picture"):
-            premultiplied = self.job.picture.premultiplied
-            how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples, premultiplied=premultiplied)
+            how = replace(self._how, premultiplied=self.job.picture.premultiplied)
             try:
                 return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, heard)
             except SamplingError as error:
                 raise UserError(f"The map cannot be applied: {error}.") from None
+
+    @property
+    def _how(self) -> Sampling:
+        return Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
+
+    @property
+    def _has_layers(self) -> bool:
+        """Whether the picture's layers are warped along: of a still, where its own pixels are moved."""
+        job = self.job
+        return job.output is not None and not job.has_frames and self.recipe.mode != "density"
+
+    def _layers(self) -> tuple[Layer, ...]:
+        """The picture's layers warped by the map as it is, if they are to be written."""
+        output = self.job.output
+        if output is None or not self._has_layers or "layers" not in picture_format(output).keeps:
+            return ()
+        return along(self.job.picture.layers, self._look_up)
+
+    def _look_up(self, pixels: np.ndarray, quality: Quality) -> np.ndarray:
+        how, warp = replace(self._how, quality=quality), self.replay.warp
+        return looked_up(self.sampler, warp, pixels, self.size, how, False, lambda rows: self.progress.check())
 
     def _density_frame(self, values: np.ndarray) -> np.ndarray:
         """The densities as 8-bit colours, in the result's size."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +12,33 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.codecs.decoding import decoding, head_of, quiet
+from app.media.codecs.exr_header import Raw, fill_rooms, raw_attributes, room_for
+from app.media.depth import as_half
 from app.media.inputs import MAX_PIXELS, check_size
-from app.media.losses import lost, not_kept
-from app.model.picture import Picture
+from app.media.losses import counted, lost, not_kept
+from app.model.picture import Layer, Picture
 
-LAYOUT = frozenset({"version", "chunkCount", "maxSamplesPerPixel", "dwaCompressionLevel"})
+# Attributes that say how a file is laid out, and those that have a place of their own in a picture.
+LAYOUT = frozenset(
+    {
+        *("type", "version", "channels", "compression", "dwaCompressionLevel", "lineOrder", "tiles", "chunkCount"),
+        *("dataWindow", "displayWindow", "maxSamplesPerPixel", "chromaticities"),
+    }
+)
+PART_NAMES = ("name", "view")
+SHARED = {"pixelAspectRatio", "timeCode", "chromaticities"}  # which all parts must have alike
+NUMBERS, CENTRE = ("int", "float"), "screenWindowCenter"  # that a header always has, and OpenEXR writes itself
+
+COMPRESSIONS = ("zip", "zips", "piz", "rle", "none", "pxr24", "dwaa", "dwab", "b44", "b44a")
+"""What `--codec` may be; those from pxr24 on lose something."""
+
+# Names of channels and layers, by what renderers and Nuke call them.
+BEAUTY = re.compile(r"(^|[.])(beauty|rgba?|combined|composite|final)[.]$", re.IGNORECASE)
+EXACT = re.compile(
+    r"[zZ]|ZBack|P|Pref|.*I[dD]s?\d*"
+    r"|(?i:(.*[\W_])?ids?\d*|(object|material|instance|asset)id\d*|.*depth.*|.*crypto.*|.*position.*)"
+)
+MOTION = re.compile(r"(?i:forward|backward|mv|.*motion.*|.*velocity.*)")
 
 
 def channel_names(file: Path) -> list[str]:
@@ -48,54 +72,148 @@ def read_channels(file: Path, max_pixels: int = MAX_PIXELS) -> tuple[dict[str, n
 
 
 def read(file: Path, max_pixels: int) -> Picture:
-    """Read the colours of the first part of an EXR, in its display window."""
-    channels, header = read_channels(file, max_pixels)
-    for wanted in (("R", "G", "B", "A"), ("R", "G", "B"), ("Y", "A"), ("Y",)):
-        if set(wanted) <= set(channels) and "RY" not in channels:
-            break
-    else:
-        names = " ".join(channels)
+    """Read the colours of an EXR in its display window; its further channels and parts become layers."""
+    parts = _parts(file, max_pixels)
+    found = _colours(parts)
+    if found is None:
+        names = " ".join(parts[0].channels)
         raise UserError(f"Cannot read {file}: of its channels {names} none are R G B or Y; save a plain RGB layer.")
-    (left, top), _ = header["dataWindow"]
-    (first_x, first_y), (last_x, last_y) = header["displayWindow"]
-    data = np.stack([channels[key] for key in wanted], axis=-1)
-    pixels = np.zeros((last_y - first_y + 1, last_x - first_x + 1, len(wanted)), np.float32)
-    place_window(data, (left - first_x, top - first_y), pixels)
-    chromaticities = header.get("chromaticities")
-    others = [key for key in channels if key not in wanted]
-    losses = [not_kept("channel", others)] if others else []
-    losses += _losses(file, header)
+    index, prefix, wanted = found
+    own = parts[index]
+    colours = [prefix + name for name in wanted]
+    cryptomattes = tuple(
+        text for part in parts for key, text in part.texts.items() if re.fullmatch("cryptomatte/.*/name", key)
+    )
+    layers, losses = [], []
+    for number, part in enumerate(parts):
+        further = [name for name in part.channels if number != index or name not in colours]
+        if part.is_flat:
+            layers += [
+                Layer(name, part.shown(name), _is_exact(name, part.channels[name].dtype, cryptomattes), number)
+                for name in further
+            ]
+        else:
+            losses.append(not_kept("further part", [part.texts.get("name", "")]))
+        if part.subsampled:
+            losses.append(not_kept("channel", part.subsampled))
+    if turned := [layer.name for layer in layers if any(MOTION.fullmatch(word) for word in layer.name.split("."))]:
+        losses.append(f"the arrows of its {counted('channel', turned)} are moved and not turned")
+    losses += _windows_lost(own)
     return Picture(
-        pixels,
-        chromaticities=tuple(float(value) for value in chromaticities) if chromaticities is not None else None,
-        texts={key: value for key, value in header.items() if isinstance(value, str) and key not in ("name", "view")},
+        np.stack([own.shown(name) for name in colours], axis=-1, dtype=np.float32),
+        chromaticities=own.chromaticities,
+        texts={key: text for key, text in own.texts.items() if key not in PART_NAMES},
         premultiplied=True,
-        attributes={key: value for key, value in header.items() if _is_kept(key, value)},
+        attributes=own.attributes,
+        layers=tuple(layers),
+        parts=tuple(part.header(whole=part is not own) for part in parts),
+        group=(index, prefix),
+        half=all(own.channels[name].dtype == np.float16 for name in colours),
         note=lost(file, losses),
     )
 
 
-def _losses(file: Path, header: Mapping[str, Any]) -> list[str]:
-    """What of an EXR lies beside its first part, or beyond its display window."""
+@dataclass(frozen=True)
+class _Part:
+    """One part of an EXR: its channels (h, w) in their own type, in the data window, and what its header says.
+
+    windows: of the data and of the display, (left, top, right, bottom) each, the last pixels among them.
+    """
+
+    channels: Mapping[str, np.ndarray]
+    subsampled: Sequence[str]
+    is_flat: bool
+    windows: tuple[tuple[int, ...], tuple[int, ...]]
+    texts: Mapping[str, str]
+    attributes: Mapping[str, Any]
+    chromaticities: tuple[float, ...] | None
+
+    def shown(self, name: str) -> np.ndarray:
+        """A channel in the display window, 0 where there is no data."""
+        (left, top, *_), (first_x, first_y, last_x, last_y) = self.windows
+        plane = np.zeros((last_y - first_y + 1, last_x - first_x + 1), self.channels[name].dtype)
+        place_window(self.channels[name], (left - first_x, top - first_y), plane)
+        return plane
+
+    def header(self, whole: bool) -> dict[str, Any]:
+        """What is written of it again: all, or its names alone."""
+        names = {key: text for key, text in self.texts.items() if whole or key in PART_NAMES}
+        if not whole:
+            return names
+        primaries = {} if self.chromaticities is None else {"chromaticities": self.chromaticities}
+        return {**names, **self.attributes, **primaries}
+
+
+def _parts(file: Path, max_pixels: int) -> list[_Part]:
     import OpenEXR
 
     with quiet():
-        parts = [part.header.get("name", "") for part in OpenEXR.File(str(file), header_only=True).parts[1:]]
-    losses = [not_kept("further part", parts)] if parts else []
-    (left, top), (right, bottom) = header["dataWindow"]
-    (first_x, first_y), (last_x, last_y) = header["displayWindow"]
+        headers = [part.header for part in OpenEXR.File(str(file), header_only=True).parts]
+        for header in headers:
+            for window in ("dataWindow", "displayWindow"):
+                left, top, right, bottom = _corners(header[window])
+                check_size(file, right - left + 1, bottom - top + 1, max_pixels)
+        # a file that ends early is announced on stdout, not raised: it just has no part
+        read = OpenEXR.File(str(file), separate_channels=True).parts
+    if not read or not all(part.channels for part in read):
+        raise ValueError("pixel data is missing")
+    parts = []
+    for header, part, raw in zip(headers, read, raw_attributes(file), strict=True):
+        primaries = header.get("chromaticities")
+        sampled = {name: (channel.xSampling, channel.ySampling) for name, channel in part.channels.items()}
+        parts.append(
+            _Part(
+                {
+                    name: np.asarray(channel.pixels)
+                    for name, channel in part.channels.items()
+                    if sampled[name] == (1, 1)
+                },
+                [name for name, steps in sampled.items() if steps != (1, 1)],
+                header["type"] in (OpenEXR.scanlineimage, OpenEXR.tiledimage),
+                (_corners(header["dataWindow"]), _corners(header["displayWindow"])),
+                {key: value for key, value in header.items() if isinstance(value, str)},
+                {
+                    key: header[key] if value.kind in NUMBERS or key == CENTRE else value
+                    for key, value in raw.items()
+                    if key not in LAYOUT and value.kind not in ("string", "preview")  # of the picture as it was
+                },
+                tuple(float(value) for value in primaries) if primaries is not None else None,
+            )
+        )
+    return parts
+
+
+def _corners(window: Any) -> tuple[int, ...]:
+    return tuple(int(value) for corner in window for value in corner)
+
+
+def _colours(parts: Sequence[_Part]) -> tuple[int, str, str] | None:
+    """The part, the layer and the channels that are the picture: plain ones, else a beauty, else the first RGB."""
+    found = []
+    for number, part in enumerate(parts):
+        for prefix in dict.fromkeys(name[: name.rfind(".") + 1] for name in part.channels):
+            for wanted in ("RGBA", "RGB", *(("YA", "Y") if not prefix or BEAUTY.search(prefix) else ())):
+                if part.is_flat and all(prefix + name in part.channels for name in wanted):
+                    if "RY" not in (*part.subsampled, *part.channels):
+                        found.append((bool(prefix), not BEAUTY.search(prefix), number, prefix, wanted))
+                    break
+    return min(found, key=lambda one: one[:3])[2:] if found else None
+
+
+def _is_exact(name: str, dtype: np.dtype, cryptomattes: tuple[str, ...]) -> bool:
+    """Whether a mean of a channel's values would be none of them: ids, depths and places."""
+    words = name.split(".")
+    return dtype == np.uint32 or name.startswith(cryptomattes) or any(EXACT.fullmatch(word) for word in words)
+
+
+def _windows_lost(part: _Part) -> list[str]:
+    """What of a part lies beyond its display window."""
+    (left, top, right, bottom), (first_x, first_y, last_x, last_y) = part.windows
     beyond = max(first_x - left, first_y - top, right - last_x, bottom - last_y)
-    if beyond > 0:
-        losses.append(f"its overscan ({int(beyond)} px beyond the display window) is not kept")
+    losses = [f"its overscan ({beyond} px beyond the display window) is not kept"] if beyond > 0 else []
     if first_x or first_y:
-        losses.append(f"its display window begins at {int(first_x)}, {int(first_y)} and is moved to 0, 0")
+        losses.append(f"its display window begins at {first_x}, {first_y} and is moved to 0, 0")
     return losses
-
-
-def _is_kept(key: str, value: Any) -> bool:
-    """Whether an attribute of an EXR is a number or a few, and says nothing about how the file is laid out."""
-    numbers = isinstance(value, int | float) or (isinstance(value, np.ndarray) and value.dtype.kind == "f")
-    return numbers and key not in LAYOUT
 
 
 def place_window(data: np.ndarray, at: tuple[int, int], into: np.ndarray) -> None:
@@ -107,8 +225,11 @@ def place_window(data: np.ndarray, at: tuple[int, int], into: np.ndarray) -> Non
     into[spans[0][0], spans[1][0]] = data[spans[0][1], spans[1][1]]
 
 
-def write(path: Path, picture: Picture, quality: int) -> None:
-    """Write an EXR of 32-bit floats, its colours multiplied by alpha."""
+def write(path: Path, picture: Picture, quality: int, codec: str | None = None) -> None:
+    """Write an EXR, its colours multiplied by alpha, with the layers in the parts they are from.
+
+    codec: the compression, one of `COMPRESSIONS`; None is the first.
+    """
     pixels = picture.pixels
     if pixels.shape[2] == 2:  # luminance with alpha is allowed, and misread by ffmpeg
         pixels = pixels[..., [0, 0, 0, 1]]
@@ -116,10 +237,29 @@ def write(path: Path, picture: Picture, quality: int) -> None:
     if picture.has_alpha and not picture.premultiplied:  # OpenEXR's convention
         with np.errstate(all="ignore"):
             pixels = np.concatenate([pixels[..., :-1] * pixels[..., -1:], pixels[..., -1:]], axis=2)
+    if picture.half:
+        pixels = as_half(pixels)
     attributes: dict[str, Any] = {**picture.texts, **picture.attributes}
     if picture.chromaticities:
         attributes["chromaticities"] = picture.chromaticities
-    write_channels(path, {name: pixels[..., index] for index, name in enumerate(names)}, attributes)
+    own, prefix = picture.group
+    channels = {own: {prefix + name: pixels[..., index] for index, name in enumerate(names)}}
+    for layer in picture.layers:
+        channels.setdefault(layer.part, {})[layer.name] = layer.values
+    parts = []
+    for number in sorted(channels):
+        header = dict(picture.parts[number]) if number < len(picture.parts) else {}
+        header |= {key: attributes[key] for key in SHARED & attributes.keys()}
+        if len(channels) > 1:
+            header.setdefault("name", f"part {number}")
+        parts.append((header | attributes if number == own else header, channels[number]))
+    _write_parts(path, parts, _compression(codec or COMPRESSIONS[0]))
+
+
+def _compression(name: str) -> Any:
+    import OpenEXR
+
+    return OpenEXR.NO_COMPRESSION if name == "none" else getattr(OpenEXR, f"{name.upper()}_COMPRESSION")
 
 
 def write_channels(
@@ -128,18 +268,36 @@ def write_channels(
     """Write float32 channels (h, w) by name; `overscan` pixels on each side lie outside the display window."""
     import OpenEXR
 
-    height, width = next(iter(channels.values())).shape
+    planes = {name: plane.astype(np.float32, copy=False) for name, plane in channels.items()}
+    _write_parts(path, [(attributes, planes)], OpenEXR.ZIP_COMPRESSION, overscan)
+
+
+def _write_parts(
+    path: Path,
+    parts: Sequence[tuple[Mapping[str, Any], Mapping[str, np.ndarray]]],
+    compression: Any,
+    overscan: int = 0,
+) -> None:
+    """Write parts, an attribute and a channel (h, w) by its name each; see `write_channels`."""
+    import OpenEXR
 
     def window(left: int, top: int, right: int, bottom: int) -> tuple[np.ndarray, np.ndarray]:
         return np.array([left, top], np.int32), np.array([right, bottom], np.int32)
 
-    header = {
-        **attributes,
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        "displayWindow": window(0, 0, width - 2 * overscan - 1, height - 2 * overscan - 1),
-        "dataWindow": window(-overscan, -overscan, width - overscan - 1, height - overscan - 1),
-    }
-    planes = {name: np.ascontiguousarray(plane, np.float32) for name, plane in channels.items()}
+    made, raws = [], []
+    for attributes, channels in parts:
+        height, width = next(iter(channels.values())).shape
+        raw = {key: value for key, value in attributes.items() if isinstance(value, Raw)}
+        header = {
+            **{key: value for key, value in attributes.items() if key not in raw},
+            **room_for(raw),
+            "compression": compression,
+            "type": OpenEXR.scanlineimage,
+            "displayWindow": window(0, 0, width - 2 * overscan - 1, height - 2 * overscan - 1),
+            "dataWindow": window(-overscan, -overscan, width - overscan - 1, height - overscan - 1),
+        }
+        made.append(OpenEXR.Part(header, {name: np.ascontiguousarray(plane) for name, plane in channels.items()}))
+        raws.append(raw)
     with path.open("wb") as stream:  # given a name OpenEXR writes to a full disk without a word
-        OpenEXR.File(header, planes).write(stream)
+        OpenEXR.File(made).write(stream)
+    fill_rooms(path, raws)
