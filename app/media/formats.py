@@ -70,7 +70,8 @@ TABLE = (
     ),
     Format(
         "OpenEXR", (".exr",), exr.read, exr.write, rb"v/1\x01",
-        bits=(16, 32), codecs=exr.COMPRESSIONS, keeps=HEADER | {"layers", "parts", "group", "half", "premultiplied"},
+        bits=(16, 32), codecs=exr.COMPRESSIONS,
+        keeps=HEADER | {"layers", "parts", "group", "half", "wide", "margins", "origin", "premultiplied"},
     ),
     Format("GIF", (".gif",), partial(pillow.read, "GIF"), signature=rb"GIF8[79]a"),
     Format("BMP", (".bmp",), partial(pillow.read, "BMP"), signature=rb"BM"),
@@ -128,10 +129,12 @@ def check_picture_output(
         )
 
 
-def unheld(path: str | os.PathLike[str], picture: Picture, *, with_layers: bool = True) -> str:
+def unheld(
+    path: str | os.PathLike[str], picture: Picture, *, with_layers: bool = True, with_margins: bool = True
+) -> str:
     """What of a picture the file `path` does not hold, in a sentence; "" if nothing.
 
-    with_layers: whether the picture's layers were warped, as they are for a still that shows its own pixels.
+    with_layers, with_margins: whether these were warped, as they are for a still that shows its own pixels.
     """
     own, kind = picture.chromaticities, FORMATS.get(Path(path).suffix.lower())
     keeps, losses = kind.keeps if kind else frozenset[str](), []
@@ -139,4 +142,8 @@ def unheld(path: str | os.PathLike[str], picture: Picture, *, with_layers: bool 
         losses.append("cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709")
     if picture.layers and not (with_layers and "layers" in keeps):
         losses.append(f"is without the picture's {counted('channel', [layer.name for layer in picture.layers])}")
+    if picture.wide is not None and not (with_margins and "wide" in keeps):
+        losses.append(f"is without the picture's overscan ({max(picture.margins)} px beyond the display window)")
+    if picture.origin != (0, 0) and "origin" not in keeps:
+        losses.append(f"begins at 0, 0 and not at {picture.origin[0]}, {picture.origin[1]} as the display window")
     return f"{Path(path).name} {'; it '.join(losses)}" if losses else ""

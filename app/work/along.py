@@ -1,4 +1,4 @@
-"""The further channels of a picture, looked up where its colours are."""
+"""The further channels of a picture, and what lies beyond its display window, looked up where its colours are."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.media.depth import as_half
+from app.media.maps import Displacement
 from app.model.picture import Layer
 from solver.resample.plan import Quality
 
@@ -32,6 +33,16 @@ def along(layers: Sequence[Layer], look_up: LookUp) -> tuple[Layer, ...]:
         together = np.stack([next(found) for _ in range(step)], axis=-1)
         made[id(layer)] = together.view(layer.values.dtype)[..., 0]
     return tuple(replace(layer, values=made[id(layer)]) for layer in layers)
+
+
+def widened(given: Displacement, margins: tuple[int, int, int, int]) -> np.ndarray:
+    """A map's values with margins around it, (h, w, 2) in longer sides of that; where it ends, its edge goes on."""
+    left, top, right, bottom = margins
+    more = max(0, max(margins) - given.overscan)
+    values = np.pad(given.values, ((more, more), (more, more), (0, 0)), mode="edge")
+    edge = given.overscan + more
+    values = values[edge - top : len(values) - edge + bottom, edge - left : values.shape[1] - edge + right]
+    return (values * (given.longest / max(values.shape[:2]))).astype(np.float32)
 
 
 def _typed(plane: np.ndarray, layer: Layer) -> np.ndarray:

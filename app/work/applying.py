@@ -20,9 +20,10 @@ from app.media.inputs import MAX_PIXELS
 from app.media.maps import Displacement, Kind, cropped, folds, read_map
 from app.media.opening import Source, open_source
 from app.media.pictures import write_picture
+from app.model.picture import Picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
-from app.work.along import along
+from app.work.along import along, widened
 from app.work.export import longer_side, looked_up, steps_for
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
@@ -113,8 +114,7 @@ class Application:
         progress.enter("reading")
         animated = is_animation(self.output)
         source = open_source(self.source, self.maps.max_pixels)
-        notices = [source.picture.note, unheld(self.output, source.picture, with_layers=not animated)]
-        notices += [unheld_of_clip(self.output, self.codec, source.clip)] if source.clip else []
+        notices = [source.picture.note]
         check_output(self.output, size=self._size(source))
         if animated != (self.maps.is_sequence or source.clip is not None):
             what = "a still" if not animated else "an animation"
@@ -123,26 +123,42 @@ class Application:
             raise UserError(f"Cannot write {self.output}: {given} do not make {what}; {mend}.")
         with Applier(device, self.edges, source.picture.premultiplied) as applier:
             if animated:
+                notices.append(unheld(self.output, source.picture, with_layers=False, with_margins=False))
+                notices += [unheld_of_clip(self.output, self.codec, source.clip)] if source.clip else []
                 self._write_frames(applier, source, progress, notices)
             else:
-                size = self._size(source)
-                steps = steps_for(size)
-                progress.total = 2 * steps
-                heard, given = progress.parts(steps, size[1]), next(self.maps.read())
-                progress.enter("")
-                picture = source.picture.with_pixels(
-                    applier.warped(given, source.picture.pixels, size, self._alpha, heard)
-                )
-                if "layers" in picture_format(self.output).keeps:
-                    look_up = partial(applier.looked_up, given, size, lambda rows: progress.check())
-                    picture = replace(picture, layers=along(source.picture.layers, look_up))
-                progress.enter("writing")
-                write_picture(
-                    self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip, codec=self.codec
-                )
-                progress.count(steps)
+                self._write_still(applier, source.picture, self._size(source), progress, notices)
             notices.extend(applier.notices(self.maps.path))
         return tuple(filter(None, notices))
+
+    def _write_still(
+        self, applier: Applier, picture: Picture, size: tuple[int, int], progress: Progress, notices: list[str]
+    ) -> None:
+        steps = steps_for(size)
+        progress.total = 2 * steps
+        given = next(self.maps.read())
+        # what lies beyond the display window has a place in a map of the same pixels only
+        fits = not given.forward and size == (given.width, given.height) == (picture.width, picture.height)
+        notices.append(unheld(self.output, picture, with_margins=fits))
+        keeps = picture_format(self.output).keeps
+        if not fits or "wide" not in keeps:
+            picture = picture.cropped()
+        pixels = picture.pixels
+        if picture.wide is not None:
+            pixels, given = picture.wide, Displacement(widened(given, picture.margins))
+            size = pixels.shape[1], pixels.shape[0]
+        heard = progress.parts(steps, size[1])
+        progress.enter("")
+        found = applier.warped(given, pixels, size, self._alpha, heard)
+        look_up = partial(applier.looked_up, given, size, lambda rows: progress.check())
+        layers = along(picture.layers, look_up) if "layers" in keeps else ()
+        if picture.wide is None:
+            picture = replace(picture.with_pixels(found), layers=layers)
+        else:
+            picture = picture.with_wide(found, layers)
+        progress.enter("writing")
+        write_picture(self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip, codec=self.codec)
+        progress.count(steps)
 
     @property
     def _alpha(self) -> bool:

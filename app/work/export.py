@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
+from functools import partial
 from itertools import chain, count, groupby, islice, pairwise, repeat
 from math import ceil
 from pathlib import Path
@@ -36,11 +37,11 @@ from app.media.maps import Displacement, Kind, check_map, map_writer, write_map
 from app.media.opening import check_picture
 from app.media.pictures import write_picture
 from app.media.video import Clip
-from app.model.picture import Layer, Picture
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.timeline import Sentinel, Timeline, frame_positions, frame_rate
 from app.progress import Progress
-from app.work.along import along
+from app.work.along import along, widened
 from app.work.checkpoints import DEFAULT_BUDGET
 from app.work.replay import Replay
 from app.work.states import StoredStates
@@ -271,8 +272,7 @@ class _Export:
             self._go_to(Fraction(end))
             if job.output is not None:
                 steps = steps_for(self.size)
-                frame = self._frame(job.picture.pixels, self.progress.parts(steps, self.size[1]))
-                picture = replace(self.like.with_pixels(frame), layers=self._layers())
+                picture = self._still(lambda height: self.progress.parts(steps, height))
                 self.progress.enter("writing")
                 write_picture(
                     job.output, picture, bits=job.bits, quality=recipe.output.quality, strip=job.strip, codec=job.codec
@@ -307,7 +307,7 @@ class _Export:
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
         output, clip = self.job.output, self.job.clip
-        if output is not None and (said := unheld(output, self.job.picture, with_layers=self._has_layers)):
+        if output is not None and (said := unheld(output, self.job.picture, **self._along)):
             self.pictures.notice(said)
         if output is not None and clip is not None and (said := unheld_of_clip(output, self.job.codec, clip)):
             self.pictures.notice(said)
@@ -461,16 +461,44 @@ class _Export:
         job = self.job
         return job.output is not None and not job.has_frames and self.recipe.mode != "density"
 
-    def _layers(self) -> tuple[Layer, ...]:
-        """The picture's layers warped by the map as it is, if they are to be written."""
-        output = self.job.output
-        if output is None or not self._has_layers or "layers" not in picture_format(output).keeps:
-            return ()
-        return along(self.job.picture.layers, self._look_up)
+    @property
+    def _has_margins(self) -> bool:
+        """Whether what lies beyond the picture's display window is warped along: where they are of the same size."""
+        return self._has_layers and self.size == (self.job.picture.width, self.job.picture.height)
 
-    def _look_up(self, pixels: np.ndarray, quality: Quality) -> np.ndarray:
-        how, warp = replace(self._how, quality=quality), self.replay.warp
-        return looked_up(self.sampler, warp, pixels, self.size, how, False, lambda rows: self.progress.check())
+    @property
+    def _along(self) -> dict[str, bool]:
+        return {"with_layers": self._has_layers, "with_margins": self._has_margins}
+
+    def _still(self, parts: Callable[[int], Callable[[int], None]]) -> Picture:
+        """The picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""
+        output, picture = self.job.output, self.like
+        assert output is not None
+        keeps = picture_format(output).keeps
+        if picture.wide is None or not self._has_margins or "wide" not in keeps:
+            still = picture.with_pixels(self._frame(picture.pixels, parts(self.size[1])))
+            if not self._has_layers or "layers" not in keeps:
+                return still
+            layers = picture.cropped().layers
+            return replace(still, layers=along(layers, partial(self._look_up, self.replay.warp, self.size)))
+        given = displacement(self.replay, self.size, 0, False, self.progress.check)
+        warp = GivenMap(self.device, widened(given, picture.margins))
+        try:
+            height, width = picture.wide.shape[:2]
+            how = replace(self._how, premultiplied=picture.premultiplied)
+            wide = looked_up(self.sampler, warp, picture.wide, (width, height), how, True, parts(height))
+            return picture.with_wide(wide, along(picture.layers, partial(self._look_up, warp, (width, height))))
+        except SamplingError as error:
+            raise UserError(f"The map cannot be applied: {error}.") from None
+        finally:
+            warp.release()
+
+    def _look_up(
+        self, warp: WarpMap | GivenMap, size: tuple[int, int], pixels: np.ndarray, quality: Quality
+    ) -> np.ndarray:
+        """The pixels of layers; see `along`."""
+        how = replace(self._how, quality=quality)
+        return looked_up(self.sampler, warp, pixels, size, how, False, lambda rows: self.progress.check())
 
     def _density_frame(self, values: np.ndarray) -> np.ndarray:
         """The densities as 8-bit colours, in the result's size."""

@@ -209,3 +209,61 @@ def test_a_damaged_header_is_told(tmp_path: Path, count: int):
     source.write_bytes(source.read_bytes()[:count])
     with pytest.raises(UserError, match="truncated or damaged"):
         read_picture(source)
+
+
+def windowed(path: Path) -> tuple[Path, np.ndarray]:
+    """A picture of 56 x 40 at 10, 20, with 6 pixels more on the left, 4 below and none elsewhere; its red."""
+
+    def window(*corners: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
+
+    y, x = np.mgrid[0 : HEIGHT + 4, 0 : WIDTH + 6].astype(np.float32)
+    planes = {"R": x / 64, "G": y / 64, "B": x * 0 + 0.5, "Z": noise(3, np.float32).repeat(2, 0).repeat(2, 1)[: len(x)]}
+    planes["Z"] = np.ascontiguousarray(planes["Z"][:, : WIDTH + 6])
+    windows = {"dataWindow": window(4, 20, 65, 63), "displayWindow": window(10, 20, 65, 59)}
+    return saved(path, (windows, planes)), planes["R"]
+
+
+@pytest.mark.parametrize("edges", ["transparent", "clamp", "mirror"])
+def test_windows_and_overscan_come_back(device: Device, tmp_path: Path, edges: str):
+    source, _ = windowed(tmp_path / "shot.exr")
+    recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), edges=edges)  # type: ignore[arg-type]
+    picture = open_source(source).picture
+    assert picture.pixels.shape == (HEIGHT, WIDTH, 3)
+    report = run(device, Job(recipe, picture, tmp_path, tmp_path / "out.exr", codec="none"), Progress())
+    assert report.notices == ()
+    (found,) = read_exr(tmp_path / "out.exr")
+    assert found.window("dataWindow") == (4, 20, 65, 63)
+    assert found.window("displayWindow") == (10, 20, 65, 59)
+    write_picture(tmp_path / "plain.exr", read_picture(source), codec="none")
+    assert_same(found, read_exr(tmp_path / "plain.exr")[0].channels)
+    library = OpenEXR.File(str(source), separate_channels=True).channels()
+    assert_same(found, {name: channel.pixels for name, channel in library.items()})
+
+
+def test_what_enters_at_an_edge_comes_from_the_overscan(device: Device, tmp_path: Path):
+    source, red = windowed(tmp_path / "shot.exr")
+    shift = np.zeros((HEIGHT, WIDTH, 2))
+    shift[..., 0] = -4 / WIDTH  # looked up 4 pixels to the left
+    write_map(tmp_path / "map.npy", Displacement(shift))
+    job = Application(MapSource(tmp_path / "map.npy"), source, tmp_path / "out.exr", codec="none", bits=32)
+    assert job.run(device, Progress()) == ()
+    (found,) = read_exr(tmp_path / "out.exr")
+    assert found.window("dataWindow") == (4, 20, 65, 63)
+    np.testing.assert_allclose(found.channels["R"][:, 6:], red[:, 2:-4], atol=1e-5)
+    np.testing.assert_allclose(found.channels["R"][:, 4:6], red[:, :2], atol=1e-5)
+
+
+def test_overscan_that_has_no_place_is_told(device: Device, tmp_path: Path):
+    source, _ = windowed(tmp_path / "shot.exr")
+    recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), output=Output(size=112))
+    said = run(
+        device, Job(recipe, read_picture(source), tmp_path, tmp_path / "o.exr", codec="none"), Progress()
+    ).notices
+    assert said == ("o.exr is without the picture's overscan (6 px beyond the display window)",)
+    (found,) = read_exr(tmp_path / "o.exr")
+    assert found.window("dataWindow") == found.window("displayWindow") == (10, 20, 121, 99)
+    assert found.channels["Z"].shape == (80, 112)
+    (said,) = rendered(device, source, tmp_path / "o.png")
+    assert "without the picture's channel Z; it is without the picture's overscan" in said
+    assert said.endswith("; it begins at 0, 0 and not at 10, 20 as the display window")

@@ -344,9 +344,6 @@ def test_what_of_an_exr_is_lost_is_told(tmp_path: Path):
         OpenEXR.File(list(parts)).write(str(path))
         return read_picture(path).note
 
-    def window(*corners: int) -> tuple[np.ndarray, np.ndarray]:
-        return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
-
     assert note(OpenEXR.Part({}, rgb)) == ""
     samples = np.empty(plane.shape, object)
     for at in np.ndindex(plane.shape):
@@ -354,10 +351,6 @@ def test_what_of_an_exr_is_lost_is_told(tmp_path: Path):
     deep = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION, "name": "deep\x1b[31m"}
     said = note(OpenEXR.Part({"name": "left"}, rgb), OpenEXR.Part(deep, {"Z": samples, "A": samples}))
     assert said == "shot.exr: its further part deep?[31m is not kept"
-    said = note(OpenEXR.Part({"dataWindow": window(-1, 0, 2, 4), "displayWindow": window(0, 0, 2, 4)}, rgb))
-    assert said == "shot.exr: its overscan (1 px beyond the display window) is not kept"
-    said = note(OpenEXR.Part({"dataWindow": window(7, 9, 10, 13), "displayWindow": window(7, 9, 10, 13)}, rgb))
-    assert said == "shot.exr: its display window begins at 7, 9 and is moved to 0, 0"
 
 
 def with_chunks(path: Path, **chunks: bytes) -> str:

@@ -32,6 +32,9 @@ NUMBERS, CENTRE = ("int", "float"), "screenWindowCenter"  # that a header always
 COMPRESSIONS = ("zip", "zips", "piz", "rle", "none", "pxr24", "dwaa", "dwab", "b44", "b44a")
 """What `--codec` may be; those from pxr24 on lose something."""
 
+Window = tuple[int, int, int, int]
+"""Left, top, right and bottom; of a window the last pixels belong to it."""
+
 # Names of channels and layers, by what renderers and Nuke call them.
 BEAUTY = re.compile(r"(^|[.])(beauty|rgba?|combined|composite|final)[.]$", re.IGNORECASE)
 EXACT = re.compile(
@@ -81,15 +84,16 @@ def read(file: Path, max_pixels: int) -> Picture:
     index, prefix, wanted = found
     own = parts[index]
     colours = [prefix + name for name in wanted]
+    margins, losses = _margins([part for part in parts if part.is_flat], max_pixels)
     cryptomattes = tuple(
         text for part in parts for key, text in part.texts.items() if re.fullmatch("cryptomatte/.*/name", key)
     )
-    layers, losses = [], []
+    layers = []
     for number, part in enumerate(parts):
         further = [name for name in part.channels if number != index or name not in colours]
         if part.is_flat:
             layers += [
-                Layer(name, part.shown(name), _is_exact(name, part.channels[name].dtype, cryptomattes), number)
+                Layer(name, part.shown(name, margins), _is_exact(name, part.channels[name].dtype, cryptomattes), number)
                 for name in further
             ]
         else:
@@ -98,9 +102,11 @@ def read(file: Path, max_pixels: int) -> Picture:
             losses.append(not_kept("channel", part.subsampled))
     if turned := [layer.name for layer in layers if any(MOTION.fullmatch(word) for word in layer.name.split("."))]:
         losses.append(f"the arrows of its {counted('channel', turned)} are moved and not turned")
-    losses += _windows_lost(own)
+    wide = np.stack([own.shown(name, margins) for name in colours], axis=-1, dtype=np.float32)
+    left, top, right, bottom = margins
+    inside = wide[top : len(wide) - bottom, left : wide.shape[1] - right]
     return Picture(
-        np.stack([own.shown(name) for name in colours], axis=-1, dtype=np.float32),
+        np.ascontiguousarray(inside),
         chromaticities=own.chromaticities,
         texts={key: text for key, text in own.texts.items() if key not in PART_NAMES},
         premultiplied=True,
@@ -109,6 +115,9 @@ def read(file: Path, max_pixels: int) -> Picture:
         parts=tuple(part.header(whole=part is not own) for part in parts),
         group=(index, prefix),
         half=all(own.channels[name].dtype == np.float16 for name in colours),
+        wide=wide if any(margins) else None,
+        margins=margins,
+        origin=own.windows[1][:2],
         note=lost(file, losses),
     )
 
@@ -123,17 +132,26 @@ class _Part:
     channels: Mapping[str, np.ndarray]
     subsampled: Sequence[str]
     is_flat: bool
-    windows: tuple[tuple[int, ...], tuple[int, ...]]
+    windows: tuple[Window, Window]
     texts: Mapping[str, str]
     attributes: Mapping[str, Any]
     chromaticities: tuple[float, ...] | None
 
-    def shown(self, name: str) -> np.ndarray:
-        """A channel in the display window, 0 where there is no data."""
+    def shown(self, name: str, margins: Window) -> np.ndarray:
+        """A channel in the display window and margins around it, 0 where there is no data."""
         (left, top, *_), (first_x, first_y, last_x, last_y) = self.windows
-        plane = np.zeros((last_y - first_y + 1, last_x - first_x + 1), self.channels[name].dtype)
-        place_window(self.channels[name], (left - first_x, top - first_y), plane)
+        height = last_y - first_y + 1 + margins[1] + margins[3]
+        width = last_x - first_x + 1 + margins[0] + margins[2]
+        plane = np.zeros((height, width), self.channels[name].dtype)
+        place_window(self.channels[name], (left - first_x + margins[0], top - first_y + margins[1]), plane)
         return plane
+
+    def margins(self) -> Window:
+        """How far its data reach beyond the display window, if they are in it at all."""
+        (left, top, right, bottom), (first_x, first_y, last_x, last_y) = self.windows
+        if left > last_x or top > last_y or right < first_x or bottom < first_y:
+            return 0, 0, 0, 0
+        return max(0, first_x - left), max(0, first_y - top), max(0, right - last_x), max(0, bottom - last_y)
 
     def header(self, whole: bool) -> dict[str, Any]:
         """What is written of it again: all, or its names alone."""
@@ -183,8 +201,19 @@ def _parts(file: Path, max_pixels: int) -> list[_Part]:
     return parts
 
 
-def _corners(window: Any) -> tuple[int, ...]:
-    return tuple(int(value) for corner in window for value in corner)
+def _corners(window: Any) -> Window:
+    (left, top), (right, bottom) = window
+    return int(left), int(top), int(right), int(bottom)
+
+
+def _margins(parts: Sequence[_Part], max_pixels: int) -> tuple[Window, list[str]]:
+    """How far the data of any part reach beyond the display window, and in words if that is too much to be kept."""
+    left, top, right, bottom = (max(sides) for sides in zip(*(part.margins() for part in parts), strict=True))
+    first_x, first_y, last_x, last_y = parts[0].windows[1]
+    if (left + last_x - first_x + 1 + right) * (top + last_y - first_y + 1 + bottom) > max_pixels:
+        far = max(left, top, right, bottom)
+        return (0, 0, 0, 0), [f"its overscan ({far} px beyond the display window) is not kept"]
+    return (left, top, right, bottom), []
 
 
 def _colours(parts: Sequence[_Part]) -> tuple[int, str, str] | None:
@@ -206,16 +235,6 @@ def _is_exact(name: str, dtype: np.dtype, cryptomattes: tuple[str, ...]) -> bool
     return dtype == np.uint32 or name.startswith(cryptomattes) or any(EXACT.fullmatch(word) for word in words)
 
 
-def _windows_lost(part: _Part) -> list[str]:
-    """What of a part lies beyond its display window."""
-    (left, top, right, bottom), (first_x, first_y, last_x, last_y) = part.windows
-    beyond = max(first_x - left, first_y - top, right - last_x, bottom - last_y)
-    losses = [f"its overscan ({beyond} px beyond the display window) is not kept"] if beyond > 0 else []
-    if first_x or first_y:
-        losses.append(f"its display window begins at {first_x}, {first_y} and is moved to 0, 0")
-    return losses
-
-
 def place_window(data: np.ndarray, at: tuple[int, int], into: np.ndarray) -> None:
     """Copy what of `data`, its corner laid at pixel `at` (x, y), falls on `into`."""
     spans = []
@@ -230,7 +249,7 @@ def write(path: Path, picture: Picture, quality: int, codec: str | None = None) 
 
     codec: the compression, one of `COMPRESSIONS`; None is the first.
     """
-    pixels = picture.pixels
+    pixels = picture.pixels if picture.wide is None else picture.wide
     if pixels.shape[2] == 2:  # luminance with alpha is allowed, and misread by ffmpeg
         pixels = pixels[..., [0, 0, 0, 1]]
     names = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
@@ -253,7 +272,7 @@ def write(path: Path, picture: Picture, quality: int, codec: str | None = None) 
         if len(channels) > 1:
             header.setdefault("name", f"part {number}")
         parts.append((header | attributes if number == own else header, channels[number]))
-    _write_parts(path, parts, _compression(codec or COMPRESSIONS[0]))
+    _write_parts(path, parts, _compression(codec or COMPRESSIONS[0]), picture.margins, picture.origin)
 
 
 def _compression(name: str) -> Any:
@@ -269,22 +288,24 @@ def write_channels(
     import OpenEXR
 
     planes = {name: plane.astype(np.float32, copy=False) for name, plane in channels.items()}
-    _write_parts(path, [(attributes, planes)], OpenEXR.ZIP_COMPRESSION, overscan)
+    _write_parts(path, [(attributes, planes)], OpenEXR.ZIP_COMPRESSION, (overscan, overscan, overscan, overscan))
 
 
 def _write_parts(
     path: Path,
     parts: Sequence[tuple[Mapping[str, Any], Mapping[str, np.ndarray]]],
     compression: Any,
-    overscan: int = 0,
+    margins: Window,
+    origin: tuple[int, int] = (0, 0),
 ) -> None:
-    """Write parts, an attribute and a channel (h, w) by its name each; see `write_channels`."""
+    """Write parts, each of attributes and channels (h, w) by name, with margins beyond the display window."""
     import OpenEXR
 
     def window(left: int, top: int, right: int, bottom: int) -> tuple[np.ndarray, np.ndarray]:
-        return np.array([left, top], np.int32), np.array([right, bottom], np.int32)
+        x, y = origin
+        return np.array([x + left, y + top], np.int32), np.array([x + right, y + bottom], np.int32)
 
-    made, raws = [], []
+    (left, top, right, bottom), made, raws = margins, [], []
     for attributes, channels in parts:
         height, width = next(iter(channels.values())).shape
         raw = {key: value for key, value in attributes.items() if isinstance(value, Raw)}
@@ -293,8 +314,8 @@ def _write_parts(
             **room_for(raw),
             "compression": compression,
             "type": OpenEXR.scanlineimage,
-            "displayWindow": window(0, 0, width - 2 * overscan - 1, height - 2 * overscan - 1),
-            "dataWindow": window(-overscan, -overscan, width - overscan - 1, height - overscan - 1),
+            "displayWindow": window(0, 0, width - left - right - 1, height - top - bottom - 1),
+            "dataWindow": window(-left, -top, width - left - 1, height - top - 1),
         }
         made.append(OpenEXR.Part(header, {name: np.ascontiguousarray(plane) for name, plane in channels.items()}))
         raws.append(raw)
