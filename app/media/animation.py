@@ -29,7 +29,7 @@ from app.media.files import (
 from app.media.formats import FORMATS, check_picture_output
 from app.media.losses import lost
 from app.media.pictures import write_picture
-from app.media.video import Clip, sound_codec
+from app.media.video import Clip, sound_codecs
 from app.model.picture import Picture
 from app.progress import never
 
@@ -111,7 +111,7 @@ class Container:
     """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
-    is turned into the first one, by `encoder`.
+    is turned into the first one, by the options `encoder`, in pairs.
     """
 
     name: str
@@ -132,23 +132,25 @@ LARGEST = {
 }  # fmt: skip
 
 ANIMATIONS = {
-    ".mp4": Container("MP4", {"h264": _mp4}, even=True, sound=("aac", "mp3", "ac3"), encoder=("aac", "-b:a", "192k")),
+    ".mp4": Container(
+        "MP4", {"h264": _mp4}, even=True, sound=("aac", "mp3", "ac3"), encoder=("-c", "aac", "-b", "192k")
+    ),
     ".webm": Container(
         "WebM",
         {"vp9": _webm, "av1": _av1},
         even=True,
         sound=("opus", "vorbis"),
-        encoder=("libopus", "-b:a", "128k"),
+        encoder=("-c", "libopus", "-b", "128k"),
     ),
     ".mkv": Container(
-        "FFV1", {"ffv1": _ffv1}, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("flac",)
+        "FFV1", {"ffv1": _ffv1}, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("-c", "flac")
     ),
     ".mov": Container(
         "ProRes",
         {"prores-4444": _prores, "prores-422-hq": _prores_422_hq},
         even=True,
         sound=("pcm_s16le", "pcm_s24le", "aac"),
-        encoder=("pcm_s16le",),
+        encoder=("-c", "pcm_s16le"),
     ),
     ".gif": Container("GIF", {"gif": _ffv1}, passes=2),  # by way of a lossless file, see _gif_writer
     ".apng": Container("APNG", {"apng": _apng}),
@@ -380,14 +382,19 @@ def _sound(
     """ffmpeg's input and output options that carry the sound of a file over."""
     if sound is None or not container.sound:
         return [], []
-    codec = sound_codec(sound)
-    if codec is None:
+    tracks = [(track, codec) for track, codec in enumerate(sound_codecs(sound)) if codec != "none"]
+    if not tracks:
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
     length = [] if frames is None else ["-t", f"{float(frames / rate):.6f}"]
-    # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
-    chosen = ("copy", "-copypriorss:a", "0") if codec in container.sound else container.encoder
-    return [*begin, *length, "-i", f"file:{sound}"], ["-map", "1:a:0", "-c:a", *chosen]
+    options: list[str] = []
+    for number, (track, codec) in enumerate(tracks):
+        # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
+        chosen = ("-c", "copy", "-copypriorss", "0") if codec in container.sound else container.encoder
+        options += ["-map", f"1:a:{track}"]
+        for name, value in zip(chosen[::2], chosen[1::2], strict=True):
+            options += [f"{name}:a:{number}", value]
+    return [*begin, *length, "-i", f"file:{sound}"], options
 
 
 @contextmanager

@@ -638,7 +638,35 @@ def test_further_tracks_of_a_clip_are_told(tmp_path: Path):
     inputs = ["-f", "lavfi", "-i", "sine=d=1", "-i", str(tmp_path / "words.srt")]
     tracks = ["-map", "0:v", "-map", "1:a", "-map", "1:a", "-map", "2:s", "-c:v", "ffv1"]
     clip = read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", *inputs, *tracks))
-    assert clip.note == "a.mkv: of its 2 sound tracks the first is taken; its subtitles are not kept"
+    assert clip.note == "a.mkv: its subtitles are not kept"
+
+
+@pytest.mark.parametrize(
+    ("ending", "codecs"),
+    [
+        (".mp4", ["aac", "mp3", "aac"]),
+        (".webm", ["opus", "opus", "opus"]),
+        (".mkv", ["aac", "mp3", "flac"]),
+        (".mov", ["aac", "pcm_s16le", "pcm_s16le"]),
+    ],
+)
+def test_every_sound_track_is_carried_over(tmp_path: Path, ending: str, codecs: list[str]):
+    tones = [word for tone in (300, 600, 900) for word in ("-f", "lavfi", "-i", f"sine=f={tone}:d=1")]
+    maps = [word for number in range(4) for word in ("-map", str(number))]
+    named = ["-metadata:s:a:0", "language=ger", "-metadata:s:a:1", "language=spa"]
+    kinds = ["-c:v", "ffv1", "-c:a:0", "aac", "-c:a:1", "libmp3lame", "-c:a:2", "pcm_s16le"]
+    clip = generate(tmp_path / "in.mkv", "testsrc=s=64x48:r=10:d=1", *tones, *maps, *kinds, *named)
+    save(tmp_path / f"a{ending}", 10, 10, sound=clip, frames=10)
+    video, *tracks = probe(tmp_path / f"a{ending}")
+    assert video["codec_type"] == "video"
+    assert [track["codec_name"] for track in tracks] == codecs
+    assert [track["tags"]["language"] for track in tracks[:2]] == ["ger", "spa"]
+    for number, tone in enumerate((300, 600, 900)):
+        command = [ffmpeg.executable(), "-v", "error", "-i", str(tmp_path / f"a{ending}"), "-map", f"0:a:{number}"]
+        raw = subprocess.run([*command, "-ac", "1", "-ar", "8000", "-f", "f32le", "-"], capture_output=True, check=True)
+        heard = np.frombuffer(raw.stdout, np.float32)
+        assert len(heard) == pytest.approx(8000, rel=0.1)
+        assert np.argmax(np.abs(np.fft.rfft(heard))) * 8000 / len(heard) == pytest.approx(tone, abs=4)
 
 
 def test_a_rate_that_varies_is_told(tmp_path: Path):
