@@ -173,6 +173,8 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
         losses.append(f"of its {count} picture tracks the first is taken")
     if re.search(r"Stream #0.*: Subtitle: ", told):
         losses.append("its subtitles are not kept")
+    if re.search(r"^\s+timecode\s*: \d", told, re.MULTILINE | re.IGNORECASE):
+        losses.append("its time code is not kept")
     return losses
 
 

@@ -641,6 +641,13 @@ def test_further_tracks_of_a_clip_are_told(tmp_path: Path):
     assert clip.note == "a.mkv: its subtitles are not kept"
 
 
+@pytest.mark.parametrize("ending", [".mov", ".mp4", ".mkv"])
+def test_a_time_code_is_told(tmp_path: Path, ending: str):
+    pixels = "format=yuv422p10" if ending == ".mov" else "format=yuv420p"
+    codec = ["-c:v", "prores_ks" if ending == ".mov" else "libx264", "-metadata", "timecode=01:02:03:04"]
+    assert tagged(tmp_path / f"a{ending}", pixels, *codec) == f"a{ending}: its time code is not kept"
+
+
 @pytest.mark.parametrize(
     ("ending", "codecs"),
     [
