@@ -118,11 +118,11 @@ def edit(
 # Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
 
 MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse larger pictures, clips and maps.")]
-Bits = Annotated[Optional[int], typer.Option(help="8, 16 or 32 bits a channel, instead of the picture's own.")]  # noqa: UP045
+Bits = Annotated[Optional[int], typer.Option(help="8, 16 (half in EXR) or 32 bits a channel, not the picture's own.")]  # noqa: UP045
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
 Codec = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option(help="Of a video, instead of its usual one: av1 in .webm, prores-422-hq in .mov."),
+    typer.Option(help="Instead of the usual one: av1 in .webm, prores-422-hq in .mov, piz, dwaa ... in .exr."),
 ]
 MapKind = Annotated[Optional[str], typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]  # noqa: UP045
 StGrid = Annotated[

@@ -13,8 +13,9 @@ from PIL import Image, ImageDraw, ImageFont
 from app.errors import UserError
 from app.media.animation import animation_writer
 from app.media.auxiliary import Pictures
+from app.media.depth import to_bits
 from app.media.files import MENDS
-from app.media.pictures import read_picture, to_bits, write_picture
+from app.media.pictures import read_picture, write_picture
 from app.media.recipes import read_recipe
 from app.model.forces import CurveForce, GradientForce, PointForce
 from app.model.masks import solid

@@ -16,6 +16,7 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media import ffmpeg
+from app.media.depth import to_bits
 from app.media.files import (
     NUMBER,
     cannot_write,
@@ -25,8 +26,10 @@ from app.media.files import (
     temporary_beside,
     temporary_file,
 )
-from app.media.pictures import FORMATS, WEBP, check_picture_output, lost, to_bits, write_picture
-from app.media.video import Clip, sound_codec
+from app.media.formats import FORMATS, check_picture_output
+from app.media.losses import lost
+from app.media.pictures import write_picture
+from app.media.video import Clip, sound_codecs
 from app.model.picture import Picture
 from app.progress import never
 
@@ -108,7 +111,7 @@ class Container:
     """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
-    is turned into the first one, by `encoder`.
+    is turned into the first one, by the options `encoder`, in pairs.
     """
 
     name: str
@@ -125,27 +128,29 @@ class Container:
 # The widest and highest picture that an encoder, or what holds it, takes.
 LARGEST = {
     "h264": (16384, 16384), "vp9": (65536, 65536), "av1": (16384, 8704), "prores-4444": (65534, 65534),
-    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (WEBP.longest, WEBP.longest),
+    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (FORMATS[".webp"].longest,) * 2,
 }  # fmt: skip
 
 ANIMATIONS = {
-    ".mp4": Container("MP4", {"h264": _mp4}, even=True, sound=("aac", "mp3", "ac3"), encoder=("aac", "-b:a", "192k")),
+    ".mp4": Container(
+        "MP4", {"h264": _mp4}, even=True, sound=("aac", "mp3", "ac3"), encoder=("-c", "aac", "-b", "192k")
+    ),
     ".webm": Container(
         "WebM",
         {"vp9": _webm, "av1": _av1},
         even=True,
         sound=("opus", "vorbis"),
-        encoder=("libopus", "-b:a", "128k"),
+        encoder=("-c", "libopus", "-b", "128k"),
     ),
     ".mkv": Container(
-        "FFV1", {"ffv1": _ffv1}, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("flac",)
+        "FFV1", {"ffv1": _ffv1}, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("-c", "flac")
     ),
     ".mov": Container(
         "ProRes",
         {"prores-4444": _prores, "prores-422-hq": _prores_422_hq},
         even=True,
         sound=("pcm_s16le", "pcm_s24le", "aac"),
-        encoder=("pcm_s16le",),
+        encoder=("-c", "pcm_s16le"),
     ),
     ".gif": Container("GIF", {"gif": _ffv1}, passes=2),  # by way of a lossless file, see _gif_writer
     ".apng": Container("APNG", {"apng": _apng}),
@@ -180,9 +185,7 @@ def check_animation(
         if suffix in ANIMATIONS and suffix not in FORMATS:
             mend = f"end in one of {' '.join(FORMATS)}, or leave out the number for one {suffix}"
             raise UserError(f"Cannot write {path}: a sequence's files are pictures; {mend}.")
-        check_picture_output(path, size=size)
-        if codec is not None:
-            raise UserError(f"Cannot write {path}: a sequence of pictures has no codec; leave out --codec.")
+        check_picture_output(path, size=size, codec=codec)
         return
     suffix = Path(path).suffix.lower()
     if suffix not in ANIMATIONS:
@@ -241,9 +244,7 @@ def check_output(
     if Path(path).suffix.lower() not in FORMATS:
         endings = f"a picture's name must end in one of {' '.join(FORMATS)}, an animation's in {' '.join(ANIMATIONS)}"
         raise UserError(f"Cannot write {path}: {endings}.")
-    check_picture_output(path, bits, size)
-    if codec is not None:
-        raise UserError(f"Cannot write {path}: a picture has no codec; leave out --codec, or write a video.")
+    check_picture_output(path, bits, size, codec)
 
 
 def crf_of(quality: int) -> int:
@@ -287,7 +288,7 @@ def animation_writer(
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
         def write_one(file: Path, frame: np.ndarray) -> None:
-            write_picture(file, template.with_pixels(frame), bits=bits, quality=quality)
+            write_picture(file, template.with_pixels(frame), bits=bits, quality=quality, codec=codec)
 
         with sequence_writer(path, write_one, first, cancel) as write:
             yield write
@@ -386,14 +387,19 @@ def _sound(
     """ffmpeg's input and output options that carry the sound of a file over."""
     if sound is None or not container.sound:
         return [], []
-    codec = sound_codec(sound)
-    if codec is None:
+    tracks = [(track, codec) for track, codec in enumerate(sound_codecs(sound)) if codec != "none"]
+    if not tracks:
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
     length = [] if frames is None else ["-t", f"{float(frames / rate):.6f}"]
-    # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
-    chosen = ("copy", "-copypriorss:a", "0") if codec in container.sound else container.encoder
-    return [*begin, *length, "-i", f"file:{sound}"], ["-map", "1:a:0", "-c:a", *chosen]
+    options: list[str] = []
+    for number, (track, codec) in enumerate(tracks):
+        # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
+        chosen = ("-c", "copy", "-copypriorss", "0") if codec in container.sound else container.encoder
+        options += ["-map", f"1:a:{track}"]
+        for name, value in zip(chosen[::2], chosen[1::2], strict=True):
+            options += [f"{name}:a:{number}", value]
+    return [*begin, *length, "-i", f"file:{sound}"], options
 
 
 @contextmanager

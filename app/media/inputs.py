@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 from app.errors import UserError
 
+MAX_PIXELS = 400_000_000  # of a picture that is unpacked, if nothing else is said
 MOST_TEXT = 128 * 2**20  # bytes of a recipe: strokes of a day
 SMALL = 2 * 2**20  # bytes that anything may unpack to
 MOST_UNPACKED = 20  # times its size that a larger member of an archive may unpack to; strokes come to 3
@@ -73,6 +74,16 @@ def _check(path: str | os.PathLike[str], status: os.stat_result, kind: str, most
 def _too_large(path: str | os.PathLike[str], kind: str, most: int) -> UserError:
     size = f"{most >> 20} MB" if most >= 2**20 else f"{most} bytes"
     return UserError(f"Cannot read {path}: it has more than {size}, the most that a {kind} may have; get it again.")
+
+
+def check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
+    """Raise `UserError` for more than `max_pixels`, telling how to raise the limit."""
+    if width * height > max_pixels:
+        size = f"Cannot read {file}: {width} x {height} pixels are more than the limit of {max_pixels}"
+        raise UserError(
+            f"{size}; if you trust the file, raise it with --max-pixels {width * height}.",
+            in_window=f"{size}; make it smaller first.",
+        )
 
 
 class Archive(zipfile.ZipFile):

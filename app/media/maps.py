@@ -15,9 +15,10 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.animation import sequence_writer
+from app.media.codecs import exr
 from app.media.files import replacing
-from app.media.inputs import open_input, read_start
-from app.media.pictures import MAX_PIXELS, check_size, exr_channels, read_exr, read_picture, write_exr
+from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
+from app.media.pictures import read_picture
 from app.progress import never
 
 Kind = Literal["st", "offsets"]
@@ -113,7 +114,7 @@ def holds(path: str | os.PathLike[str]) -> Holds:
 
 
 def _exr_holds(file: Path) -> Holds:
-    names = [name.rpartition(".")[2] for name in exr_channels(file)]
+    names = [name.rpartition(".")[2] for name in exr.channel_names(file)]
     if len(names) == 2 and any(set(pair) == set(names) for pair in PAIRS):
         return "map"
     return "either" if sorted(names) == ["B", "G", "R"] else "picture"
@@ -236,7 +237,7 @@ def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Ki
             attributes = {f"fluidwarp/{key}": value for key, value in told.items()}
             attributes["comments"] = CONVENTIONS[kind]
             channels = {"R": values[..., 0], "G": values[..., 1], "B": _third(values)}
-            write_exr(temporary, channels, attributes, displacement.overscan)
+            exr.write_channels(temporary, channels, attributes, displacement.overscan)
         else:
             _write_tiff(temporary, values, {"fluidwarp": told, "convention": CONVENTIONS[kind]})
 
@@ -370,7 +371,7 @@ def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:
 
 
 def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
-    channels, header = read_exr(file, max_pixels)
+    channels, header = exr.read_channels(file, max_pixels)
     for x, y in PAIRS:
         found = {key.rpartition(".")[2]: plane for key, plane in reversed(channels.items())}
         if x in found and y in found:

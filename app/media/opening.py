@@ -9,7 +9,9 @@ from importlib import resources
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.pictures import FORMATS, MAX_PIXELS, OTHERS, read_picture
+from app.media.formats import ENDINGS
+from app.media.inputs import MAX_PIXELS
+from app.media.pictures import read_picture
 from app.media.project import Project, is_project, load
 from app.media.recipes import read_recipe
 from app.media.video import Clip, read_clip
@@ -18,7 +20,7 @@ from app.model.recipe import Recipe
 from solver.grid import MOST_ALONG, SMALLEST_GRID
 
 SMALLEST_SIDE = 8  # pixels
-PICTURE_ENDINGS = (*FORMATS, ".gif", ".bmp", *OTHERS)
+PICTURE_ENDINGS = tuple(ENDINGS)
 CLIP_ENDINGS = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".ogv", ".wmv")
 
 

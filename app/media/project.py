@@ -11,9 +11,9 @@ from typing import Any
 
 from app.errors import UserError, shown
 from app.media.files import replacing
-from app.media.inputs import MOST_TEXT, Archive, open_input, read_input
+from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, open_input, read_input
 from app.media.leftovers import temporary_folder
-from app.media.pictures import MAX_PIXELS, read_picture
+from app.media.pictures import read_picture
 from app.media.recipes import read_recipe
 from app.model.picture import Picture
 from app.model.recipe import Recipe

@@ -14,8 +14,8 @@ import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.inputs import open_input, read_start
-from app.media.pictures import MAX_PIXELS, check_size, lost
+from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
+from app.media.losses import lost
 from app.progress import never
 
 CHANGED = 65  # exit status when a clip changes under the job
@@ -137,7 +137,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
         fps=fps,
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
         rotation=round(-float(rotation.group(1))) % 360 if rotation else 0,
-        sound=_sound_codec(told),
+        sound=next(iter(_sound_codecs(told)), None),
         late=late,
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
         pixel_format=pixel_format,
@@ -168,26 +168,26 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
         times = float(rates[2]) * (1000 if rates[3] else 1) / float(rates[1])
         if min(abs(times - 1), abs(times - 2)) > 0.02:  # 2: of fields
             losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
-    for kind, kept in (("Video", "picture tracks"), ("Audio", "sound tracks")):
-        count = sum("attached pic" not in line for line in re.findall(rf"Stream #0.*: {kind}: .*", told))
-        if count > 1:
-            losses.append(f"of its {count} {kept} the first is taken")
+    count = sum("attached pic" not in line for line in re.findall(r"Stream #0.*: Video: .*", told))
+    if count > 1:
+        losses.append(f"of its {count} picture tracks the first is taken")
     if re.search(r"Stream #0.*: Subtitle: ", told):
         losses.append("its subtitles are not kept")
+    if re.search(r"^\s+timecode\s*: \d", told, re.MULTILINE | re.IGNORECASE):
+        losses.append("its time code is not kept")
     return losses
 
 
-def sound_codec(path: str | os.PathLike[str]) -> str | None:
-    """The codec of a file's first sound track, None when it has no sound; raises `UserError` when it has nothing."""
+def sound_codecs(path: str | os.PathLike[str]) -> list[str]:
+    """The codecs of a file's sound tracks; raises `UserError` when it has neither picture nor sound."""
     told = _banner(Path(path))
     if "Stream #0" not in told:
         raise UserError(f"Cannot read {path}: there is neither picture nor sound in it; give the name of a clip.")
-    return _sound_codec(told)
+    return _sound_codecs(told)
 
 
-def _sound_codec(told: str) -> str | None:
-    found = re.search(r"Stream #0.*: Audio: (\w+)", told)
-    return found.group(1) if found else None
+def _sound_codecs(told: str) -> list[str]:
+    return re.findall(r"Stream #0.*: Audio: (\w+)", told)
 
 
 def _late(told: str, video: str) -> float:

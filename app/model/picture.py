@@ -10,6 +10,20 @@ import numpy as np
 
 
 @dataclass(frozen=True)
+class Layer:
+    """A channel of an EXR beside the colours of the picture: warped along with them, unless `exact` without mixing.
+
+    values: (h, w) float16, float32 or uint32, of the picture's size with its margins. exact: ids, depths and places, a
+    mean of which is none. part: which of the file's parts it is in, from 0.
+    """
+
+    name: str
+    values: np.ndarray
+    exact: bool = False
+    part: int = 0
+
+
+@dataclass(frozen=True)
 class Picture:
     """Pixels, top row first, with what belongs to them.
 
@@ -17,8 +31,12 @@ class Picture:
     transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
     premultiplied: where there is alpha, the colours are multiplied by it, as the file has them. They stay so, since
     dividing rounds, and since the colour where alpha is 0 (a flame, a glow) would be lost.
-    attributes: numbers of an EXR's header by name, such as pixelAspectRatio. chunks: a PNG's, that say what its colours
-    mean. note: what of the file is lost, in a sentence that names it; "" if nothing.
+    attributes: of an EXR's header by name, such as pixelAspectRatio. chunks: a PNG's, that say what its colours mean.
+    layers: an EXR's further channels; parts: the attributes of each of its parts, the colours' own without those above.
+    wide: the pixels with those that lie beyond the display window, where there are any; margins: how many more on the
+    left, at the top, on the right and at the bottom. origin: where an EXR's display window begins, x and y.
+    group: part and layer of the colours, such as (0, "beauty."). half: their floats are of 16 bits.
+    note: what of the file is lost, in a sentence that names it; "" if nothing.
     """
 
     pixels: np.ndarray
@@ -31,6 +49,13 @@ class Picture:
     premultiplied: bool = False
     attributes: Mapping[str, Any] = field(default_factory=dict)
     chunks: Mapping[bytes, bytes] = field(default_factory=dict)
+    layers: tuple[Layer, ...] = ()
+    parts: tuple[Mapping[str, Any], ...] = ()
+    group: tuple[int, str] = (0, "")
+    half: bool = False
+    wide: np.ndarray | None = None
+    margins: tuple[int, int, int, int] = (0, 0, 0, 0)
+    origin: tuple[int, int] = (0, 0)
     note: str = ""
 
     @property
@@ -56,13 +81,28 @@ class Picture:
         return self.pixels.shape[2] in (2, 4)
 
     def with_pixels(self, pixels: np.ndarray) -> Picture:
-        """The same picture with other pixels, of any size."""
-        return replace(self, pixels=pixels)
+        """The same picture with other pixels, of any size, and without the layers and margins that belong to these."""
+        return replace(self, pixels=pixels, layers=(), wide=None, margins=(0, 0, 0, 0))
+
+    def with_wide(self, wide: np.ndarray, layers: tuple[Layer, ...]) -> Picture:
+        """The same picture with other pixels and layers, both with its margins."""
+        return replace(self, pixels=np.ascontiguousarray(wide[self._inside]), wide=wide, layers=layers)
+
+    def cropped(self) -> Picture:
+        """The same picture without margins."""
+        layers = tuple(replace(layer, values=layer.values[self._inside]) for layer in self.layers)
+        return replace(self, layers=layers, wide=None, margins=(0, 0, 0, 0))
+
+    @property
+    def _inside(self) -> tuple[slice, slice]:
+        left, top, _, _ = self.margins
+        return slice(top, top + self.height), slice(left, left + self.width)
 
     def stripped(self) -> Picture:
         """The same pixels without the metadata; what the colours mean is kept."""
         kept = {key: value for key, value in self.attributes.items() if key == "pixelAspectRatio"}
-        return replace(self, exif=None, xmp=None, dpi=None, texts={}, attributes=kept)
+        texts = {key: text for key, text in self.texts.items() if key.startswith("cryptomatte/") and self.layers}
+        return replace(self, exif=None, xmp=None, dpi=None, texts=texts, attributes=kept)
 
     def straight(self) -> Picture:
         """The same picture, its colours not multiplied by alpha."""

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 from PIL import Image
 
-from app.media.pictures import to_bits
+from app.media.depth import to_bits
 from app.model.picture import Picture
 from app.ui.editor_state import EditorState
 from app.ui.theme import Palette

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
 from pathlib import Path
@@ -15,18 +15,22 @@ from app.errors import UserError
 from app.media import maps
 from app.media.animation import animation_writer, check_output, crf_of, is_animation, passes, unheld_of_clip
 from app.media.files import check_kept, is_sequence, number_in, writable
+from app.media.formats import picture_format, unheld
+from app.media.inputs import MAX_PIXELS
 from app.media.maps import Displacement, Kind, cropped, folds, read_map
 from app.media.opening import Source, open_source
-from app.media.pictures import MAX_PIXELS, picture_format, unheld, write_picture
+from app.media.pictures import write_picture
+from app.model.picture import Picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
+from app.work.along import along, widened
 from app.work.export import looked_up, steps_for, write_all
 from app.work.jobs import longer_side
 from app.work.threads import ahead
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
-from solver.resample.plan import Edges, GivenMap, Sampling, SamplingError
+from solver.resample.plan import Edges, GivenMap, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
@@ -113,8 +117,7 @@ class Application:
         progress.enter("reading")
         animated = is_animation(self.output)
         source = open_source(self.source, self.maps.max_pixels)
-        notices = [source.picture.note, unheld(self.output, source.picture)]
-        notices += [unheld_of_clip(self.output, self.codec, source.clip)] if source.clip else []
+        notices = [source.picture.note]
         check_output(self.output, size=self._size(source))
         if animated != (self.maps.is_sequence or source.clip is not None):
             what = "a still" if not animated else "an animation"
@@ -123,21 +126,42 @@ class Application:
             raise UserError(f"Cannot write {self.output}: {given} do not make {what}; {mend}.")
         with Applier(device, self.edges, source.picture.premultiplied) as applier:
             if animated:
+                notices.append(unheld(self.output, source.picture, with_layers=False, with_margins=False))
+                notices += [unheld_of_clip(self.output, self.codec, source.clip)] if source.clip else []
                 self._write_frames(applier, source, progress, notices)
             else:
-                size = self._size(source)
-                steps = steps_for(size)
-                progress.total = 2 * steps
-                heard, given = progress.parts(steps, size[1]), next(self.maps.read())
-                progress.enter("")
-                picture = source.picture.with_pixels(
-                    applier.warped(given, source.picture.pixels, size, self._alpha, heard)
-                )
-                progress.enter("writing")
-                write_picture(self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip)
-                progress.count(steps)
+                self._write_still(applier, source.picture, self._size(source), progress, notices)
             notices.extend(applier.notices(self.maps.path))
         return tuple(filter(None, notices))
+
+    def _write_still(
+        self, applier: Applier, picture: Picture, size: tuple[int, int], progress: Progress, notices: list[str]
+    ) -> None:
+        steps = steps_for(size)
+        progress.total = 2 * steps
+        given = next(self.maps.read())
+        # what lies beyond the display window has a place in a map of the same pixels only
+        fits = not given.forward and size == (given.width, given.height) == (picture.width, picture.height)
+        notices.append(unheld(self.output, picture, with_margins=fits))
+        keeps = picture_format(self.output).keeps
+        if not fits or "wide" not in keeps:
+            picture = picture.cropped()
+        pixels = picture.pixels
+        if picture.wide is not None:
+            pixels, given = picture.wide, Displacement(widened(given, picture.margins))
+            size = pixels.shape[1], pixels.shape[0]
+        heard = progress.parts(steps, size[1])
+        progress.enter("")
+        found = applier.warped(given, pixels, size, self._alpha, heard)
+        look_up = partial(applier.looked_up, given, size, lambda rows: progress.check())
+        layers = along(picture.layers, look_up) if "layers" in keeps else ()
+        if picture.wide is None:
+            picture = replace(picture.with_pixels(found), layers=layers)
+        else:
+            picture = picture.with_wide(found, layers)
+        progress.enter("writing")
+        write_picture(self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip, codec=self.codec)
+        progress.count(steps)
 
     @property
     def _alpha(self) -> bool:
@@ -201,6 +225,29 @@ class Applier:
         self, given: Displacement, pixels: np.ndarray, size: tuple[int, int], alpha: bool, heard: Callable[[int], None]
     ) -> np.ndarray:
         """The pixels looked up through the map, in another size; for `alpha` and `heard` see `looked_up`."""
+        return self._looked_up(given, pixels, size, self._how, alpha, heard)
+
+    def looked_up(
+        self,
+        given: Displacement,
+        size: tuple[int, int],
+        heard: Callable[[int], None],
+        pixels: np.ndarray,
+        quality: Quality,
+    ) -> np.ndarray:
+        """The same of a layer's pixels, in a quality of its own."""
+        how = replace(self._how, quality=quality, premultiplied=False)
+        return self._looked_up(given, pixels, size, how, False, heard)
+
+    def _looked_up(
+        self,
+        given: Displacement,
+        pixels: np.ndarray,
+        size: tuple[int, int],
+        how: Sampling,
+        alpha: bool,
+        heard: Callable[[int], None],
+    ) -> np.ndarray:
         try:
             if given is not self._given or self._map is None:
                 if self._map is not None:
@@ -210,7 +257,7 @@ class Applier:
                 if folded := folds(values):
                     self._folds.append(folded)
                 self._map, self._given = GivenMap(self._device, values), given
-            return looked_up(self._sampler, self._map, pixels, size, self._how, alpha, heard)
+            return looked_up(self._sampler, self._map, pixels, size, how, alpha, heard)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
+from functools import partial
 from itertools import chain, count, groupby, islice, pairwise, repeat
 from math import ceil
 from typing import Any
@@ -26,19 +27,22 @@ from app.media.animation import (
 )
 from app.media.auxiliary import Pictures
 from app.media.files import replacing
+from app.media.formats import picture_format, unheld
 from app.media.maps import Displacement, map_writer, write_map
-from app.media.pictures import picture_format, unheld, write_picture
+from app.media.pictures import write_picture
 from app.model.handles import ARRIVED
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.timeline import Sentinel, Timeline, frame_positions
 from app.progress import Progress
+from app.work.along import along, widened
 from app.work.checkpoints import DEFAULT_BUDGET
 from app.work.jobs import Job, MapOutput, longer_side, result_size
 from app.work.replay import Replay
 from app.work.states import StoredStates
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
-from solver.resample.plan import GivenMap, Sampling, SamplingError
+from solver.resample.plan import GivenMap, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
@@ -136,11 +140,15 @@ class _Export:
             self._go_to(Fraction(end))
             if outputs.file is not None:
                 steps = steps_for(self.size)
-                frame = self._frame(job.picture.pixels, self.progress.parts(steps, self.size[1]))
-                picture = self.like.with_pixels(frame)
+                picture = self._still(lambda height: self.progress.parts(steps, height))
                 self.progress.enter("writing")
                 write_picture(
-                    outputs.file, picture, bits=outputs.bits, quality=recipe.output.quality, strip=outputs.strip
+                    outputs.file,
+                    picture,
+                    bits=outputs.bits,
+                    quality=recipe.output.quality,
+                    strip=outputs.strip,
+                    codec=outputs.codec,
                 )
                 self.progress.count(steps)
             self._note(0, Fraction(end))
@@ -174,7 +182,7 @@ class _Export:
         for said in self.replay.unmet(ARRIVED):
             self.pictures.notice(said)
         output, clip = self.outputs.file, self.job.clip
-        if output is not None and (said := unheld(output, self.job.picture)):
+        if output is not None and (said := unheld(output, self.job.picture, **self._along)):
             self.pictures.notice(said)
         if output is not None and clip is not None and (said := unheld_of_clip(output, self.outputs.codec, clip)):
             self.pictures.notice(said)
@@ -303,12 +311,60 @@ class _Export:
         file = self.outputs.file
         alpha = not self.job.is_animation and file is not None and picture_format(file).alpha
         with self.device.stage("sample picture"):
-            premultiplied = self.job.picture.premultiplied
-            how = Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples, premultiplied=premultiplied)
+            how = replace(self._how, premultiplied=self.job.picture.premultiplied)
             try:
                 return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, heard)
             except SamplingError as error:
                 raise UserError(f"The map cannot be applied: {error}.") from None
+
+    @property
+    def _how(self) -> Sampling:
+        return Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
+
+    @property
+    def _has_layers(self) -> bool:
+        """Whether the picture's layers are warped along: of a still, where its own pixels are moved."""
+        job = self.job
+        return self.outputs.file is not None and not job.has_frames and self.recipe.mode != "density"
+
+    @property
+    def _has_margins(self) -> bool:
+        """Whether what lies beyond the picture's display window is warped along: where they are of the same size."""
+        return self._has_layers and self.size == (self.job.picture.width, self.job.picture.height)
+
+    @property
+    def _along(self) -> dict[str, bool]:
+        return {"with_layers": self._has_layers, "with_margins": self._has_margins}
+
+    def _still(self, parts: Callable[[int], Callable[[int], None]]) -> Picture:
+        """The picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""
+        output, picture = self.outputs.file, self.like
+        assert output is not None
+        keeps = picture_format(output).keeps
+        if picture.wide is None or not self._has_margins or "wide" not in keeps:
+            still = picture.with_pixels(self._frame(picture.pixels, parts(self.size[1])))
+            if not self._has_layers or "layers" not in keeps:
+                return still
+            layers = picture.cropped().layers
+            return replace(still, layers=along(layers, partial(self._look_up, self.replay.warp, self.size)))
+        given = displacement(self.replay, self.size, 0, False, self.progress.check)
+        warp = GivenMap(self.device, widened(given, picture.margins))
+        try:
+            height, width = picture.wide.shape[:2]
+            how = replace(self._how, premultiplied=picture.premultiplied)
+            wide = looked_up(self.sampler, warp, picture.wide, (width, height), how, True, parts(height))
+            return picture.with_wide(wide, along(picture.layers, partial(self._look_up, warp, (width, height))))
+        except SamplingError as error:
+            raise UserError(f"The map cannot be applied: {error}.") from None
+        finally:
+            warp.release()
+
+    def _look_up(
+        self, warp: WarpMap | GivenMap, size: tuple[int, int], pixels: np.ndarray, quality: Quality
+    ) -> np.ndarray:
+        """The pixels of layers; see `along`."""
+        how = replace(self._how, quality=quality)
+        return looked_up(self.sampler, warp, pixels, size, how, False, lambda rows: self.progress.check())
 
     def _density_frame(self, values: np.ndarray) -> np.ndarray:
         """The densities as 8-bit colours, in the result's size."""

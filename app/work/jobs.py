@@ -12,9 +12,9 @@ from pathlib import Path
 from app.errors import UserError
 from app.media.animation import check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
+from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map
 from app.media.opening import check_picture
-from app.media.pictures import MAX_PIXELS
 from app.media.video import Clip
 from app.model.picture import Picture
 from app.model.recipe import Recipe

@@ -12,8 +12,9 @@ from typing import Any
 from app.errors import UserError
 from app.media.animation import ANIMATIONS
 from app.media.files import cannot_write, check_kept, is_sequence, takes_place
+from app.media.formats import FORMATS
+from app.media.inputs import MAX_PIXELS
 from app.media.opening import CLIP_ENDINGS, Opened, open_recipe
-from app.media.pictures import FORMATS, MAX_PIXELS
 from app.media.project import picture_names
 from app.model.recipe import Recipe
 from app.work.jobs import Job, Outputs

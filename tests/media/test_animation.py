@@ -27,7 +27,8 @@ from app.media.animation import (
     order_length,
     reordered,
 )
-from app.media.pictures import read_picture, to_bits
+from app.media.depth import to_bits
+from app.media.pictures import read_picture
 from app.media.video import read_clip
 from app.model.picture import Picture
 
@@ -154,7 +155,7 @@ def test_a_codec_that_does_not_fit_is_told(tmp_path: Path, monkeypatch: pytest.M
     for name, codec, message in [
         ("a.mp4", "av1", r"a\.mp4: \.mp4 holds h264, not av1; change --codec"),
         ("a.mov", "x", "holds prores-4444 or prores-422-hq, not x"),
-        ("a.%d.png", "av1", "a sequence of pictures has no codec"),
+        ("a.%d.png", "av1", "a picture has no codec"),
     ]:
         with pytest.raises(UserError, match=message):
             check_animation(tmp_path / name, 25, codec)
@@ -637,7 +638,42 @@ def test_further_tracks_of_a_clip_are_told(tmp_path: Path):
     inputs = ["-f", "lavfi", "-i", "sine=d=1", "-i", str(tmp_path / "words.srt")]
     tracks = ["-map", "0:v", "-map", "1:a", "-map", "1:a", "-map", "2:s", "-c:v", "ffv1"]
     clip = read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", *inputs, *tracks))
-    assert clip.note == "a.mkv: of its 2 sound tracks the first is taken; its subtitles are not kept"
+    assert clip.note == "a.mkv: its subtitles are not kept"
+
+
+@pytest.mark.parametrize("ending", [".mov", ".mp4", ".mkv"])
+def test_a_time_code_is_told(tmp_path: Path, ending: str):
+    pixels = "format=yuv422p10" if ending == ".mov" else "format=yuv420p"
+    codec = ["-c:v", "prores_ks" if ending == ".mov" else "libx264", "-metadata", "timecode=01:02:03:04"]
+    assert tagged(tmp_path / f"a{ending}", pixels, *codec) == f"a{ending}: its time code is not kept"
+
+
+@pytest.mark.parametrize(
+    ("ending", "codecs"),
+    [
+        (".mp4", ["aac", "mp3", "aac"]),
+        (".webm", ["opus", "opus", "opus"]),
+        (".mkv", ["aac", "mp3", "flac"]),
+        (".mov", ["aac", "pcm_s16le", "pcm_s16le"]),
+    ],
+)
+def test_every_sound_track_is_carried_over(tmp_path: Path, ending: str, codecs: list[str]):
+    tones = [word for tone in (300, 600, 900) for word in ("-f", "lavfi", "-i", f"sine=f={tone}:d=1")]
+    maps = [word for number in range(4) for word in ("-map", str(number))]
+    named = ["-metadata:s:a:0", "language=ger", "-metadata:s:a:1", "language=spa"]
+    kinds = ["-c:v", "ffv1", "-c:a:0", "aac", "-c:a:1", "libmp3lame", "-c:a:2", "pcm_s16le"]
+    clip = generate(tmp_path / "in.mkv", "testsrc=s=64x48:r=10:d=1", *tones, *maps, *kinds, *named)
+    save(tmp_path / f"a{ending}", 10, 10, sound=clip, frames=10)
+    video, *tracks = probe(tmp_path / f"a{ending}")
+    assert video["codec_type"] == "video"
+    assert [track["codec_name"] for track in tracks] == codecs
+    assert [track["tags"]["language"] for track in tracks[:2]] == ["ger", "spa"]
+    for number, tone in enumerate((300, 600, 900)):
+        command = [ffmpeg.executable(), "-v", "error", "-i", str(tmp_path / f"a{ending}"), "-map", f"0:a:{number}"]
+        raw = subprocess.run([*command, "-ac", "1", "-ar", "8000", "-f", "f32le", "-"], capture_output=True, check=True)
+        heard = np.frombuffer(raw.stdout, np.float32)
+        assert len(heard) == pytest.approx(8000, rel=0.1)
+        assert np.argmax(np.abs(np.fft.rfft(heard))) * 8000 / len(heard) == pytest.approx(tone, abs=4)
 
 
 def test_a_rate_that_varies_is_told(tmp_path: Path):

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from app.media import ffmpeg
+from app.media.codecs.exr import read_channels
 from app.media.maps import read_map
 from app.media.opening import open_recipe
-from app.media.pictures import read_exr, read_picture
+from app.media.pictures import read_picture
 from app.model.picture import linear_to_srgb, srgb_to_linear
 from app.progress import Progress
 from app.work.export import run
@@ -43,7 +44,7 @@ def warped(request: pytest.FixtureRequest, shared_device: Device, tmp_path_facto
 
 def places(path: Path, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
     """An ST map's places in the pixels of a picture, as OpenCV counts them."""
-    channels, _ = read_exr(path)
+    channels, _ = read_channels(path)
     return channels["R"] * np.float32(width) - np.float32(0.5), (1 - channels["G"]) * np.float32(height) - np.float32(
         0.5
     )

@@ -15,6 +15,7 @@ import tifffile
 
 from app.errors import UserError
 from app.media import files
+from app.media.codecs.exr import read_channels
 from app.media.maps import (
     Displacement,
     Grid,
@@ -29,7 +30,7 @@ from app.media.maps import (
     to_st,
     write_map,
 )
-from app.media.pictures import read_exr, write_picture
+from app.media.pictures import write_picture
 from app.model.picture import Picture
 
 SIZES = [(48, 64), (64, 48), (33, 33), (1, 7)]
@@ -52,7 +53,7 @@ def identity(height: int, width: int) -> Displacement:
 
 def test_the_identity_st_map_is_the_one_of_the_convention(tmp_path: Path):
     write_map(tmp_path / "a.exr", identity(6, 10))
-    channels, header = read_exr(tmp_path / "a.exr")
+    channels, header = read_channels(tmp_path / "a.exr")
     np.testing.assert_array_equal(channels["R"][0], ((np.arange(10) + 0.5) / 10).astype(np.float32))
     assert channels["G"][0, 0] == np.float32((6 - 0.5) / 6)  # the top row: the origin is at the bottom
     assert channels["G"][-1, 0] == np.float32(0.5 / 6)
@@ -137,7 +138,7 @@ def test_st_values_are_exact_to_the_last_bit(tmp_path: Path):
     tifffile.imwrite(tmp_path / "a.tif", np.dstack([st, st[..., :1]]), photometric="rgb")
     write_map(tmp_path / "b.exr", read_map(tmp_path / "a.tif"))
     write_map(tmp_path / "c.tiff", read_map(tmp_path / "b.exr"))
-    channels, _ = read_exr(tmp_path / "b.exr")
+    channels, _ = read_channels(tmp_path / "b.exr")
     np.testing.assert_array_equal(np.stack([channels["R"], channels["G"]], -1), st)
     np.testing.assert_array_equal(tifffile.imread(tmp_path / "c.tiff")[..., :2], st)
 
@@ -185,7 +186,7 @@ def test_overscan_and_direction_are_kept(tmp_path: Path, ending: str, kind: Kind
     assert (read.width, read.height, read.overscan, read.forward) == (30, 20, 4, True)
     np.testing.assert_allclose(read.values, map_.values, atol=1.3e-7)
     if ending == ".exr":
-        _, header = read_exr(tmp_path / "a.exr")
+        _, header = read_channels(tmp_path / "a.exr")
         assert [corner.tolist() for corner in header["displayWindow"]] == [[0, 0], [29, 19]]
         assert [corner.tolist() for corner in header["dataWindow"]] == [[-4, -4], [33, 23]]
     write_map(tmp_path / "a.flo", map_)

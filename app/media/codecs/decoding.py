@@ -1,0 +1,61 @@
+"""What decoders raise and print about a damaged file, made into one sentence."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+
+from app.errors import UserError
+from app.media.inputs import read_start
+
+
+@contextmanager
+def decoding(file: Path, name: str) -> Iterator[None]:
+    """Turn whatever a decoder raises into `UserError`, and keep it from warning."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except UserError:
+        raise
+    except MemoryError:
+        raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
+    except Exception as error:  # decoders of damaged files raise anything: IndexError, struct.error, zlib.error ...
+        lines = [line.strip() for line in str(error).splitlines()]
+        reason = next((line for line in lines if line.strip("0123456789")), type(error).__name__)
+        message = f"Cannot read {file}: the {name} file is truncated or damaged ({reason}); get it again."
+        raise UserError(message) from error
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Hold back what OpenEXR and libpng print about a damaged file by themselves, where we raise an error of ours."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        with redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def head_of(file: Path) -> bytes:
+    """The first bytes of a file that is there and not empty; raises `UserError`."""
+    head = read_start(file, "picture", 16)
+    if not head:
+        raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
+    return head
+
+
+def start_of(file: Path) -> bytes:
+    """As much of a file as tells what is in it."""
+    with file.open("rb") as stream:
+        return stream.read(4096)

@@ -1,0 +1,69 @@
+"""What belongs to a picture besides its pixels, made true of the upright picture in its present size."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from app.model.picture import Picture
+
+ORIENTATION, EXIF_IFD = 0x0112, 0x8769
+
+
+def upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:
+    """Pixels an inch along x and y of the upright picture, if they are told at all."""
+    if not dpi or len(dpi) != 2 or float(dpi[0]) <= 0 or float(dpi[1]) <= 0:
+        return None
+    x, y = float(dpi[0]), float(dpi[1])
+    return (y, x) if orientation in (5, 6, 7, 8) else (x, y)
+
+
+def upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
+    """Pixels turned and mirrored as EXIF's orientation 1-8 says (CIPA DC-008, 4.6.4)."""
+    if orientation in (5, 6, 7, 8):
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    return np.ascontiguousarray(pixels)
+
+
+def upright_exif(exif: Any) -> bytes | None:
+    """Pillow's `exif` as bytes, its orientation undone; the thumbnail, stale after a warp, falls away."""
+    if not exif:
+        return None
+    if ORIENTATION in exif:
+        exif[ORIENTATION] = 1
+    try:
+        return exif.tobytes()
+    except Exception:  # a camera's damaged EXIF must not cost the picture
+        return None
+
+
+def upright_xmp(xmp: bytes | None) -> bytes | None:
+    """XMP with its orientation undone."""
+    if xmp is None:
+        return None
+    return re.sub(rb"(tiff:Orientation(?:=\"|>))[0-9]", rb"\g<1>1", xmp)
+
+
+def exif_of(picture: Picture) -> Any:
+    """Pillow's EXIF of a picture, telling its present size."""
+    from PIL import Image
+
+    exif = Image.Exif()
+    if picture.exif:
+        exif.load(picture.exif)
+        inner = exif.get_ifd(EXIF_IFD)
+        for code, size in ((0xA002, picture.width), (0xA003, picture.height)):
+            if code in inner:
+                inner[code] = size
+    return exif
+
+
+def sized_exif(picture: Picture) -> bytes:
+    """The picture's EXIF, telling its present size."""
+    return exif_of(picture).tobytes() if picture.exif else b""

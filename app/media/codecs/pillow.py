@@ -1,0 +1,89 @@
+"""What Pillow decodes and encodes, for several kinds of files."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.media.codecs.cmyk import INK, cmyk_to_rgb
+from app.media.codecs.metadata import ORIENTATION, sized_exif, upright, upright_dpi, upright_exif, upright_xmp
+from app.media.inputs import check_size
+from app.media.losses import lost
+from app.model.picture import Picture
+
+MOST_TEXT = 64 * 2**20  # bytes of a profile or text in a PNG, unpacked
+
+
+def read(name: str, file: Path, max_pixels: int) -> Picture:
+    """The first frame of a file that is of Pillow's kind `name`."""
+    with opened(name, file, max_pixels) as image:
+        return picture_of(image, file, [])
+
+
+@contextmanager
+def opened(name: str, file: Path, max_pixels: int) -> Iterator[Any]:
+    """Pillow's image of a file that is of its kind `name`, not decoded yet."""
+    from PIL import Image, PngImagePlugin
+
+    Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; ours is in check_size
+    PngImagePlugin.MAX_TEXT_CHUNK = MOST_TEXT  # 1 MiB of its own is less than some profiles have
+    with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
+        check_size(file, *image.size, max_pixels)
+        yield image
+
+
+def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | None = None) -> Picture:
+    """The picture that `image` is, with these `pixels` if they are given, and what belongs to it.
+
+    losses: what is known to be lost of the file; what else is goes to their end.
+    """
+    icc = image.info.get("icc_profile")
+    if pixels is None and image.mode == "CMYK":
+        losses.append(INK)
+        pixels, icc = cmyk_to_rgb(np.asarray(image), icc)
+    elif pixels is None:
+        pixels = np.asarray(image if image.mode == (mode := _plain_mode(image)) else image.convert(mode))
+    exif = image.getexif()
+    orientation = exif.get(ORIENTATION, 1)
+    texts = {key: str(text) for key, text in getattr(image, "text", {}).items() if key != "XML:com.adobe.xmp"}
+    if isinstance(comment := image.info.get("comment"), bytes):
+        texts["Comment"] = comment.decode("utf-8", "replace")
+    xmp = image.info.get("xmp")
+    with suppress(Exception):  # those after the first may be damaged
+        if (count := getattr(image, "n_frames", 1)) > 1:
+            frames = "pictures" if image.format in ("JPEG", "MPO") else "frames"
+            losses.append(f"of its {count} {frames} the first is taken")
+    return Picture(
+        upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
+        icc=icc,
+        exif=upright_exif(exif),
+        xmp=upright_xmp(xmp.encode() if isinstance(xmp, str) else xmp),
+        dpi=upright_dpi(image.info.get("dpi"), orientation),
+        texts={key: text.replace("\0", "") for key, text in texts.items() if key},
+        note=lost(file, losses),
+    )
+
+
+def _plain_mode(image: Any) -> str:
+    """The mode of 8-bit grey or RGB, with or without alpha, that loses nothing of Pillow's `image`."""
+    grey = image.mode in ("1", "L", "LA", "La")
+    alpha = image.mode in ("LA", "La", "RGBA", "RGBa", "PA") or "transparency" in image.info
+    return ("L" if grey else "RGB") + ("A" if alpha else "")
+
+
+def write(name: str, path: Path, picture: Picture, quality: int, **options: Any) -> None:
+    """Write a file of Pillow's kind `name`, with these options of its encoder."""
+    from PIL import Image
+
+    options |= {"quality": quality, "icc_profile": picture.icc, "exif": sized_exif(picture)}
+    if picture.xmp:
+        options["xmp"] = picture.xmp
+    pixels = picture.pixels[..., 0] if picture.pixels.shape[2] == 1 else picture.pixels
+    buffer = io.BytesIO()  # in memory: on a full disk Pillow's own writing loses the reason
+    Image.fromarray(pixels).save(buffer, format=name, **options)
+    path.write_bytes(buffer.getvalue())

@@ -1,0 +1,106 @@
+"""PNG (ISO/IEC 15948): 16 bits by libpng, and every chunk that says what the colours mean."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.media.codecs import ZLIB_LEVEL, pillow
+from app.media.codecs.decoding import quiet
+from app.media.codecs.metadata import sized_exif
+from app.media.losses import REC709, unusual_colours
+from app.model.picture import Picture
+
+UNKEPT_CHUNKS = {b"bKGD": "background colour", b"sBIT": "number of significant bits"}
+COLOUR_CHUNKS = {b"cICP": 4, b"gAMA": 4, b"cHRM": 32, b"sRGB": 1, b"mDCV": 24, b"cLLI": 8}  # and their lengths
+USUAL_GAMMA = range(45000, 46000)  # 1 / 2.2, as sRGB has it on the whole
+
+
+def read(file: Path, max_pixels: int) -> Picture:
+    """Read a PNG in its depth."""
+    with pillow.opened("PNG", file, max_pixels) as image:
+        chunks, unkept = _chunks(file)
+        losses = _colours_lost(chunks, image.info.get("icc_profile") is not None)
+        if unkept:
+            losses.append(f"what it says of its {', '.join(unkept)} is not kept")
+        pixels = None
+        if _bits(file) == 16:
+            import imagecodecs
+
+            with quiet():
+                pixels = imagecodecs.png_decode(file.read_bytes())  # Pillow gives 8 bits of 16 without a word
+        return replace(pillow.picture_of(image, file, losses, pixels), chunks=chunks)
+
+
+def _bits(file: Path) -> int:
+    with file.open("rb") as stream:
+        return stream.read(25)[24]
+
+
+def _chunks(file: Path) -> tuple[dict[bytes, bytes], list[str]]:
+    """The chunks of a PNG that say what its colours mean, and in words those that are not kept."""
+    found: dict[bytes, bytes] = {}
+    unkept: dict[str, None] = {}
+    with file.open("rb") as stream:
+        stream.seek(8)
+        while len(head := stream.read(8)) == 8 and (kind := head[4:]) != b"IEND":
+            length = int.from_bytes(head[:4], "big")
+            end = stream.tell() + length + 4
+            if kind in UNKEPT_CHUNKS:
+                unkept[UNKEPT_CHUNKS[kind]] = None
+            if COLOUR_CHUNKS.get(kind) == length:
+                found[kind] = stream.read(length)
+            stream.seek(end)
+    return found, list(unkept)
+
+
+def _colours_lost(chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:
+    """What a PNG tells of its colours, and we do not understand."""
+    if codes := chunks.get(b"cICP"):
+        colours = unusual_colours(codes[0], codes[1])
+        return [f"its colours are {colours} (cICP), which a PNG keeps, and are mixed as if sRGB"] if colours else []
+    if has_profile or b"sRGB" in chunks:
+        return []
+    told = []
+    if b"gAMA" in chunks and (value := int.from_bytes(chunks[b"gAMA"], "big")) not in USUAL_GAMMA:
+        told.append(f"gamma of {value / 100000:g} (gAMA)")
+    if b"cHRM" in chunks:
+        x_y = np.frombuffer(chunks[b"cHRM"], ">u4") / 100000
+        if not np.allclose(np.roll(x_y, -2), REC709, atol=2e-3):
+            told.append("primaries (cHRM)")
+    return [f"a PNG alone keeps its {' and '.join(told)}, and its colours are mixed as if sRGB"] if told else []
+
+
+def write(path: Path, picture: Picture, quality: int) -> None:
+    """Write a PNG in 8 or 16 bits."""
+    import zlib
+
+    import imagecodecs
+    from PIL.PngImagePlugin import PngInfo, putchunk
+
+    pixels = np.ascontiguousarray(picture.pixels)
+    # a view, so that its parts are no copies: of a large picture each would take a hundred megabytes
+    encoded = memoryview(imagecodecs.png_encode(pixels if pixels.shape[2] > 1 else pixels[..., 0], level=ZLIB_LEVEL))
+    extra = PngInfo()
+    for kind, data in picture.chunks.items():
+        extra.add(kind, data)
+    if picture.icc:
+        extra.add(b"iCCP", b"ICC Profile\0\0" + zlib.compress(picture.icc))
+    if picture.dpi:
+        metre = [round(value / 0.0254).to_bytes(4, "big") for value in picture.dpi]
+        extra.add(b"pHYs", b"".join(metre) + b"\1")
+    if picture.exif:
+        extra.add(b"eXIf", sized_exif(picture).removeprefix(b"Exif\0\0"))
+    if picture.xmp:
+        extra.add_itxt("XML:com.adobe.xmp", picture.xmp.decode("utf-8", "replace"))
+    for key, text in picture.texts.items():
+        extra.add_itxt(key.encode("latin-1", "replace")[:79], text)
+    chunks = io.BytesIO()
+    for kind, data, _ in extra.chunks:
+        putchunk(chunks, kind, data)
+    header = 8 + 25  # the signature and IHDR, after which all of these may stand
+    path.write_bytes(b"".join([encoded[:header], chunks.getvalue(), encoded[header:]]))

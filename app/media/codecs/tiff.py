@@ -1,0 +1,179 @@
+"""TIFF of any kind that is a picture."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import re
+import struct
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.codecs import ZLIB_LEVEL
+from app.media.codecs.cmyk import INK, cmyk_to_rgb
+from app.media.codecs.metadata import EXIF_IFD, ORIENTATION, exif_of, upright, upright_dpi, upright_exif, upright_xmp
+from app.media.inputs import check_size
+from app.media.losses import lost
+from app.model.picture import Picture
+
+DESCRIPTION, GPS_IFD = 0x010E, 0x8825
+# description, make, model, software, date, artist, copyright: what of a TIFF's first directory is not about its layout
+TEXTS = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
+# Descriptions in which tifffile, ImageJ and OME keep the shape, which readers believe and a result would belie.
+LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
+
+
+def read(file: Path, max_pixels: int) -> Picture:
+    """Read the first page of a TIFF."""
+    import tifffile
+    from PIL import Image
+
+    tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
+    with tifffile.TiffFile(file) as tiff:
+        page = tiff.pages.first
+        check_size(file, page.imagewidth, page.imagelength, max_pixels)
+        tags = {tag.code: tag.value for tag in page.tags}
+        samples = [axis for axis in page.axes if axis in "YXS"]
+        if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
+            raise UserError(f"Cannot read {file}: a TIFF with the axes {page.axes} is no picture; save one page of it.")
+        pieces = math.prod(page.chunked)
+        if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
+            raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
+        losses = _losses(tiff)
+        pixels = page.asarray()
+        photometric = tifffile.PHOTOMETRIC(page.photometric).name
+    pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
+    pixels = plain_depth(file, pixels)
+    icc = tags.get(34675)
+    if photometric == "PALETTE":
+        pixels = np.moveaxis(np.asarray(tags[320], np.uint16), 0, -1)[pixels[..., 0]]
+    elif photometric == "SEPARATED":
+        losses.append(INK)
+        pixels, icc = cmyk_to_rgb(pixels[..., :4], icc)
+    elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
+        pixels = np.iinfo(pixels.dtype).max - pixels
+    elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
+        raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
+    if pixels.shape[2] > 4:  # further samples are masks and spot colours
+        taken = 4 if page.extrasamples else 3
+        losses.append(f"of its {pixels.shape[2]} samples a pixel the first {taken} are taken")
+        pixels = pixels[..., :taken]
+
+    premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
+    exif = Image.Exif()
+    with file.open("rb") as stream:
+        try:
+            exif.load_from_fp(stream)
+            for code in set(exif) - {*TEXTS, ORIENTATION, EXIF_IFD, GPS_IFD}:
+                del exif[code]
+            if LAYOUT.match(str(exif.get(DESCRIPTION, ""))):
+                del exif[DESCRIPTION]
+            encoded = upright_exif(exif)
+        except Exception:  # damaged metadata must not cost the picture
+            encoded = None
+    orientation = int(tags.get(ORIENTATION, 1))
+    unit = {2: 1.0, 3: 2.54}.get(int(tags.get(296, 2)))
+    resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]
+    return Picture(
+        upright(pixels, orientation),
+        icc=bytes(icc) if icc is not None else None,
+        exif=encoded,
+        xmp=upright_xmp(bytes(tags[700])) if 700 in tags else None,
+        dpi=upright_dpi([value * unit for value in resolution], orientation) if unit else None,
+        premultiplied=premultiplied,
+        note=lost(file, losses),
+    )
+
+
+def _losses(tiff: Any) -> list[str]:
+    """What of a TIFF is not in its first page, and what is cut of its samples."""
+    losses = []
+    with suppress(Exception):  # pages after the first may be damaged
+        pages = sum(not page.subfiletype & 5 for page in tiff.pages)  # neither smaller versions nor masks
+        if pages > 1:
+            losses.append(f"of its {pages} pages the first is taken")
+    if (kind := tiff.pages.first.dtype) is not None and kind.itemsize > (2 if kind.kind == "u" else 4):
+        losses.append(f"its {8 * kind.itemsize} bits become {16 if kind.kind == 'u' else 32}")
+    return losses
+
+
+def plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
+    """Samples of any kind as uint8, uint16 or float32."""
+    kind = pixels.dtype.kind
+    if kind == "b":
+        return pixels.astype(np.uint8) * np.uint8(255)
+    if kind == "f":
+        return pixels.astype(np.float32)
+    if kind == "u" and pixels.dtype.itemsize == 4:
+        return (pixels >> 16).astype(np.uint16)
+    if kind == "u" and pixels.dtype.itemsize <= 2:
+        return pixels.astype(pixels.dtype.newbyteorder("="))
+    raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not understood; convert it to 16 bits.")
+
+
+def write(path: Path, picture: Picture, quality: int) -> None:
+    """Write a TIFF in 8, 16 or 32 bits, compressed without loss."""
+    import tifffile
+
+    exif = exif_of(picture)
+    extra: list[tuple[int, int | str, int, Any, bool]] = []
+    for code in TEXTS:
+        if isinstance(text := exif.get(code), str):
+            extra.append((code, "s", 0, text.encode(), True))
+    if picture.xmp:
+        extra.append((700, "B", len(picture.xmp), picture.xmp, True))
+    directories = {code: exif.get_ifd(code) for code in (EXIF_IFD, GPS_IFD) if exif.get_ifd(code)}
+    channels = picture.pixels.shape[2]
+    tifffile.imwrite(
+        path,
+        picture.pixels if channels > 1 else picture.pixels[..., 0],
+        photometric="rgb" if channels >= 3 else "minisblack",
+        planarconfig="contig" if channels > 1 else None,
+        extrasamples=["assocalpha" if picture.premultiplied else "unassalpha"] if picture.has_alpha else None,
+        compression="zlib",
+        compressionargs={"level": ZLIB_LEVEL},
+        predictor=True,
+        iccprofile=picture.icc,
+        resolution=picture.dpi,
+        resolutionunit="inch" if picture.dpi else None,
+        byteorder="<",
+        software=False,
+        metadata=None,
+        extratags=extra,
+    )
+    if directories:
+        _append_directories(path, directories)
+
+
+def _append_directories(path: Path, directories: Mapping[int, Mapping[int, Any]]) -> None:
+    """Put EXIF's own directories at the end of a TIFF, and a first directory that knows them (TIFF 6.0, section 2).
+
+    tifffile writes no directories but those of images.
+    """
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    with path.open("r+b") as stream:
+        mark, start = struct.unpack("<4sI", stream.read(8))
+        if mark != b"II*\0":  # a BigTIFF of 4 GB goes without
+            return
+        stream.seek(start)
+        (count,) = struct.unpack("<H", stream.read(2))
+        entries = [stream.read(12) for _ in range(count)]
+        for code, values in directories.items():
+            directory = ImageFileDirectory_v2(group=code)
+            for tag, value in values.items():
+                directory[tag] = value
+            end = stream.seek(0, os.SEEK_END)
+            stream.write(directory.tobytes(end))
+            entries.append(struct.pack("<HHII", code, 4, 1, end))
+        end = stream.seek(0, os.SEEK_END)
+        entries.sort(key=lambda entry: struct.unpack("<H", entry[:2]))
+        stream.write(struct.pack("<H", len(entries)) + b"".join(entries) + struct.pack("<I", 0))
+        stream.seek(4)
+        stream.write(struct.pack("<I", end))

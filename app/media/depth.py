@@ -1,0 +1,56 @@
+"""Pixels in another depth, and without alpha."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.model.picture import linear_to_srgb, srgb_to_linear
+
+
+def to_bits(pixels: np.ndarray, bits: int, *, dither: bool = True) -> np.ndarray:
+    """Pixels (h, w, c) in another depth: 8 and 16 are sRGB, 32 is linear light; alpha is never curved.
+
+    Going to 8 bits adds noise of one step before cutting, always the same, which leaves exact values exact. Works in
+    strips, so that the extra memory does not depend on the size.
+    """
+    if pixels.dtype.itemsize * 8 == bits:
+        return pixels
+    out = np.empty(pixels.shape, {8: np.uint8, 16: np.uint16, 32: np.float32}[bits])
+    noise = np.random.default_rng(0) if dither and bits == 8 else None
+    rows = max(1, 500_000 // max(1, pixels[0].size))
+    for top in range(0, len(pixels), rows):
+        out[top : top + rows] = _strip_to_bits(pixels[top : top + rows], bits, noise)
+    return out
+
+
+def _strip_to_bits(pixels: np.ndarray, bits: int, noise: np.random.Generator | None) -> np.ndarray:
+    if pixels.dtype == np.uint8 and bits == 16:
+        return pixels * np.uint16(257)
+    colours = pixels.shape[2] - (pixels.shape[2] in (2, 4))
+    if bits == 32:
+        values = pixels.astype(np.float32) / np.iinfo(pixels.dtype).max
+        values[..., :colours] = srgb_to_linear(values[..., :colours])
+        return values
+    top = 2**bits - 1
+    if pixels.dtype == np.uint16:
+        values = pixels / np.float32(257)
+    else:
+        values = np.clip(np.nan_to_num(pixels), 0, 1)
+        values[..., :colours] = linear_to_srgb(values[..., :colours])
+        values *= top
+    # a little less than a whole step, so that rounding errors do not move values that are exact
+    offset = 0.5 if noise is None else 0.001 + 0.998 * noise.random(values.shape, np.float32)
+    return np.minimum(values + offset, top).astype(np.uint8 if bits == 8 else np.uint16)
+
+
+def over(pixels: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:
+    """8-bit pixels with alpha laid over an opaque 8-bit RGB colour, as programs do it: in the values, not the light."""
+    alpha = pixels[..., -1:].astype(np.float32) / 255
+    ground = np.asarray(background if pixels.shape[2] == 4 else [np.mean(background)], np.float32)
+    return (pixels[..., :-1] * alpha + ground * (1 - alpha) + 0.5).astype(np.uint8)
+
+
+def as_half(values: np.ndarray) -> np.ndarray:
+    """Floats of 16 bits; what is finite stays so."""
+    most = np.float32(np.finfo(np.float16).max)
+    return np.where(np.isfinite(values), np.clip(values, -most, most), values).astype(np.float16)

@@ -1,0 +1,149 @@
+"""The table of picture files: what each kind holds, what it keeps, and the codec that reads and writes it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.codecs import avif, exr, jpeg, other, pillow, png, tiff, webp
+from app.media.losses import REC709, counted
+from app.model.picture import Picture
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of picture file.
+
+    read: from a file, with the most pixels it may have. write: a picture with a quality of 1-100; None where we do not.
+    signature: a pattern that such a file begins with; None where the ending must tell.
+    bits: a channel of what is written, deepest last. alpha, grey: whether it has them. longest: its longest side.
+    codecs: ways to compress, the usual one first, that can be asked for.
+    keeps: the fields of a `Picture` besides its pixels that come back from a written file.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    read: Callable[[Path, int], Picture]
+    write: Callable[..., None] | None = None
+    signature: bytes | None = None
+    bits: tuple[int, ...] = ()
+    alpha: bool = True
+    grey: bool = True
+    longest: int = 2**31 - 1
+    codecs: tuple[str, ...] = ()
+    keeps: frozenset[str] = frozenset()
+
+
+ONLY_READ = {
+    "DDS": (".dds",), "ICO": (".ico",), "JPEG 2000": (".j2k", ".jp2"), "PBM": (".pbm",), "PCX": (".pcx",),
+    "PGM": (".pgm",), "PNM": (".pnm",), "PPM": (".ppm",), "QOI": (".qoi",), "SGI": (".sgi",), "TGA": (".tga",),
+}  # fmt: skip
+EMBEDDED = frozenset({"icc", "exif", "xmp"})
+HEADER = frozenset({"chromaticities", "texts", "attributes"})
+TABLE = (
+    Format(
+        "PNG", (".png",), png.read, png.write, rb"\x89PNG\r\n\x1a\n",
+        bits=(8, 16), longest=1_000_000, keeps=EMBEDDED | {"dpi", "texts", "chunks"},
+    ),
+    Format(
+        "JPEG", (".jpg", ".jpeg"), jpeg.read, jpeg.write, rb"\xff\xd8\xff",
+        bits=(8,), alpha=False, longest=65500, keeps=EMBEDDED | {"dpi", "texts"},
+    ),
+    Format(
+        "WebP", (".webp",), webp.read, webp.write, rb"RIFF....WEBP",
+        bits=(8,), grey=False, longest=16383, keeps=EMBEDDED,
+    ),
+    Format(
+        "AVIF", (".avif",), avif.read, avif.write, rb"....ftypavi[fs]",
+        bits=(8,), grey=False, longest=32768, keeps=EMBEDDED,  # what decoders take
+    ),
+    Format(
+        "TIFF", (".tif", ".tiff"), tiff.read, tiff.write, rb"II[*+]\0|MM\0[*+]",
+        bits=(8, 16, 32), keeps=EMBEDDED | {"dpi", "premultiplied"},
+    ),
+    Format(
+        "OpenEXR", (".exr",), exr.read, exr.write, rb"v/1\x01",
+        bits=(16, 32), codecs=exr.COMPRESSIONS,
+        keeps=HEADER | {"layers", "parts", "group", "half", "wide", "margins", "origin", "premultiplied"},
+    ),
+    Format("GIF", (".gif",), partial(pillow.read, "GIF"), signature=rb"GIF8[79]a"),
+    Format("BMP", (".bmp",), partial(pillow.read, "BMP"), signature=rb"BM"),
+    *(Format(name, endings, partial(other.read, name)) for name, endings in ONLY_READ.items()),
+)  # fmt: skip
+
+ENDINGS = {ending: kind for kind in TABLE for ending in kind.endings}
+"""Every ending of a picture that is read, and its kind."""
+
+FORMATS = {ending: kind for ending, kind in ENDINGS.items() if kind.write}
+"""Those that are written."""
+
+
+def kind_of(file: Path, head: bytes) -> Format | None:
+    """The kind of a file that begins with `head`, by that if it can be told, else by its ending; None if unknown."""
+
+    def fits(kind: Format) -> bool:
+        if kind.signature is None:
+            return file.suffix.lower() in kind.endings
+        return re.match(kind.signature, head, re.DOTALL) is not None
+
+    return next(filter(fits, TABLE), None)
+
+
+def picture_format(path: str | os.PathLike[str]) -> Format:
+    """The format the ending of `path` asks for; raises `UserError` when it is none we write."""
+    known = FORMATS.get(Path(path).suffix.lower())
+    if known is None:
+        raise UserError(f"Cannot write {path}: a picture's name must end in one of {' '.join(FORMATS)}.")
+    return known
+
+
+def check_picture_output(
+    path: str | os.PathLike[str],
+    bits: int | None = None,
+    size: tuple[int, int] | None = None,
+    codec: str | None = None,
+) -> None:
+    """Raise `UserError` if `path` has no ending of a picture we write, or its format not these bits, size or codec."""
+    chosen = picture_format(path)
+    if bits is not None and bits not in chosen.bits:
+        raise UserError(
+            f"Cannot write {path}: {chosen.name} holds {' or '.join(map(str, chosen.bits))} bits a channel, not {bits}."
+        )
+    if codec is not None and codec not in chosen.codecs:
+        if chosen.codecs:
+            why = f"{chosen.name} is compressed as {' '.join(chosen.codecs)}, not {codec}; change --codec"
+        else:
+            why = "a picture has no codec; leave out --codec, or write a video"
+        raise UserError(f"Cannot write {path}: {why}.")
+    if size is not None and max(size) > chosen.longest:
+        raise UserError(
+            f"Cannot write {path}: the result is {size[0]} x {size[1]} pixels, and {chosen.name} holds no side longer "
+            f"than {chosen.longest}; make it smaller, or write a TIFF."
+        )
+
+
+def unheld(
+    path: str | os.PathLike[str], picture: Picture, *, with_layers: bool = True, with_margins: bool = True
+) -> str:
+    """What of a picture the file `path` does not hold, in a sentence; "" if nothing.
+
+    with_layers, with_margins: whether these were warped, as they are for a still that shows its own pixels.
+    """
+    own, kind = picture.chromaticities, FORMATS.get(Path(path).suffix.lower())
+    keeps, losses = kind.keeps if kind else frozenset[str](), []
+    if own is not None and not np.allclose(own, REC709, atol=1e-3) and "chromaticities" not in keeps:
+        losses.append("cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709")
+    if picture.layers and not (with_layers and "layers" in keeps):
+        losses.append(f"is without the picture's {counted('channel', [layer.name for layer in picture.layers])}")
+    if picture.wide is not None and not (with_margins and "wide" in keeps):
+        losses.append(f"is without the picture's overscan ({max(picture.margins)} px beyond the display window)")
+    if picture.origin != (0, 0) and "origin" not in keeps:
+        losses.append(f"begins at 0, 0 and not at {picture.origin[0]}, {picture.origin[1]} as the display window")
+    return f"{Path(path).name} {'; it '.join(losses)}" if losses else ""

@@ -1,0 +1,272 @@
+"""What of an EXR lies beside its colours: kept to the bit, and warped along; read back by a reader of our own."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from app.errors import UserError
+from app.media.codecs.exr import COMPRESSIONS
+from app.media.maps import Displacement, write_map
+from app.media.opening import open_source
+from app.media.pictures import read_picture, write_picture
+from app.model.picture import Picture
+from app.model.recipe import FluidSettings, Output, Recipe
+from app.progress import Progress
+from app.work.applying import Application, MapSource
+from app.work.export import run
+from app.work.jobs import Job, Outputs
+from solver.gl.device import Device
+from support.exr import Part, read_exr
+
+HEIGHT, WIDTH = 40, 56
+TIMECODE = OpenEXR.TimeCode(1, 2, 3, 4, *[0] * 14)
+CAMERA = np.arange(16, dtype=np.float32).reshape(4, 4)
+FILE_ATTRIBUTES: dict[str, Any] = {
+    "owner": "me", "framesPerSecond": OpenEXR.Rational(24000, 1001), "timeCode": TIMECODE, "worldToCamera": CAMERA,
+    "multiView": ["left", "right"], "whiteLuminance": 203.0, "take": 7,
+    "screenWindowCenter": np.array([0.5, 0.25], np.float32),
+    "a name of more than thirty-one letters": np.array([1.5, 2.5]),
+}  # fmt: skip
+
+
+def noise(seed: int, dtype: type) -> np.ndarray:
+    """Every bit at random, in floats mostly of ordinary size."""
+    random = np.random.default_rng(seed)
+    if dtype is np.uint32:
+        return random.integers(0, 2**32, (HEIGHT, WIDTH), np.uint32)
+    return random.random((HEIGHT, WIDTH), np.float32).astype(dtype)
+
+
+def hashes(seed: int) -> np.ndarray:
+    """Floats of any bits, as cryptomattes hold them; NaN, infinities and denormals among them."""
+    return noise(seed, np.uint32).view(np.float32)
+
+
+def saved(path: Path, *parts: tuple[dict[str, Any], dict[str, np.ndarray]]) -> Path:
+    """A file by OpenEXR; its rational is put in by hand, as OpenEXR's module cannot write one."""
+    made = []
+    for attributes, channels in parts:
+        rational = attributes.get("framesPerSecond")
+        plain = {key: value for key, value in attributes.items() if key != "framesPerSecond"}
+        room = {"framesPerSecond__": "12345678"} if rational else {}
+        made.append(OpenEXR.Part({"compression": OpenEXR.PIZ_COMPRESSION, **plain, **room}, dict(channels)))
+    OpenEXR.File(made).write(str(path))
+    value = struct.pack("<iI", 24000, 1001)
+    was, now = b"framesPerSecond__\0string\0\x08\0\0\x0012345678", b"framesPerSecond\0rational\0\x08\0\0\0" + value
+    path.write_bytes(path.read_bytes().replace(was, now))
+    return path
+
+
+def a_shot(path: Path) -> tuple[Path, list[dict[str, np.ndarray]]]:
+    """What a renderer writes: colours, layers, depth and ids in one part, a cryptomatte and a second view in others."""
+    colours = {name: noise(number, np.float16) for number, name in enumerate("RGBA")}
+    own = {**colours, "diffuse.R": noise(5, np.float16), "diffuse.G": noise(6, np.float32), "Z": noise(7, np.float32)}
+    own["instance.id"] = noise(8, np.uint32)
+    crypto = {f"uCryptoObject00.{name}": hashes(number) for number, name in enumerate("RGBA", 10)}
+    right = {name: noise(number, np.float32) for number, name in enumerate("RGB", 20)}
+    keys = {"cryptomatte/1a2b3c4/name": "uCryptoObject", "cryptomatte/1a2b3c4/manifest": '{"cup":"3f800000"}'}
+    parts = [own, crypto, right]
+    headers = [{**FILE_ATTRIBUTES, "name": "rgba"}, {**keys, "name": "crypto"}, {"name": "right", "view": "right"}]
+    return saved(path, *zip(headers, parts, strict=True)), parts
+
+
+def rendered(device: Device, source: Path, output: Path, **how: Any) -> tuple[str, ...]:
+    """The source through a recipe that does nothing; says the notices."""
+    recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), output=Output(quality=100, fps=20))
+    return run(
+        device, Job(recipe, open_source(source).picture, source.parent, Outputs(output, **how)), Progress()
+    ).notices
+
+
+def assert_same(found: Part, channels: dict[str, np.ndarray]) -> None:
+    assert sorted(found.channels) == sorted(channels)
+    for name, plane in channels.items():
+        assert found.channels[name].dtype == plane.dtype, name
+        kind = f"u{plane.dtype.itemsize}"
+        np.testing.assert_array_equal(found.channels[name].view(kind), plane.view(kind), err_msg=name)
+
+
+def test_what_nothing_is_done_to_keeps_every_channel_part_and_attribute(device: Device, tmp_path: Path):
+    source, parts = a_shot(tmp_path / "shot.exr")
+    assert rendered(device, source, tmp_path / "out.exr", codec="none") == ()
+    found = read_exr(tmp_path / "out.exr")
+    assert len(found) == 3
+    for part, channels in zip(found, parts, strict=True):
+        assert_same(part, channels)
+    uncompressed = tmp_path / "plain.exr"
+    told = found[0].attributes
+    assert told["framesPerSecond"] == ("rational", struct.pack("<iI", 24000, 1001))
+    assert told["timeCode"] == ("timecode", struct.pack("<II", 0x01020304, 0))
+    assert told["worldToCamera"] == ("m44f", CAMERA.tobytes())
+    assert told["multiView"][0] == "stringvector"
+    assert told["whiteLuminance"] == ("float", struct.pack("<f", 203))
+    assert told["take"] == ("int", struct.pack("<i", 7))
+    assert told["screenWindowCenter"] == ("v2f", struct.pack("<ff", 0.5, 0.25))
+    assert told["a name of more than thirty-one letters"] == ("v2d", struct.pack("<dd", 1.5, 2.5))
+    assert [part.attributes["name"][1] for part in found] == [b"rgba", b"crypto", b"right"]
+    assert found[2].attributes["view"] == ("string", b"right")
+    assert found[1].attributes["cryptomatte/1a2b3c4/manifest"][1] == b'{"cup":"3f800000"}'
+    # and once more, by way of the library
+    again = read_picture(tmp_path / "out.exr")
+    write_picture(uncompressed, again, codec="none")
+    assert uncompressed.read_bytes() == (tmp_path / "out.exr").read_bytes()
+
+
+def test_layers_go_where_the_colours_go_and_ids_stay_ids(device: Device, tmp_path: Path):
+    colours = {name: noise(number, np.float32) for number, name in enumerate("RGB")}
+    deep, ids, many = noise(7, np.float32) * 900, hashes(8), noise(9, np.uint32)
+    layers = {"spec.R": colours["R"], "spec.G": colours["G"], "Z": deep, "ids.uCryptoAsset": ids, "id": many}
+    source = saved(tmp_path / "shot.exr", ({}, {**colours, **layers}))
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    values = np.stack([3.3 + 2 * np.sin(y / 5), 1.7 * np.cos(x / 7)], axis=-1) / WIDTH
+    write_map(tmp_path / "map.npy", Displacement(values))
+    job = Application(MapSource(tmp_path / "map.npy"), source, tmp_path / "out.exr", edges="clamp", codec="none")
+    assert job.run(device, Progress()) == ()
+    (found,) = read_exr(tmp_path / "out.exr")
+    seen = found.channels
+    np.testing.assert_array_equal(seen["spec.R"], seen["R"])
+    np.testing.assert_array_equal(seen["spec.G"], seen["G"])
+    assert np.abs(seen["R"] - colours["R"]).mean() > 0.1
+    # the nearest pixel, but where two are as near; of all three the same one
+    px, py = values[..., 0] * WIDTH + x, values[..., 1] * WIDTH + y
+    sure = (np.abs(px % 1 - 0.5) > 0.02) & (np.abs(py % 1 - 0.5) > 0.02)
+    column, row = (np.clip(np.round(p).astype(int), 0, most - 1) for p, most in ((px, WIDTH), (py, HEIGHT)))
+    for name, plane in (("Z", deep), ("ids.uCryptoAsset", ids), ("id", many)):
+        wanted = plane[row, column].view(np.uint32)
+        np.testing.assert_array_equal(seen[name].view(np.uint32)[sure], wanted[sure], err_msg=name)
+
+
+def test_what_an_output_cannot_hold_is_told_in_a_line(device: Device, tmp_path: Path):
+    source, _ = a_shot(tmp_path / "shot.exr")
+    lost = "is without the picture's channels Z, diffuse.G, diffuse.R, instance.id and 7 more"
+    assert rendered(device, source, tmp_path / "out.png") == (f"out.png {lost}",)
+    assert rendered(device, source, tmp_path / "f.%02d.exr", codec="none") == (f"f.%02d.exr {lost}",)
+    (frame,) = read_exr(tmp_path / "f.00.exr")
+    assert sorted(frame.channels) == sorted("RGBA")
+    grey = dict.fromkeys("RGB", noise(1, np.float32))
+    moving = saved(tmp_path / "m.exr", ({}, {**grey, "forward.u": noise(2, np.float32)}))
+    assert read_picture(moving).note == "m.exr: the arrows of its channel forward.u are moved and not turned"
+
+
+def test_colours_are_found_in_a_layer_or_a_part(device: Device, tmp_path: Path):
+    planes = {name: noise(number, np.float32) for number, name in enumerate("RGB")}
+    wanted = np.stack(list(planes.values()), axis=-1)
+    other = {f"albedo.{name}": noise(number, np.float32) for number, name in enumerate("RGB", 5)}
+    beauty = {f"beauty.{name}": plane for name, plane in planes.items()}
+    source = saved(tmp_path / "layers.exr", ({}, {**other, **beauty}))
+    np.testing.assert_array_equal(read_picture(source).pixels, wanted)
+    rendered(device, source, tmp_path / "out.exr", codec="none")
+    assert_same(read_exr(tmp_path / "out.exr")[0], {**other, **beauty})
+    source = saved(tmp_path / "parts.exr", ({"name": "depth"}, {"Z": noise(9, np.float32)}), ({"name": "rgb"}, planes))
+    np.testing.assert_array_equal(read_picture(source).pixels, wanted)
+    rendered(device, source, tmp_path / "out.exr", codec="none")
+    deep, colours = read_exr(tmp_path / "out.exr")
+    assert_same(deep, {"Z": noise(9, np.float32)})
+    assert_same(colours, planes)
+
+
+@pytest.mark.parametrize("bits", [16, 32, None])
+@pytest.mark.parametrize("half", [True, False])
+def test_floats_of_16_or_32_bits(tmp_path: Path, half: bool, bits: int | None):
+    pixels = np.stack([noise(number, np.float32) for number in range(3)], axis=-1)
+    pixels[0, :3, 0] = 7e4, -7e4, np.inf
+    write_picture(tmp_path / "a.exr", Picture(pixels, half=half), bits=bits, codec="none")
+    (part,) = read_exr(tmp_path / "a.exr")
+    red = part.channels["R"]
+    assert red.dtype == (np.float16 if bits == 16 or (half and bits is None) else np.float32)
+    if red.dtype == np.float16:
+        assert red[0, :3].tolist() == [65504, -65504, np.inf]  # what is finite stays so
+    np.testing.assert_array_equal(red[1:], pixels[1:, :, 0].astype(red.dtype))
+    assert read_picture(tmp_path / "a.exr").half == (red.dtype == np.float16)
+
+
+@pytest.mark.parametrize("codec", COMPRESSIONS)
+def test_a_compression_of_choice(tmp_path: Path, codec: str):
+    codes = {"none": 0, "rle": 1, "zips": 2, "zip": 3, "piz": 4, "pxr24": 5, "b44": 6, "b44a": 7, "dwaa": 8, "dwab": 9}
+    y, x = np.mgrid[0:64, 0:64]
+    pixels = np.stack([x / 64, y / 64, x * y / 4096], axis=-1).astype(np.float32)
+    write_picture(tmp_path / "a.exr", Picture(pixels), bits=16, codec=codec)
+    data = (tmp_path / "a.exr").read_bytes()
+    at = data.index(b"compression\0compression\0") + len(b"compression\0compression\0") + 4
+    assert data[at] == codes[codec]
+    read = read_picture(tmp_path / "a.exr").pixels
+    np.testing.assert_allclose(read, pixels.astype(np.float16), atol=0 if codes[codec] < 5 else 0.02)
+
+
+def test_a_compression_that_there_is_not(tmp_path: Path):
+    with pytest.raises(UserError, match=r"a\.exr: OpenEXR is compressed as zip .*, not h264; change --codec"):
+        write_picture(tmp_path / "a.exr", Picture(np.zeros((8, 8, 3), np.float32)), codec="h264")
+    with pytest.raises(UserError, match=r"a\.png: a picture has no codec"):
+        write_picture(tmp_path / "a.png", Picture(np.zeros((8, 8, 3), np.float32)), codec="piz")
+
+
+@pytest.mark.parametrize("count", [9, 30, 200, 400])
+def test_a_damaged_header_is_told(tmp_path: Path, count: int):
+    source, _ = a_shot(tmp_path / "shot.exr")
+    source.write_bytes(source.read_bytes()[:count])
+    with pytest.raises(UserError, match="truncated or damaged"):
+        read_picture(source)
+
+
+def windowed(path: Path) -> tuple[Path, np.ndarray]:
+    """A picture of 56 x 40 at 10, 20, with 6 pixels more on the left, 4 below and none elsewhere; its red."""
+
+    def window(*corners: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
+
+    y, x = np.mgrid[0 : HEIGHT + 4, 0 : WIDTH + 6].astype(np.float32)
+    planes = {"R": x / 64, "G": y / 64, "B": x * 0 + 0.5, "Z": noise(3, np.float32).repeat(2, 0).repeat(2, 1)[: len(x)]}
+    planes["Z"] = np.ascontiguousarray(planes["Z"][:, : WIDTH + 6])
+    windows = {"dataWindow": window(4, 20, 65, 63), "displayWindow": window(10, 20, 65, 59)}
+    return saved(path, (windows, planes)), planes["R"]
+
+
+@pytest.mark.parametrize("edges", ["transparent", "clamp", "mirror"])
+def test_windows_and_overscan_come_back(device: Device, tmp_path: Path, edges: str):
+    source, _ = windowed(tmp_path / "shot.exr")
+    recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), edges=edges)  # type: ignore[arg-type]
+    picture = open_source(source).picture
+    assert picture.pixels.shape == (HEIGHT, WIDTH, 3)
+    report = run(device, Job(recipe, picture, tmp_path, Outputs(tmp_path / "out.exr", codec="none")), Progress())
+    assert report.notices == ()
+    (found,) = read_exr(tmp_path / "out.exr")
+    assert found.window("dataWindow") == (4, 20, 65, 63)
+    assert found.window("displayWindow") == (10, 20, 65, 59)
+    write_picture(tmp_path / "plain.exr", read_picture(source), codec="none")
+    assert_same(found, read_exr(tmp_path / "plain.exr")[0].channels)
+    library = OpenEXR.File(str(source), separate_channels=True).channels()
+    assert_same(found, {name: channel.pixels for name, channel in library.items()})
+
+
+def test_what_enters_at_an_edge_comes_from_the_overscan(device: Device, tmp_path: Path):
+    source, red = windowed(tmp_path / "shot.exr")
+    shift = np.zeros((HEIGHT, WIDTH, 2))
+    shift[..., 0] = -4 / WIDTH  # looked up 4 pixels to the left
+    write_map(tmp_path / "map.npy", Displacement(shift))
+    job = Application(MapSource(tmp_path / "map.npy"), source, tmp_path / "out.exr", codec="none", bits=32)
+    assert job.run(device, Progress()) == ()
+    (found,) = read_exr(tmp_path / "out.exr")
+    assert found.window("dataWindow") == (4, 20, 65, 63)
+    np.testing.assert_allclose(found.channels["R"][:, 6:], red[:, 2:-4], atol=1e-5)
+    np.testing.assert_allclose(found.channels["R"][:, 4:6], red[:, :2], atol=1e-5)
+
+
+def test_overscan_that_has_no_place_is_told(device: Device, tmp_path: Path):
+    source, _ = windowed(tmp_path / "shot.exr")
+    recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), output=Output(size=112))
+    said = run(
+        device, Job(recipe, read_picture(source), tmp_path, Outputs(tmp_path / "o.exr", codec="none")), Progress()
+    ).notices
+    assert said == ("o.exr is without the picture's overscan (6 px beyond the display window)",)
+    (found,) = read_exr(tmp_path / "o.exr")
+    assert found.window("dataWindow") == found.window("displayWindow") == (10, 20, 121, 99)
+    assert found.channels["Z"].shape == (80, 112)
+    (said,) = rendered(device, source, tmp_path / "o.png")
+    assert "without the picture's channel Z; it is without the picture's overscan" in said
+    assert said.endswith("; it begins at 0, 0 and not at 10, 20 as the display window")

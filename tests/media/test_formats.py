@@ -1,0 +1,128 @@
+"""The table of formats: what it says a format keeps comes back, what it does not does not, and README says the same."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageCms
+
+from app.media.animation import ANIMATIONS
+from app.media.formats import FORMATS, TABLE, Format
+from app.media.pictures import read_picture, write_picture
+from app.model.picture import Layer, Picture
+
+WORDS = {
+    "icc": {"profile"},
+    "exif": {"EXIF"},
+    "xmp": {"XMP"},
+    "dpi": {"resolution"},
+    "texts": {"texts", "comment"},
+    "chunks": {"gAMA", "cHRM", "cICP"},
+    "premultiplied": {"premultiplied alpha"},
+    "chromaticities": {"primaries"},
+    "attributes": {"attributes"},
+    "layers": {"layers"},
+    "group": {"layers"},
+    "parts": {"parts"},
+    "half": {"half floats"},
+    "wide": {"overscan"},
+    "margins": {"overscan"},
+    "origin": {"windows"},
+}
+WRITTEN = [kind for kind in TABLE if kind.write]
+DTYPES = {8: np.uint8, 16: np.uint16, 32: np.float32}
+
+
+def full(bits: int) -> Picture:
+    """A picture that has everything that a picture can have."""
+    exif = Image.Exif()
+    exif[0x010F] = "A camera"
+    return Picture(
+        np.full((32, 40, 4), 0.5 if bits == 32 else 2 ** (bits - 1), DTYPES[bits]),
+        icc=ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes(),
+        exif=exif.tobytes(),
+        xmp=b'<x:xmpmeta xmlns:x="adobe:ns:meta/"/>',
+        dpi=(300.0, 150.0),
+        chromaticities=(0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329),
+        texts={"Comment": "seen by me"},
+        premultiplied=True,
+        attributes={"pixelAspectRatio": 2.0},
+        chunks={b"gAMA": (100_000).to_bytes(4, "big")},
+        layers=(Layer("Z", np.ones((35, 43), np.float32), exact=True, part=0),),
+        parts=({"name": "depth"}, {"name": "beauty"}),
+        group=(1, "beauty."),
+        half=True,
+        wide=np.full((35, 43, 4), 0.5 if bits == 32 else 2 ** (bits - 1), DTYPES[bits]),
+        margins=(1, 1, 2, 2),
+        origin=(5, -7),
+    )
+
+
+def came_back(name: str, given: Picture, read: Picture) -> bool:
+    was, now = getattr(given, name), getattr(read, name)
+    if name in ("exif", "xmp"):  # written anew
+        return bool(now)
+    if name == "wide":
+        return now is not None and np.array_equal(now, was)
+    if name == "layers":
+        return [(layer.name, layer.exact, layer.part) for layer in now] == [("Z", True, 0)]
+    if name == "chromaticities" or name == "dpi":
+        return now is not None and now == pytest.approx(was, rel=1e-3)
+    if name == "parts":
+        return [part.get("name") for part in now] == ["depth", "beauty"]
+    return was.items() <= now.items() if isinstance(was, dict) else now == was
+
+
+@pytest.mark.parametrize("kind", WRITTEN, ids=lambda kind: kind.name)
+def test_a_format_keeps_what_the_table_says_and_nothing_else(tmp_path: Path, kind: Format):
+    path, given = tmp_path / f"a{kind.endings[0]}", full(kind.bits[-1])
+    write_picture(path, given)
+    read = read_picture(path)
+    told = {field.name for field in fields(Picture)} - {"pixels", "note"}
+    assert {name for name in told if came_back(name, given, read)} == kind.keeps
+    assert read.has_alpha == kind.alpha
+    for bits in kind.bits:
+        write_picture(path, given, bits=bits)
+        read = read_picture(path)
+        assert (16 if read.half else read.bits) == bits
+    grey = replace(given.with_pixels(given.pixels[..., :1]), icc=None)
+    write_picture(path, grey)
+    assert (read_picture(path).pixels.shape[2] == 1) == kind.grey
+
+
+def test_the_table_names_each_ending_and_each_signature_once():
+    endings = [ending for kind in TABLE for ending in kind.endings]
+    assert len(endings) == len(set(endings))
+    assert list(FORMATS) == [ending for kind in WRITTEN for ending in kind.endings]
+    assert all(kind.signature for kind in WRITTEN)
+
+
+def rows(heading: str) -> dict[str, list[str]]:
+    """The rows of a table of README's formats, by their first cell."""
+    text = (Path(__file__).parents[2] / "README.md").read_text("utf-8").split("## Formats")[1]
+    table = text.split(f"| {heading} |")[1].split("\n\n")[0]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
+    return {first: rest for first, *rest in cells}
+
+
+def test_readme_tells_what_the_table_does():
+    told = rows("picture")
+    for kind in WRITTEN:
+        _, out, keeps = told[kind.name]
+        assert tuple(int(bits) for bits in re.findall(r"\b(8|16|32)\b", out)) == kind.bits, kind.name
+        assert ("alpha laid over" in out) == (not kind.alpha)
+        words = set(keeps.split(", "))
+        assert {name for name, said in WORDS.items() if said & words} == kind.keeps, kind.name
+        assert words <= set().union(*WORDS.values()), kind.name
+    (only_read,) = [names for names, (_, out, _) in told.items() if not out]
+    assert only_read == ", ".join(sorted(kind.name for kind in TABLE if not kind.write))
+    assert set(told) == {kind.name for kind in WRITTEN} | {only_read, "`name.%04d.png`"}
+
+
+def test_readme_names_every_kind_of_animation():
+    told = ", ".join(rows("other")).upper()
+    assert all(ending.removeprefix(".").upper() in told for ending in ANIMATIONS)
