@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
+from solver.gl.fences import Fences
 from solver.gl.field import DoubleField, Field
 from solver.gl.timing import Timings
 
@@ -76,6 +77,7 @@ class Device:
             max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
         )
         self.timings = Timings(ctx)
+        self.fences = Fences(ctx, needed="llvmpipe" in self.limits.renderer)
         self._passes: dict[tuple[str, frozenset[tuple[str, object]]], Pass] = {}
         self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
         self._rest = ctx.simple_framebuffer((1, 1))
