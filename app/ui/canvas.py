@@ -81,6 +81,7 @@ class Canvas:
         seen = (0, 0, 0, 0) if visible is None else _in_pixels(visible, density)
         for strip in _around(seen, _in_pixels(viewport.canvas, density)):
             target.clear(*palette.ground, viewport=_from_below(strip, height))
+        self.device.fences.hold()
         if visible is None:
             return
         replay = session.replay

@@ -241,6 +241,7 @@ class Editor:
         target.viewport = (0, 0, *size)
         # Clearing is many times cheaper than the same rectangles drawn by imgui, which blends every pixel.
         target.clear(*self.ui.palette.panel)
+        self.device.fences.hold()
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         by_keys = bool(self.dialogs.shown) or self.ui.has_popup

@@ -74,6 +74,7 @@ class ImGuiBackend:
         imgui.render()
         target.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+        self.device.fences.hold()
 
     def abandon(self) -> None:
         """End a frame in which something went wrong, without drawing it."""

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import moderngl
 
+from solver.gl.fences import Fences
 from solver.gl.timing import Timings
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
@@ -71,6 +72,7 @@ class Context:
             max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
         )
         self.timings = Timings(ctx)
+        self.fences = Fences(ctx, needed="llvmpipe" in self.limits.renderer.lower())
         self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
         self._rest = ctx.simple_framebuffer((1, 1))
         # Reads a texture between its texels, where a look is enough.

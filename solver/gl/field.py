@@ -67,6 +67,7 @@ class Field:
         """Fill with `values`, by default zero."""
         red, green, blue, alpha = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
         self.framebuffer.clear(red, green, blue, alpha)
+        self.device.fences.hold()
         self.drawn()
 
     def set(self, array: np.ndarray) -> None:
@@ -101,6 +102,7 @@ class Field:
     def copy_from(self, other: Field) -> None:
         """Take over the texels of `other`, which has the same size and components."""
         self.device.ctx.copy_framebuffer(self.framebuffer, other.framebuffer)
+        self.device.fences.hold()
         # One driver (softpipe) leaves an error behind at its first copy, though that is made; who asks for errors next
         # would take it for his own.
         _ = self.device.ctx.error

@@ -99,6 +99,7 @@ class Pass:
             ctx.enable_only(moderngl.NOTHING)
         if region is not None:
             framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]
+        self.device.fences.hold()
 
     def draw_into(self, framebuffer: moderngl.Framebuffer, smooth: Sequence[str] = (), **inputs: object) -> None:
         """Draw over the viewport of a framebuffer that is not a field's, such as the window's.
@@ -114,6 +115,7 @@ class Pass:
             self.device.linear.use(unit)
         framebuffer.use()
         self._vertices.render(moderngl.TRIANGLES, vertices=3)
+        self.device.fences.hold()
         for unit in units:
             self.device.linear.clear(unit)
 

@@ -197,6 +197,7 @@ class TiledField(Field):
                 continue
             if tile.field is None:
                 self.framebuffer.clear(*self._blank_values, viewport=region)
+                self.device.fences.hold()
             else:
                 self._copy(tile.field, region, (-region[0], -region[1]))
             self._same.flat[place] = tile
