@@ -97,9 +97,9 @@ def shear_ring(cells: int, rho: float, delta: float, fine: int = 768) -> np.ndar
     across = np.tanh(rho * (np.hypot(x, y) - 1 / PI))
     wave = PI * np.arange(1, fine)
     vorticity = rho * (1 - across**2) - PI * (1 - across)
-    poisson = fft.idstn(fft.dstn(vorticity, type=1) / (wave**2 + wave[:, None] ** 2), type=1)
+    sines = np.asarray(fft.dstn(vorticity, type=1)) / (wave**2 + wave[:, None] ** 2)
     pushed = delta * PI / 2 * (x**2 - y**2) * np.cos(PI * x) * np.cos(PI * y)
-    psi = np.pad(poisson + pushed, 1)[:: fine // cells, :: fine // cells]
+    psi = np.pad(np.asarray(fft.idstn(sines, type=1)) + pushed, 1)[:: fine // cells, :: fine // cells]
     return cells * np.stack([psi[1:, :-1] - psi[:-1, :-1], psi[:-1, :-1] - psi[:-1, 1:]], axis=-1)
 
 
