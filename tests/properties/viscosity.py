@@ -104,12 +104,13 @@ def random_walls(rng: Rng) -> Walls:
 
 @dataclass
 class Case:
-    """A step of random input; dt / h^2 is one, and so mu is kappa."""
+    """A step of random input; dt / (hx hy) is one, and so mu is kappa. The aspect is hy / hx."""
 
     viscosity: np.ndarray
     faces: np.ndarray
     walls: Walls
     solid: np.ndarray
+    aspect: float = 1.0
 
     @classmethod
     def random(
@@ -133,9 +134,10 @@ class Case:
     def solved(self, device: Device) -> tuple[np.ndarray, int]:
         """The solution and how many iterations it took."""
         ny, nx = self.viscosity.shape
-        solver = Viscosity(device, (nx, ny))
+        hx, hy = 1 / max(nx, ny), self.aspect / max(nx, ny)
+        solver = Viscosity(device, (nx, ny), (hx, hy))
         fields = device.upload(self.viscosity), device.upload(self.solid.astype(np.uint8) * np.uint8(255))
-        solver.set_coefficients(*fields, 1 / max(nx, ny) ** 2, self.walls)
+        solver.set_coefficients(*fields, hx * hy, self.walls)
         velocity = device.double_field((nx, ny), 2, "velocity")
         velocity.read.set(self.faces)
         solver.diffuse(velocity)
@@ -151,9 +153,9 @@ class Case:
         return Case(turned_cells(self.viscosity, turn), faces, walls, solid)
 
     def exact(self) -> np.ndarray:
-        no_slip = self.walls.no_slip
+        spacing = self.aspect**-0.5, self.aspect**0.5
         return reference.viscous_step(
-            self.faces, self.viscosity.astype(np.float64), 1.0, 1.0, solid=self.solid, no_slip=no_slip
+            self.faces, self.viscosity.astype(np.float64), 1.0, spacing, solid=self.solid, no_slip=self.walls.no_slip
         )
 
 
@@ -175,6 +177,22 @@ def check_viscous_step(device: Device, seed: int) -> dict[str, float]:
     assert left < min(ERROR.get(contrast, np.inf), nothing), told
     assert iterations <= ITERATIONS[softest] or contrast not in ERROR, told
     return {"error": left, "doing nothing": nothing, "iterations": iterations}
+
+
+def check_uniform_viscous_step(device: Device, seed: int) -> dict[str, float]:
+    """One viscosity, noise or smooth, on any grid with cells of any aspect between any walls: within a hundredth."""
+    rng = np.random.default_rng(seed)
+    nx, ny = (round(10 ** rng.uniform(np.log10(3), np.log10(129))) for _ in "xy")
+    kappa, aspect, walls = 10 ** rng.uniform(np.log10(0.05), 4), 2 ** rng.uniform(-0.6, 0.6), random_walls(rng)
+    is_noise = bool(rng.random() < 0.5)
+    faces = rng.standard_normal((ny, nx, 2)).astype(np.float32) if is_noise else eddies(rng, nx, ny)
+    faces[:, 0, 0] = faces[0, :, 1] = 0.0
+    case = Case(np.full((ny, nx), kappa, np.float32), faces, walls, np.zeros((ny, nx), bool), aspect)
+    found, iterations = case.solved(device)
+    left = error(found, case.exact())
+    told = f"seed {seed}: {nx} x {ny}, aspect {aspect:.2f}, {walls.no_slip}, kappa {kappa:.3g}, noise {is_noise}"
+    assert left < 0.01, f"{told}: {left:.4f} in {iterations}"
+    return {"error": left, "iterations": iterations}
 
 
 def check_viscous_step_in_the_mirror(device: Device, seed: int) -> dict[str, float]:

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy import fft, ndimage
 
 from solver.brush.brush import Brush, Tip
 from solver.brush.push import Push
@@ -79,6 +80,57 @@ def test_lid_driven_cavity(device: Device) -> None:
     # The lid is on top and y points down: the published v has the other sign.
     u, v = faces[:, 32, 0], -faces[32, :, 1]
     np.testing.assert_allclose([u.min(), v.max(), v.min()], [-0.21404, 0.1795728, -0.2538030], rtol=1e-2)
+
+
+def shear_ring(cells: int, rho: float, delta: float, fine: int = 768) -> np.ndarray:
+    """Faces of a shear layer, tanh(rho (r - 1/pi)), closed to a ring of the length 2 in the unit square.
+
+    The double shear layer of Minion and Brown, J. Comput. Phys. 138 (1997), u = tanh(rho (y - 1/4)) and its image,
+    v = delta sin 2 pi x, is periodic; between walls that let nothing through a straight layer must end. The ring is as
+    long as both of its layers, has the velocities -1 and 1 on its sides (inside it turns as a whole, outside it is a
+    potential flow), and is pushed out and in twice around. The corners of the square do so four times, which grows
+    faster: it rolls up into four vortices, half a length apart where those of the periodic layers are one. With no
+    vorticity at the walls the flow is that of a sine series, odd in every wall.
+    """
+    along = np.arange(1, fine) / fine
+    x, y = np.meshgrid(along - 0.5, along - 0.5)
+    across = np.tanh(rho * (np.hypot(x, y) - 1 / PI))
+    wave = PI * np.arange(1, fine)
+    vorticity = rho * (1 - across**2) - PI * (1 - across)
+    sines = np.asarray(fft.dstn(vorticity, type=1)) / (wave**2 + wave[:, None] ** 2)
+    pushed = delta * PI / 2 * (x**2 - y**2) * np.cos(PI * x) * np.cos(PI * y)
+    psi = np.pad(np.asarray(fft.idstn(sines, type=1)) + pushed, 1)[:: fine // cells, :: fine // cells]
+    return cells * np.stack([psi[1:, :-1] - psi[:-1, :-1], psi[:-1, :-1] - psi[:-1, 1:]], axis=-1)
+
+
+def vortices(vorticity: np.ndarray, prominence: float = 0.05) -> int:
+    """How many maxima of the vorticity, smoothed by .01 sides, stand above all around by a part of the largest."""
+    smooth = ndimage.gaussian_filter(vorticity, 0.01 * (len(vorticity) - 1))
+    smooth /= smooth.max()
+    levels = np.arange(0.02, 1 - prominence, 0.02)
+    parts = np.zeros(smooth.shape, np.int32)
+    most = 0
+    for low in levels:
+        ndimage.label(smooth > low, np.ones((3, 3)), output=parts)
+        most = max(most, len(np.unique(parts[smooth > low + prominence])))
+    return most
+
+
+@pytest.mark.parametrize(("cells", "spurious"), [(64, 4), (192, 0), (256, 0)])
+def test_a_thin_shear_layer_rolls_up_into_no_more_vortices_than_it_should(
+    device: Device, cells: int, spurious: int
+) -> None:
+    """rho = 80, viscosity 1 / 20000, rolled up once: four, as a pseudo-spectral solution of 512^2 sines has.
+
+    On 64 x 64 cells the layer between two of them breaks up too.
+    """
+    fluid = Fluid(device, Grid(cells, cells))
+    fluid.set_viscosity(1 / 20000)
+    fluid.set_velocity(shear_ring(cells, rho=80, delta=0.05))
+    for _ in range(cells // 2):
+        fluid.step(1 / cells)
+    assert vortices(fluid.vorticity()) == 4 + spurious
+    fluid.release()
 
 
 @pytest.mark.parametrize("size", [(8, 8), (9, 31), (64, 40)])

@@ -21,6 +21,11 @@ def test_viscous_step_is_near_the_direct_solution(device: Device, seed: int) -> 
     viscosity.check_viscous_step(device, seed)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_uniform_viscous_step_is_near_the_direct_solution(device: Device, seed: int) -> None:
+    viscosity.check_uniform_viscous_step(device, seed)
+
+
 # Of the others solids on small and odd grids once left 9 to 36 %.
 @pytest.mark.parametrize("seed", [*range(12), 1031, 1326, 1332, 1658, 1676, 1693])
 def test_viscous_step_is_the_same_in_the_mirror(device: Device, seed: int) -> None:
