@@ -133,11 +133,6 @@ class State:
         """The textures that it holds, alone or, of tiled fields, together with other states."""
         return [*self.fields.values(), *(texture for saved in self.tiles.values() for texture in saved.textures)]
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory, with all that it shares."""
-        return sum(texture.nbytes for texture in self.textures)
-
     def release(self) -> None:
         """Free the textures that no other state holds."""
         for saved in (*self.fields.values(), *self.tiles.values()):

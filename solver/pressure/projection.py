@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.components import connected_components
 from solver.gl.field import DoubleField, Field
 from solver.packing import unpacked
 from solver.pressure.conjugate_gradients import ConjugateGradients
 from solver.pressure.cycle import Cycle
-from solver.pressure.graph import Graph, components, links_of
+from solver.pressure.graph import Graph, links_of
 
 if TYPE_CHECKING:
     from solver.gl.device import Device
@@ -151,7 +152,8 @@ class Projection:
             array -= array.mean()
         else:
             if self._regions is None:
-                self._regions = components(array.size, Graph.of_cells(*links_of(self._solid), 1.0).ends)
+                ends = Graph.of_cells(*links_of(self._solid), 1.0).ends
+                self._regions = connected_components(np.arange(array.size), *ends.T)
             sums, cells = np.bincount(self._regions, array.ravel()), np.bincount(self._regions)
             array -= (sums / np.maximum(cells, 1))[self._regions].reshape(array.shape)
         self._source.set(array * self.spacing[0])

@@ -248,12 +248,6 @@ class Level:
     def is_coarsest(self) -> bool:
         return self.texels[0] * self.texels[1] <= COARSEST
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        pairs = [*self.rhs.fields, *self.faces.read.fields, *self.faces.write.fields]
-        return sum(field.nbytes for field in (*self.packed.values(), *self.stress, *pairs))
-
     def release(self) -> None:
         for item in (*self.packed.values(), *self.stress, self.rhs, self.faces):
             item.release()

@@ -70,11 +70,6 @@ class SineCosineTransform:
         u, v = source
         pass_(target, region=self._region, u=u, v=v, matrix_u=matrices[0], matrix_v=matrices[1], **inputs)
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(field.nbytes for pair in (*self._matrices, self._half, self._spectrum) for field in pair)
-
     def release(self) -> None:
         """Free the textures."""
         for pair in (*self._matrices, self._half, self._spectrum):

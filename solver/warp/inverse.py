@@ -44,11 +44,6 @@ class ForwardMap:
         """The displacement F at points (n, 2) of the original, in longer sides: float32 (n, 2)."""
         return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **self._inputs())
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return self._guess.nbytes
-
     def release(self) -> None:
         """Free the texture."""
         self._guess.release()

@@ -314,13 +314,6 @@ class WarpMap:
             self._stand_by(self._pending, int(state.values["remapping"]))
         self._changed()
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory, as long as nothing is read at other sizes."""
-        waiting = (level.field for level in self._waiting)
-        parts = self._submap, self._accumulated, self._frozen, *waiting, *self._composed.values()
-        return sum(part.nbytes for part in parts)
-
     def release(self) -> None:
         """Free the textures."""
         self._drop_waiting()
