@@ -1,4 +1,8 @@
-"""What a fluid scheme is: the stages of a step, what is put in, what is read out, and its state."""
+"""What a fluid scheme is: the stages of a step, what is put in, what is read out, and its state.
+
+Longer than most: beside the protocol it has all that both schemes share, so that neither of them repeats it, and the
+checks of what is put in.
+"""
 
 from __future__ import annotations
 
@@ -238,7 +242,7 @@ class Scheme(ABC):
         self.masks_changed()
 
     def set_solid(self, solid: np.ndarray) -> None:
-        """Freeze the cells where the (ny, nx) array is true or non-zero: their faces do not move.
+        """Make the cells solid where the (ny, nx) array is true or non-zero, and no others: their faces do not move.
 
         Raises:
             ValueError: on another shape or a NaN.

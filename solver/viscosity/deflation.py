@@ -1,9 +1,9 @@
 """Deflation: what moves at little energy in very viscous fluid, solved for directly as a coarse space.
 
-With harmonic means at the nodes a stiff cell forces no more than u to be constant along its row and v along its
-column, and a node is stiff only where all its four cells are. So the motions without strain are spanned by *runs* (u
-along stiff cells of a row, v along those of a column) and, where it is at least five cells broad, by the rigid motions
-of *cores*. Both end at the tiles' edges, so that long things bend. Coarse correction: f += Z E^-1 Z' r with E = Z' A Z,
+With harmonic means at the nodes a stiff cell forces no more than u to be constant along its row and v along its column,
+and a node is stiff only where all its four cells are. So the motions without strain are spanned by *runs* (u along
+stiff cells of a row, v along those of a column) and, where it is at least five cells broad, by the rigid motions of
+*cores*. Both end at the tiles' edges, so that long things bend. Coarse correction (V5): f += Z E^-1 Z' r, E = Z' A Z,
 of which only couplings within a cluster are kept, that is of parts which something stiff connects.
 """
 

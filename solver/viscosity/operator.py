@@ -1,4 +1,4 @@
-"""The viscous operator A = I + B' K B and its Galerkin coarse operators, as coefficients of strains.
+"""The viscous operator A = I + B' K B (V3) and its Galerkin coarse operators (V4), as coefficients of strains.
 
 B takes differences: e_xx and e_yy in the cells, the shear s_y du + s_x dv at the nodes. K holds 2 dt mu / h^2 in the
 cells and dt mu / h^2 at the nodes. A coarse velocity that is interpolated has strains that are half an interpolation S

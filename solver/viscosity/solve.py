@@ -1,4 +1,4 @@
-"""The implicit viscous step: (I - dt div mu (grad v + grad v^T)) v = v*, viscosity varying from cell to cell."""
+"""The implicit viscous step: v - dt div( mu (grad v + grad v^T) ) = v*, viscosity varying from cell to cell (V1)."""
 
 from __future__ import annotations
 

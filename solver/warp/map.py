@@ -1,4 +1,8 @@
-"""The warp map: where every point of the result is looked up in the original."""
+"""The warp map: where every point of the result is looked up in the original.
+
+Longer than most: the submap, the accumulated map and what is frozen have modules of their own; what moves, remaps,
+saves and reads all of them together is here.
+"""
 
 from __future__ import annotations
 
