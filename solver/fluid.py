@@ -1,4 +1,7 @@
-"""The fluid: Stable Fluids with spatially varying viscosity, in the paper's order."""
+"""The fluid: Stable Fluids with spatially varying viscosity, in the paper's order.
+
+Longer than most: `step`, its stages, and each of them once more for who calls it alone, read best one below the other.
+"""
 
 from __future__ import annotations
 

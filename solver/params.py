@@ -24,7 +24,7 @@ LARGEST_SPEED = 1e6
 
 @dataclass(frozen=True)
 class Walls:
-    """What the fluid does at the sides of the grid and at frozen cells.
+    """What the fluid does at the sides of the grid and at solid cells.
 
     Attributes:
         slip: "free" glides along walls, "none" sticks to them.

@@ -1,4 +1,8 @@
-"""What a fluid scheme is: the stages of a step, what is put in, what is read out, and its state."""
+"""What a fluid scheme is: the stages of a step, what is put in, what is read out, and its state.
+
+Longer than most: beside the protocol it has all that both schemes share, so that neither of them repeats it, and the
+checks of what is put in.
+"""
 
 from __future__ import annotations
 
@@ -133,11 +137,6 @@ class State:
         """The textures that it holds, alone or, of tiled fields, together with other states."""
         return [*self.fields.values(), *(texture for saved in self.tiles.values() for texture in saved.textures)]
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory, with all that it shares."""
-        return sum(texture.nbytes for texture in self.textures)
-
     def release(self) -> None:
         """Free the textures that no other state holds."""
         for saved in (*self.fields.values(), *self.tiles.values()):
@@ -243,7 +242,7 @@ class Scheme(ABC):
         self.masks_changed()
 
     def set_solid(self, solid: np.ndarray) -> None:
-        """Freeze the cells where the (ny, nx) array is true or non-zero: their faces do not move.
+        """Make the cells solid where the (ny, nx) array is true or non-zero, and no others: their faces do not move.
 
         Raises:
             ValueError: on another shape or a NaN.

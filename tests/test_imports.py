@@ -39,11 +39,12 @@ ROOMS = {
 # The same of the solver's own.
 SOLVER = {
     "gl": set[str](),
+    "components": set[str](),
     "grid": set[str](),
     "params": set[str](),
     "packing": {"gl"},
-    "pressure": {"gl", "packing"},
-    "viscosity": {"gl", "packing", "params"},
+    "pressure": {"gl", "components", "packing"},
+    "viscosity": {"gl", "components", "packing", "params"},
     "scheme": {"gl", "grid", "params"},
     "fluid": {"gl", "grid", "params", "packing", "pressure", "viscosity", "scheme"},
     "warp": {"gl", "grid", "scheme", "fluid"},

@@ -19,6 +19,7 @@ void main() {
                        brush_weight(v) - brush_weight(vec2(v.x, -v.y)) - brush_weight(vec2(v.x, far.y - v.y)));
     vec2 before = vec2(texture(u_viscosity, v_uv - vec2(texel.x, 0.0)).r, texture(u_viscosity, v_uv - vec2(0.0, texel.y)).r);
     vec2 thickest = max(max(before, texture(u_viscosity, v_uv).r), 1e-9);
-    vec2 yielding = min(max(texelFetch(u_motion, ivec2(0), 0).w, 1e-9) / thickest, 1.0);
-    out_velocity = texelFetch(u_slip, ivec2(0), 0).r * yielding * max(weight, 0.0) * u_brush_velocity * vec2(greaterThan(p, vec2(1.0)));
+    vec2 attenuation = min(max(texelFetch(u_motion, ivec2(0), 0).w, 1e-9) / thickest, 1.0);
+    out_velocity = texelFetch(u_slip, ivec2(0), 0).r * attenuation * max(weight, 0.0) * u_brush_velocity
+                 * vec2(greaterThan(p, vec2(1.0)));
 }

@@ -1,6 +1,6 @@
-// Obstruct: the part that a brush may do, into a single texel: less the more of it lies on cells that are frozen or thicker than
-// the fluid at its tip, for all of it alike. Were it less beside them only, what the brush moves would flow back there
-// through a single cell, many times faster than the brush, and tear the map.
+// Obstruct: the obstruction factor, the part that a brush may do, into a single texel: less the more of it lies on cells
+// that are solid or thicker than the fluid at its tip, for all of it alike. Were it less beside them only, what the brush
+// moves would flow back there through a single cell, many times faster than the brush, and tear the map.
 // u_motion: from probe; u_viscosity: cells, lengths^2 / s; u_solid: cells.
 // reads: 49
 #include "lib/brush.glsl"

@@ -1,9 +1,9 @@
 // Push: make the fluid under the brush move with it, drawn with additive blending.
-//   dv = curl psi,  psi = g (dF x r),  dF = gain part strength (slip v_brush - v_fluid(centre)),
-//   r from the nearest point of the path
-// the discrete curl of a stream function at the nodes, so exactly divergence-free; at the path dv = dF
-// (regularised dipole; numerics of brushes as in de Goes and James 2017 for the fluid limit).
-// u_motion: the fluid's motion at the brush, from probe; u_slip: from slip; u_part: from restrain; u_brush_velocity: lengths / s.
+//   dv = curl psi,  psi = g (dF x r),  dF = gain part strength (slip v_brush - v_fluid(centre)),       (B1)
+// r from the nearest point of the path: the discrete curl of a stream function at the nodes, so exactly free of
+// divergence; at the path dv = dF.
+// u_motion: the fluid's motion at the brush, from probe; u_slip: from slip; u_part: from restrain; u_brush_velocity:
+// lengths / s.
 // reads: 3, and 20 when ATTENUATED
 #include "lib/brush.glsl"
 #include "lib/attenuation.glsl"
@@ -25,7 +25,8 @@ void main() {
     vec2 cell = floor(gl_FragCoord.xy);
     vec4 motion = texelFetch(u_motion, ivec2(0), 0);
     float slip = texelFetch(u_slip, ivec2(0), 0).r;
-    vec2 force = u_gain * texelFetch(u_part, ivec2(0), 0).r * u_strength * unobstructed() * (slip * u_brush_velocity - motion.xy);
+    vec2 force = u_gain * texelFetch(u_part, ivec2(0), 0).r * u_strength * unobstructed()
+               * (slip * u_brush_velocity - motion.xy);
     float corner = stream(cell, force, motion.w);
     vec2 velocity = vec2(stream(cell + vec2(0.0, 1.0), force, motion.w) - corner,
                          corner - stream(cell + vec2(1.0, 0.0), force, motion.w));

@@ -1,7 +1,6 @@
 // Viscosity attenuation: how far the fluid at a node lets a brush lead it, 1 where it is no thicker than at the brush's
-// tip, less in proportion to how much thicker it is; the least of the four cells around. And the part that obstruct.frag
-// leaves to all of the brush.
-// Both 1 unless ATTENUATED.
+// tip, less in proportion to how much thicker it is; the least of the four cells around. And the obstruction factor of
+// all of the brush, from obstruct.frag. Both 1 unless ATTENUATED.
 #ifdef ATTENUATED
 uniform sampler2D u_viscosity; // lengths^2 / s
 uniform sampler2D u_obstruction;

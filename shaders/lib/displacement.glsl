@@ -38,7 +38,7 @@ vec2 cubic_displacement(sampler2D displacement, vec2 p, out mat2 slope) {
     return sum;
 }
 
-// Six-point quintic both ways: on a base map of twice the grid as good as the cubic on one of four times. 36 reads.
+// Six-point quintic both ways: on an accumulated map of twice the grid as good as the cubic on one of four times. 36 reads.
 vec2 quintic_displacement(sampler2D displacement, vec2 p) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(2.0), size - 4.0), f = p - 0.5 - cell;

@@ -2,15 +2,15 @@
 // The pressure comes as a sum that is taken only after the differences, which keeps the digits of the smaller part.
 // Velocities are rounded anew in each step, noise from cell to cell that a trend of two steps would more than double. So
 // where there is a trend, what has changed is smoothed a little before it is kept, and more before it makes the trend.
-// in:  u_base, u_change   the two parts of the pressure;  u_before   the one kept before;  u_trend   1, or 0 for none
+// in:  u_expected, u_change   the two parts of the pressure;  u_before   the one kept before;  u_trend   1, or 0 for none
 //      links of lib/block.glsl
 // out: across, down   p - p_left and p - p_up at the blocks' four cells, lengths / s
-//      last           base + change
-//      expected       last + trend (base - before + change), at blocks, lengths / s
+//      last           expected + change
+//      next           last + trend (expected + change - before), what to expect next, at blocks, lengths / s
 // reads: 13
 #include "lib/block.glsl"
 
-uniform sampler2D u_base;
+uniform sampler2D u_expected;
 uniform sampler2D u_change;
 uniform sampler2D u_before;
 uniform float u_trend;
@@ -23,7 +23,7 @@ in vec2 v_uv;
 layout(location = 0) out vec4 out_across;
 layout(location = 1) out vec4 out_down;
 layout(location = 2) out vec4 out_last;
-layout(location = 3) out vec4 out_expected;
+layout(location = 3) out vec4 out_next;
 
 void differences(sampler2D p, vec4 here, out vec4 across, out vec4 down) {
     across = here - vec4(textureOffset(p, v_uv, ivec2(-1, 0)).yw, here.xz).xzyw;
@@ -31,12 +31,12 @@ void differences(sampler2D p, vec4 here, out vec4 across, out vec4 down) {
 }
 
 void main() {
-    vec4 base = texture(u_base, v_uv), change = texture(u_change, v_uv), across, down;
-    differences(u_base, base, out_across, out_down);
+    vec4 expected = texture(u_expected, v_uv), change = texture(u_change, v_uv), across, down;
+    differences(u_expected, expected, out_across, out_down);
     differences(u_change, change, across, down);
     out_across += across;
     out_down += down;
     vec4 bend = u_trend * laplacian(u_change, v_uv, change, links_of(floor(gl_FragCoord.xy), v_uv));
-    out_last = base + change + KEPT * bend;
-    out_expected = out_last + u_trend * (base - texture(u_before, v_uv) + change + TREND * bend);
+    out_last = expected + change + KEPT * bend;
+    out_next = out_last + u_trend * (expected - texture(u_before, v_uv) + change + TREND * bend);
 }

@@ -1,8 +1,8 @@
 // Classify: what the blocks of a result want when they are looked up, from the map's texels about each block: 2 kind +
 // inside, over 255. Kind 0: one sample a pixel is enough; 1: four samples are, as 0.75 of the stretch is at
 // most 1; 2: more are wanted. Inside: 1 where every sample lies within the bounds of the picture.
-// u_displacement: longer sides, of texels of u_texel, 0-1; u_side: pixels of the result along a block; u_scale: texels to a pixel of the result;
-// u_zoom: pixels of the picture to one of the result; u_longer: pixels of the picture to a longer side;
+// u_displacement: longer sides, of texels of u_texel, 0-1; u_side: pixels of the result along a block; u_scale: texels to
+// a pixel of the result; u_zoom: pixels of the picture to one of the result; u_longer: pixels of the picture to a longer side;
 // u_middle, u_half: middle and half sides, pixels, of the rectangle beyond which there is nothing.
 // Define SINGLE where one sample is enough anyway, EVERYWHERE where four or more are wanted as soon as one is not enough.
 // Define HELD if something is held (u_held, over the map's texels): blocks with some of that keep their kind whatever moves

@@ -10,12 +10,13 @@
 // u_displacement: longer sides, at the corners of the result's pixels; with ONE defined at their centres along x, as
 // sample_points.frag draws it, and along y still at the map's texels, u_scale to a pixel, or with AT_CENTRES both ways;
 // u_texel, u_raw_texel, u_next: size of a texel of both and of the displacement, 0-1;
-// u_pixel: the result's pixel of the first fragment, or the first of its two; u_zoom: pixels of the picture to a pixel of the result;
-// u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
+// u_pixel: the result's pixel of the first fragment, or the first of its two; u_zoom: pixels of the picture to a pixel of
+// the result; u_longer: pixels of the picture to a longer side; u_middle, u_half: middle and half sides, pixels, of the rectangle
 // beyond which there is nothing, with an alpha of u_outside.
-// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of samples, or ONE; PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside;
-// OPAQUE if there is no alpha; PREMULTIPLIED if u_raw is, and the result; LINEAR_LIGHT to encode; CODES if no value is infinite; CLAMPED to 0-1; DITHER to 8 bits;
-// GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
+// Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of samples, or ONE;
+// PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; OPAQUE if
+// there is no alpha; PREMULTIPLIED if u_raw is, and the result; LINEAR_LIGHT to encode; CODES if no value is infinite;
+// CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
 // they have in common is done once, and a software rasteriser waits for the pixels of both at the same time.
 // reads: 30
 #ifndef TAPS

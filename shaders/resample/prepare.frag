@@ -1,7 +1,8 @@
 // Prepare: the picture as it is best interpolated: colour times alpha, in linear light where LINEAR_LIGHT is defined.
-// u_picture: straight alpha, or PREMULTIPLIED is defined; 0-1; its first u_count pixels are of the picture. With PACKED defined the picture is opaque,
-// and a texel holds the pixel to its left and its own as two 16-bit numbers, 0-65535, of a word for each colour, which
-// halves the reads of those who want neighbours; there is one texel more in x, and the edge is repeated.
+// u_picture: straight alpha, or PREMULTIPLIED is defined; 0-1; its first u_count pixels are of the picture. With PACKED
+// defined the picture is opaque, and a texel holds the pixel to its left and its own as two 16-bit numbers, 0-65535, of a
+// word for each colour, which halves the reads of those who want neighbours; there is one texel more in x, and the edge is
+// repeated.
 // reads: 1
 #include "lib/srgb.glsl"
 uniform sampler2D u_picture;

@@ -1,5 +1,5 @@
-// Sample points: a displacement interpolated at the lattice of a picture in one direction, by a four-point Lagrange cubic; drawn once
-// along x and then along y, which reads 8 texels where both at once would read 16.
+// Sample points: a displacement interpolated at the lattice of a picture in one direction, by a four-point Lagrange
+// cubic; drawn once along x and then along y, which reads 8 texels where both at once would read 16.
 // u_displacement: longer sides; u_first: lattice point of the first fragment, in pixels of the picture;
 // u_scale: texels of the displacement to a pixel. Define ALONG_X for the first of the two, and PAIRED where a texel of
 // the result holds two neighbours in x: so with half the reads along y, and with NEAR, if u_scale is at most 1, along x.

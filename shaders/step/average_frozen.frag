@@ -1,4 +1,4 @@
-// Average what is frozen: cells of which at least u_enough is covered by it.
+// Average what is frozen: 1 in cells of which at least u_enough is covered by it (equation B2), else 0.
 // u_frozen: on a canvas, frozen from 1/2.
 // reads: 64
 #include "lib/texels.glsl"

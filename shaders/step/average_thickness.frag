@@ -1,5 +1,5 @@
 // Average thickness: the fluid's viscosity from what the recipe sets and what is painted over it on a canvas:
-//   mu = mu0 10^(mean thickness of the cell)
+//   mu = mu0 10^(mean thickness of the cell)                                                             (B2)
 // (a painted cell of a fluid without viscosity starts from u_least, and none comes above u_most).
 // u_base_viscosity: mu0, cells, lengths^2 / s; u_thickness: see lib/decades.glsl.
 // reads: 65

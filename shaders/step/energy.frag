@@ -1,4 +1,4 @@
-// Energy: what a step has left of the energy that departed, of the faces in a texel (equation S5).
+// Energy: what the viscous step has left of the energy of w1, of the faces in a texel (equation S5).
 // u_u, u_v: w3, packed as viscosity/operator.glsl has it, lengths / s; u_departed: |w1|^2 of the same faces.
 // squares: |w3|^2, |w1|^2.
 // reads: 3

@@ -1,6 +1,6 @@
-// Coarsen: K of e_xx and e_yy on the next coarser level, S' K S / 16 (see operator.py). A fine row counts 3/4 to the coarse
-// row it lies in and 1/4 to the nearest other one; where one of the two does not move, and is glided along, the other counts whole. Of e_yy that
-// holds for the columns.
+// Coarsen: K of e_xx and e_yy on the next coarser level, S' K S / 16 (equation V4). A fine row counts 3/4 to the coarse
+// row it lies in and 1/4 to the nearest other one; where one of the two does not move, and is glided along, the other
+// counts whole. Of e_yy that holds for the columns.
 // u_xx0 ... u_yy2: of the finer level, as in stress.frag, on the finest u_xx0 only, with u_aspect; u_open: of the coarse one.
 // reads: 64
 #include "viscosity/openness.glsl"

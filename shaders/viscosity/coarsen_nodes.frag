@@ -1,4 +1,4 @@
-// Coarsen: K of the nodes on the next coarser level, S' K S / 16 (see operator.py), S linear both ways: weights 1/2 1 1/2.
+// Coarsen: K of the nodes on the next coarser level, S' K S / 16 (equation V4), S linear both ways: weights 1/2 1 1/2.
 // u_node0 ... u_node4: of the finer level, as in stress.frag, on the finest u_node0 only; u_open: of the coarse one.
 // A coupling is the sum over the pairs of fine nodes around its two coarse ones, either way round.
 // reads: 78
@@ -37,8 +37,8 @@ vec4 square(int row, int column) {
 // Whether all four faces at a texel's nodes move, or the fluid sticks there: a free-slip wall has no shear.
 vec4 moving(vec2 texel) {
     vec4 u = open_u(texel), above = open_u(texel - vec2(0.0, 1.0)), v = open_v(texel), left = open_v(texel - vec2(1.0, 0.0));
-    vec4 held = sticks(2.0 * texel.x + vec4(0.0, 1.0, 0.0, 1.0), 2.0 * texel.y + vec4(0.0, 0.0, 1.0, 1.0));
-    return max(u * vec4(above.zw, u.xy) * v * vec4(left.y, v.x, left.w, v.z), held);
+    vec4 stuck = sticks(2.0 * texel.x + vec4(0.0, 1.0, 0.0, 1.0), 2.0 * texel.y + vec4(0.0, 0.0, 1.0, 1.0));
+    return max(u * vec4(above.zw, u.xy) * v * vec4(left.y, v.x, left.w, v.z), stuck);
 }
 
 void main() {

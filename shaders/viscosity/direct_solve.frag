@@ -1,4 +1,4 @@
-// Exact: the solution on the coarsest grid, the inverse matrix times the right-hand side.
+// Direct solve: the solution on the coarsest level, the inverse matrix times the right-hand side.
 // u_rhs_u, u_rhs_v: the right-hand side b; u_inverse: A^-1, a row for each unknown, four columns a texel, the unknowns
 // in the order of the texels, all u before all v.
 // reads: 1152

@@ -1,4 +1,4 @@
-// The operator A v = v + B' K B v on packed faces: 2 x 2 of them a texel, (x, y, z, w) = upper left, upper right, lower
+// The operator A v = v + B' K B v (equation V3) on packed faces: 2 x 2 of them a texel, (x, y, z, w) = upper left, upper right, lower
 // left, lower right, u in one texture, v in another. Around the texels in use runs a ring of zeros, so that no stage asks
 // for the edge: what lies beyond a wall is at rest. Fixed faces (walls, solid cells) hold exactly zero and are no unknowns.
 // B: the strains e_xx and e_yy in cells (K = 2 dt mu / h^2), the shear s_y du + s_x dv at nodes (K = dt mu_node / h^2).
@@ -29,7 +29,7 @@ struct Stiffness { vec4 left, here_x, above, here_y, node, node_right, node_belo
 #endif
 
 #ifdef UNIFORM
-// K of the nodes in a column (or row) over that of the inner ones: see `coefficients` in operator.py.
+// K of the nodes in a column (or row) over that of the inner ones: see `Coefficients.uniform`.
 vec4 at_walls(vec4 place, float far, vec2 no_slip) {
     return mix(mix(vec4(1.0), vec4(2.0 * no_slip.x), vec4(equal(place, vec4(0.0)))), vec4(2.0 * no_slip.y),
                vec4(equal(place, vec4(far))));

@@ -1,4 +1,4 @@
-// Stress: K B f on a coarse level, where K couples a strain with its neighbours of the same kind (see operator.py).
+// Stress: K B f on a coarse level, where K couples a strain with its neighbours of the same kind (equation V4).
 // u_u, u_v: faces f, packed as in operator.glsl; u_xx0, u_xx1, u_xx2: couplings of a cell's e_xx with itself and with the
 // cells one and two rows below; u_yy0 ...: of e_yy, with the cells to the right; u_node0 ... u_node4: of a node's shear
 // with itself, the right, the lower, the lower right and the lower left node.

@@ -1,5 +1,5 @@
 // Transform: matrices times the rows of the faces of a grid, or with DOWN their columns; one direction of the sine and
-// cosine transforms of solver/viscosity/transform.py. With SOLVE the viscous step is made on the waves that come out,
+// cosine transforms of solver/viscosity/transform.py. With SOLVE the viscous step is made on the modes that come out,
 // (1 + A) w = b, where for the wave numbers p, q in a box of n x m cells, with (k_x, k_y) = u_stiffness,
 // a = 2 k_x sin(pi p / 2 n), b = 2 k_y sin(pi q / 2 m):
 //   A = (2 a^2 + b^2   a b        )

@@ -1,5 +1,5 @@
-// Distortion: how the map x + D(x) stretches and folds, by the chain rule: J is the product of the Jacobians of its
-// parts (lib/warp.glsl), each by its own interpolant, so that nothing depends on how far apart the places are.
+// Distortion: how the map x + D(x) stretches and folds, by the chain rule: J is the product of the Jacobians of its parts
+// (lib/warp.glsl), each by the derivatives of the cubic both ways, so that nothing depends on how far apart the places are.
 // x: see lib/place.glsl.
 // largest: (-det J, det J, |D|), to be reduced to the largest of each;
 // total: (1 where det J <= 0, |D|, |det J - 1|), to be reduced to their sums.

@@ -48,7 +48,7 @@ class Brush:
         """Add to a velocity on MAC faces what it lacks of a motion: the last touch before the projection.
 
         Viscosity does not spread that any more. So it spares what is thicker than the fluid at the tip, and does less
-        the more of the brush lies on what is thicker or frozen. For `steer` of `Scheme.step`.
+        the more of the brush lies on what is thicker or solid. For `steer` of `Scheme.step`.
         """
         self._look(fluid, motion, velocity, warp)
         obstruct, tip = self.device.pass_("brush/obstruct.frag"), motion.tip.inputs(fluid.grid)

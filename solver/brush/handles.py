@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -84,6 +84,25 @@ class Handle:
         return part * part * (3 - 2 * part)
 
 
+class Lead(NamedTuple):
+    """What the active handles do in a step, found before it.
+
+    Attributes:
+        active: their numbers.
+        places, radii: of their brushes, (n, 2) and (n,).
+        influence: how the push of each moves each, (n, n, 2, 2): see `_influences`.
+        wanted: how the fluid shall move at them, (n, 2), longer sides / s.
+        local: what of their motion carries the picture and not the fluid, (n, 2).
+    """
+
+    active: np.ndarray
+    places: np.ndarray
+    radii: np.ndarray
+    influence: np.ndarray
+    wanted: np.ndarray
+    local: np.ndarray
+
+
 class Handles:
     """Leads handles together through a fluid: see *Handles* in solver/README.md.
 
@@ -103,8 +122,7 @@ class Handles:
         self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
         # Where those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
-        self._active = np.zeros(0, int)
-        self._carrying = np.zeros((0, 2))
+        self._lead: Lead | None = None  # of the present step
         self.replace(handles)
 
     def replace(self, handles: Sequence[Handle]) -> None:
@@ -137,31 +155,32 @@ class Handles:
         if (new := begun & np.isnan(self._starts[:, 0])).any():
             self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
-        self._active = np.flatnonzero(active)
-        self._wanted = self._wanted_velocities(time, dt)
-        push, local = self._influences()
-        share = self._local[self._active]
+        numbers = np.flatnonzero(active)
+        places, radii, share = self._places[numbers], self._radii[numbers], self._local[numbers]
+        wanted = self._wanted_velocities(numbers, time, dt)
+        push, local = self._influences(places, radii)
         # What is local is shared out first: the fluid would else do all of it, going on by itself.
         both = (1 - share[:, None, None]) * push + share[:, None, None] * local
-        self._carrying = share[:, None] * self._solved(both, self._wanted)
-        self._wanted = self._wanted - np.einsum("ijab,jb->ia", local, self._carrying)
-        self._influence = push
-        self._fluid.impulse.add(lambda faces: self._give(faces))
+        carried = share[:, None] * self._solved(numbers, both, wanted)
+        wanted = wanted - np.einsum("ijab,jb->ia", local, carried)
+        lead = self._lead = Lead(numbers, places, radii, push, wanted, carried)
+        self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
         """After viscosity, before the projection: add to a velocity on MAC faces what is still lacking.
 
         For `steer` of `Scheme.step`. Spares what is thicker than at each handle, as `Brush.make_up`.
         """
-        self._give(velocity, ATTENUATED=1)
+        if self._lead is not None:
+            self._give(self._lead, velocity, ATTENUATED=1)
 
     def carry(self) -> None:
         """After a step: let what is local carry the picture until the fluid's next one."""
-        fluid, grid = self._fluid, self._fluid.grid
-        if not self._carrying.any():
+        fluid, grid, lead = self._fluid, self._fluid.grid, self._lead
+        if lead is None or not lead.local.any():
             return
-        viscosity, shader = self._probed(fluid.faces())[:, 3], fluid.device.pass_("brush/carry.frag")
-        for place, radius, motion, here in zip(*self._brushes(), self._carrying, viscosity, strict=True):
+        viscosity, shader = self._probed(lead, fluid.faces())[:, 3], fluid.device.pass_("brush/carry.frag")
+        for place, radius, motion, here in zip(*_brushes(lead), lead.local, viscosity, strict=True):
             tip = Tip(place, place, radius)
             self._motion.clear(0.0, 0.0, 0.0, here)
             inputs = tip.inputs(grid) | {"brush_velocity": tuple(motion.tolist()), "viscosity": fluid.viscosity}
@@ -243,10 +262,10 @@ class Handles:
         places[begun] = best
         return places
 
-    def _wanted_velocities(self, time: float, dt: float) -> np.ndarray:
-        """How the active handles shall move in this step, longer sides / s."""
-        wanted, slower = np.zeros((len(self._active), 2)), self._slower()
-        for row, number in enumerate(self._active):
+    def _wanted_velocities(self, numbers: np.ndarray, time: float, dt: float) -> np.ndarray:
+        """How the handles of these numbers shall move in this step, longer sides / s."""
+        wanted, slower = np.zeros((len(numbers), 2)), self._slower(numbers)
+        for row, number in enumerate(numbers):
             handle, start, place = self.handles[number], self._starts[number], self._places[number]
             way = np.zeros(2) if handle.to is None else np.subtract(handle.to, start)
             way = way * min(1.0, LONGEST_WAY * handle.radius / max(float(np.hypot(*way)), 1e-30))
@@ -258,13 +277,13 @@ class Handles:
             wanted[row] = step * min(1.0, most / max(float(np.hypot(*step)), 1e-30)) / dt
         return wanted
 
-    def _slower(self) -> np.ndarray:
-        """The part of its speed, 0-1, that the map around each active handle still allows."""
-        if not len(self._active):
+    def _slower(self, numbers: np.ndarray) -> np.ndarray:
+        """The part of its speed, 0-1, that the map around each of these handles still allows."""
+        if not len(numbers):
             return np.zeros(0)
-        along, count = np.linspace(-1, 1, LATTICE), len(self._active)
-        lattice = np.stack(np.meshgrid(along, along), axis=-1) * self._radii[self._active, None, None, None]
-        points = np.clip(self._places[self._active, None, None] + lattice, 0.0, self._warp.extent)
+        along, count = np.linspace(-1, 1, LATTICE), len(numbers)
+        lattice = np.stack(np.meshgrid(along, along), axis=-1) * self._radii[numbers, None, None, None]
+        points = np.clip(self._places[numbers, None, None] + lattice, 0.0, self._warp.extent)
         listed = points.reshape(-1, 2)
         least = self._warp.determinants(listed).reshape(count, -1).min(axis=1)
         original, most = points + self._warp.at(listed).reshape(points.shape), np.zeros(count)
@@ -279,13 +298,8 @@ class Handles:
 
     # -- what they do to the fluid ----------------------------------------------------------------------------------
 
-    def _brushes(self) -> tuple[list[Point], list[float]]:
-        """Places and radii of the active handles."""
-        return [(x, y) for x, y in self._places[self._active].tolist()], self._radii[self._active].tolist()
-
-    def _influences(self) -> tuple[np.ndarray, np.ndarray]:
-        """How the push and the local brush of each active handle move each: velocities (i, a) for forces (j, b)."""
-        places, radii = self._places[self._active], self._radii[self._active]
+    def _influences(self, places: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How the push and the local brush of each handle move each: velocities (i, a) for forces (j, b)."""
         push = np.zeros((len(places), len(places), 2, 2))
         local = np.zeros_like(push)
         for mirror, shift in _images(self._fluid.grid):
@@ -301,18 +315,18 @@ class Handles:
                 local += (np.maximum(1 - q**2, 0.0) ** 3)[..., None, None] * np.diag(sign)
         return push, local
 
-    def _solved(self, influence: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    def _solved(self, numbers: np.ndarray, influence: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """The forces that together make the wanted velocities, as far as the ridge and stiffness let them: (H3)."""
         count = 2 * len(wanted)
         matrix = influence.transpose(0, 2, 1, 3).reshape(count, count)
-        soft = [1 / self.handles[number].stiffness - 1 + RIDGE for number in self._active for _ in (0, 1)]
+        soft = [1 / self.handles[number].stiffness - 1 + RIDGE for number in numbers for _ in (0, 1)]
         dual = np.linalg.solve(matrix @ matrix.T + np.diag(soft), wanted.reshape(count))
         return (matrix.T @ dual).reshape(-1, 2)
 
-    def _probed(self, velocity: Field) -> np.ndarray:
+    def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
         """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
         fluid, device = self._fluid, self._fluid.device
-        listed = np.column_stack([self._places - fluid.grid.origin, self._radii])[self._active]
+        listed = np.column_stack([lead.places - fluid.grid.origin, lead.radii])
         handles = device.upload(listed[None].astype(np.float32), "handles")
         found = device.field(handles.size, 4, "fluid at the handles")
         inputs: dict[str, Any] = {
@@ -328,13 +342,13 @@ class Handles:
         found.release()
         return values
 
-    def _give(self, faces: Field, **attenuated: Any) -> None:
+    def _give(self, lead: Lead, faces: Field, **attenuated: Any) -> None:
         """Add to a velocity on MAC faces what the active handles lack of the wanted one."""
-        if not len(self._active):
+        if not len(lead.active):
             return
         fluid, grid = self._fluid, self._fluid.grid
-        found = self._probed(faces)
-        lacking = self._solved(self._influence, self._wanted - found[:, :2])
+        found = self._probed(lead, faces)
+        lacking = self._solved(lead.active, lead.influence, lead.wanted - found[:, :2])
         masks: dict[str, Any] = {}
         if attenuated:
             lacking *= found[:, 2:3]
@@ -342,27 +356,23 @@ class Handles:
         draw, size = fluid.device.pass_("brush/handle_stream.frag", **attenuated), self._stream.size
         self._stream.clear()
         for mirror, shift in _images(grid):
-            for (x, y), radius, force, here in zip(*self._brushes(), lacking, found[:, 3], strict=True):
+            for (x, y), radius, force, here in zip(*_brushes(lead), lacking, found[:, 3], strict=True):
                 place = float(mirror[0] * x + shift[0]), float(mirror[1] * y + shift[1])
-                region = Tip(place, place, radius).region(grid)
-                if (
-                    region[0] >= size[0]
-                    or region[1] >= size[1]
-                    or region[0] + region[2] <= 0
-                    or region[1] + region[3] <= 0
-                ):
+                x0, y0, width, height = region = Tip(place, place, radius).region(grid)
+                if x0 >= size[0] or y0 >= size[1] or x0 + width <= 0 or y0 + height <= 0:
                     continue
                 from_corner = place[0] - grid.origin[0], place[1] - grid.origin[1]
-                inputs: dict[str, Any] = {
-                    "place": from_corner,
-                    "radius": radius,
-                    "force": tuple((mirror * force).tolist()),
-                    **masks,
-                }
+                inputs: dict[str, Any] = {"force": tuple((mirror * force).tolist()), **masks}
                 if attenuated:
                     inputs["tip_viscosity"] = here
-                draw(self._stream, add=True, region=region, spacing=grid.spacing, **inputs)
+                inputs |= {"place": from_corner, "radius": radius, "spacing": grid.spacing}
+                draw(self._stream, add=True, region=region, **inputs)
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
+
+
+def _brushes(lead: Lead) -> tuple[list[Point], list[float]]:
+    """Places and radii of the active handles."""
+    return [(x, y) for x, y in lead.places.tolist()], lead.radii.tolist()
 
 
 def _smoothstep(part: np.ndarray) -> np.ndarray:

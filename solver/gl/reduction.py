@@ -10,8 +10,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 
 _SIDE = 8  # texels along the blocks that become one
-_SMALL = 20  # so many texels across are cheaper for one fragment to go through than to shrink again
-_READABLE = 40  # and so many to read back
+_READABLE = 40  # texels across that are cheaper to read back than to shrink again
 
 
 class Reduction:
@@ -28,32 +27,17 @@ class Reduction:
         self._kind = kind
         self._shrink = device.pass_("gl/shrink.frag", **({"SUM": 1} if kind == "sum" else {}))
         self._levels: list[Field] = []
-        while max(size) > _SMALL:
+        while max(size) > _READABLE:
             size = -(-size[0] // _SIDE), -(-size[1] // _SIDE)
             self._levels.append(device.field(size, components, f"{kind} {size[0]} x {size[1]}"))
 
-    def shrink(self, field: Field) -> Field:
-        """A field of at most 20 x 20 texels with the same result, for stages that go on without reading it back."""
-        return self._shrink_to(_SMALL, field)
-
     def __call__(self, field: Field) -> np.ndarray:
         """One number a component, float64; waits for the GPU."""
-        field = self._shrink_to(_READABLE, field)
-        values = field.get().reshape(-1, field.components)
-        return values.max(axis=0).astype(np.float64) if self._kind == "max" else values.sum(axis=0, dtype=np.float64)
-
-    def _shrink_to(self, across: int, field: Field) -> Field:
         for level in self._levels:
-            if max(field.size) <= across:
-                break
             self._shrink(level, field=field, side=_SIDE)
             field = level
-        return field
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(level.nbytes for level in self._levels)
+        values = field.get().reshape(-1, field.components)
+        return values.max(axis=0).astype(np.float64) if self._kind == "max" else values.sum(axis=0, dtype=np.float64)
 
     def release(self) -> None:
         """Free the textures."""

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.gl.field import Field
 
-# A graph of no more unknowns than this is solved by a dense matrix: its inversion takes a few ms.
+# A graph of no more unknowns than this is solved by a dense matrix: with it preparing walls at 192 x 144 takes 11 ms of
+# processor time, with 256 it took 76.
 DIRECT = 128
 
 

@@ -6,25 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.components import connected_components
+
 # The links of a coarser graph are those of the finer one, added up, over this. A linear pressure, interpolated as
 # constant on blocks, has twice its energy, so 2 would be exact; but pressures that really are constant on blocks would
 # then be corrected twice, and a second visit would leave all of them. Four cycles leave 6e-4 of impulses between thin
 # walls with 1.6, 1.5e-4 with 1.8 and 6e-5 with 2.
 OVERCORRECTION = 1.8
-
-
-def components(count: int, ends: np.ndarray) -> np.ndarray:
-    """Of `count` items the smallest that each is connected with, by links between `ends`, (m, 2)."""
-    smallest = np.arange(count)
-    while True:
-        least = smallest[ends].min(axis=1)
-        if (smallest[ends] == least[:, None]).all():
-            return smallest
-        # Links are hung on the representatives, and the ways to these halved: the rounds grow as the logarithm.
-        for side in (0, 1):
-            np.minimum.at(smallest, smallest[ends[:, side]], least)
-        while (smallest[smallest] != smallest).any():
-            smallest = smallest[smallest]
 
 
 def links_of(solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +74,7 @@ class Graph:
         """The graph of the connected pieces of blocks, and of each unknown its piece; -1 where a piece has no links."""
         count, block = len(self.place), self.place // 2
         inside = (block[self.ends[:, 0]] == block[self.ends[:, 1]]).all(axis=1)
-        first = components(count, self.ends[inside])
+        first = connected_components(np.arange(count), *self.ends[inside].T)
         ends = first[self.ends[~inside]]
         pieces = np.unique(ends)
         piece = np.full(count, -1)
@@ -121,7 +109,7 @@ class Graph:
         np.add.at(matrix, (self.ends[:, 0], self.ends[:, 1]), self.weight)
         matrix += matrix.T
         matrix -= np.diag(matrix.sum(axis=1))
-        label = components(count, self.ends)
+        label = connected_components(np.arange(count), *self.ends.T)
         together = label[:, None] == label
         return np.linalg.inv(matrix - together / together.sum(axis=1))
 

@@ -7,22 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.components import connected_components
 from solver.gl.field import DoubleField, Field
 from solver.packing import unpacked
 from solver.pressure.conjugate_gradients import ConjugateGradients
 from solver.pressure.cycle import Cycle
-from solver.pressure.graph import Graph, components, links_of
+from solver.pressure.graph import Graph, links_of
 
 if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.packing import PackedFaces
 
-# The part of the divergence that a projection may leave.
+# The part of the divergence that a projection may leave: the target set for it, not derived.
 WANTED_LEFT = 1e-3
 
 
 class Projection:
-    """The projection u <- u - grad p with lap p = div u - s, and no flow through the edges and the solid cells.
+    """The projection u <- u - grad p with lap p = div u - s (P1 to P3), and no flow through edges and solid cells.
 
     What is kept on the GPU is p over the side of a cell along x, in lengths / s. Conjugate gradients solve for what the
     pressure differs from the one expected, the last two's trend: of a flow that changes little one iteration is enough,
@@ -111,14 +112,14 @@ class Projection:
         least = WANTED_LEFT**2 * squares
         # Two sweeps leave about a thirtieth, and take half as long again as one.
         sweeps = 1 if self._cycle.light_leaves**2 * left <= least else 2
-        taken = self._solver.solve(self._cycle, self._residual, left, least, sweeps, cycles)
+        iterations = self._solver.solve(self._cycle, self._residual, left, least, sweeps, cycles)
         if not warm and cycles is None:
             # What float32 has rounded off a pressure much larger than its gradient is corrected.
             self._expected.read.copy_from(self._solver.pressure)
             _, left = self._take_divergence(given, **wanted, expected=self._expected.read)
-            taken += self._solver.solve(self._cycle, self._residual, left, least, sweeps)
+            iterations += self._solver.solve(self._cycle, self._residual, left, least, sweeps)
         self._subtract_gradient(velocity, given, carried, trend=float(warm))
-        return taken
+        return iterations
 
     def state(self) -> tuple[Field, Field]:
         """The fields that a later warm start depends on."""
@@ -151,7 +152,8 @@ class Projection:
             array -= array.mean()
         else:
             if self._regions is None:
-                self._regions = components(array.size, Graph.of_cells(*links_of(self._solid), 1.0).ends)
+                ends = Graph.of_cells(*links_of(self._solid), 1.0).ends
+                self._regions = connected_components(np.arange(array.size), *ends.T)
             sums, cells = np.bincount(self._regions, array.ravel()), np.bincount(self._regions)
             array -= (sums / np.maximum(cells, 1))[self._regions].reshape(array.shape)
         self._source.set(array * self.spacing[0])
@@ -172,7 +174,7 @@ class Projection:
         finest = self._cycle.finest
         finest.draw(
             "gradient", (self._across, self._down, self._last.write, self._expected.write),
-            base=self._expected.read, change=self._solver.pressure, before=self._last.read, trend=trend,
+            expected=self._expected.read, change=self._solver.pressure, before=self._last.read, trend=trend,
         )  # fmt: skip
         for pair in (self._last, self._expected):
             pair.swap()

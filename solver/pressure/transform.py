@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.gl.field import Field
 
-# Products of blocks that one solve is worth; a finer grid is left to multigrid.
+# Products of blocks that one solve is worth; a finer grid is left to multigrid. Not measured.
 LARGEST = 65536
 
 

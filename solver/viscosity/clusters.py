@@ -6,22 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.components import connected_components
+
 # Unknowns of a cluster that is inverted with all the others of its kind at once; larger ones are eliminated by strips.
 SMALL = 8
-
-
-def connected(root: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """For each thing the smallest number it is connected to, as in `root` before and by the links `one` to `other`."""
-    while True:
-        a, b = root[one], root[other]
-        apart = a != b
-        if not apart.any():
-            return root
-        a, b, one, other = a[apart], b[apart], one[apart], other[apart]
-        root = root.copy()
-        np.minimum.at(root, np.maximum(a, b), np.minimum(a, b))
-        while (root != root[root]).any():
-            root = root[root]
 
 
 class Block(NamedTuple):
@@ -79,7 +67,7 @@ class ClusterMatrix:
         root, component = np.arange(len(strip)), np.zeros(len(strip), int)
         for number in range(int(strip[large].min()), int(strip[large].max()) + 1):
             here = last == number
-            root = connected(root, rows[here], columns[here])
+            root = connected_components(root, rows[here], columns[here])
             there = large[strip[large] == number]
             component[there] = root[there]
         order, number, place_of = _grouped(strip[large] * len(strip) + component[large])

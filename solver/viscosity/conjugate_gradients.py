@@ -7,7 +7,6 @@ from math import inf, isfinite
 from typing import Any
 
 from solver.gl.device import Device
-from solver.gl.field import Field
 from solver.gl.reduction import Reduction
 from solver.packing import DoublePackedFaces, PackedFaces
 from solver.viscosity.operator import Level
@@ -144,25 +143,12 @@ class ConjugateGradients:
         change.swap()
         return self._x.write
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        fields: list[Field] = [field for pair in self._pairs for field in pair.fields]
-        return sum(item.nbytes for item in (*fields, *self._sums))
-
     def release(self) -> None:
         """Free the textures."""
-        for item in (*self._pairs, *self._sums):
+        for item in (self._x, self._r, self._p, self._ap, self._az):
             item.release()
-
-    @property
-    def _pairs(self) -> list[PackedFaces]:
-        doubles = self._x, self._r, self._p, self._ap
-        return [self._az, *(pair for double in doubles for pair in (double.read, double.write))]
-
-    @property
-    def _sums(self) -> tuple[Field | Reduction, ...]:
-        return self._products, self._sum, self._guess_products, self._change_product, self._change_sum
+        for item in (self._products, self._sum, self._guess_products, self._change_product, self._change_sum):
+            item.release()
 
 
 def _series(last: float, before: float) -> float:

@@ -1,9 +1,9 @@
 """Deflation: what moves at little energy in very viscous fluid, solved for directly as a coarse space.
 
-With harmonic means at the nodes a stiff cell forces no more than u to be constant along its row and v along its
-column, and a node is stiff only where all its four cells are. So the motions without strain are spanned by *runs* (u
-along stiff cells of a row, v along those of a column) and, where it is at least five cells broad, by the rigid motions
-of *cores*. Both end at the tiles' edges, so that long things bend. Coarse correction: f += Z E^-1 Z' r with E = Z' A Z,
+With harmonic means at the nodes a stiff cell forces no more than u to be constant along its row and v along its column,
+and a node is stiff only where all its four cells are. So the motions without strain are spanned by *runs* (u along
+stiff cells of a row, v along those of a column) and, where it is at least five cells broad, by the rigid motions of
+*cores*. Both end at the tiles' edges, so that long things bend. Coarse correction (V5): f += Z E^-1 Z' r, E = Z' A Z,
 of which only couplings within a cluster are kept, that is of parts which something stiff connects.
 """
 
@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from solver.components import connected_components
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.packing import PackedFaces, framed, packed
 from solver.viscosity.changed import Box, changed
-from solver.viscosity.clusters import ClusterMatrix, connected
+from solver.viscosity.clusters import ClusterMatrix
 from solver.viscosity.operator import Coefficients, Level
 from solver.viscosity.parts import Parts, find_parts
 
@@ -111,7 +112,7 @@ class CoarseSpace:
                 both = (parts[0] > 0) & (parts[3] > 0) & (parts[0] != parts[3])
                 one.append(parts[0][both])
                 other.append(parts[3][both])
-        return connected(np.arange(self.parts.count + 1), np.concatenate(one), np.concatenate(other))
+        return connected_components(np.arange(self.parts.count + 1), np.concatenate(one), np.concatenate(other))
 
     def _entries(self, strains: list[Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Entries (row, column, value), of which Z' A Z is the sum and its transpose."""
@@ -286,11 +287,6 @@ class Deflation:
         texels = np.zeros((table.height * WIDE, 4))
         texels[: len(values), : values.shape[1]] = values
         return texels.reshape(table.height, WIDE, 4)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(field.nbytes for field in (*self._part_of, *self._tables, *self._averaged.fields))
 
     def release(self) -> None:
         """Free the textures."""

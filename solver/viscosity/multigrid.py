@@ -294,11 +294,6 @@ class Multigrid:
         coarser.faces.swap()
         return 1
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(item.nbytes for item in (*self.levels, self._inverse, self._transform))
-
     def release(self) -> None:
         """Free the textures."""
         for item in (*self.levels, self._inverse, self._transform):

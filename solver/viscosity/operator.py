@@ -1,4 +1,4 @@
-"""The viscous operator A = I + B' K B and its Galerkin coarse operators, as coefficients of strains.
+"""The viscous operator A = I + B' K B (V3) and its Galerkin coarse operators (V4), as coefficients of strains.
 
 B takes differences: e_xx and e_yy in the cells, the shear s_y du + s_x dv at the nodes. K holds 2 dt mu / h^2 in the
 cells and dt mu / h^2 at the nodes. A coarse velocity that is interpolated has strains that are half an interpolation S
@@ -247,12 +247,6 @@ class Level:
     @property
     def is_coarsest(self) -> bool:
         return self.texels[0] * self.texels[1] <= COARSEST
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        pairs = [*self.rhs.fields, *self.faces.read.fields, *self.faces.write.fields]
-        return sum(field.nbytes for field in (*self.packed.values(), *self.stress, *pairs))
 
     def release(self) -> None:
         for item in (*self.packed.values(), *self.stress, self.rhs, self.faces):

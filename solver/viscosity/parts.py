@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.components import connected_components
 from solver.packing import framed
-from solver.viscosity.clusters import connected
 
 BROAD = 5  # cells across a core, at least
 
@@ -86,7 +86,7 @@ def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
         together = (nodes[:-1, 1:-1] | nodes[1:, 1:-1]) & (np.arange(1, turned.shape[1]) % side != 0)
         links.append((turned[:, :-1][together], turned[:, 1:][together]))
     one, other = (np.concatenate(ends) for ends in zip(*links, strict=True))
-    root = connected(np.arange(count), one, other)
+    root = connected_components(np.arange(count), one, other)
     number[inside] = np.cumsum(root == np.arange(count))[root]
     return number
 

@@ -63,8 +63,10 @@ class Plan:
 
 def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
     """True if coarse levels must move stiff parts as a whole, should there be any; see `RIGID_OF_SOFTEST`."""
-    if solid.any() or kappa.min() <= ONE_SWEEP:
-        return bool(solid.any())
+    if solid.any():
+        return True
+    if kappa.min() <= ONE_SWEEP:
+        return False
     pairs = (kappa[1:], kappa[:-1]), (kappa[:, 1:], kappa[:, :-1])
     return any(bool((np.maximum(*pair) > MODERATE * np.minimum(*pair)).any()) for pair in pairs)
 

@@ -1,4 +1,4 @@
-"""The implicit viscous step: (I - dt div mu (grad v + grad v^T)) v = v*, viscosity varying from cell to cell."""
+"""The implicit viscous step: v - dt div( mu (grad v + grad v^T) ) = v*, viscosity varying from cell to cell (V1)."""
 
 from __future__ import annotations
 
@@ -62,23 +62,23 @@ class Viscosity:
         self._wall_speed = walls.drag
         hx, hy = self.spacing
         kappa = dt / (hx * hy)
-        frozen, amount = solid.get() > 0, viscosity.get()
+        is_solid, amount = solid.get() > 0, viscosity.get()
         if kappa * float(amount.max()) > MOST:
             amount = np.minimum(amount, np.float32(MOST / kappa))
-        fluid = amount[~frozen] if frozen.any() else amount
+        fluid = amount[~is_solid] if is_solid.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         self.plan = plan_for(
-            kappa * least, kappa * largest, self.size[0] * self.size[1], is_sharp(kappa * amount, frozen)
+            kappa * least, kappa * largest, self.size[0] * self.size[1], is_sharp(kappa * amount, is_solid)
         )
         self.deflation.set_stiff(None)
-        if least == largest and not frozen.any():
+        if least == largest and not is_solid.any():
             self.multigrid.set_uniform(least, dt, walls.no_slip)
         else:
-            self.multigrid.set_coefficients(viscosity, solid, amount, frozen, dt, walls.no_slip)
+            self.multigrid.set_coefficients(viscosity, solid, amount, is_solid, dt, walls.no_slip)
         if self.plan.method != "smooth" and self.multigrid.direct_level is self.multigrid.finest:
             self.plan = Plan("direct")
         elif self.plan.stiff:
-            self.deflation.set_stiff(~frozen & (kappa * amount > self.plan.stiff), self.plan.stiff)
+            self.deflation.set_stiff(~is_solid & (kappa * amount > self.plan.stiff), self.plan.stiff)
 
     @property
     def v_star(self) -> PackedFaces:
@@ -158,18 +158,7 @@ class Viscosity:
         )
         return found / wanted if wanted else 0.0
 
-    @property
-    def _parts(self) -> tuple[Multigrid | ConjugateGradients | Deflation, ...]:
-        return self.multigrid, self.conjugate_gradients, self.deflation
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        pairs = self._change.read, self._change.write, self._dragged
-        fields = [field for pair in pairs for field in pair.fields]
-        return sum(item.nbytes for item in (*fields, *self._parts))
-
     def release(self) -> None:
         """Free the textures."""
-        for item in (self._change, self._dragged, *self._parts):
+        for item in (self._change, self._dragged, self.multigrid, self.conjugate_gradients, self.deflation):
             item.release()

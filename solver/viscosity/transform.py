@@ -21,7 +21,7 @@ LARGEST = 65536
 class SineCosineTransform:
     """Solves the viscous step for one viscosity in a box with free-slip walls.
 
-    There sines along the normal and cosines across it carry u and v, and the step couples u and v of one wave only:
+    There sines along the normal and cosines across it carry u and v, and the step couples u and v of one mode only:
     four products with small matrices, and 2 x 2 equations between them.
 
     Args:
@@ -70,11 +70,6 @@ class SineCosineTransform:
         u, v = source
         pass_(target, region=self._region, u=u, v=v, matrix_u=matrices[0], matrix_v=matrices[1], **inputs)
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(field.nbytes for pair in (*self._matrices, self._half, self._spectrum) for field in pair)
-
     def release(self) -> None:
         """Free the textures."""
         for pair in (*self._matrices, self._half, self._spectrum):
@@ -83,10 +78,10 @@ class SineCosineTransform:
 
 
 def _sines_and_cosines(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
-    """Orthonormal waves between walls: rows of sines at `count` left faces and of cosines at centres, zero-padded."""
-    wave, place = np.arange(count)[:, None], np.arange(count)
-    sines = np.sqrt(2.0 / count) * np.sin(np.pi * wave * place / count)
-    cosines = np.sqrt(2.0 / count) * np.cos(np.pi * wave * (place + 0.5) / count)
+    """The orthonormal DST and DCT: rows of sines at `count` left faces and of cosines at centres, zero-padded."""
+    mode, place = np.arange(count)[:, None], np.arange(count)
+    sines = np.sqrt(2.0 / count) * np.sin(np.pi * mode * place / count)
+    cosines = np.sqrt(2.0 / count) * np.cos(np.pi * mode * (place + 0.5) / count)
     cosines[0] = np.sqrt(1.0 / count)
     padding = (0, 2 * texels - count)
     return np.pad(sines, padding), np.pad(cosines, padding)

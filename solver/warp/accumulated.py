@@ -10,7 +10,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.gl.tiled import TILE, SavedTiles, TiledField
+from solver.gl.tiled import SavedTiles, TiledField
 from solver.grid import Grid
 
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
@@ -57,7 +57,7 @@ class AccumulatedMap:
         self.extent = extent
         self.now = TiledField(device, size, 2, "accumulated map")
         self._next = TiledField(device, size, 2, "accumulated map, anew")
-        self._tiles = tiles_of(size)
+        self._tiles = self.now.kind.regions
         self._stale = set[Region]()  # tiles in which `_next` holds something older than `now`
         self._moved: list[Region] = []  # tiles to be drawn anew
         self._copied: list[Region] = []  # tiles to be copied
@@ -120,7 +120,7 @@ class AccumulatedMap:
         """Draw a region anew at once; nothing may be planned."""
         draw(self._next, [region])
         self.now.copy_from(self._next, region)
-        self._stale.update(tile for tile in self._tiles if overlap(tile, region))
+        self._stale.update(tile for tile in self._tiles if _meet(tile, region))
 
     def set(self, draw: Callable[[Field], None]) -> None:
         """Draw all of it; what was planned is forgotten."""
@@ -140,27 +140,12 @@ class AccumulatedMap:
             field.clear()
         self._stale.clear()
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return self.now.nbytes + self._next.nbytes
-
     def release(self) -> None:
         """Free the textures."""
         self.now.release()
         self._next.release()
 
 
-def overlap(a: Region, b: Region) -> bool:
+def _meet(a: Region, b: Region) -> bool:
     """True if two regions have something in common."""
     return all(a[k] < b[k] + b[k + 2] and b[k] < a[k] + a[k + 2] for k in (0, 1))
-
-
-def tiles_of(size: tuple[int, int]) -> list[Region]:
-    """The tiles of a field of `size` by rows."""
-    width, height = size
-    return [
-        (x, y, min(TILE, width - x), min(TILE, height - y))
-        for y in range(0, height, TILE)
-        for x in range(0, width, TILE)
-    ]

@@ -99,11 +99,6 @@ class Frozen:
             for name, field in zip(("held", "kept"), self._fields(), strict=True):
                 field.restore(tiles[name])
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        return sum(field.nbytes for field in (self.held, self.kept) if field is not None)
-
     def release(self) -> None:
         """Let go of everything."""
         for field in (self.held, self.kept):

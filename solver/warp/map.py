@@ -1,4 +1,8 @@
-"""The warp map: where every point of the result is looked up in the original."""
+"""The warp map: where every point of the result is looked up in the original.
+
+Longer than most: the submap, the accumulated map and what is frozen have modules of their own; what moves, remaps,
+saves and reads all of them together is here.
+"""
 
 from __future__ import annotations
 
@@ -311,13 +315,6 @@ class WarpMap:
         if self._pending is not None:
             self._stand_by(self._pending, int(state.values["remapping"]))
         self._changed()
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory, as long as nothing is read at other sizes."""
-        waiting = (level.field for level in self._waiting)
-        parts = self._submap, self._accumulated, self._frozen, *waiting, *self._composed.values()
-        return sum(part.nbytes for part in parts)
 
     def release(self) -> None:
         """Free the textures."""

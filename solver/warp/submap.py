@@ -60,12 +60,6 @@ class Submap(DoubleField):
         find(self._steepness, displacement=self.read, spacing=self.grid.spacing)
         return self._find_steepest(self._steepness)[0] > STEEPEST**2
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of texture memory."""
-        parts = self.read, self.write, self.trace, self._steepness, self._find_steepest
-        return sum(part.nbytes for part in parts)
-
     def release(self) -> None:
         super().release()
         for part in (self.trace, self._steepness, self._find_steepest):

@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from solver.components import connected_components
 from solver.gl.device import Device
 from solver.params import NoSlip
-from solver.viscosity.clusters import ClusterMatrix, connected
+from solver.viscosity.clusters import ClusterMatrix
 from solver.viscosity.multigrid import Multigrid
 
 
@@ -68,6 +69,6 @@ def test_clusters_are_solved_directly(seed: int) -> None:
     matrix += np.diag(own)
     each = np.arange(count)
     rows, columns = np.append(one, each), np.append(other, each)
-    solver = ClusterMatrix(connected(each, one, other), strip, rows, columns, np.append(values, 0.5 * own))
+    solver = ClusterMatrix(connected_components(each, one, other), strip, rows, columns, np.append(values, 0.5 * own))
     rhs = rng.normal(size=count)
     assert np.allclose(matrix @ solver.solve(rhs), rhs, atol=1e-9)
