@@ -292,7 +292,7 @@ class Replay:
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
-        leads = any(handle.start <= (self.tick + 0.5) * dt for handle in self.handles.handles)
+        leads = any(handle.start <= self.tick * dt + dt / 2 for handle in self.handles.handles)
         at_work = [(stroke, dabs) for stroke in self.recipe.stroke if (dabs := stroke.at(self.tick))]
         self._follow([(stroke, dabs) for stroke, dabs in at_work if stroke.tool in FLOWING])
         self._set_parameters(self.settings)
