@@ -49,8 +49,9 @@ class _Led(Model):
         return self
 
     def first_tick(self, dt: float) -> int:
-        """The tick in which it begins."""
-        return max(0, ceil(self.start / dt - 0.5))
+        """The tick in which it begins: as `Handles.lead` has it, however that is rounded."""
+        near = ceil(min(self.start / dt, 2.0**40) - 0.5)
+        return next((tick for tick in (near - 1, near) if tick >= 0 and self.start <= tick * dt + dt / 2), near + 1)
 
 
 class RecipeHandle(_Led):

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, model_validator
 from app.errors import UserError
 from app.model import toml
 from app.model.forces import Force
-from app.model.handles import MOST_HANDLES, RecipeHandle, RecipePin
+from app.model.handles import MOST_HANDLES, RecipeHandle, RecipePin, is_inside
 from app.model.masks import FreezeLayer, ViscosityLayer
 from app.model.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
 from app.model.strokes import Change, Stroke
@@ -314,8 +314,11 @@ class Recipe(Model):
                 both = [stroke for stroke in (mine, theirs) if stroke is not None]
                 until = both[0].agrees_until(both[1]) if len(both) == 2 else both[0].first_tick
                 agreed = min(agreed, until)
+        renumbered = self.pin != other.pin
         for mine, theirs in zip_longest(self.handle, other.handle):
-            if mine != theirs or self.pin != other.pin:
+            if mine is not None and theirs is not None:
+                renumbered |= is_inside(mine.at) != is_inside(theirs.at)  # those behind it
+            if mine != theirs or renumbered:
                 agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (mine, theirs) if led is not None)])
         if self.pin != other.pin:
             agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (*self.pin, *other.pin))])

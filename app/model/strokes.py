@@ -88,6 +88,17 @@ class Stroke(Model):
         after = [] if inside else [self._interpolated(tick)]
         return self._joined(([before] if before else []) + inside + after)
 
+    def before(self, tick: int) -> Stroke | None:
+        """What of it acts before a tick; None if nothing does. A curve is whole or not at all."""
+        if self.last_tick < tick:
+            return self
+        if self.first_tick >= tick or self.tool == "curve":
+            return None
+        samples = tuple(sample for sample in self.samples if sample[0] < tick)
+        if samples[-1][0] < tick - 1:
+            samples = *samples, self._interpolated(tick - 1)
+        return self.model_copy(update={"samples": samples})
+
     def travelled(self, tick: int, extent: tuple[float, float]) -> float:
         """The length of the path up to where the pieces of `at(tick)` begin, in units of `extent`'s sides."""
         if tick <= self.first_tick:

@@ -292,10 +292,10 @@ class Replay:
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
-        leads = any(handle.start <= (self.tick + 0.5) * dt for handle in self.handles.handles)
+        leads = any(handle.start <= self.tick * dt + dt / 2 for handle in self.handles.handles)
         at_work = [(stroke, dabs) for stroke in self.recipe.stroke if (dabs := stroke.at(self.tick))]
         self._follow([(stroke, dabs) for stroke, dabs in at_work if stroke.tool in FLOWING])
-        self._set_parameters()
+        self._set_parameters(self.settings)
         painted = False
         self._leading.clear()
         with self.device.stage("brush"):
@@ -323,8 +323,7 @@ class Replay:
             self.masks.clear()
             self._viscosity_in_force = None
 
-    def _set_parameters(self) -> None:
-        settings = self.settings
+    def _set_parameters(self, settings: FluidSettings) -> None:
         slip = "free" if settings.walls == "free-slip" else "none"
         params = FluidParams(walls=Walls.of(slip, self.fluid.grid.at_edge), drag=settings.drag, sweeps=settings.sweeps)
         if params != self.fluid.params:
@@ -340,11 +339,11 @@ class Replay:
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
-                    self._set_parameters()  # also of a fluid that has just been restored
+                    self._set_parameters(self.settings)  # also of a fluid that has just been restored
                     flow = self.fluid.flow_on(self._cells_of(window))
                     self._look_at(window)
                     self.warp.move_to(self.fluid.grid)
-                    self._set_parameters()
+                    self._set_parameters(self.settings)
                     self._apply_masks()
                     self.fluid.go_on_with(flow)
                     flow.release()
@@ -497,7 +496,7 @@ class Replay:
         built = build(recipe.force, self.grid, self.pictures, recipe.duration)
         self.forces = [LoadedForce.of(self.device, force) for force in built]
         self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
-        self._set_parameters()
+        self._set_parameters(recipe.fluid)  # changes come with the tick
 
     def _in_picture(self) -> list[tuple[str, RecipeHandle | RecipePin]]:
         """The recipe's pins and handles that take hold of something, with what messages call them; pins come first."""

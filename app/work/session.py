@@ -554,15 +554,10 @@ class Session:
         return tick
 
     def _cut(self, tick: int) -> None:
-        base, strokes = self._base, []
-        for stroke in base.stroke:
-            kept = tuple(sample for sample in stroke.samples if sample[0] < tick)
-            if len(kept) == len(stroke.samples):
-                strokes.append(stroke)
-            elif kept and stroke.tool != "curve":
-                strokes.append(stroke.model_copy(update={"samples": kept}))
+        base = self._base
+        strokes = (stroke.before(tick) for stroke in base.stroke)
         cut = base.edited(
-            stroke=tuple(strokes),
+            stroke=tuple(stroke for stroke in strokes if stroke is not None),
             change=tuple(change for change in base.change if change.tick < tick),
             duration=max(tick, 1) * self.dt,
         )

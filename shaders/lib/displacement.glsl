@@ -20,20 +20,22 @@ vec2 cubic_displacement(sampler2D displacement, vec2 p) {
 #undef AT
 }
 
-// Four-point cubic both ways, and its derivatives along x (first column) and y, to a texel. 16 reads.
+// The same with its own derivatives along x (first column) and y, to a texel: far from the middle of the four points, as in
+// a picture's corner, those of another cubic would not tell of its folds. 16 reads.
 vec2 cubic_displacement(sampler2D displacement, vec2 p, out mat2 slope) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
-    vec4 wx = cubic_lagrange(f.x), wy = cubic_lagrange(f.y), sx = cubic_slope(f.x), sy = cubic_slope(f.y);
+    vec4 lx = vec4(0.0, 1.0 - f.x, f.x, 0.0), ly = vec4(0.0, 1.0 - f.y, f.y, 0.0), along = vec4(0.0, -1.0, 1.0, 0.0);
+    vec4 cx = cubic_lagrange(f.x), sx = cubic_slope(f.x), by = cubic_lagrange(f.y) - ly, sy = cubic_slope(f.y) - along;
     vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
     vec2 sum = vec2(0.0);
     slope = mat2(0.0);
     for (int j = 0; j < 4; ++j)
         for (int i = 0; i < 4; ++i) {
             vec2 value = texture(displacement, vec2(x[i], y[j])).rg;
-            sum += wx[i] * wy[j] * value;
-            slope[0] += sx[i] * wy[j] * value;
-            slope[1] += wx[i] * sy[j] * value;
+            sum += (cx[i] * ly[j] + lx[i] * by[j]) * value;
+            slope[0] += (sx[i] * ly[j] + along[i] * by[j]) * value;
+            slope[1] += (cx[i] * along[j] + lx[i] * sy[j]) * value;
         }
     return sum;
 }

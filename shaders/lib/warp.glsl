@@ -70,9 +70,6 @@ bool is_held(vec2 place) {
     return held > (on_texel(place) == floor(place) + 0.5 ? 0.5 : 0.9);
 }
 
-// What it is there: u_kept on a texel, and between texels the cubic both ways, which reaches none that moves.
-vec2 held_displacement(vec2 place) {
-    mat2 slope;
-    return cubic_displacement(u_kept, on_texel(place), slope);
-}
+// What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves.
+vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place)); }
 #endif

@@ -80,7 +80,9 @@ class Handle:
         """The part of its way, 0-1, that it shall have gone at a time."""
         if time >= self.start + self.duration:
             return 1.0
-        part = max(time - self.start, 0.0) / self.duration
+        if time <= self.start:  # also where it goes its way at once
+            return 0.0
+        part = (time - self.start) / self.duration
         return part * part * (3 - 2 * part)
 
 

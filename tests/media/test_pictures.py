@@ -257,6 +257,15 @@ def test_compressed_tiffs_of_16_bits(tmp_path: Path, compression: str):
     np.testing.assert_array_equal(read_picture(tmp_path / "a.tif").pixels, pixels)
 
 
+@pytest.mark.parametrize("size", [(1, 1), (1, 200), (2, 5000), (5000, 1), (127, 127), (1, 40_000)])
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_noise_of_any_shape_is_a_png(size: tuple[int, int], channels: int, tmp_path: Path):
+    for dtype in (np.uint8, np.uint16):
+        pixels = np.random.default_rng(1).integers(0, np.iinfo(dtype).max, (size[1], size[0], channels), dtype, True)
+        write_picture(tmp_path / "a.png", Picture(pixels))
+        np.testing.assert_array_equal(read_picture(tmp_path / "a.png").pixels, pixels)
+
+
 def test_a_large_profile_in_a_png_is_kept_and_a_bomb_refused(tmp_path: Path):
     profile = cmyk_profile()[:16] + b"RGB " + cmyk_profile()[20:]
     large = profile + np.random.default_rng(0).bytes(2_000_000)

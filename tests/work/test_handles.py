@@ -123,6 +123,35 @@ def test_a_handle_that_is_added_later_gives_the_same_as_one_that_was_there(devic
         each.release()
 
 
+def test_a_handle_that_comes_into_the_picture_gives_the_same_as_one_that_was_there(device: Device):
+    """Those behind it get another number."""
+    outside, inside = ([led_to(at, [0.4, 0.4], start=0.3), HANDLES[0]] for at in ([1.2, 0.3], [0.2, 0.3]))
+    replay, straight = replay_of(device, handle=outside), replay_of(device, handle=inside)
+    replay.seek(30)
+    replay.use(straight.recipe)
+    straight.seek(30)
+    assert np.array_equal(replay.warp.read(), straight.warp.read())
+    for each in (replay, straight):
+        each.release()
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 0.02, 0.1, 1e-308])
+def test_a_handle_begins_in_the_tick_that_it_says(dt: float):
+    """In the middle of a tick, too, however that is rounded."""
+    for start in {round((tick + 0.5) * dt, digits) for tick in range(300) for digits in (3, 5, 16)} | {1e6}:
+        handle = Recipe.model_validate(frozen({"handle": [led_to([0.5, 0.5], [0.6, 0.5], start=start)]})).handle[0]
+        tick = handle.first_tick(dt)
+        assert start <= tick * dt + dt / 2 or tick > 2**39
+        assert tick == 0 or start > (tick - 1) * dt + dt / 2
+
+
+def test_a_handle_goes_its_way_at_once_from_within_a_tick(device: Device):
+    replay = replay_of(device, handle=[led_to([0.5, 0.5], [0.51, 0.5]) | {"start": 0.005, "duration": 0.0}])
+    replay.seek(30)
+    assert replay.handles.away.max() < ARRIVED
+    replay.release()
+
+
 def test_what_is_not_reached_is_told_by_number(device: Device):
     frozen_disc = {"kind": "path", "points": [[0.15, 0.17]], "radius": 0.1, "hardness": 1.0}
     handles = [led_to([0.6, 0.6], [0.7, 0.6]), led_to([0.15, 0.17], [0.4, 0.5], name="held")]

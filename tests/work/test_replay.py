@@ -166,6 +166,21 @@ def test_changes_act_at_their_tick(device: Device):
         replay.release()
 
 
+def test_the_start_is_what_it_was_before_anything_changed(device: Device):
+    """Also with a change in the first tick, which comes with its step, and gone back to from behind a later one."""
+    plain, replay = Replay(device, RECIPE, pictures()), Replay(device, RECIPE, pictures(), budget=0)
+    first = RECIPE.change[0].model_copy(update={"tick": 0})
+    changed = Replay(device, RECIPE.edited(change=(first,)), pictures())
+    try:
+        replay.seek(LAST)
+        replay.seek(0)
+        assert moment(replay) == moment(plain)
+        assert moment(changed) == moment(plain)
+    finally:
+        for item in (plain, replay, changed):
+            item.release()
+
+
 GRIDS = """
 [fluid]
 grid = {}

@@ -380,6 +380,19 @@ def test_only_sending_the_playhead_back_cuts_what_comes_after_it(session: Sessio
     assert session.notice is not None
 
 
+def test_going_on_from_within_a_stroke_with_few_samples_changes_nothing_that_was_there(session: Session) -> None:
+    stroke = Stroke.model_validate({"tool": "push", "samples": ((0, 0.3, 0.5, 1.0), (20, 0.7, 0.5, 1.0))})
+    session.edit("Stroke", stroke=(stroke,), duration=24 * session.dt)
+    session.seek(12)
+    session.settle()
+    seen = session.replay.warp.read()
+    session.change("Honey", viscosity=0.03)
+    session.seek(12)
+    session.settle()
+    np.testing.assert_allclose(session.replay.warp.read(), seen, atol=1e-5)
+    assert [stroke.last_tick for stroke in session.recipe.stroke] == [11]
+
+
 @pytest.mark.parametrize(
     "settings", [{"viscosity": 0.3, "drag": 0.0}, {"clear_velocity": True}], ids=["another feel", "all motion stopped"]
 )
