@@ -219,6 +219,5 @@ def _catching_up(ui: Ui, editor: Editor) -> None:
     session, canvas = editor.session, editor.layout.canvas
     if session.target - session.tick < BEHIND:
         return
-    with ui.floating("catching up", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9):
-        imgui.dummy(ImVec2(0, 0))
+    with ui.floating("catching up", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
         ui.dim(f"  Simulating: {session.tick} of {session.target} steps  ", 13.5)
