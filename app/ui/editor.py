@@ -62,6 +62,7 @@ class Editor:
     ) -> None:
         self.preferences = likes = preferences or Preferences()
         self.state = EditorState(inspector=likes.inspector, auto_quality=likes.auto_quality)
+        self._device = device
         self.backend = ImGuiBackend(device)
         self.ui = Ui(theme.PALETTES[likes.theme], self.backend.fonts, likes.scale)
         self.layout = self._layout(1280, 800)
@@ -241,7 +242,7 @@ class Editor:
         target.viewport = (0, 0, *size)
         # Clearing is many times cheaper than the same rectangles drawn by imgui, which blends every pixel.
         target.clear(*self.ui.palette.panel)
-        self.device.fences.hold()
+        self._device.fences.hold()
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         by_keys = bool(self.dialogs.shown) or self.ui.has_popup

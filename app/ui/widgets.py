@@ -85,18 +85,20 @@ class Ui:
 
     @contextmanager
     def floating(
-        self, name: str, x: float, y: float, pivot: tuple[float, float], alpha: float = 0.94
+        self, name: str, x: float, y: float, pivot: tuple[float, float], alpha: float = 0.94, clicked: bool = True
     ) -> Iterator[None]:
-        """A small panel that lies on the canvas and is as large as what is in it."""
+        """A small panel that lies on the canvas and is as large as what is in it; the pointer may go through it."""
         imgui.set_next_window_pos(ImVec2(x, y), imgui.Cond_.always, ImVec2(*pivot))
         imgui.set_next_window_bg_alpha(alpha)
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(6), self.px(4)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(8))
-        imgui.begin(name, None, PANEL | imgui.WindowFlags_.always_auto_resize)
+        through = 0 if clicked else imgui.WindowFlags_.no_inputs
+        imgui.begin(name, None, PANEL | imgui.WindowFlags_.always_auto_resize | through)
         imgui.pop_style_var(2)
         try:
             yield
-            self.cover()
+            if clicked:
+                self.cover()
         finally:
             imgui.end()
 

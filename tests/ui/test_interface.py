@@ -14,11 +14,12 @@ from app.media.maps import Displacement, write_map
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER
-from app.model.tools import TOOLS
+from app.model.tools import TOOL, TOOLS, Press
 from app.ui.clock import HOVERING
 from app.ui.events import LEFT, Button, Key, Mods, Move, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog
 from app.ui.files import load_any
+from app.ui.panels.hud import BEHIND
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
@@ -291,6 +292,24 @@ def test_the_wheel_over_the_statistics_does_not_zoom(robot: Robot) -> None:
     robot.move(100, 80)
     robot.wheel(3)
     assert robot.editor.view.zoom is None
+
+
+def test_a_stroke_may_begin_where_it_is_told_that_strokes_wait(robot: Robot) -> None:
+    editor = robot.editor
+    session, canvas = editor.session, editor.layout.canvas
+    press = Press(editor.state.brush, False, session.extent, session.dt)
+    for _ in range(40):
+        session.press(TOOL["push"], press, 0.3, 0.5)
+        session.move(0.5, 0.5)
+        session.advance(1)
+        session.release()
+    robot.frame(count=3, dt=0)
+    x, y = canvas.x + canvas.width / 2, canvas.y + 24
+    assert session.target - session.tick > BEHIND
+    robot.move(x, y)
+    assert editor.shows_ring
+    robot.press()
+    assert session.is_painting
 
 
 # Dialogs ------------------------------------------------------------------------------------------------------------

@@ -106,6 +106,5 @@ def _statistics(ui: Ui, canvas: Rect, session: Session, numbers: Numbers, clock:
 
 
 def _catching_up(ui: Ui, canvas: Rect, session: Session) -> None:
-    with ui.floating("catching up", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9):
-        imgui.dummy(ImVec2(0, 0))
+    with ui.floating("catching up", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
         ui.dim(f"  Simulating: {session.tick} of {session.target} steps  ", 13.5)
