@@ -307,7 +307,7 @@ def test_a_stroke_may_begin_where_it_is_told_that_strokes_wait(robot: Robot) -> 
     x, y = canvas.x + canvas.width / 2, canvas.y + 24
     assert session.target - session.tick > BEHIND
     robot.move(x, y)
-    assert editor.shows_ring
+    assert editor.pointer.shows_ring
     robot.press()
     assert session.is_painting
 
