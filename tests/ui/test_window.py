@@ -292,6 +292,7 @@ FORMATS = 229
 @pytest.mark.parametrize(
     ("kind", "across", "name"),
     [
+        ("picture", 640, "work warped.jpg"),
         ("picture", 790, "work warped.tif"),
         ("animation", 790, "work warped.%04d.png"),
         ("map", 470, "work map.exr"),
