@@ -1,63 +1,30 @@
-"""The fluid: Stable Fluids with spatially varying viscosity, in the paper's order.
-
-Longer than most: `step`, its stages, and each of them once more for who calls it alone, read best one below the other.
-"""
+"""The fluid: Stable Fluids with spatially varying viscosity, in the paper's order."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from solver.advection import Advected, Advection, Rows
+from solver.energy import EnergyBound
+from solver.faces import Forces, Vector, impulses, on_faces
+from solver.flow import Flow
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.reduction import Reduction
-from solver.grid import Grid, check_type
+from solver.grid import Grid
+from solver.limits import check_size, check_step, check_type
 from solver.packing import PackedFaces
 from solver.params import FluidParams
 from solver.pressure.projection import Projection
-from solver.scheme import (
-    LARGEST_SPEED,
-    Forces,
-    Residuals,
-    Scheme,
-    State,
-    Vector,
-    check_size,
-    check_step,
-    on_faces,
-)
+from solver.scheme import Residuals, Scheme
+from solver.state import State
+from solver.trace import Trace, Tracing
 from solver.viscosity.solve import Viscosity
-
-Rows = tuple[Field, Field]  # of u and of v, four faces of a row a texel: see `depart.frag`
-
-
-@dataclass(frozen=True)
-class Tracing:
-    """What drawing the trace takes: where to, and the defines and inputs of `trace.frag`."""
-
-    target: Field
-    defines: dict[str, Any]
-    inputs: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Flow:
-    """A flow on the faces of a grid: time, velocity, and half the last pressure gradient where that is known."""
-
-    time: float
-    velocity: Field
-    carried: Field | None = None
-
-    def release(self) -> None:
-        """Free the textures."""
-        for field in (self.velocity, self.carried):
-            if field is not None:
-                field.release()
 
 
 class Fluid(Scheme):
@@ -72,19 +39,14 @@ class Fluid(Scheme):
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
         super().__init__(device, grid, params)
         self.velocity = device.double_field(grid.size, 2, "velocity")
-        # Half the last pressure gradient, which the next step takes off where the fluid departs.
+        # g: half the last pressure gradient, which the next step takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
-        rows = grid.nx // 2 + 3, grid.ny + 4
-        self._departing = device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")
-        self._trace = device.field(grid.size, 2, "trace")
-        self._traced: float | None = None  # the step that it is of; None if the velocity has changed since
-        packed = -(-grid.nx // 2) + 2, -(-grid.ny // 2) + 2
-        self._departed = device.field(packed, 1, "departed energy")
-        self._squares = device.field(packed, 2, "energies")
-        self._sum_of_squares = Reduction(device, packed, 2, "sum")
-        self._limited = PackedFaces(device, packed, "limited velocity")
+        self._trace = Trace(device, grid.size)
         self._viscosity_solver = Viscosity(device, grid.size, grid.spacing)
         self._pressure_solver = Projection(device, grid.size, grid.spacing)
+        packed = self._viscosity_solver.v_star.u.size
+        self._advection = Advection(device, grid.size, packed)
+        self._energy_bound = EnergyBound(device, grid.nx * grid.ny, packed)
         # What the solvers hold of the masks; None if they have to look.
         self._coefficients_of: object = None
         self._solids_of: np.ndarray | None = None
@@ -101,104 +63,91 @@ class Fluid(Scheme):
         if steer is not None:
             check_type("what steers", steer, Callable)
         self.local.clear()
+        self.residuals = Residuals()
         w1 = self._add_force(forces, dt)
         w2 = self._advect(w1, dt)
-        w3 = self._diffuse(w2, dt)
-        viscous_residual = self._viscous_residual(w3) if self.measuring else None
-        w3 = self._bound_energy(w3)
-        self._project(w3 if steer is None else self._steered(w3, steer))
-        if self.measuring:
-            self.residuals = replace(self.residuals, viscous_residual=viscous_residual)
+        w3 = self._diffuse(w2)
+        w3 = self._bound_energy(w3, w2.energy)
+        if steer is None:
+            self._project(w3)
+        else:
+            self._unpack(w3)
+            steer(self.velocity.read)
+            self._project()
         self.time += dt
 
     def _add_force(self, forces: Forces, dt: float) -> Rows:
-        """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn.
+        """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn: equation (S2).
 
-        g is half the last pressure gradient: with the projection, where the fluid arrives, pressure then acts along the
-        path by the trapezoidal rule, second order in time, where the paper's splitting is first order and dissipates
-        (it takes dt^2 |grad p|^2 of energy a step). Xiu and Karniadakis, J. Comput. Phys. 172 (2001), treat such
-        schemes.
+        g is half the last pressure gradient; the projection takes off the other half where the fluid arrives. So
+        pressure acts along the path by the trapezoidal rule, which is of second order in time.
         """
         self._check_source()
         force = self._force(forces, dt)
         with self.device.stage("add force"):
-            departing = self._depart(carried=self._carried.read, **force)
+            w1 = self._advection.depart(self.velocity.read, self.params.walls, carried=self._carried.read, **force)
         self.impulse.clear()
-        return departing
+        return w1
 
-    def _advect(self, departing: Rows, dt: float) -> PackedFaces:
-        """w2(x) = w1(x_d): second-order backtrace, cubic interpolation, each component from where it departs; and drag.
+    def _advect(self, w1: Rows, dt: float) -> Advected:
+        """w2(x) = w1(x_d), each component from where it departs; and drag.
 
         Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has
         just been carried by it, so that the trace is there already.
         """
         trace = self.trace(dt)
         self._take_up_masks(dt)
+        target, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
         with self.device.stage("advect"):
-            advected, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
-            advect = self.device.pass_("step/advect.frag", **packing.defines)
-            advect((*advected.fields, self._departed), region=packing.region, rows_u=departing[0], rows_v=departing[1],
-                   trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
-        return advected
+            return self._advection.advect(w1, trace, math.exp(-self.params.drag * dt), target, packing)
 
-    def _diffuse(self, advected: PackedFaces, dt: float) -> PackedFaces:
-        """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled."""
-        assert advected is self._viscosity_solver.v_star
-        self._take_up_masks(dt)
+    def _diffuse(self, w2: Advected) -> PackedFaces:
+        """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled: equation (V1)."""
+        assert w2.faces is self._viscosity_solver.v_star
         with self.device.stage("diffuse"):
-            return self._viscosity_solver.solve()
+            w3 = self._viscosity_solver.solve()
+        if self.measuring:
+            self._viscosity_solver.unpack(w3, self.velocity.write)
+            left = self._viscosity_solver.residual_norm(self.velocity.write)
+            self.residuals = replace(self.residuals, viscous_residual=left)
+        return w3
 
-    def _bound_energy(self, diffused: PackedFaces) -> PackedFaces:
-        """w3, made smaller where it has more energy than departed: advection moves energy and viscosity takes it.
+    def _bound_energy(self, w3: PackedFaces, before: Field) -> PackedFaces:
+        """w3, made smaller if it has more energy than w1: equation (S5).
 
-        A semi-Lagrangian step reads some places more often than others and so may make energy; see equation (S6). Walls
-        that move may besides bring all of the fluid to their own speed.
+        Walls that move may besides bring all of the fluid to their own speed.
 
         Raises:
             ValueError: if what departed is not finite, or beyond all measure; the velocity stays as it was.
         """
         with self.device.stage("diffuse"):
-            energy = self.device.pass_("step/energy.frag")
-            energy(self._squares, **diffused.inputs(), departed=self._departed)
-            after, before = self._sum_of_squares(self._squares).tolist()
-            cells = self.grid.nx * self.grid.ny
-            if not (before <= cells * LARGEST_SPEED**2 and math.isfinite(after)):
+            try:
+                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.drag)))
+            except ValueError:
                 self._forget_last_step()
-                raise ValueError("the forces and brushes of this step are beyond all measure")
-            moved = max(map(abs, self.params.walls.drag))
-            most = math.sqrt(before) + moved * math.sqrt(cells)
-            if math.sqrt(after) <= most:
-                return diffused
-            scale = self.device.pass_("step/scale.frag")
-            scale(self._limited.fields, **diffused.inputs(), factor=most / math.sqrt(after))
-            return self._limited
+                raise
 
-    def _steered(self, diffused: PackedFaces, steer: Callable[[Field], None]) -> None:
-        """w3 in the hand of brushes: from here on it is what `velocity` holds."""
-        self._unpack(diffused)
-        steer(self.velocity.read)
-
-    def _project(self, diffused: PackedFaces | None, carried: bool = True) -> None:
-        """w4 = w3 - grad q with lap q = div w3 - source; w3 is what `velocity` holds, if it is not given."""
-        if self.measuring and diffused is not None:
-            self._unpack(diffused)
-            diffused = None
+    def _project(self, w3: PackedFaces | None = None, carries: bool = True) -> None:
+        """w4 = w3 - grad q with lap q = div w3 - source, and g for the next step; w3 is by default `velocity`."""
+        if self.measuring and w3 is not None:
+            self._unpack(w3)
+            w3 = None
         wanted = self.source.field.get() if self.measuring else None
         before = self._divergence_norm(wanted)
         with self.device.stage("project"):
             self._take_up_solids()
-            source = None if self.source.is_empty else self.source.field
             self._pressure_solver.project(
                 self.velocity,
                 self.params.pressure_cycles,
-                source,
+                None if self.source.is_empty else self.source.field,
                 warm=True,
-                carried=self._carried if carried else None,
-                packed=diffused,
+                carried=self._carried if carries else None,
+                packed=w3,
             )
             self.source.clear()
-            self._traced = None
-        self.residuals = Residuals(before, self._divergence_norm(wanted))
+            self._trace.forget()
+        after = self._divergence_norm(wanted)
+        self.residuals = replace(self.residuals, divergence_before=before, divergence_after=after)
 
     # -- its stages, each alone -------------------------------------------------------------------------------------
 
@@ -207,24 +156,26 @@ class Fluid(Scheme):
         if force := self._force(forces, check_step(dt)):
             self.device.pass_("step/add_impulse.frag")(self.velocity.read, add=True, **force)
         self.impulse.clear()
-        self._traced = None
+        self._trace.forget()
 
     def advect(self, dt: float) -> None:
         """Let the velocity carry itself for `dt` seconds; the result is not free of divergence."""
         dt = check_step(dt)
-        self._unpack(self._advect(self._depart(), dt))
+        w1 = self._advection.depart(self.velocity.read, self.params.walls)
+        self._unpack(self._advect(w1, dt).faces)
 
     def diffuse(self, dt: float) -> None:
         """Let viscosity act on the velocity for `dt` seconds; the result is not free of divergence."""
         self._take_up_masks(check_step(dt))
         with self.device.stage("diffuse"):
             self._viscosity_solver.diffuse(self.velocity)
-            self._traced = None
+            self._trace.forget()
 
     def project(self) -> None:
         """Make the velocity free of divergence, but for what brushes ask for."""
         self._check_source()
-        self._project(None, carried=False)
+        self.residuals = Residuals()
+        self._project(carries=False)
 
     def trace(self, dt: float) -> Field:
         """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells.
@@ -232,28 +183,24 @@ class Fluid(Scheme):
         Valid until the velocity changes. The next step follows it.
         """
         dt = check_step(dt)
-        if self._traced != dt:
-            self._traced, tracing = dt, self._tracing(self.faces(), dt)
+        if tracing := self._begin_own_trace(dt):
             with self.device.stage("trace"):
                 self.device.pass_("step/trace.frag", **tracing.defines)(tracing.target, **tracing.inputs)
-        return self._trace
+        return self._trace.field
 
     def begin_trace(self, dt: float) -> Tracing | None:
-        """The trace of what carries the picture, for whoever then draws it beside something else; None if it is `trace`
-        and that is there already.
-        """
-        if not self.local.is_empty:
-            self._traced = None  # what is drawn is not the fluid's own
-            return self._tracing(self.carrier(), dt)
-        if self._traced == dt:
-            return None
-        self._traced = dt
-        return self._tracing(self.faces(), dt)
+        """What it takes to draw the trace of what carries the picture, for whoever draws it beside something else now.
 
-    def _tracing(self, velocity: Field, dt: float) -> Tracing:
-        hx, hy = self.grid.spacing
-        inputs = {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **self._wall_inputs()}
-        return Tracing(self._trace, self._wall_defines(), inputs)
+        None if that is `trace`, and there already.
+        """
+        if self.local.is_empty:
+            return self._begin_own_trace(dt)
+        tracing = self._trace.begin(self.carrier(), dt, self.grid, self.params.walls)
+        self._trace.forget()  # it is not the fluid's own
+        return tracing
+
+    def _begin_own_trace(self, dt: float) -> Tracing | None:
+        return None if self._trace.is_of(dt) else self._trace.begin(self.faces(), dt, self.grid, self.params.walls)
 
     # -- what is put in ---------------------------------------------------------------------------------------------
 
@@ -299,21 +246,10 @@ class Fluid(Scheme):
     def flow_on(self, grid: Grid) -> Flow:
         """The flow on the faces of another grid of the same picture, which the caller releases; see `go_on_with`.
 
-        Where that is the same cells, moved by whole ones, it is the same to the bit, and else a mean over each face, so
-        that as much flows through it. Outside the fluid's own grid all is at rest.
+        Of the same cells, moved by whole ones, it is the same to the bit; see `Flow.resampled`.
         """
-        step = np.divide(grid.spacing, self.grid.spacing)
-        origin = np.subtract(grid.origin, self.grid.origin) / self.grid.spacing
-        is_moved = bool(np.allclose(step, 1.0, rtol=0.0, atol=1e-6))
-        if is_moved:
-            step, origin = np.ones(2), np.round(origin)
-        inputs: dict[str, Any] = {"origin": tuple(origin.tolist()), "step": tuple(step.tolist())}
-        inputs |= {"samples": tuple(np.maximum(np.ceil(step), 1.0).tolist()), **self._wall_inputs()}
-        carry_over, fields = self.device.pass_("step/carry_over.frag", **self._wall_defines()), []
-        for live in (self.velocity.read, self._carried.read)[: 2 if is_moved else 1]:
-            fields.append(self.device.field(grid.size, 2, f"{live.label}, carried over"))
-            carry_over(fields[-1], velocity=live, **inputs)
-        return Flow(self.time, *fields)
+        flow = Flow(self.time, self.velocity.read, self._carried.read)
+        return flow.resampled(self.device, self.grid, grid, self.params.walls)
 
     def go_on_with(self, flow: Flow) -> None:
         """Take over a flow on this grid, from `flow_on`, made free of divergence between its walls and solids."""
@@ -345,14 +281,14 @@ class Fluid(Scheme):
 
     def restore(self, state: State) -> None:
         super().restore(state)
-        self._traced = None
+        self._trace.forget()
 
     def release(self) -> None:
         super().release()
-        for item in (self.velocity, self._carried, *self._departing, self._trace, self._departed):
+        for item in (self.velocity, self._carried, self._trace, self._advection, self._energy_bound):
             item.release()
-        for item in (self._squares, self._sum_of_squares, self._limited, self._viscosity_solver, self._pressure_solver):
-            item.release()
+        self._viscosity_solver.release()
+        self._pressure_solver.release()
 
     def _live(self) -> dict[str, Field]:
         solvers = {"viscosity solver": self._viscosity_solver.state(), "pressure solver": self._pressure_solver.state()}
@@ -367,7 +303,7 @@ class Fluid(Scheme):
 
         More than one are added up where brushes draw.
         """
-        fields, faces = self._acting(forces, dt)
+        fields, faces = impulses(forces, self.grid, self.time, dt)
         upload = None if faces is None else self.device.upload(faces, "force")
         if upload:
             fields.append((upload, 1.0))
@@ -380,25 +316,10 @@ class Fluid(Scheme):
             upload.release()
         return {"force": fields[0][0], "impulse": fields[0][1]} if fields else {}
 
-    def _depart(self, **parts: Any) -> Rows:
-        """The velocity, less what is `carried` and with a `force`, if they are given, as advection reads it."""
-        rows, (nx, ny) = self._departing, self.grid.size
-        width, height = rows[0].size
-        # Texels whose faces are all inside: none beyond a wall or on it.
-        left, right, above, below = 2, (nx + 1) // 2, 3, ny + 2
-        inside = (left, above, right - left, below - above)
-        around = [(0, 0, width, above), (0, below, width, height - below)]
-        around += [(0, above, left, below - above), (right, above, width - right, below - above)]
-        given = {name.upper(): 1 for name in parts if name != "impulse"}
-        self.device.pass_("step/depart.frag", **given)(rows, region=inside, velocity=self.velocity.read, **parts)
-        edges = self.device.pass_("step/depart.frag", EDGES=1, **given, **self._wall_defines())
-        edges(rows, region=around, velocity=self.velocity.read, **parts, **self._wall_inputs())
-        return rows
-
     def _unpack(self, faces: PackedFaces) -> None:
         """Let packed faces be the velocity."""
         self._viscosity_solver.unpack(faces, self.velocity.read)
-        self._traced = None
+        self._trace.forget()
 
     def _check_source(self) -> None:
         if self.source.is_empty:
@@ -409,13 +330,9 @@ class Fluid(Scheme):
             self.source.clear()
             raise
 
-    def _viscous_residual(self, diffused: PackedFaces) -> float:
-        self._viscosity_solver.unpack(diffused, self.velocity.write)
-        return self._viscosity_solver.residual_norm(self.velocity.write)
-
     def _forget_last_step(self) -> None:
         self.impulse.clear()
-        self._traced = None
+        self._trace.forget()
         self._carried.read.clear()
         self._viscosity_solver.forget()
         self._pressure_solver.forget()

@@ -4,25 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil
-from numbers import Real
-from typing import Any
 
 import numpy as np
+
+from solver.limits import check_type
 
 SMALLEST_GRID = 8
 ROUNDING = 1e-9  # longer sides
 MOST_ALONG = 4096  # cells that a narrow picture gets along it: twice as many texels of the map a GL must have
-
-
-def check_type(what: str, value: object, kind: Any = Real) -> None:
-    """Make sure that a value is of a kind, by default a number.
-
-    Raises:
-        TypeError: if it is not.
-    """
-    if not isinstance(value, kind):
-        wanted = "number" if kind is Real else kind.__name__
-        raise TypeError(f"{what} is {value!r}, a {wanted} is wanted")
 
 
 @dataclass(frozen=True)

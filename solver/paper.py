@@ -7,12 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from solver.faces import Forces, Vector, impulses
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.grid import Grid, check_type
+from solver.grid import Grid
+from solver.limits import check_shape, check_size, check_step, check_type, real_array
 from solver.params import FluidParams
-from solver.scheme import Forces, Residuals, Scheme, Vector, check_shape, check_size, check_step, real_array
+from solver.scheme import Residuals, Scheme
 from solver.warp.map import Velocity, WarpMap
 
 
@@ -60,7 +62,7 @@ class PaperFluid(Scheme):
 
     def add_force(self, forces: Forces, dt: float) -> None:
         """w1 = w0 + dt f, f the sum of the forces and of what brushes have drawn."""
-        fields, faces = self._acting(forces, check_step(dt))
+        fields, faces = impulses(forces, self.grid, self.time, check_step(dt))
         with self.device.stage("add force"):
             if faces is not None:
                 upload = self.device.upload(faces, "force")
@@ -76,7 +78,7 @@ class PaperFluid(Scheme):
         """w2(x) = decay w1(x - dt w1(x)): first-order backtrace, bilinear."""
         dt = check_step(dt)
         with self.device.stage("advect"):
-            advect = self.device.pass_("paper/advect.frag", **self._wall_defines())
+            advect = self.device.pass_("paper/advect.frag", **self.params.walls.defines)
             decay = math.exp(-self.params.drag * dt)
             advect(self.velocity.write, velocity=self.velocity.read, dt_over_h=dt / self.grid.h, decay=decay)
             self.velocity.swap()
@@ -86,7 +88,7 @@ class PaperFluid(Scheme):
         dt = check_step(dt)
         with self.device.stage("diffuse"):
             self._before.copy_from(self.velocity.read)
-            sweep = self.device.pass_("paper/diffuse.frag", **self._wall_defines())
+            sweep = self.device.pass_("paper/diffuse.frag", **self.params.walls.defines)
             for _ in range(self.params.sweeps):
                 sweep(
                     self.velocity.write,
@@ -137,7 +139,7 @@ class PaperFluid(Scheme):
     # -- what is read out -------------------------------------------------------------------------------------------
 
     def faces(self) -> Field:
-        self.device.pass_("paper/to_faces.frag", **self._wall_defines())(self._faces, velocity=self.velocity.read)
+        self.device.pass_("paper/to_faces.frag", **self.params.walls.defines)(self._faces, velocity=self.velocity.read)
         return self._faces
 
     def carrier_at_centres(self) -> Field:
@@ -175,7 +177,7 @@ class PaperFluid(Scheme):
         add(self.velocity.read, add=True, force=faces, impulse=impulse)
 
     def _find_divergence(self) -> None:
-        divergence = self.device.pass_("paper/divergence.frag", **self._wall_defines())
+        divergence = self.device.pass_("paper/divergence.frag", **self.params.walls.defines)
         divergence(self._divergence, velocity=self.velocity.read, source=self.source.field, h=self.grid.h)
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+from solver.limits import LARGEST_SPEED
 
 
 class NoSlip(NamedTuple):
@@ -15,11 +17,6 @@ class NoSlip(NamedTuple):
     top: bool
     bottom: bool
     solids: bool
-
-
-# Longer sides per second, and as much for what is put in: the solvers multiply sums of squares over the grid, which
-# then stay below float32's 3e38.
-LARGEST_SPEED = 1e6
 
 
 @dataclass(frozen=True)
@@ -57,6 +54,18 @@ class Walls:
     def drag(self) -> tuple[float, ...]:
         """The speeds of the walls that it sticks to, 0 for the others."""
         return tuple(speed if sticks else 0.0 for speed, sticks in zip(self.speed, self.no_slip, strict=False))
+
+    @property
+    def defines(self) -> dict[str, Any]:
+        """The defines of `lib/walls.glsl`."""
+        return {"NO_SLIP": 1} if any(self.no_slip) else {}
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """The uniforms of `lib/walls.glsl`."""
+        if not any(self.no_slip):
+            return {}
+        return {"wall_speed": self.speed, "wall_image": tuple(-1.0 if side else 1.0 for side in self.no_slip[:4])}
 
     def __post_init__(self) -> None:
         if self.slip not in ("free", "none"):

@@ -1,34 +1,20 @@
-"""What a fluid scheme is: the stages of a step, what is put in, what is read out, and its state.
-
-Longer than most: beside the protocol it has all that both schemes share, so that neither of them repeats it, and the
-checks of what is put in.
-"""
+"""What a fluid scheme is: the stages of a step, what is put in, what is read out, and its state."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Self
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from solver.faces import Forces, Vector, check_field
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.tiled import SavedTiles, TiledField
-from solver.grid import Grid, check_type
-from solver.params import LARGEST_SPEED, FluidParams
-
-# Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below what float32 holds.
-LONGEST_STEP = 1e4
-LARGEST_VISCOSITY = 1e6
-
-# A vector on MAC faces: (ny, nx, 2), or a function (x, y, t) of arrays that gives both components.
-Vector = np.ndarray | Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
-
-# A force, lengths / s^2: a vector, or a field on faces with its time law integrated over the step, seconds.
-Force = Vector | tuple[Field, float]
-Forces = Vector | Iterable[Force]
+from solver.grid import Grid
+from solver.limits import LARGEST_VISCOSITY, check_finite, check_shape, check_type, real_array
+from solver.params import FluidParams
+from solver.state import State
 
 
 @dataclass(frozen=True)
@@ -58,93 +44,8 @@ class Motion:
     largest_speed: float
 
 
-@dataclass(frozen=True)
-class State:
-    """A copy of everything that later steps depend on, on the GPU; whoever has it releases it.
-
-    Attributes:
-        fields: the textures by name.
-        values: what is no texture, by name.
-        tiles: what is saved of tiled fields, by name.
-    """
-
-    fields: dict[str, Field]
-    values: dict[str, np.ndarray] = field(default_factory=dict)
-    tiles: dict[str, SavedTiles] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, device: Device, fields: Mapping[str, Field], **values: object) -> Self:
-        """Copy `fields` and `values`; a value that is None is left out."""
-        copies, tiles = dict[str, Field](), dict[str, SavedTiles]()
-        for name, live in fields.items():
-            if isinstance(live, TiledField):
-                tiles[name] = live.save()
-            else:
-                copies[name] = device.field(live.size, live.components, f"{live.label}, saved", live.dtype)
-                copies[name].copy_from(live)
-        given = {name: np.array(value) for name, value in values.items() if value is not None}
-        return cls(copies, given, tiles)
-
-    def write_to(self, fields: Mapping[str, Field]) -> None:
-        """Copy the saved textures back into the live ones of the same names.
-
-        Raises:
-            ValueError: if they are those of something else.
-        """
-        saved = {name: (item.size, item.components, item.dtype) for name, item in self.fields.items()}
-        saved |= {name: item.kind for name, item in self.tiles.items()}
-        kinds = {
-            name: item.kind if isinstance(item, TiledField) else (item.size, item.components, item.dtype)
-            for name, item in fields.items()
-        }
-        if saved != kinds:
-            raise ValueError("the state is of another grid or of another scheme")
-        for name, live in fields.items():
-            if isinstance(live, TiledField):
-                live.restore(self.tiles[name])
-            else:
-                live.copy_from(self.fields[name])
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Everything in it by name, off the GPU; of tiled fields what is not zero."""
-        tiles = {f"{name}/{part}": a for name, item in self.tiles.items() for part, a in item.arrays().items()}
-        return {name: saved.get() for name, saved in self.fields.items()} | tiles | self.values
-
-    def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> State:
-        """A state like this one that holds what `arrays()` gave.
-
-        Raises:
-            ValueError: if those were of something else.
-        """
-        rest, fields, tiles = dict(arrays), dict[str, Field](), dict[str, SavedTiles]()
-        made = State(fields, rest, tiles)
-        try:
-            for name, saved in self.fields.items():
-                given, now = rest.pop(name, None), saved.get()
-                if given is None or (given.shape, given.dtype) != (now.shape, now.dtype):
-                    raise ValueError(f"its {name} is missing or of another size")
-                fields[name] = device.upload(given, f"{saved.label}, given", saved.dtype)
-            for name, saved in self.tiles.items():
-                parts = {key.removeprefix(f"{name}/"): rest.pop(key) for key in arrays if key.startswith(f"{name}/")}
-                tiles[name] = saved.with_arrays(device, parts)
-        except ValueError:
-            made.release()
-            raise
-        return made
-
-    @property
-    def textures(self) -> list[Field]:
-        """The textures that it holds, alone or, of tiled fields, together with other states."""
-        return [*self.fields.values(), *(texture for saved in self.tiles.values() for texture in saved.textures)]
-
-    def release(self) -> None:
-        """Free the textures that no other state holds."""
-        for saved in (*self.fields.values(), *self.tiles.values()):
-            saved.release()
-
-
-class Gathered:
-    """A field that is drawn into between two steps, by addition, and used up by the next."""
+class Additions:
+    """A field that is added to between two steps, and used up by the next."""
 
     def __init__(self, device: Device, size: tuple[int, int], components: int, label: str) -> None:
         self.field = device.field(size, components, label)
@@ -192,9 +93,9 @@ class Scheme(ABC):
         self.time = 0.0
         self.viscosity = device.field(grid.size, 1, "viscosity")
         self.solid = device.field(grid.size, 1, "solid", "f1")
-        self.impulse = Gathered(device, grid.size, 2, "impulse")
-        self.source = Gathered(device, grid.size, 1, "divergence source")
-        self.local = Gathered(device, grid.size, 2, "local motion")
+        self.impulse = Additions(device, grid.size, 2, "impulse")
+        self.source = Additions(device, grid.size, 1, "divergence source")
+        self.local = Additions(device, grid.size, 2, "local motion")
         self._carrier = device.field(grid.size, 2, "what carries the picture")
         self.measuring = False
         self.residuals = Residuals()
@@ -376,107 +277,3 @@ class Scheme(ABC):
             f"{self.params.walls.slip}-slip walls, energy {motion.kinetic_energy:.4g}, "
             f"fastest {motion.largest_speed:.4g} sides / s)".replace("none-slip", "no-slip")
         )
-
-    # -- for the schemes --------------------------------------------------------------------------------------------
-
-    def _acting(self, forces: Forces, dt: float) -> tuple[list[tuple[Field, float]], np.ndarray | None]:
-        """Forces as fields with their impulses, and the velocity, (ny, nx, 2), that all others make in `dt`."""
-        fields, total = list[tuple[Field, float]](), None
-        several = [forces] if isinstance(forces, np.ndarray) or callable(forces) else forces
-        check_type("what forces the fluid", several, Iterable)
-        for force in several:
-            if isinstance(force, tuple):
-                field, impulse = force
-                check_field("a force", field, self.grid)
-                check_finite("a force's impulse", impulse)
-                if impulse != 0.0:
-                    fields.append((field, float(impulse)))
-            else:
-                faces = dt * on_faces("a force", force, self.grid, self.time + dt / 2)
-                check_size("what a force adds to the velocity", faces)
-                total = faces if total is None else total + faces
-        return fields, total
-
-    def _wall_defines(self) -> dict[str, Any]:
-        return {"NO_SLIP": 1} if any(self.params.walls.no_slip) else {}
-
-    def _wall_inputs(self) -> dict[str, Any]:
-        walls = self.params.walls
-        if not any(walls.no_slip):
-            return {}
-        return {"wall_speed": walls.speed, "wall_image": tuple(-1.0 if side else 1.0 for side in walls.no_slip[:4])}
-
-
-def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.ndarray:
-    """A vector on MAC faces as (ny, nx, 2) float32: u on left faces, v on upper ones.
-
-    Raises:
-        ValueError: on another shape or a value that is not finite.
-    """
-    if callable(vector):
-        both = vector(*grid.u_faces(), time), vector(*grid.v_faces(), time)
-        if {len(parts) for parts in both} != {2}:
-            raise ValueError(f"{what} has two components, and the function gave {len(both[0])}")
-        shape = grid.ny, grid.nx
-        array = np.stack([np.broadcast_to(parts[axis], shape) for axis, parts in enumerate(both)], axis=-1)
-    else:
-        array = vector
-    array = real_array(what, array)
-    check_shape(what, array, (grid.ny, grid.nx, 2))
-    if not np.isfinite(array).all():
-        raise ValueError(f"{what} holds a value that is not finite")
-    return array.astype(np.float32)
-
-
-def real_array(what: str, values: object) -> np.ndarray:
-    """Values as an array.
-
-    Raises:
-        ValueError: if they are no real numbers, or rows of them are of unequal length.
-    """
-    try:
-        array = np.asarray(values)
-    except ValueError:
-        raise ValueError(f"{what} has rows of unequal length") from None
-    if array.dtype.kind not in "fiub":
-        raise ValueError(f"{what} is of {array.dtype}, real numbers are wanted")
-    return array
-
-
-def check_step(dt: float) -> float:
-    """A time step, if it is one.
-
-    Raises:
-        ValueError: if it is not from 0 to `LONGEST_STEP` seconds.
-        TypeError: if it is no number.
-    """
-    check_type("a step", dt)
-    if not 0 <= dt <= LONGEST_STEP:
-        raise ValueError(f"a step of {dt} s was asked for; it must be from 0 to {LONGEST_STEP:g} s")
-    return float(dt)
-
-
-def check_finite(what: str, value: float) -> None:
-    """Make sure that a number is finite, and no larger than `LARGEST_SPEED`."""
-    check_type(what, value)
-    if not abs(value) <= LARGEST_SPEED:
-        raise ValueError(f"{what} of {value} was given; it must be finite and no larger than {LARGEST_SPEED:g}")
-
-
-def check_size(what: str, array: np.ndarray) -> None:
-    """Make sure that nothing in an array is faster than `LARGEST_SPEED`."""
-    if not (np.abs(array) <= LARGEST_SPEED).all():
-        raise ValueError(f"{what} is beyond {LARGEST_SPEED:g} longer sides per second somewhere, or not finite")
-
-
-def check_shape(what: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
-    """Make sure that an array has a shape."""
-    if array.shape != shape:
-        raise ValueError(f"{what} of shape {array.shape} was given, {shape} is wanted")
-
-
-def check_field(what: str, field: Field, grid: Grid) -> None:
-    """Make sure that a field is a vector on the faces of a grid."""
-    check_type(what, field, Field)
-    if field.size != grid.size or field.components != 2:
-        raise ValueError(f"{what} is {field}, {grid.nx} x {grid.ny} x 2 is wanted")

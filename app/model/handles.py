@@ -12,14 +12,13 @@ from pydantic import Field, model_validator
 
 from app.model.sampling import Point
 from app.model.schema import Fraction01, Model
+from solver.limits import LARGEST_LEAD
 
 MOST_HANDLES = 64  # with the pins
 ARRIVED = 0.001  # longer sides: half a pixel of 512
 # Radii that two places are apart at which they are the same; how many times farther apart, or nearer, neighbours may be
 # led.
 SAME, MOST_STRETCH = 0.05, 4.0
-
-LONGEST_WAY = 2.0  # radii that a handle is led
 
 Time = Annotated[float, Field(ge=0, le=1_000_000)]
 
@@ -99,9 +98,9 @@ def objections(
             yield f"{label} is led to the picture's edge only: {_shown(one.to)} is outside the picture"
         elif (
             isinstance(one, RecipeHandle)
-            and (far := hypot(*_between(one.to, one.at, extent)) / one.radius) > LONGEST_WAY
+            and (far := hypot(*_between(one.to, one.at, extent)) / one.radius) > LARGEST_LEAD
         ):
-            yield f"{label} is led {LONGEST_WAY:g} of the {far:.3g} radii of its way only; give it a larger radius"
+            yield f"{label} is led {LARGEST_LEAD:g} of the {far:.3g} radii of its way only; give it a larger radius"
     inside = [(label, one) for label, one in led if is_inside(one.at)]
     for (label, one), (other_label, other) in combinations(inside, 2):
         if max(one.start, other.start) < min(one.end or inf, other.end or inf):

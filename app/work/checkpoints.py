@@ -12,7 +12,7 @@ import numpy as np
 from app.model.recipe import Recipe
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.scheme import State
+from solver.state import State
 
 DEFAULT_BUDGET = 512 * 2**20
 

@@ -34,7 +34,7 @@ from solver.gl.field import Field, FieldError
 from solver.grid import SMALLEST_GRID, Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
-from solver.scheme import State
+from solver.state import State
 from solver.warp.accumulated import map_size
 from solver.warp.density import Density
 from solver.warp.map import WarpMap

@@ -14,7 +14,8 @@ from solver.brush.twirl import Twirl
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.reduction import Reduction
-from solver.scheme import Scheme, check_finite
+from solver.limits import check_finite
+from solver.scheme import Scheme
 from solver.warp.map import WarpMap
 
 Motion = Push | Twirl

@@ -11,17 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.brush.tip import FARTHEST, Point, Tip
+from solver.faces import Forces
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.scheme import Forces, Scheme, State, check_step
+from solver.limits import LARGEST_LEAD, check_step
+from solver.scheme import Scheme
+from solver.state import State
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
 # Radii that a handle goes in a tick at most: what lies under its brush must still do so in the next.
 FARTHEST_STEP = 0.25
-# Radii of a handle's way at most: farther, a push draws what it leads out into threads finer than the map.
-LONGEST_WAY = 2.0
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
@@ -270,7 +271,7 @@ class Handles:
         for row, number in enumerate(numbers):
             handle, start, place = self.handles[number], self._starts[number], self._places[number]
             way = np.zeros(2) if handle.to is None else np.subtract(handle.to, start)
-            way = way * min(1.0, LONGEST_WAY * handle.radius / max(float(np.hypot(*way)), 1e-30))
+            way = way * min(1.0, LARGEST_LEAD * handle.radius / max(float(np.hypot(*way)), 1e-30))
             now, then = handle.passed(time), handle.passed(time + dt)
             back = start + now * way - place
             most = FARTHEST_STEP * handle.radius

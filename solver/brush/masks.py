@@ -15,7 +15,9 @@ from solver.gl.field import Field, FieldPool
 from solver.gl.passes import Blend, Region
 from solver.gl.tiled import TILE, Kind, SavedTiles, TiledField
 from solver.grid import Grid
-from solver.scheme import LARGEST_VISCOSITY, Scheme, State, check_finite
+from solver.limits import LARGEST_VISCOSITY, check_finite
+from solver.scheme import Scheme
+from solver.state import State
 
 # Thickness is kept in 16 bits: so many steps a decade and the step that is zero leave room for 3 decades that painting
 # may thin by and 5 that it may thicken by; `lib/decades.glsl` has them too.

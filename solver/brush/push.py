@@ -10,7 +10,7 @@ from solver.brush.tip import Point, Tip
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.scheme import check_finite, check_step
+from solver.limits import check_finite, check_step
 from solver.warp.map import WarpMap
 
 # A push slips so that what it draws out does not become thinner than the map can tell: there the map would fold.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from solver.brush.tip import Tip
-from solver.scheme import check_finite
+from solver.limits import check_finite
 
 
 @dataclass(frozen=True)

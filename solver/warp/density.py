@@ -7,7 +7,8 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.scheme import LARGEST_VISCOSITY, State, check_shape, check_step
+from solver.limits import LARGEST_VISCOSITY, check_shape, check_step
+from solver.state import State
 
 DIFFUSION_SWEEPS = 20
 

@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.faces import check_field, on_faces
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldError
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
-from solver.grid import Grid, check_type
-from solver.scheme import Scheme, State, check_field, check_step, on_faces, real_array
+from solver.grid import Grid
+from solver.limits import check_step, check_type, real_array
+from solver.scheme import Scheme
+from solver.state import State
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen

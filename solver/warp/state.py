@@ -9,7 +9,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.tiled import TILE, Kind, SavedTiles
 from solver.grid import Grid
-from solver.scheme import State
+from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 

@@ -11,8 +11,8 @@ from properties import viscosity
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
+from solver.limits import LARGEST_VISCOSITY, LONGEST_STEP
 from solver.params import FluidParams, Walls
-from solver.scheme import LARGEST_VISCOSITY, LONGEST_STEP
 
 
 # Of the others a spiral and snakes once took 12 to 14 iterations, and a contrast of 1e8 or a solid left 9 to 90 %.

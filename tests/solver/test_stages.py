@@ -38,7 +38,7 @@ def test_trace_and_advect(device: Device, nx: int, ny: int, walls: Walls, couran
     fluid._carried.read.set(carried)
     dt = courant * fluid.grid.h
     departing = fluid._add_force([(device.upload(force), 0.3)], dt)
-    fluid._viscosity_solver.unpack(fluid._advect(departing, dt), fluid.velocity.read)
+    fluid._viscosity_solver.unpack(fluid._advect(departing, dt).faces, fluid.velocity.read)
     after = fluid.velocity.read.get()
     wanted = reference.advect(faces, courant, 0.3 * force - carried, no_slip=walls.no_slip, speed=walls.speed) * np.exp(
         -0.5 * dt

@@ -11,7 +11,7 @@ from app.model.recipe import Recipe
 from app.work.checkpoints import Checkpoint, Checkpoints, Moment
 from solver.gl.device import Device
 from solver.gl.tiled import TiledField
-from solver.scheme import State
+from solver.state import State
 
 SIZE = 100, 70
 SIDE = 32

@@ -1,4 +1,4 @@
-// Carry over: the velocity on the faces of a grid, from that on those of another grid of the same picture: the mean of
+// Resample: the velocity on the faces of a grid, from that on those of another grid of the same picture: the mean of
 // u_samples places along a face, bilinear, and at rest outside the other grid.
 // u_velocity: MAC faces, lengths / s; u_origin: where this grid begins on the other one, in its cells; u_step: this grid's
 // cells in its cells.

@@ -1,0 +1,70 @@
+"""Advection: the fluid carries itself, semi-Lagrangian and cubic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.packing import PackedFaces, Packing
+from solver.params import Walls
+
+
+@dataclass(frozen=True)
+class Rows:
+    """w1, four faces of a row a texel, as the cubic reads it; see `depart.frag`."""
+
+    u: Field
+    v: Field
+
+
+@dataclass(frozen=True)
+class Advected:
+    """w2 on packed faces, and |w1|^2 of the faces in each texel, which bounds what w3 may have."""
+
+    faces: PackedFaces
+    energy: Field
+
+
+class Advection:
+    """w2(x) = decay w1(x_d) on packed faces, from w1 = w0 - g + dt f.
+
+    Args:
+        device: the device.
+        size: (nx, ny) cells.
+        packed: (width, height) of packed faces.
+    """
+
+    def __init__(self, device: Device, size: tuple[int, int], packed: tuple[int, int]) -> None:
+        self.device = device
+        self.size = nx, ny = size
+        laid = nx // 2 + 3, ny + 4
+        self._rows = Rows(device.field(laid, 4, "rows of u"), device.field(laid, 4, "rows of v"))
+        self._energy = device.field(packed, 1, "energy before advection")
+
+    def depart(self, velocity: Field, walls: Walls, **terms: Any) -> Rows:
+        """w1, from w0 on MAC faces and, if they are given, `carried`, and `force` and its `impulse`."""
+        targets, (nx, ny) = (self._rows.u, self._rows.v), self.size
+        width, height = self._rows.u.size
+        # Texels whose faces are all inside: none beyond a wall or on it.
+        left, right, above, below = 2, (nx + 1) // 2, 3, ny + 2
+        inside = (left, above, right - left, below - above)
+        around = [(0, 0, width, above), (0, below, width, height - below)]
+        around += [(0, above, left, below - above), (right, above, width - right, below - above)]
+        defines = {name.upper(): 1 for name in terms if name != "impulse"}
+        self.device.pass_("step/depart.frag", **defines)(targets, region=inside, velocity=velocity, **terms)
+        edges = self.device.pass_("step/depart.frag", EDGES=1, **defines, **walls.defines)
+        edges(targets, region=around, velocity=velocity, **terms, **walls.inputs)
+        return self._rows
+
+    def advect(self, w1: Rows, trace: Field, decay: float, target: PackedFaces, packing: Packing) -> Advected:
+        """Draw w2 into `target`: each component `decay` times what it is where its own face departs."""
+        advect = self.device.pass_("step/advect.frag", **packing.defines)
+        targets = *target.fields, self._energy
+        advect(targets, region=packing.region, rows_u=w1.u, rows_v=w1.v, trace=trace, decay=decay, **packing.open)
+        return Advected(target, self._energy)
+
+    def release(self) -> None:
+        for field in (self._rows.u, self._rows.v, self._energy):
+            field.release()
