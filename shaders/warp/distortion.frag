@@ -1,5 +1,6 @@
 // Distortion: how the map x + D(x) stretches and folds, by the chain rule: J is the product of the Jacobians of its parts
 // (lib/warp.glsl), each by the derivatives of the cubic both ways, so that nothing depends on how far apart the places are.
+// With HELD, where the map is held, by those of what is kept of it.
 // x: see lib/place.glsl.
 // largest: (-det J, det J, |D|), to be reduced to the largest of each;
 // total: (1 where det J <= 0, |D|, |det J - 1|), to be reduced to their sums.
@@ -19,9 +20,17 @@ float stretch_of(sampler2D submap, vec4 window, vec2 x, inout vec2 moved) {
     return determinant(mat2(1.0) + at.z * mat2(slope[0] * density.x, slope[1] * density.y));
 }
 
-void main() {
-    vec2 x = fragment_place() * u_picture, size = vec2(textureSize(u_accumulated, 0)), density = size / u_picture;
-    vec2 moved = vec2(0.0);
+// Determinant of the whole map's Jacobian at x; D(x) goes to `moved`.
+float determinant_at(vec2 x, out vec2 moved) {
+    mat2 slope;
+    vec2 size = vec2(textureSize(u_accumulated, 0)), density = size / u_picture;
+    moved = vec2(0.0);
+#ifdef HELD
+    if (is_held(x * density)) {
+        moved = cubic_displacement(u_kept, on_texel(x * density), slope);
+        return determinant(mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y));
+    }
+#endif
     float change = stretch_of(u_submap, u_window, x, moved);
 #if LEVELS > 1
     change *= stretch_of(u_second, u_second_window, x, moved);
@@ -29,10 +38,13 @@ void main() {
 #if LEVELS > 2
     change *= stretch_of(u_third, u_third_window, x, moved);
 #endif
-    mat2 slope;
-    vec2 more = cubic_displacement(u_accumulated, (x + moved) * density, slope);
-    change *= determinant(mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y));
-    float far = length(moved + more);
+    moved += cubic_displacement(u_accumulated, (x + moved) * density, slope);
+    return change * determinant(mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y));
+}
+
+void main() {
+    vec2 moved;
+    float change = determinant_at(fragment_place() * u_picture, moved), far = length(moved);
     out_largest = vec4(-change, change, far, 0.0);
     out_total = vec4(change <= 0.0 ? 1.0 : 0.0, far, abs(change - 1.0), 0.0);
 }

@@ -417,6 +417,33 @@ def test_what_is_frozen_while_the_map_is_made_anew_is_taken_in_once(device: Devi
         warp.advance_prescribed(lambda x, y, t: (0 * x, 0 * y), 0.04)
 
 
+def test_the_distortion_of_what_is_frozen_is_that_of_what_is_looked_up(device: Device) -> None:
+    grid = Grid(64, 64)
+    masks, fluid, warp = Masks(device, grid), Fluid(device, grid), WarpMap(device, grid)
+    fluid.set_velocity(lambda x, y, t: vortex(x, y, 0.0))
+    for _ in range(20):
+        fluid.step(1 / 30)
+        warp.follow(fluid, 1 / 30)
+    x, y = grid.centres()
+    disc = np.hypot(x - 0.6, y - 0.5) < 0.12
+    masks.set_frozen(disc)
+    masks.apply(fluid)
+    warp.hold(device.upload(disc.astype(np.uint8) * 255))
+    points = np.array([0.6, 0.5]) + np.random.default_rng(1).uniform(-0.06, 0.06, (200, 2))
+    before, step = warp.determinants(points), 1 / 2048
+    for _ in range(20):
+        fluid.step(1 / 30)
+        warp.follow(fluid, 1 / 30)
+    warp.remap()
+    np.testing.assert_array_equal(warp.determinants(points), before)
+    across, down = (
+        (warp.at(points + ahead).astype(np.float64) - warp.at(points - ahead)) / (2 * step)
+        for ahead in step * np.eye(2)
+    )
+    differences = np.linalg.det(np.stack([across, down], axis=-1) + np.eye(2))
+    assert np.median(np.abs(before - differences)) < 1e-3
+
+
 def window(whole: Grid, left: int, top: int, nx: int, ny: int) -> Grid:
     """Some cells of a grid."""
     hx, hy = whole.spacing
