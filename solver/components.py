@@ -6,7 +6,7 @@ import numpy as np
 
 
 def connected_components(root: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """For each vertex the smallest number it is connected to, as in `root` before and by the links `one` to `other`."""
+    """For each vertex the smallest number it is connected to, as in `root` before and by the edges `one` to `other`."""
     while True:
         a, b = root[one], root[other]
         apart = a != b
@@ -14,7 +14,7 @@ def connected_components(root: np.ndarray, one: np.ndarray, other: np.ndarray) -
             return root
         a, b, one, other = a[apart], b[apart], one[apart], other[apart]
         root = root.copy()
-        # Links are hung on the representatives, and the ways to these halved: the rounds grow as the logarithm.
+        # Edges are hung on the representatives, and the paths to these halved: the rounds grow as the logarithm.
         np.minimum.at(root, np.maximum(a, b), np.minimum(a, b))
         while (root != root[root]).any():
             root = root[root]

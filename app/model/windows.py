@@ -18,7 +18,7 @@ from solver.grid import SMALLEST_GRID, Grid
 
 CELLS = 192  # along a side of a window; its levels divide it by two down to three
 # Cells a brush's radius. Each detail serves brushes up to a third larger, so that not every one has another lattice; a
-# window is 12 to 16 radii wide, where it is off the whole picture's by half a percent (solver/README.md).
+# window is 12 to 16 radii wide, where it is off the whole picture's by half a percent (solver/MEASURED.md).
 LEAST_PER_RADIUS, STEP = 12.0, 4 / 3
 # How much finer than the whole picture's cells those of a window must be to be worth it.
 FINER = 1.5

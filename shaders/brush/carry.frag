@@ -1,4 +1,4 @@
-// Carry: the local part of a push, g F and nothing beside it, drawn with additive blending; less its image beyond a wall
+// Carry: the local part of a push, b F and nothing beside it, drawn with additive blending; less its image beyond a wall
 // that it pushes at or from, so that it comes to rest there smoothly.
 // u_motion: the fluid at the brush, from probe; u_slip: from slip; u_brush_velocity: lengths / s, the local part of it;
 // u_viscosity: cells, lengths^2 / s: what is thicker than at the brush is carried less.

@@ -1,6 +1,6 @@
 // Curl: the flow of a stream function at the nodes, u = dpsi/dy, v = -dpsi/dx, drawn with additive blending; exactly free
 // of divergence. The faces of walls stay at rest.
-// u_stream: nodes, one more each way than there are cells, lengths^2 / s; u_spacing: sides of a cell, lengths.
+// u_stream: nodes, one more along each axis than there are cells, lengths^2 / s; u_spacing: sides of a cell, lengths.
 // reads: 3
 uniform sampler2D u_stream;
 uniform vec2 u_spacing;

@@ -1,4 +1,4 @@
-// Bloat or pinch: a divergence source under the brush, 1 / s, drawn with additive blending.
+// Expand: bloat or pinch, a divergence source under the brush, 1 / s, drawn with additive blending.
 // u_rate: the source at the brush's centre, 1 / s; negative pinches.
 // reads: 0
 #include "lib/brush.glsl"

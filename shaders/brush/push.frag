@@ -1,5 +1,5 @@
 // Push: make the fluid under the brush move with it, drawn with additive blending.
-//   dv = curl psi,  psi = g (dF x r),  dF = gain part strength (slip v_brush - v_fluid(centre)),       (B1)
+//   dv = curl psi,  psi = b (dF x r),  dF = gain part strength (slip v_brush - v_fluid(centre)),       (B1)
 // r from the nearest point of the path: the discrete curl of a stream function at the nodes, so exactly free of
 // divergence; at the path dv = dF.
 // u_motion: the fluid's motion at the brush, from probe; u_slip: from slip; u_part: from restrain; u_brush_velocity:

@@ -2,7 +2,7 @@
 // picture, less the more radii it has come with the brush already and the more the push would stretch what is stretched
 // several times over. Drawn out without end, it would become thinner than a cell, and the map fold there.
 //   dC/dt = -(grad v)^T C - C grad v,  C = J^T J,  J = I + grad D:  growth = -2 (C : grad v) / tr C for the brush's own
-//   flow v = curl (g (F x r)), F a unit, so in e-folds of C a radius of the way; strain = sqrt(tr C / 2) growth where
+//   flow v = curl (b (F x r)), F a unit, so in e-folds of C a radius of the path; strain = sqrt(tr C / 2) growth where
 //   that is positive, in the mean over the brush of its fourth power.
 // What is pushed back to where it came from becomes shorter again, and is held as firmly as at first.
 // u_around: the warp map's displacement on a lattice around the brush, longer sides, its texels 1 / fine of the radius
@@ -24,7 +24,7 @@ int fine() { return textureSize(u_around, 0).x / 2 - 1; }
 
 vec2 displacement(ivec2 node) { return texelFetch(u_around, node + fine() + 1, 0).rg / u_radius; }
 
-float by_way(vec2 back, vec2 ahead) {
+float by_path(vec2 back, vec2 ahead) {
     float far = length(back);
     if (far == 0.0) return 1.0;
     float along = 1.0 - smoothstep(0.0, 1.0, dot(back, ahead) / far);
@@ -63,5 +63,5 @@ float by_strain(vec2 ahead) {
 void main() {
     float speed = length(u_brush_velocity);
     vec2 ahead = u_brush_velocity / max(speed, 1e-9);
-    out_slip = speed == 0.0 ? 1.0 : by_way(displacement(ivec2(0)), ahead) * by_strain(ahead);
+    out_slip = speed == 0.0 ? 1.0 : by_path(displacement(ivec2(0)), ahead) * by_strain(ahead);
 }

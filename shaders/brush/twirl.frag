@@ -1,4 +1,4 @@
-// Twirl: make the fluid under the brush turn at a rate, drawn with additive blending: dv = gain domega g(r) (-y, x).
+// Twirl: make the fluid under the brush turn at a rate, drawn with additive blending: dv = gain domega b(r) (-y, x).
 // u_motion: the fluid's motion at the brush, from probe; u_rate: wanted rotation, rad / s, positive clockwise.
 // reads: 1, and 10 when ATTENUATED
 #include "lib/brush.glsl"

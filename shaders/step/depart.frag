@@ -14,7 +14,7 @@ uniform float u_impulse;
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
 
-vec2 departing(vec2 place) {
+vec2 advected_velocity(vec2 place) {
     vec2 w = texture(u_velocity, place).rg;
 #ifdef CARRIED
     w -= texture(u_carried, place).rg;
@@ -32,11 +32,11 @@ vec2 face(vec2 cell, vec2 size) {
                         image_tangential(cell.y, size.y, u_wall_image.zw, u_wall_speed.zw, sign_u_across, added_u));
     vec2 image_v = vec2(image_tangential(cell.x, size.x, u_wall_image.xy, u_wall_speed.xy, sign_v_across, added_v),
                         image_normal(cell.y, size.y, sign_v));
-    return vec2(sign_u * (sign_u_across * departing((image_u + 0.5) / size).x + added_u),
-                sign_v * (sign_v_across * departing((image_v + 0.5) / size).y + added_v));
+    return vec2(sign_u * (sign_u_across * advected_velocity((image_u + 0.5) / size).x + added_u),
+                sign_v * (sign_v_across * advected_velocity((image_v + 0.5) / size).y + added_v));
 }
 #else
-vec2 face(vec2 cell, vec2 size) { return departing((cell + 0.5) / size); }
+vec2 face(vec2 cell, vec2 size) { return advected_velocity((cell + 0.5) / size); }
 #endif
 
 void main() {

@@ -96,7 +96,7 @@ Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, out Faces here, out Fa
                  here.v + vec4(above.zw, yy.xy) - yy + u_shear.y * (xy - vec4(xy.y, right.x, xy.w, right.z)));
 }
 #else
-// The same, the stresses made on the way. 12 reads, and 6 of textures of K.
+// The same, the stresses made along with it. 12 reads, and 6 of textures of K.
 Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {
     vec2 x = vec2(1.0 / float(textureSize(fu, 0).x), 0.0), y = vec2(0.0, 1.0 / float(textureSize(fu, 0).y));
     vec4 u = texture(fu, at), v = texture(fv, at);

@@ -38,7 +38,7 @@ class Brush:
     def lead(self, fluid: Scheme, motion: Motion, gain: float = 1.0, warp: WarpMap | None = None) -> None:
         """Add to the fluid's next step what it lacks of a motion, `gain` times (see `gain_compensation`).
 
-        With `warp`, the picture's map, a push lets slip what has come a long way with it already, and what it would
+        With `warp`, the picture's map, a push lets slip what has come a long path with it already, and what it would
         stretch too far.
         """
         check_finite("a gain", gain)
@@ -127,7 +127,7 @@ class Brush:
             self._take_back(fluid, motion.tip, faces, np.where(glides, given, 0.0))
 
     def _take_back(self, fluid: Scheme, tip: Tip, faces: Field, given: np.ndarray) -> None:
-        """Add what has the opposite momentum of `given`, a sum over the faces, around the end of the tip's way.
+        """Add what has the opposite momentum of `given`, a sum over the faces, around the end of the tip's path.
 
         A curl within the fluid has none. But where the picture's edge cuts through it and the fluid glides, some is
         left, and drives the fluid along the edge as far as that goes: what is driven falls off with the logarithm of

@@ -47,7 +47,7 @@ class Handle:
         to: where to; None for a pin, which stays where it is at its start.
         radius: how far its brush reaches.
         start: when it begins.
-        duration: of the way, which begins and ends softly.
+        duration: of the path, which begins and ends softly.
         end: when it lets go; until then it stays where it has arrived.
         stiffness: 1 is led exactly; with less it gives way to the fluid and to the others.
         local: the part of its motion, 0-1, that carries what is under it alone; see `Push`.
@@ -107,7 +107,7 @@ class Lead(NamedTuple):
 
 
 class Handles:
-    """Leads handles together through a fluid: see *Handles* in solver/README.md.
+    """Leads handles together through a fluid: see *Handles* in README.md.
 
     Where they are is found in every step by inverting the map, so that no error adds up.
 

@@ -15,16 +15,16 @@ from solver.warp.map import WarpMap
 
 # A push slips so that what it draws out does not become thinner than the map can tell: there the map would fold.
 #
-# 1. By the brush's own way: it holds fast for FIRM radii, and in the end gives LOOSEST of its speed; one over a square
+# 1. By the brush's own path: it holds fast for FIRM radii, and in the end gives LOOSEST of its speed; one over a square
 #    in between. Else a long stroke would draw out what lay at its start into a thread.
 FIRM, LOOSEST = 0.7, 0.3
-# 2. By the way that the picture under it has come with it, in this stroke or before: the same law. What is pushed back
+# 2. By the path that the picture under it has come with it, in this stroke or before: the same law. What is pushed back
 #    to where it came from becomes shorter again and is held as firmly as at first.
 FIRM_CARRIED, LOOSEST_CARRIED = 0.5, 0.5
-# 3. By strain, in e-folds a radius of the way times how far the picture is stretched already: where a push with all of
+# 3. By strain, in e-folds a radius of the path times how far the picture is stretched already: where a push with all of
 #    the strain limit begins to slip, and where it gives nothing.
 SLIPPING, HELD_OFF = 4.0, 5.25
-# The strain limit: its part at the beginning of a stroke; the radii of the way in which as much is added; and how much
+# The strain limit: its part at the beginning of a stroke; the radii of the path in which as much is added; and how much
 # less for every radius that the fluid will go on without the brush, after the first. Found, as all of these, by making
 # the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
 BEGINNING, GAINING, COASTING = 0.68, 6.0, 3.0

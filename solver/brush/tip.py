@@ -1,4 +1,4 @@
-"""A brush tip on its way."""
+"""A brush tip on its path."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NEAR = 4.0
 
 @dataclass(frozen=True)
 class Tip:
-    """A brush tip on its way from `start` to `end` within one tick.
+    """A brush tip on its path from `start` to `end` within one tick.
 
     Attributes:
         start, end: places, in lengths (the longer side of the picture is 1), y down.
@@ -51,7 +51,7 @@ class Tip:
 
     @property
     def wide(self) -> Tip:
-        """The soft one on the same way under which it takes back."""
+        """The soft one on the same path under which it takes back."""
         return replace(self, radius=NEAR * self.radius, hardness=0.0)
 
     def inputs(self, grid: Grid) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Pictures on their way to the GPU and back."""
+"""Pictures that go to the GPU and back."""
 
 from __future__ import annotations
 

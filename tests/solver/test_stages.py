@@ -37,8 +37,8 @@ def test_trace_and_advect(device: Device, nx: int, ny: int, walls: Walls, couran
     assert relative(fluid.trace(courant * fluid.grid.h).get(), traced) < 1e-4
     fluid._carried.read.set(carried)
     dt = courant * fluid.grid.h
-    departing = fluid._add_force([(device.upload(force), 0.3)], dt)
-    fluid._viscosity_solver.unpack(fluid._advect(departing, dt).faces, fluid.velocity.read)
+    w1 = fluid._add_force([(device.upload(force), 0.3)], dt)
+    fluid._viscosity_solver.unpack(fluid._advect(w1, dt).faces, fluid.velocity.read)
     after = fluid.velocity.read.get()
     wanted = reference.advect(faces, courant, 0.3 * force - carried, no_slip=walls.no_slip, speed=walls.speed) * np.exp(
         -0.5 * dt

@@ -91,7 +91,7 @@ def test_vortex_comes_back(device: Device) -> None:
 
 
 def test_small_steps_do_not_blur(device: Device) -> None:
-    """A quarter of the vortex's way in steps of CFL 0.1, where interpolating every step would blur most."""
+    """A quarter of the vortex's path in steps of CFL 0.1, where interpolating every step would blur most."""
     grid = Grid(48, 48)
     warp = WarpMap(device, grid)
     x, y = grid.centres()
