@@ -72,7 +72,7 @@ class Grid:
         return cls(nx, ny, (width / longer, height / longer))
 
     def refined(self, times: int) -> Grid:
-        """The grid with so many cells for each of these, both ways."""
+        """The grid with so many cells for each of these along each axis."""
         return Grid(self.nx * times, self.ny * times, self.extent, self.origin, self.picture)
 
     @property

@@ -9,9 +9,9 @@ uniform sampler2D u_motion;
 uniform sampler2D u_viscosity;
 uniform sampler2D u_solid;
 uniform vec2 u_spacing;
-layout(location = 0) out float out_part;
+layout(location = 0) out float out_factor;
 
 void main() {
     float viscosity = texelFetch(u_motion, ivec2(0), 0).w;
-    out_part = uncrowded(crowding(u_viscosity, u_solid, u_segment.zw, u_radius, viscosity, u_spacing));
+    out_factor = uncrowded(crowding(u_viscosity, u_solid, u_segment.zw, u_radius, viscosity, u_spacing));
 }

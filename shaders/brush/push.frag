@@ -1,15 +1,15 @@
 // Push: make the fluid under the brush move with it, drawn with additive blending.
-//   dv = curl psi,  psi = b (dF x r),  dF = gain part strength (slip v_brush - v_fluid(centre)),       (B1)
+//   dv = curl psi,  psi = b (dF x r),  dF = gain scaling strength (slip v_brush - v_fluid(centre)),       (B1)
 // r from the nearest point of the path: the discrete curl of a stream function at the nodes, so exactly free of
 // divergence; at the path dv = dF.
-// u_motion: the fluid's motion at the brush, from probe; u_slip: from slip; u_part: from restrain; u_brush_velocity:
+// u_motion: the fluid's motion at the brush, from probe; u_slip: from slip; u_scaling: from restrain; u_brush_velocity:
 // lengths / s.
 // reads: 3, and 20 when ATTENUATED
 #include "lib/brush.glsl"
 #include "lib/attenuation.glsl"
 uniform sampler2D u_motion;
 uniform sampler2D u_slip;
-uniform sampler2D u_part;
+uniform sampler2D u_scaling;
 uniform vec2 u_brush_velocity;
 uniform float u_strength;
 uniform float u_gain;
@@ -25,7 +25,7 @@ void main() {
     vec2 cell = floor(gl_FragCoord.xy);
     vec4 motion = texelFetch(u_motion, ivec2(0), 0);
     float slip = texelFetch(u_slip, ivec2(0), 0).r;
-    vec2 force = u_gain * texelFetch(u_part, ivec2(0), 0).r * u_strength * unobstructed()
+    vec2 force = u_gain * texelFetch(u_scaling, ivec2(0), 0).r * u_strength * unobstructed()
                * (slip * u_brush_velocity - motion.xy);
     float corner = stream(cell, force, motion.w);
     vec2 velocity = vec2(stream(cell + vec2(0.0, 1.0), force, motion.w) - corner,

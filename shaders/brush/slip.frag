@@ -24,28 +24,28 @@ int fine() { return textureSize(u_around, 0).x / 2 - 1; }
 
 vec2 displacement(ivec2 node) { return texelFetch(u_around, node + fine() + 1, 0).rg / u_radius; }
 
-float by_path(vec2 back, vec2 ahead) {
+float by_path(vec2 back, vec2 direction) {
     float far = length(back);
     if (far == 0.0) return 1.0;
-    float along = 1.0 - smoothstep(0.0, 1.0, dot(back, ahead) / far);
+    float along = 1.0 - smoothstep(0.0, 1.0, dot(back, direction) / far);
     float beyond = max(far * along - u_carried.x, 0.0);
     return mix(u_carried.y, 1.0, 1.0 / (1.0 + 2.0 * beyond * beyond));
 }
 
-float strain(ivec2 node, vec2 ahead) {
+float strain(ivec2 node, vec2 direction) {
     vec2 e = vec2(1.0 / float(fine()), 0.0);
     float scale = 0.5 * float(fine());
     vec2 r = vec2(node) * e.x;
     vec2 jx = vec2(1.0, 0.0) + scale * (displacement(node + ivec2(1, 0)) - displacement(node - ivec2(1, 0)));
     vec2 jy = vec2(0.0, 1.0) + scale * (displacement(node + ivec2(0, 1)) - displacement(node - ivec2(0, 1)));
-    vec2 vx = scale * (brush_flow(r + e.xy, ahead) - brush_flow(r - e.xy, ahead));
-    vec2 vy = scale * (brush_flow(r + e.yx, ahead) - brush_flow(r - e.yx, ahead));
+    vec2 vx = scale * (brush_flow(r + e.xy, direction) - brush_flow(r - e.xy, direction));
+    vec2 vy = scale * (brush_flow(r + e.yx, direction) - brush_flow(r - e.yx, direction));
     float xx = dot(jx, jx), xy = dot(jx, jy), yy = dot(jy, jy);
     float growth = -2.0 * (xx * vx.x + xy * (vx.y + vy.x) + yy * vy.y) / max(xx + yy, 1e-6);
     return sqrt(0.5 * (xx + yy)) * max(growth, 0.0);
 }
 
-float by_strain(vec2 ahead) {
+float by_strain(vec2 direction) {
     int fine = fine();
     float sum = 0.0, count = 0.0;
     for (int j = -fine; j <= fine; ++j)
@@ -53,7 +53,7 @@ float by_strain(vec2 ahead) {
             vec2 r = vec2(i, j) / float(fine), place = u_place + r * u_radius;
             bool inside = all(greaterThan(place, vec2(0.0))) && all(lessThan(place, u_extent));
             if (dot(r, r) >= 1.0 || !inside) continue;
-            float here = strain(ivec2(i, j), ahead);
+            float here = strain(ivec2(i, j), direction);
             sum += here * here * here * here;
             count += 1.0;
         }
@@ -62,6 +62,6 @@ float by_strain(vec2 ahead) {
 
 void main() {
     float speed = length(u_brush_velocity);
-    vec2 ahead = u_brush_velocity / max(speed, 1e-9);
-    out_slip = speed == 0.0 ? 1.0 : by_path(displacement(ivec2(0)), ahead) * by_strain(ahead);
+    vec2 direction = u_brush_velocity / max(speed, 1e-9);
+    out_slip = speed == 0.0 ? 1.0 : by_path(displacement(ivec2(0)), direction) * by_strain(direction);
 }

@@ -19,8 +19,8 @@ float brush_falloff(float distance_to_path) {
 
 float brush_weight(vec2 x) { return brush_falloff(distance(x, brush_nearest(x))); }
 
-// The flow of a soft push at r, in radii: curl of its falloff times ahead x r.
-vec2 brush_flow(vec2 r, vec2 ahead) {
+// The flow of a soft push at r, in radii: curl of its falloff times direction x r.
+vec2 brush_flow(vec2 r, vec2 direction) {
     float w = max(1.0 - dot(r, r), 0.0);
-    return w * w * (w * ahead + 6.0 * (ahead.x * r.y - ahead.y * r.x) * vec2(-r.y, r.x));
+    return w * w * (w * direction + 6.0 * (direction.x * r.y - direction.y * r.x) * vec2(-r.y, r.x));
 }

@@ -129,14 +129,14 @@ void both(float low, float high, vec2 there, out float mean[BLOCK], out float od
     }
 }
 
-// The mean of the picture over four places: `middle` with `apart` added or taken away along x and along y, in pixels
+// The mean of the picture over four sample points: `middle` with `offset` added or taken away along x and along y, in pixels
 // from the corner of the pixel `whole` (two parts, so that large pictures lose no precision). The two on one diagonal
 // weigh (1 + correlation) / 4 each, the others (1 - correlation) / 4, so that any parallelogram's second moments are
-// met. Beyond the bounds there is nothing. `apart` is less than half a pixel, and so all are made of one block.
-COLOR four_places(vec2 whole, vec2 middle, vec2 apart, float correlation) {
-    vec2 cell = floor(middle - apart - float(TAPS / 2) + 0.5), first = whole - CORNER + cell;
-    vec2 low = middle - apart - cell - float(TAPS / 2) + 0.5, high = low + 2.0 * apart;
-    vec4 there = within(whole + middle - apart, whole + middle + apart);
+// met. Beyond the bounds there is nothing. `offset` is less than half a pixel, and so all are made of one block.
+COLOR four_samples(vec2 whole, vec2 middle, vec2 offset, float correlation) {
+    vec2 cell = floor(middle - offset - float(TAPS / 2) + 0.5), first = whole - CORNER + cell;
+    vec2 low = middle - offset - cell - float(TAPS / 2) + 0.5, high = low + 2.0 * offset;
+    vec4 there = within(whole + middle - offset, whole + middle + offset);
     float x[BLOCK] = coordinates(first.x + LEFT, EXTENT.x, u_texel.x), y[BLOCK] = coordinates(first.y, EXTENT.y, u_texel.y);
     float mean_x[BLOCK], odd_x[BLOCK], mean_y[BLOCK], odd_y[BLOCK];
     both(low.x, high.x, there.xz, mean_x, odd_x);
@@ -163,7 +163,7 @@ COLOR four_places(vec2 whole, vec2 middle, vec2 apart, float correlation) {
 #endif
 
 // The picture at one place.
-COLOR one_place(vec2 whole, vec2 place) {
+COLOR one_sample(vec2 whole, vec2 place) {
 #if TAPS == 1
     vec2 only = WITHIN(whole - CORNER + floor(place) + 0.5, u_extent) * u_texel;
     COLOR sum = AT(only.x, only.y);
@@ -222,7 +222,7 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #ifdef ONE
     const bool shifted = true;
     vec2 centre = rest + 0.5 * zoom + at;
-    COLOR color = one_place(whole, centre);
+    COLOR color = one_sample(whole, centre);
 #else
     vec2 a = at[0], b = at[1], c = at[2], d = at[3];
     vec2 centre = rest + 0.5 * zoom + 0.25 * (a + b + c + d);
@@ -235,10 +235,10 @@ vec4 look_up(vec2 pixel, CORNERS at) {
 #else
     const vec2 pairs = vec2(1.0);
 #endif
-    // As far apart as gives the places the variance of the pixel itself: a mean of fourth order.
-    vec2 spread = away_from_one * inversesqrt(1.0 - 0.25 / (pairs * pairs));
-    // The second moments of the four places about the middle of each four.
-    vec2 u = 0.25 * spread.x / pairs.x * along_x, v = 0.25 * spread.y / pairs.y * along_y;
+    // As far from each other as gives the samples the variance of the pixel itself: a mean of fourth order.
+    vec2 stride = away_from_one * inversesqrt(1.0 - 0.25 / (pairs * pairs));
+    // The second moments of the four samples about the middle of each four.
+    vec2 u = 0.25 * stride.x / pairs.x * along_x, v = 0.25 * stride.y / pairs.y * along_y;
     vec2 moments = u * u + v * v;
     float correlation = (u.x * u.y + v.x * v.y) * inversesqrt(max(moments.x * moments.y, 1e-20));
     vec2 away = min(sqrt(moments), 0.499);
@@ -246,14 +246,14 @@ vec4 look_up(vec2 pixel, CORNERS at) {
     COLOR color = COLOR(0.0);
     vec2 place = vec2(0.5);
     for (int n = int(pairs.x * pairs.y); n > 0; --n) {
-        vec2 off = spread * (place / pairs - 0.5);
+        vec2 off = stride * (place / pairs - 0.5);
         vec2 middle = centre + off.x * along_x + off.y * along_y + (off.x * off.y) * bend;
-        color += four_places(whole, middle, away, correlation);
+        color += four_samples(whole, middle, away, correlation);
         place = place.x + 1.0 < pairs.x ? place + vec2(1.0, 0.0) : vec2(0.5, place.y + 1.0);
     }
     color /= pairs.x * pairs.y;
 #else
-    COLOR color = four_places(whole, centre, away, correlation);
+    COLOR color = four_samples(whole, centre, away, correlation);
 #endif
 #endif
 

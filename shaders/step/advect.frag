@@ -1,5 +1,5 @@
 // Advect: w2(x) = decay w1(x_d), each component of what departs carried to its own faces from where these depart, by the
-// four-point cubic both ways; packed 2 x 2 cells a texel as viscosity/operator.glsl has it, 0 on fixed faces.
+// four-point cubic along each axis; packed 2 x 2 cells a texel as viscosity/operator.glsl has it, 0 on fixed faces.
 // u_rows_u, u_rows_v: w1 as depart.frag lays it; u_trace: backtrace of the cell centres, cells; u_decay: exp(-drag dt).
 // A face departs midway between the two cells that it parts, so inside the grid, where those do.
 // Beside w2: |w1|^2 of the faces in the texel, as if they stayed where they are.

@@ -26,7 +26,8 @@ float determinant_at(vec2 x, out vec2 moved) {
     vec2 size = vec2(textureSize(u_accumulated, 0)), density = size / u_picture;
     moved = vec2(0.0);
 #ifdef HELD
-    if (is_held(x * density)) {
+    // Not on a texel that is held by itself: its slopes would be those to others, which are not kept.
+    if (texture(u_held, x / u_picture).r > 0.9) {
         moved = cubic_displacement(u_kept, on_texel(x * density), slope);
         return determinant(mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y));
     }

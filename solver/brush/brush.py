@@ -115,7 +115,7 @@ class Brush:
         inputs: dict[str, Any] = motion.tip.inputs(fluid.grid) | motion.inputs()
         inputs |= {"motion": self._motion, "gain": gain}
         if isinstance(motion, Push):
-            inputs |= {"slip": self._slip.factor, "part": self._slip.part}
+            inputs |= {"slip": self._slip.factor, "scaling": self._slip.scaling}
         inputs |= attenuation or {}
 
         def draw(target: Field) -> None:

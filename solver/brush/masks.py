@@ -54,7 +54,7 @@ class Masks:
         self._frozen_before: SavedTiles | None = None  # what is frozen by the recipe
         self._base: Base = 0.0
         self._cells = FieldPool(device, "masks")
-        # The fluid that was told last, if it need not be told everything, and the texels of a mask changed since.
+        # The fluid that got them last, if it need not get all of them, and the texels of a mask changed since.
         self._applied_to: tuple[Scheme, Grid] | None = None
         self._changed: dict[str, Region] = {}
         self._frozen_in: Region | None = None  # the texels frozen or thawed since that was asked last
@@ -123,7 +123,7 @@ class Masks:
     def apply(self, fluid: Scheme) -> None:
         """Give a fluid, on the whole picture or a window, its viscosity and solid cells; the next step takes them up.
 
-        They are averages over the cells, worked out where a mask has changed since it was told last. Solid are the
+        They are averages over the cells, worked out where a mask has changed since it got them last. Solid are the
         cells with something frozen in them and those within two of them: there the map, which holds what is frozen to
         the bit (`WarpMap.hold`), goes over into what flows. Were only cells solid of which half is frozen, the fluid
         would glide along the edge, and the map tear there.
@@ -165,12 +165,12 @@ class Masks:
         fluid.masks_changed()
 
     def forget_fluid(self) -> None:
-        """Tell the fluid everything next time: it lies elsewhere now, or is another one."""
+        """Give the fluid everything next time: it lies elsewhere now, or is another one."""
         self._applied_to = None
 
     @property
     def base_viscosity(self) -> Field:
-        """What is painted over, on the cells of the fluid that was told last, lengths^2 / s."""
+        """What is painted over, on the cells of the fluid that got them last, lengths^2 / s."""
         return self._cells["base viscosity"]
 
     @property

@@ -69,8 +69,8 @@ def strain_limit(tip: Tip, dt: float, travelled: float, drag: float, viscosity: 
 
 def gain_compensation(radius: float, dt: float, drag: float, viscosity: float) -> float:
     """How many times a brush's motion is put in, so that about all of it is left after a tick of viscosity and drag."""
-    held = math.exp(min(drag * dt, 10.0)) * (1 + SQUARED_WAVENUMBER * dt * viscosity / radius**2)
-    return min(held, MOST_GAIN)
+    gain = math.exp(min(drag * dt, 10.0)) * (1 + SQUARED_WAVENUMBER * dt * viscosity / radius**2)
+    return min(gain, MOST_GAIN)
 
 
 @dataclass(frozen=True)
@@ -136,13 +136,13 @@ class Slip:
 
     Attributes:
         factor: the part of its speed that it gives, by what it has carried and stretched: the second and third law.
-        part: the part of what the fluid lacks that it gives, by energy: the fourth.
+        scaling: of what the fluid lacks, that it gives, by energy: the fourth.
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.factor = device.field((1, 1), 1, "slip factor")
-        self.part = device.field((1, 1), 1, "part of the push")
+        self.scaling = device.field((1, 1), 1, "scaling of the push")
         self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
 
     def find(self, push: Push, warp: WarpMap | None) -> None:
@@ -166,11 +166,11 @@ class Slip:
         )
 
     def restrain(self, push: Push, grid: Grid, **at_brush: Field) -> None:
-        """Set `part`, after `factor`, for a push on a fluid: its velocity, impulse and motion at the brush."""
+        """Set `scaling`, after `factor`, for a push on a fluid: its velocity, impulse and motion at the brush."""
         inputs = push.tip.inputs(grid) | push.inputs() | {"slip": self.factor, "most": MOST_ENERGY}
-        self.device.pass_("brush/restrain.frag")(self.part, **at_brush, **inputs)
+        self.device.pass_("brush/restrain.frag")(self.scaling, **at_brush, **inputs)
 
     def release(self) -> None:
         self.factor.release()
-        self.part.release()
+        self.scaling.release()
         self._around.release()

@@ -52,7 +52,7 @@ class Timings:
 
     def take(self) -> dict[str, float]:
         """Milliseconds by stage since the last call; starts anew."""
-        taken = dict(self.milliseconds)
+        totals = dict(self.milliseconds)
         for book in (self.milliseconds, self.passes, self.texel_reads, self.texel_writes):
             book.clear()
-        return taken
+        return totals

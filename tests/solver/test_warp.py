@@ -39,26 +39,25 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 def test_one_step_agrees_with_float64(device: Device, size: tuple[int, int]) -> None:
     rng = np.random.default_rng(3)
     grid = Grid(*size)
-    near, trace = smooth(rng, size, 0.1), smooth(rng, size, 3.0)
+    submap, trace = smooth(rng, size, 0.1), smooth(rng, size, 3.0)
     warp = WarpMap(device, grid)
-    warp._submap.read.set(near)
+    warp._submap.read.set(submap)
     warp.advance_traced(device.upload(trace))
-    assert difference(warp._submap.read.get(), reference.advance_map(near, trace, grid.h)) < 1e-5
+    assert difference(warp._submap.read.get(), reference.advance_map(submap, trace, grid.h)) < 1e-5
 
 
 @pytest.mark.parametrize("size", [(37, 23), (8, 8), (16, 51)])
 def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) -> None:
     rng = np.random.default_rng(4)
     grid = Grid(*size)
-    near, base = smooth(rng, size, 0.1), smooth(rng, (2 * size[0], 2 * size[1]), 0.3)
+    submap, accumulated = smooth(rng, size, 0.1), smooth(rng, (2 * size[0], 2 * size[1]), 0.3)
     warp = WarpMap(device, grid, (2 * size[0], 2 * size[1]))
-    warp.set(base)
-    warp._submap.read.set(near)
+    warp.set(accumulated)
+    warp._submap.read.set(submap)
     warp._steps = 1
     for wanted in (grid.size, (50, 31)):
-        assert (
-            difference(warp.read(wanted), reference.compose_map(near, base, grid.extent, wanted, warp._limits)) < 1e-5
-        )
+        expected = reference.compose_map(submap, accumulated, grid.extent, wanted, warp._limits)
+        assert difference(warp.read(wanted), expected) < 1e-5
     before = warp.read()
     warp.remap()
     assert difference(warp.read((2 * size[0], 2 * size[1])), warp._accumulated.now.get()) < 1e-5
@@ -428,7 +427,10 @@ def test_the_distortion_of_what_is_frozen_is_that_of_what_is_looked_up(device: D
     disc = np.hypot(x - 0.6, y - 0.5) < 0.12
     masks.set_frozen(disc)
     masks.apply(fluid)
+    texels = np.stack(Grid(*warp.size).centres(), axis=-1).reshape(-1, 2)
+    free = warp.determinants(texels)
     warp.hold(device.upload(disc.astype(np.uint8) * 255))
+    assert np.abs(warp.determinants(texels) - free).max() < 0.05
     points = np.array([0.6, 0.5]) + np.random.default_rng(1).uniform(-0.06, 0.06, (200, 2))
     before, step = warp.determinants(points), 1 / 2048
     for _ in range(20):
