@@ -60,7 +60,7 @@ class SamplePoints:
             along_x(rows, region=region, displacement=plan.displacement, first=left + shift, scale=scale)
         return rows
 
-    def places(self, plan: Plan, tile: Piece) -> np.ndarray:
+    def positions(self, plan: Plan, tile: Piece) -> np.ndarray:
         """Where in the picture a tile's pixels are looked up, in its pixels; waits for the GPU.
 
         (rows, columns, 2) float32 at the pixels' centres, or with one row and column more at their corners.
@@ -68,11 +68,11 @@ class SamplePoints:
         left, top, right, bottom = tile
         more = 0 if plan.is_single else 1
         field = self.lattice(plan, tile, at_centres=plan.is_single)
-        places = field.get().reshape(field.height, -1, 2)[:, : right - left + more]
-        places *= np.array(plan.longer, np.float32)
-        places[..., 0] += (np.arange(left, right + more) * plan.zoom[0])[None, :]
-        places[..., 1] += (np.arange(top, bottom + more) * plan.zoom[1])[:, None]
-        return places
+        positions = field.get().reshape(field.height, -1, 2)[:, : right - left + more]
+        positions *= np.array(plan.longer, np.float32)
+        positions[..., 0] += (np.arange(left, right + more) * plan.zoom[0])[None, :]
+        positions[..., 1] += (np.arange(top, bottom + more) * plan.zoom[1])[:, None]
+        return positions
 
     def is_known(self, plan: Plan, tile: Piece) -> bool:
         """Whether the centres were asked for before, as in a batch, where it pays to interpolate them for good."""

@@ -126,15 +126,15 @@ class Sampler:
         if room is None:
             self._look_up(plan, target, tile, region)
         else:
-            self._draw_pieces(plan, target, tile, self.points.places(plan, tile), region, room)
+            self._draw_pieces(plan, target, tile, self.points.positions(plan, tile), region, room)
         return target
 
     def _draw_pieces(
-        self, plan: Plan, target: Field, tile: Piece, places: np.ndarray, region: Region, room: tuple[int, int]
+        self, plan: Plan, target: Field, tile: Piece, positions: np.ndarray, region: Region, room: tuple[int, int]
     ) -> None:
         """Draw a region of a tile from the piece of the picture it needs, or its halves, if that is too large."""
         _, _, width, height = region
-        piece = piece_of(plan, places, region)
+        piece = piece_of(plan, positions, region)
         size = size_of(piece)
         fits = self.tiling.fits(size)
         unwarped = max(width * max(plan.zoom[0], 1), height * max(plan.zoom[1], 1))
@@ -146,9 +146,9 @@ class Sampler:
         if not is_smallest and (size[0] > room[0] or size[1] > room[1]):
             halves = halves_of(region)
             # Where the map is torn, both halves may need what the whole does.
-            if not fits or sum(prod(size_of(piece_of(plan, places, half))) for half in halves) < 1.5 * prod(size):
+            if not fits or sum(prod(size_of(piece_of(plan, positions, half))) for half in halves) < 1.5 * prod(size):
                 for half in halves:
-                    self._draw_pieces(plan, target, tile, places, half, room)
+                    self._draw_pieces(plan, target, tile, positions, half, room)
                 return
         self.source.load(plan, piece, room)
         self._look_up(plan, target, tile, region)

@@ -82,11 +82,11 @@ def overlap(a: Sequence[int], b: Sequence[int]) -> Region:
     return x, y, min(a[0] + a[2], b[0] + b[2]) - x, min(a[1] + a[3], b[1] + b[3]) - y
 
 
-def piece_of(plan: Plan, places: np.ndarray, region: Region) -> Piece:
+def piece_of(plan: Plan, positions: np.ndarray, region: Region) -> Piece:
     """What a region (x, y, width, height) of a tile needs of the picture: left, top, right and bottom."""
     x, y, width, height = region
     more = 0 if plan.is_single else 1
-    within = places[y : y + height + more, x : x + width + more]
+    within = positions[y : y + height + more, x : x + width + more]
     # One axis after the other: over both at once NumPy is fifty times slower.
     low = np.floor(within.min(axis=0).min(axis=0)).astype(int) - REACH
     high = np.ceil(within.max(axis=0).max(axis=0) + np.array(plan.zoom)).astype(int) + REACH
