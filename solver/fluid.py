@@ -1,4 +1,8 @@
-"""The fluid: Stable Fluids with spatially varying viscosity, in the paper's order."""
+"""The fluid: Stable Fluids with spatially varying viscosity, in the paper's order.
+
+Its class is longer than most: `step`, its stages, and each of them once more for who calls it alone, read best one
+below the other. What they do is in `advection`, `viscosity`, `energy` and `pressure`.
+"""
 
 from __future__ import annotations
 
