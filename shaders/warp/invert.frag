@@ -1,7 +1,7 @@
 // Invert: F(y) = x - y with x + D(x) = y, by Newton's method from a guess.
 // u_displacement (D), u_guess (F): longer sides, over the same domain; u_extent: its width and height, longer sides;
 // y: see lib/place.glsl.
-// reads: 113
+// reads: 257
 #include "lib/displacement.glsl"
 #include "lib/place.glsl"
 uniform sampler2D u_displacement;
@@ -9,7 +9,8 @@ uniform sampler2D u_guess;
 uniform vec2 u_extent;
 layout(location = 0) out vec2 out_displacement;
 
-const int ROUNDS = 7;
+const int ROUNDS = 16;
+const float ROUNDING = 1e-7;  // longer sides, of a place in float32
 
 void main() {
     float farthest = length(u_extent / vec2(textureSize(u_guess, 0))) * 0.70710678;  // that one round may go: as the guess is apart
@@ -23,6 +24,9 @@ void main() {
         float error = dot(rest, rest);
         best = error < least ? found : best;
         least = min(error, least);
+        if (error < ROUNDING * ROUNDING) {
+            break;
+        }
         mat2 jacobian = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
         float determinant = jacobian[0].x * jacobian[1].y - jacobian[1].x * jacobian[0].y;
         determinant = determinant < 0.0 ? min(determinant, -1e-4) : max(determinant, 1e-4);
