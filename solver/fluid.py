@@ -33,7 +33,7 @@ from solver.scheme import (
 )
 from solver.viscosity.solve import Viscosity
 
-Rows = tuple[Field, Field]  # of u and of v, four faces of a row a texel: see `depart.frag`
+Departing = tuple[Field, Field]  # w1: of u and of v, 2 x 2 faces a texel: see `depart.frag`
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ class Fluid(Scheme):
         self.velocity = device.double_field(grid.size, 2, "velocity")
         # Half the last pressure gradient, which the next step takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
-        rows = grid.nx // 2 + 3, grid.ny + 4
-        self._departing = device.field(rows, 4, "departing rows of u"), device.field(rows, 4, "departing rows of v")
+        blocks = grid.nx + 4, (grid.ny + 1) // 2 + 3
+        self._departing = device.field(blocks, 4, "departing u"), device.field(blocks, 4, "departing v")
         self._trace = device.field(grid.size, 2, "trace")
         self._traced: float | None = None  # the step that it is of; None if the velocity has changed since
         packed = -(-grid.nx // 2) + 2, -(-grid.ny // 2) + 2
@@ -111,7 +111,7 @@ class Fluid(Scheme):
             self.residuals = replace(self.residuals, viscous_residual=viscous_residual)
         self.time += dt
 
-    def _add_force(self, forces: Forces, dt: float) -> Rows:
+    def _add_force(self, forces: Forces, dt: float) -> Departing:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn.
 
         g is half the last pressure gradient: with the projection, where the fluid arrives, pressure then acts along the
@@ -126,7 +126,7 @@ class Fluid(Scheme):
         self.impulse.clear()
         return departing
 
-    def _advect(self, departing: Rows, dt: float) -> PackedFaces:
+    def _advect(self, departing: Departing, dt: float) -> PackedFaces:
         """w2(x) = w1(x_d): second-order backtrace, cubic interpolation, each component from where it departs; and drag.
 
         Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has
@@ -137,8 +137,8 @@ class Fluid(Scheme):
         with self.device.stage("advect"):
             advected, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
             advect = self.device.pass_("step/advect.frag", **packing.defines)
-            advect((*advected.fields, self._departed), region=packing.region, rows_u=departing[0], rows_v=departing[1],
-                   trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
+            advect((*advected.fields, self._departed), region=packing.region, departing_u=departing[0],
+                   departing_v=departing[1], trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
         return advected
 
     def _diffuse(self, advected: PackedFaces, dt: float) -> PackedFaces:
@@ -380,20 +380,20 @@ class Fluid(Scheme):
             upload.release()
         return {"force": fields[0][0], "impulse": fields[0][1]} if fields else {}
 
-    def _depart(self, **parts: Any) -> Rows:
+    def _depart(self, **parts: Any) -> Departing:
         """The velocity, less what is `carried` and with a `force`, if they are given, as advection reads it."""
-        rows, (nx, ny) = self._departing, self.grid.size
-        width, height = rows[0].size
+        departing, (nx, ny) = self._departing, self.grid.size
+        width, height = departing[0].size
         # Texels whose faces are all inside: none beyond a wall or on it.
-        left, right, above, below = 2, (nx + 1) // 2, 3, ny + 2
+        left, right, above, below = 3, nx + 1, 2, ny // 2 + 1
         inside = (left, above, right - left, below - above)
         around = [(0, 0, width, above), (0, below, width, height - below)]
         around += [(0, above, left, below - above), (right, above, width - right, below - above)]
         given = {name.upper(): 1 for name in parts if name != "impulse"}
-        self.device.pass_("step/depart.frag", **given)(rows, region=inside, velocity=self.velocity.read, **parts)
+        self.device.pass_("step/depart.frag", **given)(departing, region=inside, velocity=self.velocity.read, **parts)
         edges = self.device.pass_("step/depart.frag", EDGES=1, **given, **self._wall_defines())
-        edges(rows, region=around, velocity=self.velocity.read, **parts, **self._wall_inputs())
-        return rows
+        edges(departing, region=around, velocity=self.velocity.read, **parts, **self._wall_inputs())
+        return departing
 
     def _unpack(self, faces: PackedFaces) -> None:
         """Let packed faces be the velocity."""
