@@ -137,8 +137,9 @@ class Fluid(Scheme):
         with self.device.stage("advect"):
             advected, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
             advect = self.device.pass_("step/advect.frag", **packing.defines)
-            advect((*advected.fields, self._departed), region=packing.region, departing_u=departing[0],
-                   departing_v=departing[1], trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
+            u, v = departing
+            advect((*advected.fields, self._departed), region=packing.region, departing_u=u, departing_v=v,
+                   trace=trace, decay=math.exp(-self.params.drag * dt), **packing.open)  # fmt: skip
         return advected
 
     def _diffuse(self, advected: PackedFaces, dt: float) -> PackedFaces:

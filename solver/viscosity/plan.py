@@ -5,13 +5,15 @@ The errors are those of `tests/benchmarks/bench_viscosity.py`, against a direct 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-# kappa up to which two smoothing sweeps leave less than 0.1 %.
-BARELY_VISCOUS = 0.05
+# Smoothing sweeps up to which they alone are the viscous step, as many as the bound of `sweeps_alone` asks for: that is
+# up to kappa = .4. A solve of one iteration costs as much as ten (512^2, one viscosity; a sweep 1.1 J, the solve 11).
+MOST_SWEEPS = 10
 # Deflated is what is stiffer than this: below, multigrid alone takes no more iterations. A node that touches the
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
@@ -43,8 +45,8 @@ class Plan:
     """How a viscous step is solved; see `plan_for`.
 
     Attributes:
-        method: "smooth": v* is smoothed; "direct": the grid is so small that its inverse is at hand; "cg": by conjugate
-            gradients, each iteration with one multigrid cycle.
+        method: "smooth": v* is smoothed, by Chebyshev's weights; "direct": the grid is so small that its inverse is at
+            hand; "cg": by conjugate gradients, each iteration with one multigrid cycle.
         sweeps: smoothing sweeps; of conjugate gradients, before and after the coarser levels, or of one viscosity only
             after them.
         tolerance: of the conjugate gradients.
@@ -71,10 +73,23 @@ def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
     return any(bool((np.maximum(*pair) > MODERATE * np.minimum(*pair)).any()) for pair in pairs)
 
 
+def sweeps_alone(kappa: float, leaves: float) -> int:
+    """Chebyshev-Jacobi sweeps after which that part of the error is left at most, by kappa of one viscosity.
+
+    A is 1 + kappa |q|^2 for a wave q of no divergence and at most 1 + 16 kappa for a gradient, so n sweeps leave
+    1 / T_n(1 + 1 / (8 kappa)). At first the error of v* is 16 kappa |v| at most.
+    """
+    if kappa <= 0.0 or leaves >= 1.0:
+        return 1
+    return math.ceil(math.acosh(1.0 / leaves) / math.acosh(1.0 + 0.125 / kappa))
+
+
 def plan_for(least: float, largest: float, cells: int, is_sharp: bool) -> Plan:
     """The plan for kappa between `least` and `largest` on so many cells; see `is_sharp`."""
-    if largest <= BARELY_VISCOUS:
-        return Plan("smooth", 2)
+    tolerance = TOLERANCE_UNIFORM if cells > SMALL else TOLERANCE_UNIFORM / 3
+    count = sweeps_alone(largest, tolerance / (16.0 * max(largest, 1e-30)))
+    if count <= MOST_SWEEPS:
+        return Plan("smooth", count)
     rigid = is_sharp and largest > MODERATE * least
     count = 1 if least <= ONE_SWEEP and least < largest and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
