@@ -24,13 +24,12 @@ STIFF_OF_SOFTEST = 4.0
 # whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without.
 RIGID_OF_SOFTEST = 40.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
-# fifths. Of one viscosity there are two, both after the coarser levels.
+# fifths, if a contrast beyond `MODERATE` leaves more. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
 # Conjugate gradients end when less than this part of the energy, squared, is left: the error is below 1 % where the
-# viscosity varies so much at most, and below 5 % beyond.
+# viscosity varies so much at most, and below 5 % beyond. With .017 noise of one viscosity was 1.8 % off, checkerboards 1.
 MODERATE = 300.0
-TOLERANCE = 0.017
-TOLERANCE_UNIFORM = 0.008  # for one viscosity, whose cycle leaves more: of noise between sticky sides 1.8 % with .017
+TOLERANCE = 0.008
 TOLERANCE_STIFF = 0.07
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
 # third of the tolerance is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
@@ -86,18 +85,15 @@ def sweeps_alone(kappa: float, leaves: float) -> int:
 
 def plan_for(least: float, largest: float, cells: int, is_sharp: bool) -> Plan:
     """The plan for kappa between `least` and `largest` on so many cells; see `is_sharp`."""
-    tolerance = TOLERANCE_UNIFORM if cells > SMALL else TOLERANCE_UNIFORM / 3
-    count = sweeps_alone(largest, tolerance / (16.0 * max(largest, 1e-30)))
+    share = 1.0 if cells > SMALL else 1.0 / 3.0
+    count = sweeps_alone(largest, share * TOLERANCE / (16.0 * max(largest, 1e-30)))
     if count <= MOST_SWEEPS:
         return Plan("smooth", count)
-    rigid = is_sharp and largest > MODERATE * least
-    count = 1 if least <= ONE_SWEEP and least < largest and not rigid else 2
+    varies = largest > MODERATE * least
+    rigid = is_sharp and varies
+    count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
-    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF
-    if least == largest and not is_sharp:  # which it is beside solids: they are no case of one viscosity
-        tolerance = TOLERANCE_UNIFORM
-    if cells <= SMALL:
-        tolerance /= 3
+    tolerance = share * (TOLERANCE_STIFF if varies else TOLERANCE)
     if largest <= stiff:
         return Plan("cg", count, tolerance)
     return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid)
