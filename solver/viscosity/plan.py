@@ -27,7 +27,7 @@ RIGID_OF_SOFTEST = 40.0
 # fifths, if a contrast beyond `MODERATE` leaves more. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
 # Conjugate gradients end when less than this part of the energy, squared, is left: the error is below 1 % where the
-# viscosity varies so much at most, and below 5 % beyond. With .017 noise of one viscosity was 1.8 % off, checkerboards 1.
+# viscosity varies so much at most, and below 5 % beyond. With .017 noise of one viscosity was 1.8 % off.
 MODERATE = 300.0
 TOLERANCE = 0.008
 TOLERANCE_STIFF = 0.07
