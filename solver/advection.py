@@ -12,8 +12,8 @@ from solver.params import Walls
 
 
 @dataclass(frozen=True)
-class Rows:
-    """w1, four faces of a row a texel, as the cubic reads it; see `depart.frag`."""
+class Blocks:
+    """w1, 2 x 2 faces a texel, as the cubic reads it; see `depart.frag`."""
 
     u: Field
     v: Field
@@ -39,16 +39,16 @@ class Advection:
     def __init__(self, device: Device, size: tuple[int, int], packed: tuple[int, int]) -> None:
         self.device = device
         self.size = nx, ny = size
-        laid = nx // 2 + 3, ny + 4
-        self._rows = Rows(device.field(laid, 4, "rows of u"), device.field(laid, 4, "rows of v"))
+        laid = nx + 4, (ny + 1) // 2 + 3
+        self._blocks = Blocks(device.field(laid, 4, "blocks of u"), device.field(laid, 4, "blocks of v"))
         self._energy = device.field(packed, 1, "energy before advection")
 
-    def depart(self, velocity: Field, walls: Walls, **terms: Any) -> Rows:
+    def depart(self, velocity: Field, walls: Walls, **terms: Any) -> Blocks:
         """w1, from w0 on MAC faces and, if they are given, `carried`, and `force` and its `impulse`."""
-        targets, (nx, ny) = (self._rows.u, self._rows.v), self.size
-        width, height = self._rows.u.size
+        targets, (nx, ny) = (self._blocks.u, self._blocks.v), self.size
+        width, height = self._blocks.u.size
         # Texels whose faces are all inside: none beyond a wall or on it.
-        left, right, above, below = 2, (nx + 1) // 2, 3, ny + 2
+        left, right, above, below = 3, nx + 1, 2, ny // 2 + 1
         inside = (left, above, right - left, below - above)
         around = [(0, 0, width, above), (0, below, width, height - below)]
         around += [(0, above, left, below - above), (right, above, width - right, below - above)]
@@ -56,15 +56,15 @@ class Advection:
         self.device.pass_("step/depart.frag", **defines)(targets, region=inside, velocity=velocity, **terms)
         edges = self.device.pass_("step/depart.frag", EDGES=1, **defines, **walls.defines)
         edges(targets, region=around, velocity=velocity, **terms, **walls.inputs)
-        return self._rows
+        return self._blocks
 
-    def advect(self, w1: Rows, trace: Field, decay: float, target: PackedFaces, packing: Packing) -> Advected:
+    def advect(self, w1: Blocks, trace: Field, decay: float, target: PackedFaces, packing: Packing) -> Advected:
         """Draw w2 into `target`: each component `decay` times what it is where its own face departs."""
         advect = self.device.pass_("step/advect.frag", **packing.defines)
         targets = *target.fields, self._energy
-        advect(targets, region=packing.region, rows_u=w1.u, rows_v=w1.v, trace=trace, decay=decay, **packing.open)
+        advect(targets, region=packing.region, blocks_u=w1.u, blocks_v=w1.v, trace=trace, decay=decay, **packing.open)
         return Advected(target, self._energy)
 
     def release(self) -> None:
-        for field in (self._rows.u, self._rows.v, self._energy):
+        for field in (self._blocks.u, self._blocks.v, self._energy):
             field.release()

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.advection import Advected, Advection, Rows
+from solver.advection import Advected, Advection, Blocks
 from solver.energy import EnergyBound
 from solver.faces import Forces, Vector, impulses, on_faces
 from solver.flow import Flow
@@ -80,7 +80,7 @@ class Fluid(Scheme):
             self._project()
         self.time += dt
 
-    def _add_force(self, forces: Forces, dt: float) -> Rows:
+    def _add_force(self, forces: Forces, dt: float) -> Blocks:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn: equation (S2).
 
         g is half the last pressure gradient; the projection takes off the other half where the fluid arrives. So
@@ -93,7 +93,7 @@ class Fluid(Scheme):
         self.impulse.clear()
         return w1
 
-    def _advect(self, w1: Rows, dt: float) -> Advected:
+    def _advect(self, w1: Blocks, dt: float) -> Advected:
         """w2(x) = w1(x_d), each component from where it departs; and drag.
 
         Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has

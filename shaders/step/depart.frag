@@ -1,6 +1,7 @@
-// Depart: w1 = w0 - g + dt f (equation S2; paper section 3.2, first stage), laid out so that the cubic reads four faces of
-// a row at once: texel (k + 1, j + 2) holds faces 2k - 1 to 2k + 2 of row j. It reaches as far beyond the walls as the cubic
-// does, with images of the faces inside. Only where no face is on a wall or beyond one; with EDGES anywhere.
+// Depart: w1 = w0 - g + dt f (equation S2; paper section 3.2, first stage), laid out so that six texels hold the 4 x 4 faces
+// of any cubic: texel (i + 2, k + 1) holds 2 x 2 faces, of columns i and i + 1, rows 2k and 2k + 1. It reaches as far beyond
+// the walls as the cubic does, with images of the faces inside. Only where no face is on a wall or beyond one; with EDGES
+// anywhere.
 // u_velocity (w0), with CARRIED u_carried (g, half the last pressure gradient): MAC faces, lengths / s. With FORCE: u_force,
 // MAC faces, lengths / s^2, and u_impulse, the force's time law integrated over the tick, seconds.
 // reads: 12
@@ -40,8 +41,8 @@ vec2 face(vec2 cell, vec2 size) { return advected_velocity((cell + 0.5) / size);
 #endif
 
 void main() {
-    vec2 cell = vec2(2.0, 1.0) * floor(gl_FragCoord.xy) - 2.0, size = vec2(textureSize(u_velocity, 0)), x = vec2(1.0, 0.0);
-    vec2 a = face(cell - x, size), b = face(cell, size), c = face(cell + x, size), d = face(cell + 2.0 * x, size);
+    vec2 cell = vec2(1.0, 2.0) * floor(gl_FragCoord.xy) - 2.0, size = vec2(textureSize(u_velocity, 0));
+    vec2 a = face(cell, size), b = face(cell + vec2(1.0, 0.0), size), c = face(cell + vec2(0.0, 1.0), size), d = face(cell + 1.0, size);
     out_u = vec4(a.x, b.x, c.x, d.x);
     out_v = vec4(a.y, b.y, c.y, d.y);
 }

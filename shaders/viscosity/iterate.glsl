@@ -1,5 +1,5 @@
 // The iterate x of the conjugate gradients and the search direction p = z + beta p_before; with FIRST the iterate is the
-// guess a f + c d of galerkin_guess.frag, and p = z.
+// guess a f + c d of guess_residual.frag, and p = z.
 // u_u, u_v: f = v*; u_change_u, u_change_v: d; u_parts: (a, c); u_x_u, u_x_v: x; u_p_u, u_p_v: p_before; u_z_u, u_z_v: z;
 // u_beta.
 uniform sampler2D u_u;

@@ -96,22 +96,39 @@ Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, out Faces here, out Fa
                  here.v + vec4(above.zw, yy.xy) - yy + u_shear.y * (xy - vec4(xy.y, right.x, xy.w, right.z)));
 }
 #else
-// The same, the stresses made along with it. 12 reads, and 6 of textures of K.
-Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {
+// A texel's faces and those that they are coupled with. 12 reads.
+struct Around { vec4 u, u_left, u_right, u_up, u_down, v, v_left, v_right, v_up, v_down; float u_corner, v_corner; };
+
+Around read_around(sampler2D fu, sampler2D fv, vec2 at) {
     vec2 x = vec2(1.0 / float(textureSize(fu, 0).x), 0.0), y = vec2(0.0, 1.0 / float(textureSize(fu, 0).y));
-    vec4 u = texture(fu, at), v = texture(fv, at);
-    vec4 u_left = texture(fu, at - x), u_right = texture(fu, at + x), u_up = texture(fu, at - y), u_down = texture(fu, at + y);
-    vec4 v_left = texture(fv, at - x), v_right = texture(fv, at + x), v_up = texture(fv, at - y), v_down = texture(fv, at + y);
-    float u_corner = texture(fu, at + x - y).z, v_corner = texture(fv, at - x + y).y;
-    here = Faces(u, v);
+    return Around(texture(fu, at), texture(fu, at - x), texture(fu, at + x), texture(fu, at - y), texture(fu, at + y),
+                  texture(fv, at), texture(fv, at - x), texture(fv, at + x), texture(fv, at - y), texture(fv, at + y),
+                  texture(fu, at + x - y).z, texture(fv, at - x + y).y);
+}
+
+// B f of the texel's cells, and of their upper left nodes.
+vec4 strain_xx(Around f) { return vec4(f.u.y, f.u_right.x, f.u.w, f.u_right.z) - f.u; }
+vec4 strain_yy(Around f) { return vec4(f.v.zw, f.v_down.xy) - f.v; }
+vec4 strain_xy(Around f) {
+    return u_shear.x * (f.u - vec4(f.u_up.zw, f.u.xy)) + u_shear.y * (f.v - vec4(f.v_left.y, f.v.x, f.v_left.w, f.v.z));
+}
+
+Faces apply_operator(Around f, Stiffness k) {
     // Tensions in the cells either side of a face, and shear at the nodes.
-    vec4 along_u = k.here_x * (vec4(u.y, u_right.x, u.w, u_right.z) - u) - k.left * (u - vec4(u_left.y, u.x, u_left.w, u.z));
-    vec4 along_v = k.here_y * (vec4(v.zw, v_down.xy) - v) - k.above * (v - vec4(v_up.zw, v.xy));
-    vec4 shear = k.node * (u_shear.x * (u - vec4(u_up.zw, u.xy)) + u_shear.y * (v - vec4(v_left.y, v.x, v_left.w, v.z)));
-    vec2 shear_below = k.node_below.zw * (u_shear.x * (u_down.xy - u.zw) + u_shear.y * (v_down.xy - vec2(v_corner, v_down.x)));
-    vec2 shear_right = k.node_right.yw * (u_shear.x * (u_right.xz - vec2(u_corner, u_right.x)) + u_shear.y * (v_right.xz - v.yw));
-    return Faces(u - along_u + u_shear.x * (shear - vec4(shear.zw, shear_below)),
-                 v - along_v + u_shear.y * (shear - vec4(shear.y, shear_right.x, shear.w, shear_right.y)));
+    vec4 along_u = k.here_x * strain_xx(f) - k.left * (f.u - vec4(f.u_left.y, f.u.x, f.u_left.w, f.u.z));
+    vec4 along_v = k.here_y * strain_yy(f) - k.above * (f.v - vec4(f.v_up.zw, f.v.xy));
+    vec4 shear = k.node * strain_xy(f);
+    vec2 shear_below = k.node_below.zw * (u_shear.x * (f.u_down.xy - f.u.zw) + u_shear.y * (f.v_down.xy - vec2(f.v_corner, f.v_down.x)));
+    vec2 shear_right = k.node_right.yw * (u_shear.x * (f.u_right.xz - vec2(f.u_corner, f.u_right.x)) + u_shear.y * (f.v_right.xz - f.v.yw));
+    return Faces(f.u - along_u + u_shear.x * (shear - vec4(shear.zw, shear_below)),
+                 f.v - along_v + u_shear.y * (shear - vec4(shear.y, shear_right.x, shear.w, shear_right.y)));
+}
+
+// The same as above, the stresses made on the way; and 6 reads of textures of K.
+Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, Stiffness k, out Faces here) {
+    Around f = read_around(fu, fv, at);
+    here = Faces(f.u, f.v);
+    return apply_operator(f, k);
 }
 
 Faces apply_operator(sampler2D fu, sampler2D fv, vec2 at, out Faces here, out Faces is_open) {

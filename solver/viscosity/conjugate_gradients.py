@@ -11,6 +11,10 @@ from solver.gl.reduction import Reduction
 from solver.packing import DoublePackedFaces, PackedFaces
 from solver.viscosity.operator import Level
 
+# v* + d, d what the last step made of its own v*, is a guess good enough if the best one has less than this part of the
+# tolerated error less: the residual is at hand, and in a flow that goes on as it did it takes an eighth of a step less.
+NEAR = 0.5
+
 
 class ConjugateGradients:
     """Solves A x = b; the scalar products are summed up in float64, and wait for the GPU.
@@ -32,6 +36,7 @@ class ConjugateGradients:
         self._az = PackedFaces(device, ringed, "viscous A z")
         self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
+        # Of the guess, with the strains on the far walls, which lie in the ring.
         self._guess_products = device.field(ringed, 4, "viscous products of the guess")
         self._change_product = device.field(ringed, 1, "viscous product of the change")
         self._change_sum = Reduction(device, ringed, 1, "sum")
@@ -46,21 +51,30 @@ class ConjugateGradients:
         tolerance: float,
         most: int,
     ) -> PackedFaces:
-        """The solution, from the best first guess in the plane of `v_star` and the last step's `change`.
+        """The solution, from about the best first guess in the plane of `v_star` and the last step's `change`.
 
         `change` becomes what this step has made of `v_star`. Ends when less than the part `tolerance`^2 of the energy
         is left, or after so many iterations at most. What is left is the rest of the geometric series of what
         iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r.
         """
-        parts, found, of_v_star = self._galerkin_initial_guess(v_star, change.read, rhs)
+        before: dict[str, Any] = {"parts": (1.0, 1.0), **v_star.inputs(), **change.read.inputs("change_")}
+        self._guess(before, rhs)
+        bv, bd, vav, vad, dad = (
+            *self._sum(self._guess_products).tolist(),
+            float(self._change_sum(self._change_product)[0]),
+        )
         self.iterations = 0
-        if rhs is v_star and not of_v_star:  # at rest
+        if rhs is v_star and not vav:  # at rest
             for field in change.read.fields:
                 field.clear()
             return v_star
-        before: dict[str, Any] = {"parts": parts, **v_star.inputs(), **change.read.inputs("change_")}
-        draw = self.device.pass_("viscosity/guess_residual.frag", **self.level.defines)
-        draw(self._r.read.fields, region=self.level.region, **before, **rhs.inputs("rhs_"), **self.level.operator)
+        a, c = least_energy(bv, bd, vav, vad, dad)
+        found, lost = a * bv + c * bd, (1.0 - a) ** 2 * vav + 2.0 * (1.0 - a) * (1.0 - c) * vad + (1.0 - c) ** 2 * dad
+        if not lost <= (NEAR * tolerance) ** 2 * found:
+            before["parts"] = a, c
+            self._guess(before, rhs)
+        else:
+            found -= lost
         curvature, gained_before = 0.0, inf
         while True:
             is_first = not self.iterations
@@ -79,31 +93,12 @@ class ConjugateGradients:
             gained_before = gained
             self._update(before, z, alpha, is_first)
 
-    def _galerkin_initial_guess(
-        self, v_star: PackedFaces, change: PackedFaces, rhs: PackedFaces
-    ) -> tuple[tuple[float, float], float, float]:
-        """(a, c) of the x = a v* + c d of least energy, d the `change`; x . A x, and v* . A v*."""
+    def _guess(self, guess: dict[str, Any], rhs: PackedFaces) -> None:
+        """The residual of a v* + c d, (a, c) its `parts`, and the products that tell the best ones."""
         x, y, width, height = self.level.region
-        draw = self.device.pass_("viscosity/galerkin_guess.frag", **self.level.defines)
-        draw(
-            (self._guess_products, self._change_product),
-            region=(x, y, width + 1, height + 1),
-            **v_star.inputs(),
-            **change.inputs("change_"),
-            **rhs.inputs("rhs_"),
-            **self.level.operator,
-        )
-        bv, bd, vav, vad = self._sum(self._guess_products).tolist()
-        dad = float(self._change_sum(self._change_product)[0])
-        # Along v*; then along what of d is conjugate to v*, unless rounding has spoiled it or nothing is left.
-        a = bv / vav if vav > 0.0 else 0.0
-        conjugate = vad / vav if vav > 0.0 else 0.0
-        left = dad - conjugate * vad
-        c = (bd - conjugate * bv) / left if left > 1e-5 * dad else 0.0
-        a -= conjugate * c
-        if not (isfinite(a) and isfinite(c)) or a == 0.0:
-            a, c = 0.0, 0.0
-        return (a, c), a * bv + c * bd, vav
+        draw = self.device.pass_("viscosity/guess_residual.frag", **self.level.defines)
+        targets = *self._r.read.fields, self._guess_products, self._change_product
+        draw(targets, region=(x, y, width + 1, height + 1), **guess, **rhs.inputs("rhs_"), **self.level.operator)
 
     def _apply_operator(self, z: PackedFaces, first: bool) -> tuple[float, float, float]:
         """A z, and r . z, z . A z, z . A p, at first 0."""
@@ -149,6 +144,17 @@ class ConjugateGradients:
             item.release()
         for item in (self._products, self._sum, self._guess_products, self._change_product, self._change_sum):
             item.release()
+
+
+def least_energy(bv: float, bd: float, vav: float, vad: float, dad: float) -> tuple[float, float]:
+    """(a, c) of the x = a v* + c d of least energy, of products of v*, d and b; zeros where rounding has spoiled it."""
+    # Along v*; then along what of d is conjugate to v*, unless rounding has spoiled it or nothing is left.
+    a = bv / vav if vav > 0.0 else 0.0
+    conjugate = vad / vav if vav > 0.0 else 0.0
+    left = dad - conjugate * vad
+    c = (bd - conjugate * bv) / left if left > 1e-5 * dad else 0.0
+    a -= conjugate * c
+    return (a, c) if isfinite(a) and isfinite(c) else (0.0, 0.0)
 
 
 def _series(last: float, before: float) -> float:

@@ -15,7 +15,7 @@ from solver.params import NoSlip
 from solver.viscosity.changed import Box, changed
 from solver.viscosity.deflation import Deflation
 from solver.viscosity.operator import Coefficients, Level, inverse_matrix
-from solver.viscosity.plan import Plan
+from solver.viscosity.plan import Plan, sweeps_alone
 from solver.viscosity.transform import SineCosineTransform
 
 # Largest eigenvalue of D^-1 A that the smoother reckons with: on the finest level 2.8 was the largest found over random
@@ -23,6 +23,11 @@ from solver.viscosity.transform import SineCosineTransform
 LARGEST_EIGENVALUE = 2.8, 4.0
 # The smoothed part of the spectrum, up from the largest eigenvalue over this; by the number of sweeps.
 SMOOTHED = {1: 3.8, 2: 5.0}
+
+# Of one viscosity, a level that so many sweeps solve but for a tenth, an order less than what the cycle leaves, is
+# smoothed alone: with two sweeps, transfers and coarser levels it costs as much.
+MOST_ALONE = 4
+ALONE_LEAVES = 0.1
 
 # kappa that no cell has: the coarse levels count it all.
 UNBOUNDED = 1e30
@@ -81,6 +86,7 @@ class Multigrid:
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
         self._largest = 0.0  # kappa
+        self._alone: Level | None = None  # of one viscosity: the first that needs no coarser one
 
     # -- what is solved ---------------------------------------------------------------------------------------------
 
@@ -96,8 +102,11 @@ class Multigrid:
         self._taken_up = None
         self._largest = viscosity * self._scale(dt)
         for level in self.levels:
-            level.set_uniform(self._largest / 4.0**level.depth, no_slip)
+            level.set_uniform(self._kappa(level), no_slip)
         self.has_transform = not any(no_slip)
+        # A level that is the coarsest is solved at once, and the finest has a plan of its own.
+        alone = (level for level in self.levels[1:-1] if self._sweeps_alone(level) <= MOST_ALONE)
+        self._alone = None if self.direct_level is self.finest else next(alone, None)
         last = self.last
         if not self.has_transform and last is self.levels[-1]:
             stiffness = last.operator["stiffness"]
@@ -112,7 +121,7 @@ class Multigrid:
         What is made again is what has changed: a dab of a brush changes few cells. Where the field holds more than the
         largest `amount`, it counts as that.
         """
-        self.has_transform = False
+        self.has_transform, self._alone = False, None
         self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
         most = self.plan.stiff if self.plan.rigid else UNBOUNDED
         taken_up, basis = self._taken_up, (dt, no_slip, self.last.depth, most)
@@ -130,6 +139,14 @@ class Multigrid:
         if self.last is self.levels[-1]:
             self._inverse.set(inverse_matrix(self.last.coefficients()))
 
+    def _kappa(self, level: Level) -> float:
+        """The largest kappa on a level, of one viscosity."""
+        return self._largest / 4.0**level.depth
+
+    def _sweeps_alone(self, level: Level) -> int:
+        """The sweeps that leave little enough of a coarse correction."""
+        return sweeps_alone(self._kappa(level), ALONE_LEAVES)
+
     def _scale(self, dt: float) -> float:
         """kappa of a viscosity of one."""
         return dt / (self.spacing[0] * self.spacing[1])
@@ -146,7 +163,7 @@ class Multigrid:
     @property
     def last(self) -> Level:
         """The coarsest level that is visited."""
-        return self.finest if self.plan.method == "smooth" else self.direct_level
+        return self.finest if self.plan.method == "smooth" else self._alone or self.direct_level
 
     # -- cycles -----------------------------------------------------------------------------------------------------
 
@@ -181,9 +198,13 @@ class Multigrid:
             self.direct_solve(rhs)
             return
         coarser = self.levels[level.depth + 1]
-        restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
-        restrict(coarser.rhs.fields, region=coarser.region, **rhs.inputs(), **coarser.bounds)
-        self.sawtooth(coarser, coarser.rhs)
+        if coarser is self._alone:
+            begun = self._restrict(rhs, coarser)
+            self.smooth(coarser, coarser.rhs, self.weights(coarser)[begun:])
+        else:
+            restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
+            restrict(coarser.rhs.fields, region=coarser.region, **rhs.inputs(), **coarser.bounds)
+            self.sawtooth(coarser, coarser.rhs)
         prolong = self.device.pass_("viscosity/prolong.frag", ALONE=1, **level.defines)
         prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **level.bounds)
         level.faces.swap()
@@ -215,13 +236,13 @@ class Multigrid:
 
     def weights(self, level: Level) -> list[float]:
         """Chebyshev weights of the smoothing sweeps."""
-        count = self.plan.sweeps
-        if self.plan.method == "cg":
+        count, k = self.plan.sweeps, self._kappa(level)
+        if level is self._alone:
+            count = self._sweeps_alone(level)
+        elif self.plan.method == "cg":
             largest = LARGEST_EIGENVALUE[1 if level.stencil else 0]
             return chebyshev_weights(largest / SMOOTHED[count], largest, count)
-        # As for one viscosity: A v = v + k |q|^2 v for a wave q of no divergence, at most 16 k for a gradient; D is
-        # 1 + 6 k, and no coarser level takes over.
-        k = self._largest
+        # No coarser level takes over: see `sweeps_alone`. D is 1 + 6 k.
         return chebyshev_weights(1.0 / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), count)
 
     def smooth(

@@ -5,13 +5,15 @@ The errors are those of `tests/benchmarks/bench_viscosity.py`, against a direct 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-# kappa up to which two smoothing sweeps leave less than 0.1 %.
-BARELY_VISCOUS = 0.05
+# Smoothing sweeps up to which they alone are the viscous step, as many as the bound of `sweeps_alone` asks for: that is
+# up to kappa = .4. A solve of one iteration costs as much as ten (512^2, one viscosity; a sweep 1.1 J, the solve 11).
+MOST_SWEEPS = 10
 # Deflated is what is stiffer than this: below, multigrid alone takes no more iterations. A node that touches the
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three resist everything.
 STIFF = 30.0
@@ -22,13 +24,12 @@ STIFF_OF_SOFTEST = 4.0
 # whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without.
 RIGID_OF_SOFTEST = 40.0
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
-# fifths. Of one viscosity there are two, both after the coarser levels.
+# fifths, if a contrast beyond `MODERATE` leaves more. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
 # Conjugate gradients end when less than this part of the energy, squared, is left: the error is below 1 % where the
-# viscosity varies so much at most, and below 5 % beyond.
+# viscosity varies so much at most, and below 5 % beyond. With .017 noise of one viscosity was 1.8 % off.
 MODERATE = 300.0
-TOLERANCE = 0.017
-TOLERANCE_UNIFORM = 0.008  # for one viscosity, whose cycle leaves more: of noise between sticky sides 1.8 % with .017
+TOLERANCE = 0.008
 TOLERANCE_STIFF = 0.07
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
 # third of the tolerance is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
@@ -43,8 +44,8 @@ class Plan:
     """How a viscous step is solved; see `plan_for`.
 
     Attributes:
-        method: "smooth": v* is smoothed; "direct": the grid is so small that its inverse is at hand; "cg": by conjugate
-            gradients, each iteration with one multigrid cycle.
+        method: "smooth": v* is smoothed, by Chebyshev's weights; "direct": the grid is so small that its inverse is at
+            hand; "cg": by conjugate gradients, each iteration with one multigrid cycle.
         sweeps: smoothing sweeps; of conjugate gradients, before and after the coarser levels, or of one viscosity only
             after them.
         tolerance: of the conjugate gradients.
@@ -71,18 +72,28 @@ def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
     return any(bool((np.maximum(*pair) > MODERATE * np.minimum(*pair)).any()) for pair in pairs)
 
 
+def sweeps_alone(kappa: float, leaves: float) -> int:
+    """Chebyshev-Jacobi sweeps after which that part of the error is left at most, by kappa of one viscosity.
+
+    A is 1 + kappa |q|^2 for a wave q of no divergence and at most 1 + 16 kappa for a gradient, so n sweeps leave
+    1 / T_n(1 + 1 / (8 kappa)). At first the error of v* is 16 kappa |v| at most.
+    """
+    if kappa <= 0.0 or leaves >= 1.0:
+        return 1
+    return math.ceil(math.acosh(1.0 / leaves) / math.acosh(1.0 + 0.125 / kappa))
+
+
 def plan_for(least: float, largest: float, cells: int, is_sharp: bool) -> Plan:
     """The plan for kappa between `least` and `largest` on so many cells; see `is_sharp`."""
-    if largest <= BARELY_VISCOUS:
-        return Plan("smooth", 2)
-    rigid = is_sharp and largest > MODERATE * least
-    count = 1 if least <= ONE_SWEEP and least < largest and not rigid else 2
+    share = 1.0 if cells > SMALL else 1.0 / 3.0
+    count = sweeps_alone(largest, share * TOLERANCE / (16.0 * max(largest, 1e-30)))
+    if count <= MOST_SWEEPS:
+        return Plan("smooth", count)
+    varies = largest > MODERATE * least
+    rigid = is_sharp and varies
+    count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
-    tolerance = TOLERANCE if largest <= MODERATE * least else TOLERANCE_STIFF
-    if least == largest and not is_sharp:  # which it is beside solids: they are no case of one viscosity
-        tolerance = TOLERANCE_UNIFORM
-    if cells <= SMALL:
-        tolerance /= 3
+    tolerance = share * (TOLERANCE_STIFF if varies else TOLERANCE)
     if largest <= stiff:
         return Plan("cg", count, tolerance)
     return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid)
