@@ -13,7 +13,8 @@ from solver.gl.passes import Region
 from solver.grid import Grid, check_type
 from solver.params import FluidParams
 from solver.scheme import Forces, Residuals, Scheme, Vector, check_shape, check_size, check_step, real_array
-from solver.warp.map import Velocity, WarpMap
+from solver.warp.map import WarpMap
+from solver.warp.prescribed import Velocity
 
 
 class PaperFluid(Scheme):

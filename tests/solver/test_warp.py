@@ -16,7 +16,8 @@ from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
 from solver.warp.frozen import Frozen
 from solver.warp.inverse import ForwardMap
-from solver.warp.map import MOST_TILES, REMAP_STEPS, WarpMap
+from solver.warp.map import WarpMap
+from solver.warp.remapping import MOST_TILES, REMAP_STEPS
 from support import reference
 from support.flows import VORTEX_TIME, vortex, vortex_faces
 
@@ -57,7 +58,10 @@ def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) 
     warp._steps = 1
     for wanted in (grid.size, (50, 31)):
         assert (
-            difference(warp.read(wanted), reference.compose_map(near, base, grid.extent, wanted, warp._limits)) < 1e-5
+            difference(
+                warp.read(wanted), reference.compose_map(near, base, grid.extent, wanted, warp._accumulated.limits)
+            )
+            < 1e-5
         )
     before = warp.read()
     warp.remap()
