@@ -15,7 +15,8 @@ from solver.grid import Grid
 from solver.limits import check_shape, check_size, check_step, check_type, real_array
 from solver.params import FluidParams
 from solver.scheme import Residuals, Scheme
-from solver.warp.map import Velocity, WarpMap
+from solver.warp.map import WarpMap
+from solver.warp.prescribed import Velocity
 
 
 class PaperFluid(Scheme):

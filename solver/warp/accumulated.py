@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,8 @@ LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs n
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels that what has moved less has not moved
+
+Limits = tuple[float, float, float, float]
 
 
 def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, int]:
@@ -49,7 +52,7 @@ class AccumulatedMap:
 
     Attributes:
         now: the displacement. What is drawn anew is drawn into another field, which takes its place once it is whole.
-        begun: the part of `draw`, below 1, that what is planned begins at.
+        limits: of the places looked up: left, top, right, bottom.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
@@ -62,7 +65,7 @@ class AccumulatedMap:
         self._moved: list[Region] = []  # tiles to be drawn anew
         self._copied: list[Region] = []  # tiles to be copied
         self._done = 0  # of both
-        self.begun = 0.0
+        self.limits = self._picture = (0.0, 0.0, *extent)
 
     def is_fine(self, grid: Grid) -> bool:
         """True if it has `LEAST_TEXELS` texels along a cell of a grid."""
@@ -86,7 +89,6 @@ class AccumulatedMap:
                     wanted.add(tile)
         self._moved = [tile for tile in self._tiles if tile in wanted]
         self._copied = sorted(self._stale.difference(wanted))
-        self.begun = 0.0
         return len(self._moved)
 
     def _cells(self, tile: Region, grid: Grid, axis: int) -> tuple[int, int]:
@@ -97,10 +99,13 @@ class AccumulatedMap:
         first, last = math.floor((start - origin) / step) - REACH, math.ceil((end - origin) / step) + REACH
         return min(max(first, 0), count), min(max(last, 0), count)
 
+    def inputs(self) -> dict[str, Any]:
+        """It as `lib/warp.glsl` has it."""
+        return {"accumulated": self.now, "picture": self.extent, "limits": self.limits}
+
     def draw(self, part: float, draw: Callable[[Field, list[Region]], None]) -> None:
         """Come to a `part` of what is planned, 0-1: `draw` draws regions anew, out of `now`, into another field."""
-        share = (part - self.begun) / (1 - self.begun)
-        before, until = self._done, math.ceil(share * (len(self._moved) + len(self._copied)))
+        before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
         if anew := self._moved[before:until]:
             draw(self._next, anew)
         count = len(self._moved)
@@ -122,16 +127,18 @@ class AccumulatedMap:
         self.now.copy_from(self._next, region)
         self._stale.update(tile for tile in self._tiles if _meet(tile, region))
 
-    def set(self, draw: Callable[[Field], None]) -> None:
-        """Draw all of it; what was planned is forgotten."""
+    def set(self, draw: Callable[[Field], None], limits: Limits) -> None:
+        """Draw all of it, which looks up places within these limits; what was planned is forgotten."""
         self.forget()
         draw(self.now)
         self._stale = set(self._tiles)
+        self.limits = limits
 
-    def restore(self, saved: SavedTiles) -> None:
-        """Go back to what `now.save()` gave; what was planned is forgotten."""
+    def restore(self, saved: SavedTiles, limits: Limits) -> None:
+        """Go back to what `now.save()` gave and the limits of then; what was planned is forgotten."""
         self.forget()
         self._stale.update(self.now.restore(saved))
+        self.limits = limits
 
     def clear(self) -> None:
         """The identity; what was planned is forgotten."""
@@ -139,6 +146,7 @@ class AccumulatedMap:
         for field in (self.now, self._next):
             field.clear()
         self._stale.clear()
+        self.limits = self._picture
 
     def release(self) -> None:
         """Free the textures."""

@@ -1,8 +1,4 @@
-"""The warp map: where every point of the result is looked up in the original.
-
-Longer than most: the submap, the accumulated map and what is frozen have modules of their own; what moves, remaps,
-saves and reads all of them together is here.
-"""
+"""The warp map: where every point of the result is looked up in the original."""
 
 from __future__ import annotations
 
@@ -24,20 +20,16 @@ from solver.state import State
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen
+from solver.warp.prescribed import Velocity, traced
+from solver.warp.remapping import Remapping
 from solver.warp.state import SUBMAPS, MapState, grid_in, values_of
-from solver.warp.submap import Level, Submap, window_of
+from solver.warp.submap import Level, Submap, depth, inputs_of, window_of
 
 if TYPE_CHECKING:
     from solver.fluid import Fluid
 
-Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
-
 CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last remap
 MOST_PLACES = 2**19  # at which its distortion is looked at
-REMAP_STEPS = CHECK_EVERY  # steps over which a remap is spread, at least
-MOST_TILES = 8  # that are made anew in a step, unless something has to be out of the way: the work of one of the fluid
-MOST_GATHERED = 8, 2**19  # texels of what is gathered, along a cell and in all, but for `LEAST_TEXELS` along a cell
-NAMES = ("submap", "window"), ("second", "second_window"), ("third", "third_window")  # of levels, in shaders
 
 
 class WarpMap:
@@ -72,16 +64,12 @@ class WarpMap:
         across, down = self.coarse_size
         self.size = size or (LEAST_TEXELS * across, LEAST_TEXELS * down)
         self._accumulated = AccumulatedMap(device, self.size, self.extent)
-        self._gathered: Level | None = None  # only while another is pending
-        self._pending: Level | None = None
-        self._tiles = 0  # that are made anew for it
-        self._remapping = 0  # how far they are, of `_whole`
+        self._remapping = Remapping(device, self._accumulated)
         self._frozen = Frozen(device, self.size)
         self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
         self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last remap
         self._is_settled = True  # the submap leads nowhere where the map is held
-        self._limits = self._picture = (0.0, 0.0, *self.extent)  # of the places looked up: left, top, right, bottom
         self.version = 0
 
     @property
@@ -124,11 +112,7 @@ class WarpMap:
         """A step was made: remap as far as it is time to."""
         self._steps += 1
         self._changed()
-        if self._pending is not None:
-            # What was gathered on another grid has to be out of the way when the submap on this one is bent.
-            waits = self._gathered is not None and self._gathered.grid != self.grid
-            self._remapping += self._whole // REMAP_STEPS if waits else REMAP_STEPS
-            self._take_in(min(self._remapping / self._whole, 1.0))
+        self._remapping.advance(self.grid)
         # The look waits for the GPU, so not at every step; at fixed steps, so that a replay remaps at the same ones.
         if self._steps >= self.remap_every or (self._steps % CHECK_EVERY == 0 and self._submap.is_steep):
             self._begin_remap()
@@ -154,17 +138,13 @@ class WarpMap:
             return
         check_type("a velocity", velocity, Callable)
         check_type("a time", time)
-        x, y = self.grid.centres()
-        back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
-        left, top, width, height = window_of(self.grid)
-        back = np.stack([np.clip(back_x, left, left + width) - x, np.clip(back_y, top, top + height) - y], axis=-1)
-        self._submap.trace.set(back / self.grid.spacing)
+        self._submap.trace.set(traced(velocity, self.grid, dt, time))
         self.advance_traced(self._submap.trace)
 
     def remap(self) -> None:
         """Let the accumulated map take in all that has moved, at once; the whole map stays what it was."""
         self._begin_remap()
-        self._take_in_all()
+        self._remapping.finish()
 
     def move_to(self, grid: Grid) -> None:
         """Go on with a submap on another grid of the same picture; the map stays what it was.
@@ -212,7 +192,7 @@ class WarpMap:
         """
         if not self._is_settled:
             self._begin_remap()  # or what is around the held places would not go on from them
-        self._take_in_all()
+        self._remapping.finish()
         restore = self.device.pass_("warp/restore.frag", **self._held_defines())
         inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
         still = None
@@ -231,7 +211,7 @@ class WarpMap:
             accumulated.change(
                 (left, top, right - left, bottom - top),
                 lambda target, regions: restore(
-                    target, region=regions, displacement=accumulated.now, window=self._picture, **inputs
+                    target, region=regions, displacement=accumulated.now, window=(0.0, 0.0, *self.extent), **inputs
                 ),
             )
         if still is not None:
@@ -242,12 +222,11 @@ class WarpMap:
 
     def reset(self) -> None:
         """Back to the identity."""
-        self._drop_waiting()
+        self._remapping.drop()
         self._submap.read.clear()
         self._accumulated.clear()
         self._steps = 0
         self._is_settled = True
-        self._limits = self._picture
         self._frozen.draw_anew(self._keep)
         self._changed()
 
@@ -270,24 +249,25 @@ class WarpMap:
             )
         self.reset()
         resample = self.device.pass_("warp/resample.frag")
-        self._accumulated.set(lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel))
-        given.release()
         x, y = (np.arange(columns) + 0.5) / columns * width, (np.arange(rows) + 0.5) / rows * height
         across, down = x + displacement[..., 0], y[:, None] + displacement[..., 1]
         # Each of them in float32, as the shaders take them.
         lowest, highest = np.minimum(0, [across.min(), down.min()]), [across.max(), down.max()]
-        self._limits = (*lowest.tolist(), *np.maximum(self.extent, highest).tolist())
+        self._accumulated.set(
+            lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel),
+            (*lowest.tolist(), *np.maximum(self.extent, highest).tolist()),
+        )
+        given.release()
         self._frozen.draw_anew(self._keep)
 
     def save(self) -> MapState:
         """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
-        values: dict[str, Any] = {"steps": self._steps, "limits": self._limits, "grid": values_of(self.grid)}
-        values["settled"] = self._is_settled
-        for name, level in (("gathered", self._gathered), ("pending", self._pending)):
-            if level is not None:
-                fields[name] = level.field
-                values |= {SUBMAPS[name]: values_of(level.grid), "remapping": self._remapping}
+        values: dict[str, Any] = {"steps": self._steps, "limits": self._accumulated.limits}
+        values |= {"grid": values_of(self.grid), "settled": self._is_settled}
+        for name, level in self._remapping.saved():
+            fields[name] = level.field
+            values |= {SUBMAPS[name]: values_of(level.grid), "remapping": self._remapping.progress}
         state = MapState.of(self.device, fields, **values)
         state.tiles.update(self._frozen.save())
         return state
@@ -303,25 +283,26 @@ class WarpMap:
         tiles = state.tiles.get("accumulated map")
         if grid.picture != self.extent or tiles is None or tiles.kind != self._accumulated.now.kind:
             raise ValueError("the state is of another picture")
-        self._accumulated.restore(tiles)
+        left, top, right, bottom = state.values["limits"].tolist()
+        self._accumulated.restore(tiles, (left, top, right, bottom))
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)
         self._submap.read.copy_from(state.fields["submap"])
         self._steps = int(state.values["steps"])
-        left, top, right, bottom = state.values["limits"].tolist()
-        self._limits = left, top, right, bottom
         self._is_settled = bool(state.values["settled"])
         self._frozen.restore(state.tiles)
-        self._drop_waiting()
-        self._pending, self._gathered = self._level_in(state, "pending"), self._level_in(state, "gathered")
-        if self._pending is not None:
-            self._stand_by(self._pending, int(state.values["remapping"]))
+        waiting = {
+            name: Level(state.fields[name], grid_in(state.values, place))
+            for name, place in SUBMAPS.items()
+            if name != "submap" and name in state.fields
+        }
+        self._remapping.restore(waiting, int(state.values.get("remapping", 0)))
         self._changed()
 
     def release(self) -> None:
         """Free the textures."""
-        self._drop_waiting()
+        self._remapping.drop()
         for thing in (self._submap, self._accumulated, self._frozen, *self._composed.values()):
             thing.release()
 
@@ -334,7 +315,7 @@ class WarpMap:
         accumulated map for it.
         """
         size = size or self.size
-        if size == self.size and self._steps == 0 and self._pending is None and self._frozen.held is None:
+        if size == self.size and self._steps == 0 and self._remapping.is_idle and self._frozen.held is None:
             return self._accumulated.now
         key = size, exact
         if key not in self._composed:
@@ -391,7 +372,7 @@ class WarpMap:
             points,
             self.extent,
             "warp/distortion.frag",
-            self._held_defines() | _depth(self._levels),
+            self._held_defines() | depth(self._levels),
             **self._parts(),
         )[:, 1]
 
@@ -416,93 +397,21 @@ class WarpMap:
             width, height = self.size
             apart = math.ceil(math.sqrt(width * height / MOST_PLACES))
             size = -(-width // apart), -(-height // apart)
-        return distortion(self.device, size, self._held_defines() | _depth(self._levels), self._parts())
+        return distortion(self.device, size, self._held_defines() | depth(self._levels), self._parts())
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
     def _begin_remap(self) -> None:
         """Let what has moved stand by to be taken in, and begin with a submap of nothing."""
-        if not self._steps:
-            return
-        if self._gathered is not None and self._gathered.grid != self.grid:
-            self._take_in_all()
-        elif self._tiles * (1 - self._remapping / self._whole) <= MOST_TILES:
-            self._take_in(1.0)  # which is less work than to gather
-        self._steps = 0
-        self._is_settled = True
-        if self._pending is not None:
-            self._gather()
-        elif self._stand_by(Level(self._submap.read, self.grid)):
-            self._submap.replace()
-
-    def _stand_by(self, moved: Level, remapping: int = 0) -> bool:
-        """Let a level be taken in from the next step on, or go on with it; False if there is nothing to take in."""
-        self._tiles = self._accumulated.begin((moved.field.get(), moved.grid))
-        self._remapping = max(0, min(remapping, self._whole - 1))
-        self._accumulated.begun = self._remapping / self._whole
-        self._pending = moved if self._tiles else None
-        return self._tiles > 0
-
-    def _gather(self) -> None:
-        """Let the submap go into what is to be taken in after what is pending."""
-        (nx, ny), (most, in_all) = self.grid.size, MOST_GATHERED
-        times = max(LEAST_TEXELS, min(math.isqrt(in_all // (nx * ny)), most))
-        field = self.device.field((times * nx, times * ny), 2, "gathered submap")
-        levels = [Level(self._submap.read, self.grid), *([] if self._gathered is None else [self._gathered])]
-        compose = self.device.pass_("warp/compose.frag", GATHER=1, **_depth(levels))
-        left, top, width, height = window_of(self.grid)
-        step = width / field.width, height / field.height
-        origin = left / step[0], top / step[1]
-        compose(field, **self._parts_of(levels), origin=origin, step=np.divide(step, self.extent).tolist())
-        self._submap.read.clear()
-        if self._gathered is not None:
-            self._gathered.field.release()
-        self._gathered = Level(field, self.grid)
-
-    def _take_in(self, part: float) -> None:
-        """Come to a `part`, 0-1, of what the pending level wants."""
-        if self._pending is None:
-            return
-        self._draw_anew([self._pending], part)
-        if part >= 1:
-            gathered, self._gathered = self._gathered, None
-            self._drop_waiting()
-            if gathered is not None and not self._stand_by(gathered):
-                gathered.field.release()
-
-    def _take_in_all(self) -> None:
-        """Let the accumulated map take in all levels but the submap, at once."""
-        if self._gathered is None:
-            self._take_in(1.0)
-        else:
-            self._accumulated.begin(*((level.field.get(), level.grid) for level in self._waiting))
-            self._draw_anew(self._waiting, 1.0)
-            self._drop_waiting()
-
-    def _draw_anew(self, levels: list[Level], part: float) -> None:
-        fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
-        # Also where the map is held: places beside that may look into it, and once it is thawed it goes on from there.
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **_depth(levels))
-        inputs = self._parts_of(levels)
-        self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
-
-    def _drop_waiting(self) -> None:
-        for level in self._waiting:
-            level.field.release()
-        self._gathered = self._pending = None
-
-    def _level_in(self, state: State, name: str) -> Level | None:
-        """A copy of a level that a state holds."""
-        if (saved := state.fields.get(name)) is None:
-            return None
-        field = self.device.field(saved.size, 2, f"{name} submap")
-        field.copy_from(saved)
-        return Level(field, grid_in(state.values, SUBMAPS[name]))
+        if self._steps:
+            self._remapping.give(self._submap)
+            self._steps = 0
+            self._is_settled = True
 
     def _keep(self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field) -> None:
         """Draw the map where it is held now and was not before; see `Frozen`."""
         fine = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **_depth(self._levels))
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **depth(self._levels))
         compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
 
     def _still_under(
@@ -525,53 +434,23 @@ class WarpMap:
         compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
 
     @property
-    def _whole(self) -> int:
-        """`REMAP_STEPS` times the steps that the pending level is taken in over, if nothing waits."""
-        return REMAP_STEPS * max(REMAP_STEPS, math.ceil(self._tiles / MOST_TILES))
-
-    @property
-    def _waiting(self) -> list[Level]:
-        """What stands between the submap and the accumulated map."""
-        return [level for level in (self._gathered, self._pending) if level is not None]
-
-    @property
     def _levels(self) -> list[Level]:
         """All above the accumulated map."""
-        return [Level(self._submap.read, self.grid), *self._waiting]
+        return [Level(self._submap.read, self.grid), *self._remapping.levels]
 
     def _defines(self) -> dict[str, object]:
         """How the whole map is put together."""
         fine: dict[str, object] = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        return fine | self._held_defines() | _depth(self._levels)
+        return fine | self._held_defines() | depth(self._levels)
 
     def _held_defines(self) -> dict[str, object]:
         return {} if self._frozen.held is None else {"HELD": 1}
 
     def _parts(self) -> dict[str, Any]:
         """What `lib/warp.glsl` puts together."""
-        return self._parts_of(self._levels)
-
-    def _parts_of(self, levels: list[Level]) -> dict[str, Any]:
-        parts: dict[str, Any] = {"accumulated": self._accumulated.now, "picture": self.extent, "limits": self._limits}
-        for (name, window), level in zip(NAMES, levels, strict=False):
-            parts |= {name: level.field, window: window_of(level.grid)}
+        parts = self._accumulated.inputs() | inputs_of(self._levels)
         return parts if self._frozen.held is None else parts | {"held": self._frozen.held, "kept": self._frozen.kept}
 
     def _changed(self) -> None:
         self.version += 1
         self._fresh.clear()
-
-
-def _depth(levels: list[Level]) -> dict[str, object]:
-    return {"LEVELS": len(levels)} if len(levels) > 1 else {}
-
-
-def _runge_kutta(
-    velocity: Velocity, x: np.ndarray, y: np.ndarray, time: float, dt: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where points are carried in `dt` by a velocity: the classical fourth-order step."""
-    u1, v1 = velocity(x, y, time)
-    u2, v2 = velocity(x + dt / 2 * u1, y + dt / 2 * v1, time + dt / 2)
-    u3, v3 = velocity(x + dt / 2 * u2, y + dt / 2 * v2, time + dt / 2)
-    u4, v4 = velocity(x + dt * u3, y + dt * v3, time + dt)
-    return x + dt / 6 * (u1 + 2 * u2 + 2 * u3 + u4), y + dt / 6 * (v1 + 2 * v2 + 2 * v3 + v4)

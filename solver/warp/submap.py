@@ -10,6 +10,7 @@ from solver.gl.reduction import Reduction
 from solver.grid import Grid
 
 STEEPEST = 1.0  # largest |grad S| that the cubic carries well
+NAMES = ("submap", "window"), ("second", "second_window"), ("third", "third_window")  # of levels, in shaders
 
 
 class Submap(DoubleField):
@@ -76,3 +77,16 @@ class Level(NamedTuple):
 def window_of(grid: Grid) -> tuple[float, float, float, float]:
     """Left, top, width and height of what a grid covers, longer sides."""
     return *grid.origin, *grid.extent
+
+
+def depth(levels: list[Level]) -> dict[str, object]:
+    """The define of `lib/warp.glsl` for so many levels."""
+    return {"LEVELS": len(levels)} if len(levels) > 1 else {}
+
+
+def inputs_of(levels: list[Level]) -> dict[str, Any]:
+    """Levels, the uppermost first, as `lib/warp.glsl` has them."""
+    parts: dict[str, Any] = {}
+    for (name, window), level in zip(NAMES, levels, strict=False):
+        parts |= {name: level.field, window: window_of(level.grid)}
+    return parts

@@ -16,7 +16,8 @@ from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
 from solver.warp.frozen import Frozen
 from solver.warp.inverse import ForwardMap
-from solver.warp.map import MOST_TILES, REMAP_STEPS, WarpMap
+from solver.warp.map import WarpMap
+from solver.warp.remapping import MOST_TILES, REMAP_STEPS
 from support import reference
 from support.flows import VORTEX_TIME, vortex, vortex_faces
 
@@ -56,7 +57,7 @@ def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) 
     warp._submap.read.set(submap)
     warp._steps = 1
     for wanted in (grid.size, (50, 31)):
-        expected = reference.compose_map(submap, accumulated, grid.extent, wanted, warp._limits)
+        expected = reference.compose_map(submap, accumulated, grid.extent, wanted, warp._accumulated.limits)
         assert difference(warp.read(wanted), expected) < 1e-5
     before = warp.read()
     warp.remap()

@@ -1,0 +1,156 @@
+"""What the accumulated map is still to take in, and how it does so a few tiles at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.grid import Grid
+from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
+from solver.warp.submap import Level, Submap, depth, inputs_of, window_of
+
+REMAP_STEPS = 8  # steps over which a remap is spread, at least
+MOST_TILES = 8  # that are made anew in a step, unless something has to be out of the way: the work of one of the fluid
+MOST_GATHERED = 8, 2**19  # texels of what is gathered, along a cell and in all, but for `LEAST_TEXELS` along a cell
+
+
+class Remapping:
+    """Submaps on their way into the accumulated map.
+
+    The one that is *pending* is taken in tile by tile, and stands above the accumulated map until all tiles are there.
+    What is given meanwhile is *gathered* in a level above that one, of several texels a cell, and is pending next.
+
+    Args:
+        device: the device.
+        accumulated: the map that takes in.
+    """
+
+    def __init__(self, device: Device, accumulated: AccumulatedMap) -> None:
+        self.device = device
+        self._accumulated = accumulated
+        self._gathered: Level | None = None  # only while another is pending
+        self._pending: Level | None = None
+        self._tiles = 0  # that are made anew for it
+        self._begun = self._done = 0  # how far they are, of `_whole`, and where that was begun
+
+    @property
+    def levels(self) -> list[Level]:
+        """What stands between the submap and the accumulated map, the uppermost first."""
+        return [level for level in (self._gathered, self._pending) if level is not None]
+
+    @property
+    def is_idle(self) -> bool:
+        """True if nothing is on its way."""
+        return self._pending is None
+
+    def advance(self, grid: Grid) -> None:
+        """Come a step further, with the submap on a grid."""
+        if self._pending is not None:
+            # What was gathered on another grid has to be out of the way when the submap on this one is bent.
+            waits = self._gathered is not None and self._gathered.grid != grid
+            self._done += self._whole // REMAP_STEPS if waits else REMAP_STEPS
+            self._take_in(min(self._done / self._whole, 1.0))
+
+    def give(self, submap: Submap) -> None:
+        """Take over what a submap holds, which begins anew with nothing."""
+        if self._gathered is not None and self._gathered.grid != submap.grid:
+            self.finish()
+        elif self._tiles * (1 - self._done / self._whole) <= MOST_TILES:
+            self._take_in(1.0)  # which is less work than to gather
+        if self._pending is not None:
+            self._gather(submap)
+        elif self._stand_by(Level(submap.read, submap.grid)):
+            submap.replace()
+
+    def finish(self) -> None:
+        """Let the accumulated map take in all of it at once."""
+        if self._gathered is None:
+            self._take_in(1.0)
+        else:
+            self._accumulated.begin(*((level.field.get(), level.grid) for level in self.levels))
+            self._draw_anew(self.levels, 1.0)
+            self.drop()
+
+    def drop(self) -> None:
+        """Let nothing be on its way any more."""
+        for level in self.levels:
+            level.field.release()
+        self._gathered = self._pending = None
+
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def saved(self) -> Iterator[tuple[str, Level]]:
+        """The levels by name."""
+        for name, level in (("gathered", self._gathered), ("pending", self._pending)):
+            if level is not None:
+                yield name, level
+
+    @property
+    def progress(self) -> int:
+        """How far the pending level is, for `restore`."""
+        return self._done
+
+    def restore(self, saved: dict[str, Level], progress: int) -> None:
+        """Go on with copies of what `saved` gave; the accumulated map is that of then."""
+        self.drop()
+        copies = {}
+        for name, (field, grid) in saved.items():
+            copies[name] = Level(self.device.field(field.size, 2, f"{name} submap"), grid)
+            copies[name].field.copy_from(field)
+        self._gathered, pending = copies.get("gathered"), copies.get("pending")
+        if pending is not None:
+            self._stand_by(pending, progress)
+
+    # -- its parts --------------------------------------------------------------------------------------------------
+
+    def _stand_by(self, moved: Level, progress: int = 0) -> bool:
+        """Let a level be taken in from the next step on, or go on with it; False if there is nothing to take in."""
+        self._tiles = self._accumulated.begin((moved.field.get(), moved.grid))
+        self._begun = self._done = max(0, min(progress, self._whole - 1))
+        self._pending = moved if self._tiles else None
+        return self._tiles > 0
+
+    def _gather(self, submap: Submap) -> None:
+        """Let a submap go into what is to be taken in after what is pending."""
+        grid, (most, in_all) = submap.grid, MOST_GATHERED
+        times = max(LEAST_TEXELS, min(math.isqrt(in_all // (grid.nx * grid.ny)), most))
+        field = self.device.field((times * grid.nx, times * grid.ny), 2, "gathered submap")
+        levels = [Level(submap.read, grid), *([] if self._gathered is None else [self._gathered])]
+        compose = self.device.pass_("warp/compose.frag", GATHER=1, **depth(levels))
+        left, top, width, height = window_of(grid)
+        step = width / field.width, height / field.height
+        origin = left / step[0], top / step[1]
+        fractions = np.divide(step, grid.picture).tolist()
+        compose(field, **self._accumulated.inputs(), **inputs_of(levels), origin=origin, step=fractions)
+        submap.read.clear()
+        if self._gathered is not None:
+            self._gathered.field.release()
+        self._gathered = Level(field, grid)
+
+    def _take_in(self, part: float) -> None:
+        """Come to a `part`, 0-1, of what the pending level wants."""
+        if self._pending is None:
+            return
+        begun = self._begun / self._whole
+        self._draw_anew([self._pending], (part - begun) / (1 - begun))
+        if part >= 1:
+            gathered, self._gathered = self._gathered, None
+            self.drop()
+            if gathered is not None and not self._stand_by(gathered):
+                gathered.field.release()
+
+    def _draw_anew(self, levels: list[Level], part: float) -> None:
+        """Come to a `part` of the accumulated map's tiles that are planned for levels."""
+        fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
+        # Also where the map is held: places beside that may look into it, and once it is thawed it goes on from there.
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **depth(levels))
+        inputs = self._accumulated.inputs() | inputs_of(levels)
+        self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
+
+    @property
+    def _whole(self) -> int:
+        """`REMAP_STEPS` times the steps that the pending level is taken in over, if nothing waits."""
+        return REMAP_STEPS * max(REMAP_STEPS, math.ceil(self._tiles / MOST_TILES))
