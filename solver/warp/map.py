@@ -28,7 +28,7 @@ from solver.warp.submap import Level, Submap, depth, inputs_of, window_of
 if TYPE_CHECKING:
     from solver.fluid import Fluid
 
-CHECK_EVERY = 8  # steps between two looks at how far the map is bent since the last remap
+CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
 MOST_PLACES = 2**19  # at which its distortion is looked at
 
 

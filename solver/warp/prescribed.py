@@ -16,8 +16,13 @@ def traced(velocity: Velocity, grid: Grid, dt: float, time: float) -> np.ndarray
     """How far back what arrives at the cells' centres at `time + dt` came from, in cells: (ny, nx, 2).
 
     A fourth-order Runge-Kutta step; what would come from beyond the grid's edge comes from the edge.
+
+    Raises:
+        ValueError: if the velocity has not two components.
     """
     x, y = grid.centres()
+    if (count := len(velocity(x, y, time + dt))) != 2:
+        raise ValueError(f"a velocity has two components, and the function gave {count}")
     back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
     left, top, width, height = window_of(grid)
     back = np.stack([np.clip(back_x, left, left + width) - x, np.clip(back_y, top, top + height) - y], axis=-1)

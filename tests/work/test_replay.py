@@ -268,3 +268,23 @@ def test_a_window_has_the_viscosity_that_the_whole_picture_has_there(device: Dev
     assert found.max() > 100 * found.min()
     for thing in (*fluids, replay):
         thing.release()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_quick_long_pushes_of_water_do_not_fold(seed: int, device: Device) -> None:
+    """Straight through the picture, half a radius a step at most, on pictures of any aspect: by the chain rule."""
+    rng = np.random.default_rng(seed)
+    width, height = rng.integers(600, 1200, 2).tolist()
+    radius = float(rng.uniform(0.04, 0.1))
+    start, end = rng.uniform(0.1, 0.3, 2), rng.uniform(0.7, 0.9, 2)
+    steps = int(np.ceil(np.hypot(*(end - start)) / (0.45 * radius))) + 1
+    places = zip(*(np.linspace(a, b, steps).tolist() for a, b in zip(start, end, strict=True)), strict=True)
+    samples = tuple((tick, x, y, 1.0) for tick, (x, y) in enumerate(places))
+    push = Stroke.model_validate({"tool": "push", "samples": samples, "radius": radius})
+    water = "version = 3\nduration = 2.0\n[fluid]\ngrid = 96\nviscosity = 0.0065\ndrag = 0.0"
+    pictures = Pictures(Picture(np.zeros((height, width, 3), np.uint8)))
+    replay = Replay(device, Recipe.parse(water).edited(stroke=(push,)), pictures, budget=0)
+    replay.seek(steps + 10)
+    found = replay.warp.statistics()
+    assert (found.folds, found.displacement_max > radius) == (0, True)
+    replay.release()
