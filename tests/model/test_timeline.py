@@ -34,7 +34,8 @@ def test_frame_rate_is_independent_of_the_tick():
 
 
 @pytest.mark.parametrize(
-    ("fps", "count"), [(29.97, 31), (23.976, 25), (59.94, 61), (12.5, 13), (10.4, 11), (10.6, 12), (0.4, 2), (1000, 1001)]
+    ("fps", "count"),
+    [(29.97, 31), (23.976, 25), (59.94, 61), (12.5, 13), (10.4, 11), (10.6, 12), (0.4, 2), (1000, 1001)],
 )
 def test_a_second_at_a_fractional_rate_has_the_nearest_number_of_frames(fps: float, count: int):
     """One more than spaces between them; halves go to the even number."""
