@@ -174,6 +174,15 @@ def test_doctor(folder: Path):
     assert ran.returncode == 0
     assert "OpenGL" in ran.stdout
     assert "no display" in ran.stdout
+    assert "missing" not in ran.stdout
+
+
+def test_doctor_fails_where_something_vital_is_missing(folder: Path):
+    nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ""}
+    ran = fluidwarp(folder, "doctor", **nothing)
+    assert ran.returncode == 1
+    assert "missing" in ran.stdout
+    assert "apt-get install" in ran.stdout
 
 
 def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
@@ -184,6 +193,20 @@ def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
 
 
 # -- what does not ----------------------------------------------------------------------------------------------------
+
+
+def test_a_mistake_of_ours_has_a_status_of_its_own(folder: Path):
+    broken = "import app.cli\napp.cli.cli = lambda: 1 / 0\napp.cli.main()"
+    ran = subprocess.run(
+        [sys.executable, "-c", broken],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 70
+    assert ran.stderr.startswith("fluidwarp: this is a mistake in fluidwarp (ZeroDivisionError: division by zero);")
+    assert len(ran.stderr.splitlines()) == 1
 
 
 def test_no_egl_is_told(folder: Path):

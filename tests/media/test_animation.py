@@ -22,6 +22,7 @@ from app.media import animation, ffmpeg, files, video
 from app.media.animation import (
     animation_writer,
     check_animation,
+    crf_of,
     frame_order,
     is_animation,
     order_length,
@@ -170,6 +171,11 @@ def test_a_codec_that_does_not_fit_is_told(tmp_path: Path, monkeypatch: pytest.M
     ):
         write(np.zeros((64, 64, 3), np.uint8))
     assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize(("quality", "crf"), [(1, 45), (50, 30), (75, 22), (90, 18), (100, 15)])
+def test_quality_is_a_constant_rate_factor(quality: int, crf: int):
+    assert crf_of(quality) == crf
 
 
 def test_mp4_starts_fast_and_follows_the_crf(tmp_path: Path):

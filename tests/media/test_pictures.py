@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 import tifffile
-from PIL import Image, ImageCms, PngImagePlugin
+from PIL import Image, ImageCms, JpegImagePlugin, PngImagePlugin
 
 from app.errors import UserError
 from app.media import files
@@ -137,6 +137,9 @@ def test_lossy_formats_are_close(tmp_path: Path, ending: str, channels: int):
     assert seen.shape == expected.shape
     assert np.abs(seen - expected).mean() < 2
     assert np.abs(read_picture(path).pixels - seen).mean() < 1
+    if ending == ".jpg" and seen.shape[2] == 3:
+        with Image.open(path) as image:
+            assert JpegImagePlugin.get_sampling(image) == 0, "colours of full resolution"
 
 
 def test_webp_at_full_quality_is_lossless(tmp_path: Path):

@@ -25,9 +25,10 @@ from app.media.pictures import read_picture, write_picture
 from app.media.video import read_clip
 from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
+from app.model.timeline import Timeline
 from app.progress import Progress
 from app.work.applying import Application, MapSource, converted, inverted
-from app.work.export import displacement, run
+from app.work.export import displacement, run, shown_positions
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.threads import ahead, behind
@@ -227,6 +228,29 @@ def test_the_rates_of_ntsc_are_exact(device: Device, picture: Path, tmp_path: Pa
 
 
 # Maps ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("time", "order"),
+    [
+        ("", [0, 1, 2, 3, 4]),
+        ("hold_first = 0.1\nhold_last = 0.2", [0, 0, 1, 2, 3, 4, 4, 4]),
+        ("reverse = true\nhold_last = 0.1", [4, 3, 2, 1, 0, 0]),
+        ("ping_pong = true\nhold_first = 0.1", [0, 0, 1, 2, 3, 4, 3, 2, 1]),
+        ("start = 0.1\nend = 0.3\nspeed = 0.5", [1, 1.5, 2, 2.5, 3]),
+    ],
+)
+def test_the_order_in_which_warps_are_shown(time: str, order: list[float]):
+    """Ten frames a second, a tick each."""
+    recipe = Recipe.parse(f"duration = 0.4\n[fluid]\ndt = 0.1\n[time]\n{time}\n")
+    assert shown_positions(Timeline.of(recipe), recipe, 10) == order
+
+
+def test_a_video_has_the_quality_of_its_recipe(device: Device, picture: Path, tmp_path: Path):
+    recipe = "duration = 0.1\n[fluid]\ngrid = 16\n[output]\nquality = {}\n"
+    for quality, crf in ((50, 30), (90, 18)):
+        render(device, recipe.format(quality), picture, tmp_path / "a.mp4")
+        assert f"crf={crf}.0".encode() in (tmp_path / "a.mp4").read_bytes()
 
 
 def test_a_map_for_every_frame(device: Device, picture: Path, tmp_path: Path):
