@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -369,11 +368,8 @@ def test_interrupted_leaves_nothing(folder: Path):
         except subprocess.TimeoutExpired:
             continue
         break
-    asked = time.monotonic()
     started.send_signal(signal.SIGINT)
-    _, told = started.communicate(timeout=60)
-    # Half a second on a machine of its own; tests share theirs.
-    assert time.monotonic() - asked < 3
+    _, told = started.communicate(timeout=60)  # of a job of hours
     assert started.returncode == cli.INTERRUPTED
     assert told == "fluidwarp: cancelled; nothing half-written is left\n"
     assert here(folder) == before
@@ -388,6 +384,7 @@ with on_terminal("stuck", 1), replacing("out.png") as temporary:
     temporary.write_bytes(b"half")
     print("writing", flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 2**30)
+    print("all of it", flush=True)
 """
 
 
@@ -403,11 +400,10 @@ def test_interrupted_where_nobody_asks(folder: Path):
     assert started.stdout is not None
     assert started.stdout.readline() == b"writing\n"
     assert here(folder) != before
-    asked = time.monotonic()
     started.send_signal(signal.SIGINT)
-    _, told = started.communicate(timeout=60)
-    assert time.monotonic() - asked < 3
+    given, told = started.communicate(timeout=60)
     assert started.returncode == cli.INTERRUPTED
+    assert given == b""  # it was broken off and not waited for
     assert told == b"fluidwarp: cancelled; nothing half-written is left\n"
     assert here(folder) == before
 

@@ -25,6 +25,8 @@ class Widgets:
     def __init__(self, robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
         self.robot = robot
         self.at: dict[str, Rect] = {}
+        self.words: list[str] = []
+        self.index = 0
         for kind in ("slider", "button", "check", "section"):
             self._note(monkeypatch, kind, 1 if kind == "slider" else 0)
         segmented, combo = Ui.segmented, imgui.combo

@@ -929,6 +929,9 @@ def test_the_theme_and_the_scale(robot: Robot) -> None:
     robot.key("ctrl+l")
     robot.frame()
     assert robot.pixels().mean() > dark + 30
+    robot.key("ctrl+l")
+    robot.frame()
+    assert robot.pixels().mean() == pytest.approx(dark, abs=3)
     robot.editor.preferences.scale = 1.5
     robot.frame(count=2)
     assert robot.editor.layout.bar.height == 72

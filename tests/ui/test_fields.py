@@ -139,7 +139,7 @@ def test_a_button_of_the_inspector_does_what_it_says(robot: Robot, widgets: Widg
     only(robot, "masks")
     widgets.click(words)
     recipe = robot.editor.session.recipe
-    assert recipe.change == (Change(tick=recipe.change[0].tick, **{name: True}),)
+    assert recipe.change == (Change.model_validate({"tick": recipe.change[0].tick, name: True}),)
 
 
 def test_an_entry_of_the_history_is_the_one_that_is_pressed(robot: Robot) -> None:

@@ -12,6 +12,7 @@ import pytest
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.ui.files import load_any
+from app.ui.theme import PALETTES
 from solver.gl.device import Device
 from support.editing import Robot
 
@@ -53,6 +54,25 @@ def test_the_ring_is_as_large_as_the_brush(robot: Robot, tool: str, radius: floa
     assert lit[lit > 6].max() == pytest.approx(reach if half < reach - 3 else half, abs=1.6)
     assert found[8:].argmax() + 8 == pytest.approx(half, abs=1.1)
     assert found[round(reach) + 5 : round(reach) + 15] == pytest.approx(110, abs=6)
+
+
+def test_under_a_transparent_picture_lie_squares_of_the_themes_tones(device: Device, tmp_path: Path) -> None:
+    write_picture(tmp_path / "clear.png", Picture(np.zeros((120, 160, 4), np.uint8)))
+    robot = Robot(device, load_any(tmp_path / "clear.png"))
+    try:
+        for theme in (PALETTES["dark"], PALETTES["light"]):
+            robot.move(5, 5)
+            robot.frame(count=2)
+            x, y = (round(place) for place in robot.at(0.5, 0.5))
+            tones, counts = np.unique(
+                robot.pixels()[y - 32 : y + 32, x - 32 : x + 32].reshape(-1, 3), axis=0, return_counts=True
+            )
+            wanted = sorted(tuple(round(255 * part) for part in tone[:3]) for tone in theme.checker)
+            assert [tuple(tone) for tone in tones] == wanted
+            assert counts == pytest.approx(2048, abs=1)
+            robot.key("ctrl+l")
+    finally:
+        robot.close()
 
 
 def test_the_other_direction_has_a_minus_in_the_ring(robot: Robot) -> None:

@@ -104,6 +104,7 @@ def test_the_split_is_taken_hold_of_at_its_line_and_follows_the_pointer(robot: R
     assert robot.editor.pointer.cursor == "resize_ew"
     pull(robot, 33, 60)
     assert state.split == pytest.approx(robot.editor.view.to_picture(x + 40, 0)[0])
+    assert state.split is not None
     robot.move(*robot.at(state.split, 0.6))
     pull(robot, -2000, 0)
     assert state.split == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -118,10 +119,11 @@ def test_a_gradient_alone_moves_nothing_in_a_uniform_fluid(device: Device) -> No
 
 @pytest.mark.parametrize(("name", "most"), [("strongest", 2.0 * 60), ("fastest", 2.0), ("widest", 3.0)])
 def test_a_force_may_throw_by_two_pictures_a_tick_and_swell_by_three_e_folds(name: str, most: float) -> None:
-    none = {"strongest": 0.0, "widest": 0.0, "fastest": 0.0}
-    fields = {"faces": None, "divergence": None, "motion": None}
+    none = LoadedForce(
+        "force[1]", Instants((0.0,)), faces=None, divergence=None, motion=None, strongest=0.0, widest=0.0, fastest=0.0
+    )
     for part in (0.99, 1.01):
-        force = LoadedForce("force[1]", Instants((0.0,)), **fields, **none | {name: part * most})
+        force = replace(none, **{name: part * most})
         if part < 1:
             force.check(1.0, 1 / 60, 0.0)
         else:

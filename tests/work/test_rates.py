@@ -74,12 +74,12 @@ def test_thicken_paints_four_decades_a_second(
     device: Device, tool: str, rate: float, pressures: tuple[float, ...]
 ) -> None:
     """However many samples there are in a tick: with several, all of it in one."""
-    ticks = 1 if len(pressures) > 1 else TICKS
-    held = [(0, p) for p in pressures] if ticks == 1 else [(tick, pressures[0]) for tick, _ in HELD]
+    first, ticks = pressures[0], 1 if len(pressures) > 1 else TICKS
+    held = [(0, p) for p in pressures] if ticks == 1 else [(tick, first) for tick, _ in HELD]
     with replayed(device, tool, *held) as replay:
         replay.seek(ticks)
         viscosity = replay.fluid.viscosity.get()[23:25, 31:33]
-        assert np.log10(viscosity / 0.01) / (ticks * DT) == pytest.approx(rate * pressures[0], rel=0.02)
+        assert np.log10(viscosity / 0.01) / (ticks * DT) == pytest.approx(rate * first, rel=0.02)
 
 
 @pytest.mark.parametrize("position", [TICKS, 1, Fraction(1, 3)])
