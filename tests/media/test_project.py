@@ -89,7 +89,7 @@ def test_another_picture_gets_the_same_recipe(made: Project, tmp_path: Path) -> 
 def test_a_newer_project_says_so(made: Project, tmp_path: Path) -> None:
     path = tmp_path / "work.fluidwarp"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("format.txt", "fluidwarp project 99\n")
+        archive.writestr("format.txt", f"fluidwarp project {projects.VERSION + 1}\n")
     with pytest.raises(UserError, match="newer"):
         projects.load(path)
 

@@ -28,11 +28,12 @@ from app.model.recipe import Recipe
 from app.model.timeline import Timeline
 from app.progress import Progress
 from app.work.applying import Application, MapSource, converted, inverted
-from app.work.export import displacement, run, shown_positions
+from app.work.export import displacement, looked_up, run, shown_positions
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
+from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
 
 WIDTH, HEIGHT = 96, 64
@@ -447,6 +448,19 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
         assert not takes_place("/a/f.%03d.png", other)
     (tmp_path / "m.02.npy").unlink()
     assert files(tmp_path, "") == before
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_a_map_that_reaches_beyond_an_opaque_picture_gives_it_alpha(device: Device, dtype: type):
+    top = 1 if dtype is np.float32 else np.iinfo(dtype).max
+    pixels = np.full((30, 40, 3), top, dtype)
+    values = np.zeros((30, 40, 2), np.float32)
+    values[..., 0] = 0.25  # of the longer side: the right quarter comes from beyond
+    given, how = GivenMap(device, values), Sampling(edges="transparent")
+    found = looked_up(Sampler(device), given, pixels, (40, 30), how, True, lambda _: None)
+    assert found.shape == (30, 40, 4)
+    assert (found[:, :29, 3] == top).all()
+    assert (found[:, 31:, 3] == 0).all()
 
 
 def test_what_is_opaque_stays_so(device: Device, tmp_path: Path):
