@@ -91,6 +91,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description="Which faults do the tests notice?")
     parser.add_argument("--room", help="only those of a room: the name of its TOML file")
     parser.add_argument("--name", default="", help="only those with this in their name")
+    parser.add_argument("--again", type=Path, help="only those that an earlier run, whose output this is, did not notice")
     parser.add_argument("--jobs", type=int, default=1, help="copies of the tree in which they are tried at once")
     parser.add_argument("--limit", type=float, default=180.0, help="seconds that the tests of one may take")
     parser.add_argument("--baseline", action="store_true", help="run the tests without the faults: all must pass")
@@ -98,6 +99,9 @@ def main() -> int:
     asked = parser.parse_args()
     try:
         wanted = [m for m in read() if asked.room in (None, m.room) and asked.name in m.name]
+        if asked.again:
+            lines = asked.again.read_text("utf-8").splitlines()
+            wanted = [m for m in wanted if any(f"{m.room}: {m.name} [" in line and line[0] != "." for line in lines)]
         for mutant in wanted:
             mutant.text_in(ROOT)
     except Stale as error:
