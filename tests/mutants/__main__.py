@@ -91,7 +91,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description="Which faults do the tests notice?")
     parser.add_argument("--room", help="only those of a room: the name of its TOML file")
     parser.add_argument("--name", default="", help="only those with this in their name")
-    parser.add_argument("--again", type=Path, help="only those that an earlier run, whose output this is, did not notice")
+    parser.add_argument("--again", type=Path, help="only those that the run which printed this did not notice")
     parser.add_argument("--jobs", type=int, default=1, help="copies of the tree in which they are tried at once")
     parser.add_argument("--limit", type=float, default=180.0, help="seconds that the tests of one may take")
     parser.add_argument("--baseline", action="store_true", help="run the tests without the faults: all must pass")

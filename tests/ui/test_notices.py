@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from app.ui.browser import Browser
 from app.ui.messages import MOST, Messages
 from app.ui.preferences import MOST_RECENT, Preferences
 
@@ -26,3 +27,12 @@ def test_files_of_late_are_newest_first_and_each_once(tmp_path: Path) -> None:
         preferences.opened(tmp_path / name)
     newest = [str(number) for number in reversed(range(MOST_RECENT - 2))]
     assert [Path(name).name for name in preferences.recent] == ["a", *newest, "b"]
+
+
+def test_folders_are_listed_before_files(tmp_path: Path) -> None:
+    for name in ("b", "D"):
+        (tmp_path / name).mkdir()
+    for name in ("c.png", "A.png", "e.txt", ".f.png"):
+        (tmp_path / name).touch()
+    browser = Browser("Open", tmp_path, (".png",), lambda path: None)
+    assert [path.name for path in browser.inside] == ["b", "D", "A.png", "c.png"]
