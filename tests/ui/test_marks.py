@@ -75,6 +75,20 @@ def test_under_a_transparent_picture_lie_squares_of_the_themes_tones(device: Dev
         robot.close()
 
 
+def test_what_is_opaque_beside_what_is_transparent_shows_no_squares(device: Device, tmp_path: Path) -> None:
+    pixels = np.full((120, 160, 4), (110, 110, 110, 255), np.uint8)
+    pixels[:, :40, 3] = 0
+    write_picture(tmp_path / "half.png", Picture(pixels))
+    robot = Robot(device, load_any(tmp_path / "half.png"))
+    try:
+        robot.move(5, 5)
+        robot.frame(count=2)
+        x, y = (round(place) for place in robot.at(0.7, 0.5))
+        assert robot.pixels()[y - 20 : y + 20, x - 20 : x + 20] == pytest.approx(110, abs=1)
+    finally:
+        robot.close()
+
+
 def test_the_other_direction_has_a_minus_in_the_ring(robot: Robot) -> None:
     x, y = (round(place) + 0.5 for place in robot.at(0.5, 0.5))
     robot.move(x, y)
