@@ -174,6 +174,15 @@ def test_doctor(folder: Path):
     assert ran.returncode == 0
     assert "OpenGL" in ran.stdout
     assert "no display" in ran.stdout
+    assert "missing" not in ran.stdout
+
+
+def test_doctor_fails_where_something_vital_is_missing(folder: Path):
+    nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ""}
+    ran = fluidwarp(folder, "doctor", **nothing)
+    assert ran.returncode == 1
+    assert "missing" in ran.stdout
+    assert "apt-get install" in ran.stdout
 
 
 def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
@@ -184,6 +193,20 @@ def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
 
 
 # -- what does not ----------------------------------------------------------------------------------------------------
+
+
+def test_a_mistake_of_ours_has_a_status_of_its_own(folder: Path):
+    broken = "import app.cli\napp.cli.cli = lambda: 1 / 0\napp.cli.main()"
+    ran = subprocess.run(
+        [sys.executable, "-c", broken],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 70
+    assert ran.stderr.startswith("fluidwarp: this is a mistake in fluidwarp (ZeroDivisionError: division by zero);")
+    assert len(ran.stderr.splitlines()) == 1
 
 
 def test_no_egl_is_told(folder: Path):
@@ -346,11 +369,8 @@ def test_interrupted_leaves_nothing(folder: Path):
         except subprocess.TimeoutExpired:
             continue
         break
-    asked = time.monotonic()
     started.send_signal(signal.SIGINT)
-    _, told = started.communicate(timeout=60)
-    # Half a second on a machine of its own; tests share theirs.
-    assert time.monotonic() - asked < 3
+    _, told = started.communicate(timeout=60)  # of a job of hours
     assert started.returncode == cli.INTERRUPTED
     assert told == "fluidwarp: cancelled; nothing half-written is left\n"
     assert here(folder) == before
@@ -365,6 +385,7 @@ with on_terminal("stuck", 1), replacing("out.png") as temporary:
     temporary.write_bytes(b"half")
     print("writing", flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 2**30)
+    print("all of it", flush=True)
 """
 
 
@@ -380,11 +401,10 @@ def test_interrupted_where_nobody_asks(folder: Path):
     assert started.stdout is not None
     assert started.stdout.readline() == b"writing\n"
     assert here(folder) != before
-    asked = time.monotonic()
     started.send_signal(signal.SIGINT)
-    _, told = started.communicate(timeout=60)
-    assert time.monotonic() - asked < 3
+    given, told = started.communicate(timeout=60)
     assert started.returncode == cli.INTERRUPTED
+    assert given == b""  # it was broken off and not waited for
     assert told == b"fluidwarp: cancelled; nothing half-written is left\n"
     assert here(folder) == before
 

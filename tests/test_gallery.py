@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from app import gallery
 from app.errors import UserError
-from app.gallery import Studio, arrows, contact_sheet, load, shades, sharpness, spline_warp
+from app.gallery import Studio, arrows, contact_sheet, light, load, shades, sharpness, spline_warp
 from app.media.auxiliary import Pictures
 from app.media.pictures import read_picture
 from app.progress import Progress
@@ -93,3 +93,8 @@ def test_a_folder_that_cannot_be_made_is_told(device: Device, tmp_path: Path) ->
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"Cannot write to .*file/in"):
         gallery.make(device, tmp_path / "file" / "in", Progress())
+
+
+def test_light_is_luminance_in_linear_light() -> None:
+    colours = np.array([[(188, 188, 188), (255, 0, 0), (0, 255, 0), (0, 0, 255)]], np.uint8)
+    np.testing.assert_allclose(light(colours), [[0.5029, 0.2126, 0.7152, 0.0722]], atol=1e-4)

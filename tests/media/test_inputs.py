@@ -458,6 +458,11 @@ def test_preferences_that_are_hostile_are_as_by_default(tmp_path: Path, text: st
 # Messages -----------------------------------------------------------------------------------------------------------
 
 
+def test_what_is_long_lacks_its_middle():
+    assert shown("a" * 600 + "b" * 5000 + "c" * 600) == "a" * 500 + " ... " + "c" * 500
+    assert shown("a" * 1000) == "a" * 1000
+
+
 def test_what_is_shown_is_one_line_that_no_terminal_obeys():
     assert shown("Grüße, 你好 👩‍🚀: \\") == "Grüße, 你好 👩‍🚀: \\"  # as it is
     assert shown("a\x1b[31m\n\t\r\0\x7f\x9b\u202e\u2028\udcff") == (r"a\x1b[31m\n\t\r\x00\x7f\x9b\u202e\u2028\udcff")

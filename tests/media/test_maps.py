@@ -236,6 +236,13 @@ def test_fitting_to_a_picture():
 # What must be refused -----------------------------------------------------------------------------------------------
 
 
+def test_a_map_fitted_to_other_proportions_keeps_its_fractions():
+    """200 x 100 is, but for rounding, as 202 x 100 is not: half of the height stays half of the height."""
+    fitted = Displacement(np.full((50, 100, 2), 0.25)).fitted(202, 100)
+    np.testing.assert_allclose(fitted.values[..., 0], 0.25)
+    np.testing.assert_allclose(fitted.values[..., 1], 0.5 * 100 / 202)
+
+
 @pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
 def test_nan_is_refused(tmp_path: Path, ending: str):
     map_ = swirl(8, 9)

@@ -30,6 +30,28 @@ def made(tmp_path: Path) -> Project:
     return projects.from_picture(tmp_path / "photo.png", Recipe(duration=0.25, stroke=(stroke,)))
 
 
+def test_a_project_holds_every_picture_that_its_recipe_names(made: Project, tmp_path: Path) -> None:
+    names = ("mask.png", "field.png", "layer.png")
+    for name in names:
+        (tmp_path / name).write_bytes((tmp_path / "photo.png").read_bytes())
+    text = """
+[[viscosity]]
+kind = "picture"
+picture = "layer.png"
+scale = 1
+[[freeze]]
+kind = "picture"
+segment = { mask = "mask.png" }
+[[force]]
+kind = "field"
+picture = "field.png"
+"""
+    named = made.recipe.edited(**{key: getattr(Recipe.parse(text), key) for key in ("viscosity", "freeze", "force")})
+    projects.save(replace(made, recipe=named), tmp_path / "work.fluidwarp")
+    with zipfile.ZipFile(tmp_path / "work.fluidwarp") as archive:
+        assert {*names, "photo.png"} < set(archive.namelist())
+
+
 def test_a_project_holds_everything(made: Project, tmp_path: Path) -> None:
     saved = projects.save(made, tmp_path / "work.fluidwarp")
     assert (saved.path, saved.name) == (tmp_path / "work.fluidwarp", "work")
@@ -67,7 +89,7 @@ def test_another_picture_gets_the_same_recipe(made: Project, tmp_path: Path) -> 
 def test_a_newer_project_says_so(made: Project, tmp_path: Path) -> None:
     path = tmp_path / "work.fluidwarp"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("format.txt", "fluidwarp project 99\n")
+        archive.writestr("format.txt", f"fluidwarp project {projects.VERSION + 1}\n")
     with pytest.raises(UserError, match="newer"):
         projects.load(path)
 

@@ -186,6 +186,19 @@ def test_a_spline_passes_through_its_points_and_a_corner_has_no_seam(pictures: P
     assert np.abs(np.diff(faces, axis=0)).max() < 0.15
 
 
+def test_a_spline_is_that_of_catmull_and_rom() -> None:
+    """Of evenly spaced points of a parabola: in its inner pieces, the parabola itself."""
+    from app.model.forces import _along
+
+    x = np.arange(5.0)
+    at, tangents, lengths = _along(np.stack([x, x * x / 4], axis=-1), True, 0.05)
+    inner = (at[:, 0] > 1) & (at[:, 0] < 3)
+    assert inner.sum() > 50
+    assert at[inner, 1] == pytest.approx(at[inner, 0] ** 2 / 4, abs=1e-3)
+    assert tangents[inner, 1] / tangents[inner, 0] == pytest.approx(at[inner, 0] / 2, abs=1e-3)
+    assert lengths.max() <= 0.05
+
+
 def field_picture(path: Path, pixels: np.ndarray) -> None:
     import imagecodecs
 

@@ -172,6 +172,66 @@ def test_faults_are_told_in_a_sentence(text: str, words: str):
     assert "input" not in message.lower()
 
 
+FORCE = "[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]\n"
+STROKE = "[[stroke]]\ntool = 'push'\nsamples = [[0, 0, 0, 1]]\n"
+HANDLE = "[[handle]]\nat = [0.5, 0.5]\nto = [0.6, 0.5]\n"
+LAYER = "[[viscosity]]\nkind = 'constant'\n"
+PICTURE = "[[freeze]]\nkind = 'picture'\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "most"),
+    [
+        ("fluid.dt = 10\nduration = {}", 1_000_000),
+        ("[fluid]\ngrid = {}", 4096),
+        ("[fluid]\ndt = {}", 10),
+        ("[fluid]\nviscosity = {}", 1000),
+        ("[fluid]\ndrag = {}", 1000),
+        ("[fluid]\nsweeps = {}", 10_000),
+        ("[density]\nkappa = {}", 1000),
+        ("[density]\nsource = [0, 0, {}]", 1000),
+        ("[stop]\nhandles_within = {}\n" + HANDLE, 1),
+        ("[[stop.watch]]\npoint = [0.5, 0.5]\ndistance = {}", 10),
+        ("[time]\nspeed = {}", 1000),
+        ("[time]\nhold_first = {}", 100_000),
+        ("[output]\nsize = {}", 32_768),
+        ("[output]\nfps = {}", 1000),
+        ("[output]\nquality = {}", 100),
+        (FORCE + "strength = {}", 1e6),
+        (FORCE + "radius = {}", 10),
+        (FORCE + "at = {}", 1_000_000),
+        ("[[force]]\nkind = 'vortex'\npoint = [0.5, {}]", 10),
+        ("[[force]]\nkind = 'point'\ndirection = [1, 0]\npoint = [0.5, 0.5]\nlocal = {}", 1),
+        (LAYER + "scale = {}", 1e6),
+        (PICTURE + "threshold = {}", 1),
+        (PICTURE + "blur = {}", 10),
+        (PICTURE + "levels = {}", 256),
+        (PICTURE + "segment = {{ above = {} }}", 1),
+        (PICTURE + "segment = {{ color = '#000000', tolerance = {} }}", 2),
+        (LAYER + "scale = 1\nwindow = {{ box = [0, 0, 1, 1], soft = {} }}", 10),
+        (HANDLE + "radius = {}", 1),
+        (HANDLE + "stiffness = {}", 1),
+        (HANDLE + "start = {}", 1_000_000),
+        (STROKE + "radius = {}", 10),
+        (STROKE + "hardness = {}", 1),
+        (STROKE + "strength = {}", 100),
+        ("[[stroke]]\ntool = 'push'\nsamples = [[{}, 0, 0, 1]]", 10_000_000),
+        ("[[stroke]]\ntool = 'push'\nsamples = [[0, 0, {}, 1]]", 10),
+        ("[[stroke]]\ntool = 'push'\nsamples = [[0, 0, 0, {}]]", 1),
+        ("[[change]]\ntick = 0\nviscosity = {}", 1000),
+        ("[[change]]\ntick = 0\ndrag = {}", 1000),
+    ],
+)
+def test_numbers_have_an_upper_bound_which_is_allowed(text: str, most: float):
+    Recipe.parse(text.format(most))
+    above = most + 1 if isinstance(most, int) else 1.0001 * most
+    with pytest.raises(UserError) as caught:
+        Recipe.parse(text.format(above))
+    told = re.search(r"must be at most (\S+), not", str(caught.value))
+    assert told is not None
+    assert float(told[1]) == most
+
+
 def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
     """As Windows' Notepad sets it."""
     (tmp_path / "a.toml").write_text("duration = 2.0\n", "utf-8-sig")

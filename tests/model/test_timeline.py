@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import UserError
 from app.model.recipe import Playback, Recipe, Stop, Watch
-from app.model.timeline import Observation, Sentinel, Timeline, frame_positions
+from app.model.timeline import Observation, Sentinel, Timeline, frame_positions, frame_rate
 
 TEN = Timeline(10, 0.1)
 
@@ -17,6 +17,7 @@ TEN = Timeline(10, 0.1)
 def test_duration_is_a_whole_number_of_ticks():
     recipe = Recipe.parse("duration = 1.0\n[fluid]\ndt = 0.3")
     assert Timeline.of(recipe).ticks == 3
+    assert Recipe.parse("duration = 1.1\n[fluid]\ndt = 0.3").ticks == 4
     assert Recipe.parse("duration = 1e-6").ticks == 1
 
 
@@ -30,6 +31,30 @@ def test_frame_rate_is_independent_of_the_tick():
     assert positions[0] == 0
     assert positions[-1] == 10
     assert {b - a for a, b in pairwise(positions)} == {Fraction(10, 24)}
+
+
+@pytest.mark.parametrize(
+    ("fps", "count"),
+    [(29.97, 31), (23.976, 25), (59.94, 61), (12.5, 13), (10.4, 11), (10.6, 12), (0.4, 2), (1000, 1001)],
+)
+def test_a_second_at_a_fractional_rate_has_the_nearest_number_of_frames(fps: float, count: int):
+    """One more than spaces between them; halves go to the even number."""
+    positions = frame_positions(TEN, Playback(), fps)
+    assert len(positions) == count
+    assert (positions[0], positions[-1]) == (0, 10)
+    assert {b - a for a, b in pairwise(positions)} == {Fraction(10, count - 1)}
+
+
+@pytest.mark.parametrize(
+    ("fps", "rate"),
+    [
+        (23.976, Fraction(24000, 1001)), (29.97, Fraction(30000, 1001)), (47.952, Fraction(48000, 1001)),
+        (59.94, Fraction(60000, 1001)), (119.88, Fraction(120000, 1001)), (12.5, Fraction(25, 2)),
+        (1 / 3, Fraction(1, 3)), (30, Fraction(30)),
+    ],
+)  # fmt: skip
+def test_a_rate_is_the_fraction_that_is_meant(fps: float, rate: Fraction):
+    assert frame_rate(fps) == rate
 
 
 def test_slow_motion_has_more_frames():

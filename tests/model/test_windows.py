@@ -54,6 +54,11 @@ def test_a_window_stays_while_the_brush_has_room_and_is_dragged_along_by_whole_c
     assert abs(x.mean() - 0.5) < 2 * grid.h
     assert abs(y.mean() - 0.5 * 2 / 3) < 2 * grid.h
     assert Window.of([(stroke(), at(0.5, 0.5, 0.51, 0.5))], 0, window, WHOLE) == window
+    ahead = Window.of([(stroke(), at(0.49, 0.5, 0.5, 0.5))], 0, None, WHOLE)
+    assert ahead is not None
+    # A radius of the brush, of 12 cells, to the right of where it has come.
+    assert ahead.column - window.column == pytest.approx(12, abs=1)
+    assert ahead.row == window.row
     moved, place = window, 0.5
     seen = set()
     while place < 0.99:

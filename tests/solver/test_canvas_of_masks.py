@@ -101,6 +101,16 @@ def test_thickness_is_painted_with_the_brush_s_falloff_within_its_limits(masks: 
     assert decades(masks).min() == -3
 
 
+@pytest.mark.parametrize("hardness", [0.0, 0.4, 1.0])
+def test_a_shaders_brush_falls_off_as_the_recipes(hardness: float, masks: Masks) -> None:
+    """1 in a core of 0.9 of its hardness, then (1 - q^2)^3 to the rim."""
+    x, y = CANVAS.centres()
+    core = 0.9 * hardness * 0.2
+    q = np.clip((np.hypot(x - 0.5, y - 0.3) - core) / (0.2 - core), 0, 1)
+    masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.2, hardness), 2.0)
+    np.testing.assert_allclose(decades(masks), 2.0 * (1 - q**2) ** 3, atol=1.5 / STEPS)
+
+
 GRIDS = {
     "whole": Grid(60, 40),
     "no multiple": Grid(47, 31, CANVAS.extent),

@@ -286,3 +286,24 @@ def test_energy_never_grows(device: Device, courant: float) -> None:
     assert max(energy) < 1.02 * energy[0]
     assert energy[-1] < energy[0]
     fluid.release()
+
+
+def test_a_place_that_is_read_everywhere_gives_no_more_than_it_has(device: Device) -> None:
+    """Advection alone would make the energy of all from that of two spots: what departs bounds what arrives (S6)."""
+    grid = Grid(48, 48)
+    fluid = Fluid(device, grid)
+    at = np.array([0.25, 0.75])
+
+    def apart(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        # In a step of 1 s what arrives anywhere in a half comes from the middle of that half.
+        return x - 0.5, y - at[(y > 0.5).astype(int)]
+
+    force = np.zeros((48, 48, 2))
+    for row, push in ((12, 100.0), (36, -100.0)):
+        force[row - 2 : row + 2, 22:27, 0] = push
+    fluid.set_velocity(apart)
+    faces = fluid.faces().get()
+    departed = 0.5 * ((faces + force) ** 2).sum() * grid.h**2
+    fluid.step(1.0, force)
+    assert 0.1 * departed < fluid.motion().kinetic_energy < 1.001 * departed
+    fluid.release()

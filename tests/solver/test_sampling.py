@@ -181,9 +181,37 @@ def test_colour_of_transparent_pixels_does_not_bleed(device: Device) -> None:
     picture[..., 0] = 255
     picture[:, 16:] = 0, 255, 0, 255
     found = Sampler(device).apply(GivenMap(device, shift((32, 32), 0.5, 0.0)), picture)
+    # From the half of the last transparent column on, but for what is beyond the picture.
+    assert (found[:, :14, 3] == 0).all()
+    assert found[4:-4, 15, 3] == pytest.approx(128, abs=1)
+    assert (found[4:-4, 17:30, 3] == 255).all()
     visible = found[found[..., 3] > 0]
     assert (visible[:, 0] == 0).all()
     assert (visible[:, 1] == 255).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("premultiplied", [False, True])
+def test_soft_alpha_is_mixed_as_light_that_it_weighs(device: Device, kind: str, premultiplied: bool) -> None:
+    """Half way between neighbours of other colours and alphas, against float64."""
+    dtype, top = KINDS[kind]
+    straight = 0.1 + 0.9 * np.random.default_rng(3).random((40, 48, 4))
+    picture = straight.copy()
+    if premultiplied:
+        picture[..., :3] *= picture[..., 3:]
+    picture = (np.round(picture * top) if top > 1 else picture).astype(dtype)
+    values = picture / top
+    if premultiplied:
+        values[..., :3] /= values[..., 3:]
+    light = values if kind == "float" else np.dstack([srgb_to_linear(values[..., :3]), values[..., 3]])
+    weighed = np.dstack([light[..., :3] * light[..., 3:], light[..., 3]])
+    mean = (weighed[:, 1:] + weighed[:, :-1]) / 2
+    colours = mean[..., :3] / mean[..., 3:]
+    colours = colours if kind == "float" else linear_to_srgb(colours)
+    wanted = np.dstack([colours * mean[..., 3:] if premultiplied else colours, mean[..., 3]])
+    how = Sampling("bilinear", "clamp", dither=False, premultiplied=premultiplied)
+    found = Sampler(device).apply(GivenMap(device, shift((48, 40), 0.5, 0.0)), picture, how=how)[:, :-1] / top
+    np.testing.assert_allclose(found[:, 2:-2], wanted[:, 2:-2], atol=1.1 / top if kind == "8" else 1e-4)
 
 
 def test_half_black_half_white_is_half_the_light(device: Device) -> None:
@@ -202,6 +230,21 @@ def test_dithering_keeps_the_mean(device: Device) -> None:
     found = Sampler(device).apply(warp, picture, how=how)
     exact = Sampler(device).apply(warp, picture.astype(np.uint16) * 257, how=how)
     assert abs(found.mean() - exact.mean() / 257) < 0.01
+
+
+def test_dithering_is_even_in_every_neighbourhood(device: Device) -> None:
+    """Of a grey between two codes each 8 x 8 pixels have the share of both that makes its mean; no row stands out."""
+    picture = np.zeros((64, 64), np.uint8)
+    picture[:, 1::2] = 1
+    warp = GivenMap(device, shift((64, 64), 0.3, 0.0))
+    found = Sampler(device).apply(warp, picture, how=Sampling("bilinear", "clamp"))[:, 1:-1:2][:, :-1]
+    share = found.astype(float)
+    assert set(np.unique(found)) == {0, 1}
+    blocks = share[:, :24].reshape(8, 8, 3, 8).mean(axis=(1, 3))
+    assert blocks == pytest.approx(share.mean(), abs=0.12)
+    assert 0.1 < share.mean() < 0.9
+    assert share.mean(axis=0) == pytest.approx(share.mean(), abs=0.25)
+    assert share.mean(axis=1) == pytest.approx(share.mean(), abs=0.25)
 
 
 def test_result_of_another_size_follows_the_map(device: Device) -> None:

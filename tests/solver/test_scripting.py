@@ -185,6 +185,8 @@ def test_vorticity_and_stream_function_are_those_of_a_known_flow(device: Device,
     np.testing.assert_allclose(fluid.vorticity()[inner], 2 * pi**2 * psi[inner], atol=2e-2)
     assert fluid.u.shape == (64, 65)
     assert fluid.v.shape == (65, 64)
+    assert fluid.motion().kinetic_energy == pytest.approx(pi**2 / 4, rel=1e-3)
+    assert fluid.motion().largest_speed == pytest.approx(pi, rel=1e-3)
     top = fluid.vorticity()[0, 32]  # -du/dy between the wall's speed and the first row's
     first = fluid.u[0, 32]
     assert top == pytest.approx(0.0 if walls.slip == "free" else (1.0 - first) * 2 * 64, abs=1e-2)
@@ -196,7 +198,7 @@ def test_forces_as_fields_arrays_and_functions_do_the_same(device: Device) -> No
     grid, found = Grid(24, 16), []
 
     def push(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        return np.sin(3 * y) + t, np.cos(2 * x)
+        return np.sin(3 * y) * (1 + 10 * t), np.cos(2 * x)  # a uniform push, walls would hold up
 
     (ux, uy), (vx, vy) = grid.u_faces(), grid.v_faces()
     array = np.stack([push(ux, uy, 0.05)[0], push(vx, vy, 0.05)[1]], axis=-1)

@@ -34,6 +34,7 @@ def test_trace_and_advect(device: Device, nx: int, ny: int, walls: Walls, couran
     faces[:, 0, 0] = faces[0, :, 1] = 0.0
     fluid.set_velocity(faces)
     traced = reference.trace(faces, courant, no_slip=walls.no_slip, speed=walls.speed)
+    fluid.trace(0.5 * courant * fluid.grid.h)  # another step's is not taken for it
     assert relative(fluid.trace(courant * fluid.grid.h).get(), traced) < 1e-4
     fluid._carried.read.set(carried)
     dt = courant * fluid.grid.h

@@ -34,6 +34,7 @@ from app.ui.quality import GRIDS, Speed
 from app.ui.saving import SaveDialog
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
+from solver.brush.masks import ZERO
 from solver.gl.device import Device
 from support.editing import Robot, command_line, export_dialog, pattern, small_project, write_foreign_map
 
@@ -130,6 +131,20 @@ def test_a_curve_acts_once_it_is_let_go(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize(
+    ("key", "name"),
+    [
+        ("p", "Push"), ("shift+p", "Push"), ("c", "Curve"), ("t", "Twirl"), ("shift+t", "Twirl"), ("b", "Bloat"),
+        ("shift+b", "Pinch"), ("v", "Thicken"), ("shift+v", "Thin"), ("f", "Freeze"), ("d", "Thaw"),
+        ("s", "Smooth mask"), ("r", "Restore"),
+    ],
+)  # fmt: skip
+def test_the_history_calls_a_stroke_what_it_was(robot: Robot, key: str, name: str) -> None:
+    robot.key(key)
+    robot.drag((0.5, 0.5), (0.53, 0.5), steps=2)
+    assert names(robot) == ["Open", name]
+
+
+@pytest.mark.parametrize(
     ("key", "tool"),
     [("t", "twirl"), ("b", "bloat"), ("shift+b", "pinch")],
 )
@@ -145,14 +160,13 @@ def test_tools_that_work_while_held(robot: Robot, key: str, tool: str) -> None:
         # Turned clockwise: what is to the right of the middle came from above.
         assert right[1] < -0.005
     else:
-        assert (right[0] < -0.004) == (tool == "bloat")
+        assert right[0] * (1 if tool == "bloat" else -1) < -0.004
 
 
-@pytest.mark.parametrize(("key", "low", "high"), [("v", 2.0, 1e9), ("shift+v", 0.0, 0.5)])
-def test_thicken_and_thin_act_in_the_very_next_frame(robot: Robot, key: str, low: float, high: float) -> None:
+@pytest.mark.parametrize(("key", "rate"), [("v", 4.0), ("shift+v", -4.0)])
+def test_thicken_and_thin_act_in_the_very_next_frame(robot: Robot, key: str, rate: float) -> None:
     robot.key(key)
     robot.frame(count=2)
-    before = robot.canvas()
     robot.move(*robot.at(0.5, 0.5))
     still = robot.canvas()
     robot.press()
@@ -163,8 +177,9 @@ def test_thicken_and_thin_act_in_the_very_next_frame(robot: Robot, key: str, low
     robot.frame(count=8)
     robot.release()
     ratio = robot.editor.session.replay.fluid.viscosity.get() / 0.03
-    assert low < ratio[ratio.shape[0] // 2, ratio.shape[1] // 2] < high
-    assert before.shape == still.shape
+    stroke = robot.editor.session.recipe.stroke[0]
+    seconds = (stroke.last_tick + 1 - stroke.first_tick) / 30
+    assert np.log10(ratio[ratio.shape[0] // 2, ratio.shape[1] // 2]) == pytest.approx(rate * seconds, rel=0.05)
 
 
 def test_what_is_frozen_stays(robot: Robot) -> None:
@@ -183,28 +198,35 @@ def test_what_is_frozen_stays(robot: Robot) -> None:
     robot.key("d")
     assert robot.editor.state.opposite["freeze"]
     robot.drag((0.7, 0.5), (0.7, 0.55), steps=3)
-    assert (robot.editor.session.replay.fluid.solid.get() > 127).sum() < solid.sum() / 2
+    assert not robot.editor.session.replay.fluid.solid.get().any()
 
 
 def test_smoothing_softens_a_mask(robot: Robot) -> None:
     robot.key("v")
     robot.key("]")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=6)
-    peak = robot.editor.session.replay.masks.thickness.get().max()
+    masks = robot.editor.session.replay.masks
+    before = masks.thickness.get().astype(float) - ZERO
     robot.key("s")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=10)
-    assert robot.editor.session.replay.masks.thickness.get().max() < peak
+    after = masks.thickness.get().astype(float) - ZERO
+    assert 0.6 * before.max() < after.max() < 0.9 * before.max()
+    assert after.sum() == pytest.approx(before.sum(), rel=0.15)
 
 
 def test_restore_brings_the_picture_back(robot: Robot) -> None:
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
-    before = np.abs(robot.warp()).max()
+    place = np.array([[0.55, 0.5 * 0.75]])
+    before = robot.editor.session.replay.warp.at(place)
     robot.key("r")
-    robot.key("]")
-    robot.drag((0.55, 0.5), (0.45, 0.5), steps=4, hold=40)
+    robot.drag((0.55, 0.5), (0.55, 0.5), steps=1, hold=20)
     robot.rest()
-    assert np.abs(robot.warp()).max() < 0.5 * before
+    stroke = robot.editor.session.recipe.stroke[-1]
+    seconds = (stroke.last_tick + 1 - stroke.first_tick) / 30
+    left = robot.editor.session.replay.warp.at(place) / before
+    assert np.hypot(*before[0]) > 0.05
+    assert left[0, 0] == pytest.approx(np.exp(-6.0 * seconds), rel=0.05)
 
 
 def test_a_gesture_can_be_given_up(robot: Robot) -> None:
@@ -235,54 +257,6 @@ def test_honey_comes_to_rest_by_itself_and_putty_stops_with_the_brush(robot: Rob
 
 
 # The brush and the view ---------------------------------------------------------------------------------------------
-
-
-def test_the_brush_is_set_by_keys_and_by_dragging(robot: Robot) -> None:
-    state = robot.editor.state
-    size = state.brush.radius
-    robot.key("]")
-    assert state.brush.radius > size
-    robot.key("[")
-    assert state.brush.radius == pytest.approx(size)
-    robot.key("}")
-    assert state.brush.hardness == pytest.approx(0.1)
-    robot.key("shift+[")
-    assert state.brush.hardness == 0
-    robot.key(";")
-    assert state.brush.strength == pytest.approx(0.9)
-    robot.drag((0.5, 0.5), (0.6, 0.3), button=RIGHT)
-    assert state.brush.radius > size
-    assert state.brush.hardness > 0.1
-    assert robot.editor.session.recipe.stroke == ()
-
-
-def test_the_wheel_zooms_at_the_pointer(robot: Robot) -> None:
-    place = (0.3, 0.4)
-    point = robot.at(*place)
-    robot.move(*point)
-    robot.wheel(4)
-    assert robot.editor.view.to_picture(*point) == pytest.approx(place, abs=1e-6)
-    zoom = robot.editor.view.zoom
-    assert zoom is not None
-    assert zoom > robot.editor.view.fit_zoom * 1.5
-    robot.key("0")
-    assert robot.editor.view.zoom is None
-    robot.key("ctrl+1")
-    assert robot.editor.view.percent == pytest.approx(100)
-
-
-def test_panning_while_a_tool_is_in_hand(robot: Robot) -> None:
-    robot.key("ctrl+1")
-    for button, space in ((MIDDLE, False), (0, True)):
-        centre = robot.editor.view.centre
-        if space:
-            robot.hold("space", True)
-        robot.drag((0.5, 0.5), (0.6, 0.5), button=button)
-        if space:
-            robot.hold("space", False)
-        assert robot.editor.view.centre != centre
-    assert not robot.editor.session.playing
-    assert robot.editor.session.recipe.stroke == ()
 
 
 def test_before_and_split(robot: Robot) -> None:
@@ -925,6 +899,15 @@ def test_every_action_can_be_done_at_any_time(robot: Robot, name: str) -> None:
     robot.frame(count=3)
     robot.move(*robot.at(0.4, 0.6))
     robot.frame(count=2)
+    assert not [message.text for message in robot.editor.messages.shown if message.icon == "warn"]
+    # A dialog is left by Escape, once for a field in it; and the stroke is there whatever was done after it.
+    for _ in robot.editor.dialogs.shown * 2:
+        robot.key("escape")
+    assert not robot.editor.dialogs.shown
+    robot.editor.session.go_to(1)
+    robot.rest()
+    assert [stroke.tool for stroke in robot.editor.session.recipe.stroke] == ["push"]
+    assert np.abs(robot.warp()).max() > 0.01
 
 
 @pytest.mark.parametrize("tool", [tool.name for tool in TOOLS])
@@ -946,6 +929,9 @@ def test_the_theme_and_the_scale(robot: Robot) -> None:
     robot.key("ctrl+l")
     robot.frame()
     assert robot.pixels().mean() > dark + 30
+    robot.key("ctrl+l")
+    robot.frame()
+    assert robot.pixels().mean() == pytest.approx(dark, abs=3)
     robot.editor.preferences.scale = 1.5
     robot.frame(count=2)
     assert robot.editor.layout.bar.height == 72

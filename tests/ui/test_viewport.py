@@ -21,6 +21,11 @@ def test_the_whole_picture_fits() -> None:
     assert rect.width / rect.height == pytest.approx(1.5, abs=0.01)
 
 
+@pytest.mark.parametrize("density", [1.0, 2.0])
+def test_a_small_picture_is_seen_at_four_hundred_percent_at_most(density: float) -> None:
+    assert Viewport(VIEW.canvas, (30, 20), density).fit_zoom == 4.0 * density
+
+
 @pytest.mark.parametrize("zoom", [0.2, 1, 7, 64])
 def test_zooming_keeps_the_place_under_the_pointer(zoom: float) -> None:
     place = VIEW.to_picture(333, 222)

@@ -76,9 +76,7 @@ def test_a_message_goes_by_itself(desk: Desk) -> None:
     before = still(desk)
     desk.key("ctrl+shift+c")
     desk.until(lambda: differs(desk.seen(), before, 300, 600, 760, 690), "the message")
-    shown = time.monotonic()
     desk.until(lambda: not differs(desk.seen(), before, 300, 600, 760, 690), "the message to go")
-    assert time.monotonic() - shown < 20
 
 
 @busy

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
-from app.work.replay import Replay
+from app.model.timelaws import Instants
+from app.work.replay import LoadedForce, Replay
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
 
@@ -112,3 +115,17 @@ def test_a_gradient_alone_moves_nothing_in_a_uniform_fluid(device: Device) -> No
     assert still.displacement_max * 512 < 0.5
     assert window.displacement_max * 512 > 5
     assert area_of_disc(swollen, 40 / 300) > 1.1 * math.pi * (40 / 300) ** 2
+
+
+@pytest.mark.parametrize(("name", "most"), [("strongest", 2.0 * 60), ("fastest", 2.0), ("widest", 3.0)])
+def test_a_force_may_throw_by_two_pictures_a_tick_and_swell_by_three_e_folds(name: str, most: float) -> None:
+    none = LoadedForce(
+        "force[1]", Instants((0.0,)), faces=None, divergence=None, motion=None, strongest=0.0, widest=0.0, fastest=0.0
+    )
+    for part in (0.99, 1.01):
+        force = replace(none, **{name: part * most})
+        if part < 1:
+            force.check(1.0, 1 / 60, 0.0)
+        else:
+            with pytest.raises(UserError, match=r"force\[1\]: at t = 0 s"):
+                force.check(-1.0, 1 / 60, 0.0)

@@ -25,13 +25,15 @@ from app.media.pictures import read_picture, write_picture
 from app.media.video import read_clip
 from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
+from app.model.timeline import Timeline
 from app.progress import Progress
 from app.work.applying import Application, MapSource, converted, inverted
-from app.work.export import displacement, run
+from app.work.export import displacement, looked_up, run, shown_positions
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
+from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
 
 WIDTH, HEIGHT = 96, 64
@@ -229,6 +231,29 @@ def test_the_rates_of_ntsc_are_exact(device: Device, picture: Path, tmp_path: Pa
 # Maps ---------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("time", "order"),
+    [
+        ("", [0, 1, 2, 3, 4]),
+        ("hold_first = 0.1\nhold_last = 0.2", [0, 0, 1, 2, 3, 4, 4, 4]),
+        ("reverse = true\nhold_last = 0.1", [4, 3, 2, 1, 0, 0]),
+        ("ping_pong = true\nhold_first = 0.1", [0, 0, 1, 2, 3, 4, 3, 2, 1]),
+        ("start = 0.1\nend = 0.3\nspeed = 0.5", [1, 1.5, 2, 2.5, 3]),
+    ],
+)
+def test_the_order_in_which_warps_are_shown(time: str, order: list[float]):
+    """Ten frames a second, a tick each."""
+    recipe = Recipe.parse(f"duration = 0.4\n[fluid]\ndt = 0.1\n[time]\n{time}\n")
+    assert shown_positions(Timeline.of(recipe), recipe, 10) == order
+
+
+def test_a_video_has_the_quality_of_its_recipe(device: Device, picture: Path, tmp_path: Path):
+    recipe = "duration = 0.1\n[fluid]\ngrid = 16\n[output]\nquality = {}\n"
+    for quality, crf in ((50, 30), (90, 18)):
+        render(device, recipe.format(quality), picture, tmp_path / "a.mp4")
+        assert f"crf={crf}.0".encode() in (tmp_path / "a.mp4").read_bytes()
+
+
 def test_a_map_for_every_frame(device: Device, picture: Path, tmp_path: Path):
     """The picture through map k is frame k; converted, they are the same maps."""
     render(device, WHIRL, picture, tmp_path / "f.%03d.png", maps=MapOutput(tmp_path / "m.%03d.exr", overscan=3))
@@ -423,6 +448,19 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
         assert not takes_place("/a/f.%03d.png", other)
     (tmp_path / "m.02.npy").unlink()
     assert files(tmp_path, "") == before
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_a_map_that_reaches_beyond_an_opaque_picture_gives_it_alpha(device: Device, dtype: type):
+    top = 1 if dtype is np.float32 else np.iinfo(dtype).max
+    pixels = np.full((30, 40, 3), top, dtype)
+    values = np.zeros((30, 40, 2), np.float32)
+    values[..., 0] = 0.25  # of the longer side: the right quarter comes from beyond
+    given, how = GivenMap(device, values), Sampling(edges="transparent")
+    found = looked_up(Sampler(device), given, pixels, (40, 30), how, True, lambda _: None)
+    assert found.shape == (30, 40, 4)
+    assert (found[:, :29, 3] == top).all()
+    assert (found[:, 31:, 3] == 0).all()
 
 
 def test_what_is_opaque_stays_so(device: Device, tmp_path: Path):

@@ -172,6 +172,8 @@ def test_what_cannot_be_met_is_objected_to():
         led_to([0.6, 0.5], [0.4, 0.5]),
         led_to([0.8, 0.8], [0.9, 0.8]),
         led_to([0.8, 0.801], [0.7, 0.8]),
+        led_to([0.1, 0.8], [0.1, 0.75]) | {"radius": 0.05},
+        led_to([0.12, 0.8], [0.2, 0.82]) | {"radius": 0.05},
     ]
     recipe = Recipe.model_validate(frozen({"handle": handles}))
     assert list(objections(recipe.handle, recipe.pin, EXTENT)) == [
@@ -179,6 +181,7 @@ def test_what_cannot_be_met_is_objected_to():
         "handle[2] is led to the picture's edge only: (0.2, -0.5) is outside the picture",
         "handle[3] and handle[4] cross each other's way",
         "handle[5] and handle[6] hold the same place and are led apart",
+        "handle[7] and handle[8] are led 5.65 times as far apart as they lie",
     ]
 
 

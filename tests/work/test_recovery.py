@@ -655,6 +655,17 @@ def test_a_picture_that_is_gone_is_told_in_the_window(starter: Starter, tmp_path
     assert found_in(root).work.strokes == 2
 
 
+@pytest.mark.usefixtures("before")
+def test_another_picture_of_the_same_name_is_told_in_the_window(starter: Starter, tmp_path: Path) -> None:
+    away = tmp_path / "away"
+    away.mkdir()
+    robot = starter.start(away)
+    write_picture(tmp_path / "pattern.png", Picture(np.zeros((180, 240, 3), np.uint8)))
+    answer(robot, "Restore")
+    (message,) = robot.editor.messages.shown
+    assert message.text.startswith("All strokes are here, but pattern.png is not the same picture any more")
+
+
 def test_trouble_with_the_journal_is_told_once_and_painting_goes_on(
     starter: Starter, tmp_path: Path, root: Path
 ) -> None:

@@ -1,0 +1,103 @@
+"""The widgets of the window by what stands on them: a test presses "Edges hold" and not a point of the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from imgui_bundle import imgui
+
+from app.ui.events import Mods, Move
+from app.ui.viewport import Rect
+from app.ui.widgets import Ui
+from support.editing import Robot
+
+
+class Widgets:
+    """Notes where each widget is drawn, by what is written on it; of choices, each.
+
+    Args:
+        robot: whose window it is.
+        monkeypatch: of the test, at whose end nothing is noted any more.
+    """
+
+    def __init__(self, robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.robot = robot
+        self.at: dict[str, Rect] = {}
+        self.words: list[str] = []
+        self.index = 0
+        for kind in ("slider", "button", "check", "section"):
+            self._note(monkeypatch, kind, 1 if kind == "slider" else 0)
+        segmented, combo = Ui.segmented, imgui.combo
+
+        def choices(ui: Ui, name: str, words: Sequence[str], index: int, width: float = 0.0) -> int:
+            corner, chosen = imgui.get_cursor_screen_pos(), segmented(ui, name, words, index, width)
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            imgui.push_font(ui.fonts.regular, 13.5)
+            shares = [1.0 if width else imgui.calc_text_size(word).x + ui.px(20) for word in words]
+            imgui.pop_font()
+            x = corner.x
+            for word, share in zip(words, shares, strict=True):
+                across = (high.x - low.x) * share / sum(shares)
+                self.at[word] = Rect(x, low.y, across, high.y - low.y)
+                x += across
+            return chosen
+
+        def listed(name: str, index: int, words: list[str]) -> tuple[bool, int]:
+            said = combo(name, index, words)
+            self.at[name], self.words, self.index = _last(), words, index
+            return said
+
+        monkeypatch.setattr(Ui, "segmented", choices)
+        monkeypatch.setattr(imgui, "combo", listed)
+        self.look()
+
+    def _note(self, monkeypatch: pytest.MonkeyPatch, kind: str, place: int) -> None:
+        drawn = getattr(Ui, kind)
+
+        def noting(ui: Ui, *given: Any, **named: Any) -> Any:
+            said = drawn(ui, *given, **named)
+            self.at[given[place].split("##")[0]] = _last()
+            return said
+
+        monkeypatch.setattr(Ui, kind, noting)
+
+    def look(self) -> None:
+        """Draw until everything is where it stays."""
+        self.robot.move(5, 5)
+        self.robot.frame(count=2)
+        self.at.clear()
+        self.robot.frame()
+
+    def click(self, words: str) -> None:
+        """Click on the middle of what these words stand on."""
+        self.look()
+        self.robot.click(*self.at[words].middle)
+        self.robot.frame(count=2)
+
+    def type(self, words: str, text: str) -> None:
+        """Ctrl+click the slider of this label, type, and take it by Enter."""
+        self.look()
+        self.robot.mods = Mods(ctrl=True)
+        self.robot.click(*self.at[words].middle)
+        self.robot.mods = Mods()
+        self.robot.key("ctrl+a")
+        self.robot.type(text)
+        self.robot.frame(count=2)
+        self.robot.key("enter")
+        self.robot.frame(Move(5, 5), dt=1.0)  # so that no double click comes of the next one
+
+    def choose(self, name: str, words: str) -> None:
+        """Open a list and go to one of its rows by the arrows."""
+        self.click(name)
+        steps = self.words.index(words) - self.index
+        for _ in range(abs(steps)):
+            self.robot.key("down" if steps > 0 else "up")
+        self.robot.key("enter")
+        self.robot.frame(count=2)
+
+
+def _last() -> Rect:
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    return Rect(low.x, low.y, high.x - low.x, high.y - low.y)

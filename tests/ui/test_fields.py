@@ -1,0 +1,250 @@
+"""Which slider, switch, choice or button sets what, by the words that stand on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.model.strokes import Change
+from app.ui.exporting import ANIMATION, MAP, PICTURE, ExportDialog
+from app.ui.panels import inspector
+from solver.gl.device import Device
+from support.editing import Robot, small_project
+from support.widgets import Widgets
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    robot = Robot(device, small_project(tmp_path))
+    yield robot
+    robot.close()
+
+
+@pytest.fixture
+def widgets(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Widgets:
+    return Widgets(robot, monkeypatch)
+
+
+def only(robot: Robot, *sections: str) -> None:
+    """Let these sections of the inspector be open, and no others."""
+    names = ("fluid", "view", "quality", "masks", "history", "numbers")
+    robot.editor.state.sections = {name: name in sections for name in names}
+
+
+def changed(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in after.items() if value != before[name]}
+
+
+@pytest.mark.parametrize(
+    ("label", "typed", "wanted"),
+    [
+        ("Size", "60 px", {"radius": 60 / 480}),
+        ("Hardness", "35 %", {"hardness": 0.35}),
+        ("Strength", "40 %", {"strength": 0.4}),
+        ("Local", "25 %", {"local": 0.25}),
+    ],
+)
+def test_a_slider_of_the_bar_sets_its_part_of_the_brush(
+    robot: Robot, widgets: Widgets, label: str, typed: str, wanted: dict[str, float]
+) -> None:
+    before = asdict(robot.editor.state.brush)
+    widgets.type(label, typed)
+    assert changed(before, asdict(robot.editor.state.brush)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(("label", "name"), [("Viscosity", "viscosity"), ("Drag", "drag")])
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_slider_of_the_fluid_sets_its_number(
+    robot: Robot, widgets: Widgets, label: str, name: str, begun: bool
+) -> None:
+    session = robot.editor.session
+    if begun:
+        robot.drag((0.4, 0.5), (0.45, 0.5), steps=2)
+        robot.rest()
+    only(robot, "fluid")
+    before = session.recipe.fluid_at(session.end).model_dump()
+    widgets.type(label, "1.25")
+    robot.rest()
+    assert changed(before, session.recipe.fluid_at(session.end).model_dump()) == {name: 1.25}
+    assert session.document.history.entries[-1].name == label
+
+
+def test_edges_of_the_fluid_are_what_is_pressed(robot: Robot, widgets: Widgets) -> None:
+    for words, walls in (("Edges hold", "no-slip"), ("Edges glide", "free-slip")):
+        widgets.click(words)
+        assert robot.editor.session.recipe.fluid.walls == walls
+
+
+@pytest.mark.parametrize(
+    ("words", "viscosity", "drag", "local"),
+    [("Putty", 0.3, 0.0, 1.0), ("Honey", 0.03, 2.0, 0.0), ("Water", 0.0065, 0.0, 0.0)],
+)
+def test_a_feel_is_its_viscosity_drag_and_how_local_a_push_is(
+    robot: Robot, widgets: Widgets, words: str, viscosity: float, drag: float, local: float
+) -> None:
+    robot.editor.workspace.change("own", viscosity=0.5, drag=1.0)
+    widgets.click(words)
+    fluid = robot.editor.session.recipe.fluid
+    assert (fluid.viscosity, fluid.drag, robot.editor.state.brush.local) == (viscosity, drag, local)
+
+
+def test_every_kind_of_edge_of_the_picture_is_what_it_is_called(robot: Robot, widgets: Widgets) -> None:
+    only(robot, "quality")
+    for words, edges in (
+        ("Black", "black"),
+        ("Mirrored", "mirror"),
+        ("Its outermost pixels", "clamp"),
+        ("Transparent", "transparent"),
+        ("Repeated", "wrap"),
+    ):
+        widgets.choose("##edges", words)
+        assert robot.editor.session.recipe.edges == edges
+
+
+def test_a_grid_is_the_one_that_is_pressed(robot: Robot, widgets: Widgets) -> None:
+    only(robot, "quality")
+    for cells in inspector.GRIDS[:3]:
+        widgets.click(str(cells))
+        assert robot.editor.session.recipe.fluid.grid == cells
+        assert robot.editor.session.document.history.entries[-1].name == f"Grid of {cells}"
+    widgets.click("Auto")
+    assert robot.editor.quality.is_on
+
+
+@pytest.mark.parametrize("label", ["Warp grid", "Viscosity", "Frozen", "Velocity", "Forces"])
+def test_an_overlay_is_shown_as_strongly_as_its_slider_says(robot: Robot, widgets: Widgets, label: str) -> None:
+    only(robot, "view")
+    name = {"Warp grid": "grid"}.get(label, label.lower())
+    key = {"grid": "1", "viscosity": "2", "frozen": "3", "velocity": "4", "forces": "5"}[name]
+    widgets.click(label)
+    assert [other for other, overlay in robot.editor.state.overlays.items() if overlay.shown] == [name]
+    widgets.type("Opacity", "35 %")
+    assert {other for other, overlay in robot.editor.state.overlays.items() if overlay.opacity == 0.35} == {name}
+    robot.key(key)
+    assert not robot.editor.state.overlays[name].shown
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [("Clear the masks", "clear_masks"), ("Stop all motion", "clear_velocity"), ("Reset the warp", "reset_warp")],
+)
+def test_a_button_of_the_inspector_does_what_it_says(robot: Robot, widgets: Widgets, words: str, name: str) -> None:
+    robot.drag((0.4, 0.5), (0.45, 0.5), steps=2)
+    robot.rest()
+    only(robot, "masks")
+    widgets.click(words)
+    recipe = robot.editor.session.recipe
+    assert recipe.change == (Change.model_validate({"tick": recipe.change[0].tick, name: True}),)
+
+
+def test_an_entry_of_the_history_is_the_one_that_is_pressed(robot: Robot) -> None:
+    for number in range(3):
+        robot.drag((0.3 + 0.1 * number, 0.4), (0.33 + 0.1 * number, 0.4), steps=2)
+    robot.rest()
+    only(robot, "history")
+    robot.frame(count=2)
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    session = robot.editor.session
+    rows = []
+    for y in range(round(rect.y), round(rect.y) + 400, 13):
+        robot.click(rect.x + 60, y)
+        robot.frame()
+        if (index := session.document.history.index) not in rows[-1:]:
+            rows.append(index)
+    assert rows == [3, 0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("part", [0.0, 0.25, 1.0])
+def test_the_track_is_as_long_as_the_recording(robot: Robot, part: float) -> None:
+    """Its ends lie 7 points within, where the playhead is drawn; white and bright as nothing else there."""
+    session, rect = robot.editor.session, robot.editor.layout.timebar
+    robot.drag((0.4, 0.5), (0.41, 0.5), steps=2)
+    robot.rest()
+    session.edit("Longer", duration=4.0)
+    robot.rest()
+    session.seek(round(part * session.end))
+    robot.rest()
+    robot.move(5, 5)
+    bright = (robot.pixels()[round(rect.y) + 22 : round(rect.y) + 34, 245:1090].min(axis=-1) > 225).sum(axis=0)
+    x = 245 + float(np.flatnonzero(bright > 6).mean())
+    session.seek(session.end // 3)
+    robot.rest()
+    robot.move(x, rect.y + 28)
+    robot.press()
+    robot.release()
+    robot.rest()
+    assert session.tick == round(part * session.end)
+
+
+def test_amount_is_the_part_of_the_recording_that_is_seen(robot: Robot, widgets: Widgets) -> None:
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=6)
+    robot.rest()
+    session = robot.editor.session
+    for percent in (75, 20, 100):
+        widgets.type("Amount", f"{percent} %")
+        robot.rest()
+        assert session.tick == round(percent / 100 * session.end)
+
+
+@pytest.fixture
+def dialog(robot: Robot) -> ExportDialog:
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=6)
+    robot.rest()
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog)
+    return dialog
+
+
+def test_an_exported_picture_is_what_is_asked_for(
+    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widgets = Widgets(robot, monkeypatch)
+    widgets.click("JPEG")
+    widgets.type("Quality", "35")
+    widgets.type("Size", "120")
+    grid = robot.editor.session.recipe.fluid.grid
+    assert (dialog.kind, dialog.job().recipe.fluid.grid) == (PICTURE, grid)
+    widgets.click("2 x")
+    job = dialog.job()
+    assert (job.target.suffix, job.recipe.output.quality, job.recipe.output.size) == (".jpg", 35, 120)
+    assert job.recipe.fluid.grid == 2 * grid
+
+
+def test_an_exported_animation_is_what_is_asked_for(
+    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widgets = Widgets(robot, monkeypatch)
+    widgets.click("Animation")
+    for words, ending in (("GIF", ".gif"), ("PNG sequence", ".%04d.png"), ("MP4", ".mp4")):
+        widgets.click(words)
+        assert dialog.job().target.name.endswith(ending)
+    widgets.type("Frames a second", "24")
+    widgets.type("From", "0.1")
+    widgets.type("To", "0.2")
+    job = dialog.job()
+    assert dialog.kind == ANIMATION
+    assert (job.recipe.output.fps, job.recipe.time.start, job.recipe.time.end) == pytest.approx((24, 0.1, 0.2))
+
+
+def test_an_exported_map_is_what_is_asked_for(
+    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widgets = Widgets(robot, monkeypatch)
+    widgets.click("Warp map")
+    maps = dialog.job().outputs.maps
+    assert maps is not None
+    assert (dialog.kind, maps.kind, maps.forward, maps.path.suffix) == (MAP, "st", False, ".exr")
+    widgets.click("TIFF")
+    widgets.click("From the original")
+    widgets.click("Offsets in pixels")
+    maps = dialog.job().outputs.maps
+    assert maps is not None
+    assert (maps.kind, maps.forward, maps.path.suffix) == ("offsets", True, ".tif")

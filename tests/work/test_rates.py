@@ -1,0 +1,108 @@
+"""What each tool does in a second: its absolute rate, its direction, and the part of it that pressure leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from app.media.auxiliary import Pictures
+from app.model.picture import Picture
+from app.model.recipe import Recipe
+from app.work.replay import Replay
+from solver.gl.device import Device
+
+TICKS, DT = 10, 0.02
+HELD = (0, 1.0), (TICKS - 1, 1.0)
+MIDDLE = np.array([[0.5, 0.375]])
+
+
+@contextmanager
+def replayed(
+    device: Device, tool: str, *samples: tuple[int, float], viscosity: float = 0.01, **keys: object
+) -> Iterator[Replay]:
+    """A stroke in the middle of a picture of 4 : 3, held there in ticks with pressures; nothing is simulated yet."""
+    told = {"tool": tool, "radius": 0.2, "hardness": 0.0, "samples": tuple((n, 0.5, 0.5, p) for n, p in samples)}
+    fluid = {"grid": 64, "dt": DT, "viscosity": viscosity}
+    recipe = Recipe.model_validate({"fluid": fluid, "stroke": (told | keys,)})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((96, 128, 3), np.uint8))))
+    try:
+        yield replay
+    finally:
+        replay.release()
+
+
+@pytest.mark.parametrize("viscosity", [1e-3, 0.3])
+@pytest.mark.parametrize(("pressure", "reverse", "rate"), [(1.0, False, 4.0), (0.5, False, 2.0), (1.0, True, -4.0)])
+def test_twirl_turns_by_four_radians_a_second(
+    device: Device, viscosity: float, pressure: float, reverse: bool, rate: float
+) -> None:
+    held = [(tick, pressure) for tick, _ in HELD]
+    with replayed(device, "twirl", *held, viscosity=viscosity, reverse=reverse, hardness=1.0) as replay:
+        replay.seek(TICKS)
+        points = MIDDLE + np.array([[0.02, 0], [-0.02, 0]])
+        right, left = points + replay.warp.at(points)
+        across, down = right - left
+        # Positive is clockwise on the screen; what is looked up comes from the other way.
+        assert -math.atan2(down, across) / (TICKS * DT) == pytest.approx(rate, rel=0.1)
+
+
+@pytest.mark.parametrize(("tool", "sign"), [("bloat", 1), ("pinch", -1)])
+@pytest.mark.parametrize("pressure", [1.0, 0.25])
+def test_bloat_doubles_its_exponent_in_a_second(device: Device, tool: str, sign: int, pressure: float) -> None:
+    """Areas grow as e^(2 t), less what all of the picture gives for it: the brush's integral, pi r^2 / 4."""
+    with replayed(device, tool, *((tick, pressure) for tick, _ in HELD)) as replay:
+        replay.seek(TICKS)
+        rate = -math.log(replay.warp.determinants(MIDDLE)[0]) / (TICKS * DT)
+        assert rate == pytest.approx(sign * pressure * 2.0 * (1 - math.pi * 0.2**2 / 4 / 0.75), rel=0.01)
+
+
+def test_a_curve_blows_at_half_a_side_a_second(device: Device) -> None:
+    samples = ((0, 0.3, 0.5, 1.0), (0, 0.7, 0.5, 1.0))
+    with replayed(device, "curve", (0, 1.0), viscosity=1e-4, samples=samples) as replay:
+        replay.seek(1)
+        assert replay.fluid.velocity_at_centres()[24, 28:36, 0] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.parametrize(("tool", "rate"), [("thicken", 4.0), ("thin", -4.0)])
+@pytest.mark.parametrize("pressures", [(1.0,), (0.5,), (1.0, 1.0, 1.0)], ids=str)
+def test_thicken_paints_four_decades_a_second(
+    device: Device, tool: str, rate: float, pressures: tuple[float, ...]
+) -> None:
+    """However many samples there are in a tick: with several, all of it in one."""
+    first, ticks = pressures[0], 1 if len(pressures) > 1 else TICKS
+    held = [(0, p) for p in pressures] if ticks == 1 else [(tick, first) for tick, _ in HELD]
+    with replayed(device, tool, *held) as replay:
+        replay.seek(ticks)
+        viscosity = replay.fluid.viscosity.get()[23:25, 31:33]
+        assert np.log10(viscosity / 0.01) / (ticks * DT) == pytest.approx(rate * first, rel=0.02)
+
+
+@pytest.mark.parametrize("position", [TICKS, 1, Fraction(1, 3)])
+@pytest.mark.parametrize("pressure", [1.0, 0.5])
+def test_restore_takes_a_sixth_of_a_second_for_an_e_fold(
+    device: Device, position: int | Fraction, pressure: float
+) -> None:
+    with replayed(device, "restore", *((tick, pressure) for tick, _ in HELD)) as replay:
+        replay.warp.set(np.full((96, 128, 2), 0.05))
+        replay.checkpoint()
+        replay.seek(position)
+        left = replay.warp.at(MIDDLE)[0] / 0.05
+        assert left == pytest.approx(math.exp(-6.0 * pressure * float(position) * DT), rel=1e-3)
+
+
+def test_freeze_and_thaw_act_at_once(device: Device) -> None:
+    for pressure, frozen in ((1.0, True), (0.4, False)):
+        with replayed(device, "freeze", (0, pressure)) as replay:
+            replay.seek(1)
+            assert bool(replay.fluid.solid.get()[24, 32]) is frozen
+    with replayed(device, "thaw", (0, 1.0)) as replay:
+        replay.masks.set_frozen(np.ones((replay.masks.canvas.ny, replay.masks.canvas.nx), bool))
+        replay.seek(1)
+        solid = replay.fluid.solid.get()
+        assert not solid[24, 32]
+        assert solid[0, 0]
