@@ -121,13 +121,23 @@ def test_what_cannot_be_simulated_is_refused_and_nothing_has_happened(fluid: Flu
         lambda warp: warp.advance_prescribed(np.zeros((12, 20)), 0.1),
         lambda warp: warp.advance_prescribed(np.zeros((12, 20, 2)), -0.1),
         lambda warp: warp.advance_prescribed(lambda x, y, t: (x, y), np.nan),
+        lambda warp: warp.advance_prescribed(lambda x, y, t: x, 0.1),
         lambda warp: warp.advance(warp.device.upload(np.zeros((12, 20))), 0.1),
     ],
-    ids=["transposed", "one component", "transposed velocity", "velocity", "negative step", "NaN step", "field"],
+    ids=[
+        "transposed",
+        "one component",
+        "transposed velocity",
+        "velocity",
+        "negative step",
+        "NaN step",
+        "function",
+        "field",
+    ],
 )
 def test_a_map_refuses_what_does_not_fit(device: Device, act: Callable[[WarpMap], object]) -> None:
     warp = WarpMap(device, Grid(20, 12))
-    with pytest.raises(ValueError, match=r"shape|transposed|step|wanted"):
+    with pytest.raises(ValueError, match=r"shape|transposed|step|wanted|components"):
         act(warp)
     assert not warp.read().any()
     warp.release()
