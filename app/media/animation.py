@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -16,27 +17,39 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media import ffmpeg
+from app.media.clip import Clip
 from app.media.depth import to_bits
 from app.media.files import (
     NUMBER,
     cannot_write,
     is_sequence,
+    numbered,
     replacing,
-    replacing_many,
     temporary_beside,
     temporary_file,
 )
 from app.media.formats import FORMATS, check_picture_output
 from app.media.losses import lost
 from app.media.pictures import write_picture
-from app.media.video import Clip, sound_codecs
+from app.media.video import sound_codecs
 from app.model.picture import Picture
 from app.progress import never
 
+T_contra = TypeVar("T_contra", contravariant=True)
 T = TypeVar("T")
 
-FrameWriter = Callable[[np.ndarray], None]
-"""Takes a frame (h, w, c): uint8 or uint16 sRGB, or float32 linear light, all of one kind in one animation."""
+Frame = np.ndarray | Picture
+"""(h, w, c), uint8 or uint16 sRGB, or float32 linear light, all of one kind in one animation; or all that is written of
+one, with what belongs to it."""
+
+
+class NumberedWriter(Protocol[T_contra]):
+    """Takes a frame and, for a sequence, its number; None is the one after the last."""
+
+    def __call__(self, item: T_contra, number: int | None = None, /) -> None: ...
+
+
+FrameWriter = NumberedWriter[Frame]
 
 # What players take a video for. The filters set the tags: the frames' own overrule those given to the encoder.
 BT709 = (
@@ -179,7 +192,7 @@ def check_animation(
     if not 0 < fps <= 1000:
         raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
     if is_sequence(path):
-        if "%" in NUMBER.sub("", Path(path).name, count=1):
+        if NUMBER.search(NUMBER.sub("", Path(path).name, count=1)):
             raise UserError(f"Cannot write {path}: a sequence's name holds one number, as in name.%04d.png.")
         suffix = Path(path).suffix.lower()
         if suffix in ANIMATIONS and suffix not in FORMATS:
@@ -266,50 +279,62 @@ def animation_writer(
     sound_from: float = 0.0,
     frames: int | None = None,
     first: int = 0,
+    resumed: bool = False,
+    durations: Sequence[int] | None = None,
     like: Picture | None = None,
     cancel: Callable[[], bool] = never,
     passed: Callable[[int], None] = lambda frames: None,
+    written: Callable[[int], None] = lambda number: None,
 ) -> Iterator[FrameWriter]:
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
-    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on.
+    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on, each of
+        which appears as soon as it is written, and stays.
     codec: one of the container's; None is its first. crf: constant rate factor of H.264 (18), VP9 (24) or AV1 (30).
-    loops: GIF, APNG, WebP; 0 is for ever.
+    loops: GIF, APNG, WebP; 0 is for ever. durations: of the frames, in steps of 1 / fps; None is 1 for each.
     quality, bits: of a sequence's pictures; see `write_picture`.
     sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
     like: the picture whose profile and metadata the pictures of a sequence get; whether its alpha is premultiplied, so
         that of the frames is.
     cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
     passed: hears of frames that a later pass has gone through, after all were given, in formats that have `passes`.
+    written: hears of each file of a sequence, by its number. resumed: it may be that none of them is left to write.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
     """
-    check_animation(path, fps, codec)
+    check_animation(path, fps / min(durations or [1]), codec)
     if is_sequence(path):
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
-        def write_one(file: Path, frame: np.ndarray) -> None:
-            write_picture(file, template.with_pixels(frame), bits=bits, quality=quality, codec=codec)
+        def write_one(file: Path, frame: Frame) -> None:
+            picture = frame if isinstance(frame, Picture) else template.with_pixels(frame)
+            write_picture(file, picture, bits=bits, quality=quality, codec=codec)
 
-        with sequence_writer(path, write_one, first, cancel) as write:
+        with sequence_writer(path, write_one, first, cancel, written, resumed) as write:
             yield write
         return
 
-    def straight(frame: np.ndarray) -> np.ndarray:
+    def straight(frame: Frame) -> np.ndarray:
+        if isinstance(frame, Picture):
+            return frame.straight().pixels
         return like.with_pixels(frame).straight().pixels if like else frame
 
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
     with replacing(path) as temporary:
         if container.name == "GIF":
-            with _gif_writer(temporary, str(path), rate, loops, cancel, passed) as write:
-                yield lambda frame: write(straight(frame))
+            with _gif_writer(temporary, str(path), rate, loops, durations, cancel, passed) as write:
+                yield lambda frame, number=None: write(straight(frame))
             return
         sound_in, sound_out = _sound(container, sound, rate, frames, sound_from)
         encoding = container.encoding(codec)
         even = container.even
-        with _Video(temporary, str(path), encoding, rate, even, crf, loops, sound_in, sound_out, cancel) as video:
-            yield lambda frame: video.write(straight(frame))
+        with _Video(
+            temporary, str(path), encoding, rate, even, crf, loops, sound_in, sound_out, cancel, durations
+        ) as video:
+            yield lambda frame, number=None: video.write(straight(frame))
             video.finish()
+        if container.name == "animated WebP" and durations:
+            _end_webp(temporary, round(sum(durations) * 1000 / rate))
 
 
 class _Video:
@@ -327,7 +352,9 @@ class _Video:
         sound_in: list[str] | None = None,
         sound_out: list[str] | None = None,
         cancel: Callable[[], bool] = never,
+        durations: Sequence[int] | None = None,
     ) -> None:
+        self._durations = durations
         self._temporary, self._label, self._encoding, self._rate, self._even = temporary, label, encoding, rate, even
         self._crf, self._loops, self._cancel = crf, loops, cancel
         self._sound_in, self._sound_out = sound_in or [], sound_out or []
@@ -366,7 +393,7 @@ class _Video:
             [
                 *["-f", "rawvideo", "-pix_fmt", names[channels - 1], "-s", f"{width}x{height}", "-r", str(self._rate)],
                 *["-i", "-", *self._sound_in, "-map", "0:v:0"],
-                *self._encoding(channels in (2, 4), bits, self._crf, self._loops),
+                *self._timed(self._encoding(channels in (2, 4), bits, self._crf, self._loops)),
                 *self._sound_out,
                 f"file:{self._temporary}",
             ],
@@ -374,11 +401,49 @@ class _Video:
             cancel=self._cancel,
         )
 
+    def _timed(self, options: list[str]) -> list[str]:
+        """The options, for frames that are shown for as long as they are to be."""
+        if self._durations is None:
+            return options
+        options, filters = [*options], [shown_for(self._durations)]
+        if "-vf" in options:
+            place = options.index("-vf")
+            filters.append(options[place + 1])
+            del options[place : place + 2]
+        last = ["-final_delay", str(self._durations[-1] / self._rate)] if "apng" in options else []
+        return ["-vf", ",".join(filters), "-fps_mode", "passthrough", *options, *last]
+
     def finish(self) -> None:
         """Wait for the encoder to have written everything."""
         if self._process is None:
             raise UserError(f"Cannot write {self._label}: the animation has no frame.")
         self._process.finish()
+
+
+def shown_for(durations: Sequence[int]) -> str:
+    """A filter of ffmpeg's that shows each frame for so many steps of its time base."""
+    changes = [(at, after - before) for at, (before, after) in enumerate(pairwise(durations), 1) if after != before]
+    # the sum of the durations before frame N, from where these change
+    later = "".join(f"+gte(N\\,{at})*(N-{at})*({by})" for at, by in changes)
+    return f"setpts=N*{durations[0]}{later}"
+
+
+def _end_webp(file: Path, total: int) -> None:
+    """Let an animated WebP last `total` milliseconds: ffmpeg gives its last frame the mean of the others."""
+    with file.open("r+b") as stream:
+        place, size, last, before = 12, file.stat().st_size, 0, 0
+        while place + 8 <= size:
+            stream.seek(place)
+            kind, length = stream.read(4), int.from_bytes(stream.read(4), "little")
+            if kind == b"ANMF":
+                stream.seek(place + 8 + 12)  # after the frame's place and size
+                last, before = place + 8 + 12, before + int.from_bytes(stream.read(3), "little")
+            place += 8 + length + length % 2
+        if last:
+            stream.seek(last)
+            own = int.from_bytes(stream.read(3), "little")
+            stream.seek(last)
+            stream.write(min(max(1, total - before + own), 2**24 - 1).to_bytes(3, "little"))
 
 
 def _sound(
@@ -408,9 +473,10 @@ def _gif_writer(
     label: str,
     rate: Fraction,
     loops: int,
+    durations: Sequence[int] | None,
     cancel: Callable[[], bool],
     passed: Callable[[int], None],
-) -> Iterator[FrameWriter]:
+) -> Iterator[Callable[[np.ndarray], None]]:
     """Frames into a lossless file first: a palette of all colours needs all frames, which may not fit in memory."""
     name = temporary_beside(temporary.with_suffix(".mkv"))
     with temporary_file(name) as spool, temporary_file(name.with_suffix(".png")) as palette:
@@ -423,7 +489,11 @@ def _gif_writer(
         with _Video(spool, label, with_palette, rate, cancel=cancel) as video:
             yield lambda frame: video.write(to_bits(frame, 8))
             video.finish()
-        use = ["-lavfi", "paletteuse=dither=sierra2_4a:diff_mode=rectangle"]
+        dithered, shown = "paletteuse=dither=sierra2_4a:diff_mode=rectangle", []
+        if durations is not None:
+            dithered = f"[0:v]settb={1 / rate},{shown_for(durations)}[shown];[shown][1:v]{dithered}"
+            shown = ["-fps_mode", "passthrough", "-final_delay", str(round(100 * durations[-1] / rate))]
+        use = ["-lavfi", dithered, *shown]
         # ffmpeg counts repetitions, and -1 means none
         repeat = ["-loop", str(loops - 1 if loops > 1 else -1 if loops == 1 else 0)]
         files = ["-i", f"file:{spool}", "-i", f"file:{palette}"]
@@ -436,28 +506,27 @@ def sequence_writer(
     write_one: Callable[[Path, T], None],
     first: int = 0,
     cancel: Callable[[], bool] = never,
-) -> Iterator[Callable[[T], None]]:
-    """Yield a function that writes one numbered file by `write_one`; all appear when the block ends well, or none.
+    written: Callable[[int], None] = lambda number: None,
+    resumed: bool = False,
+) -> Iterator[NumberedWriter[T]]:
+    """Yield a function that writes one numbered file by `write_one`, which lets it appear whole.
 
-    path: such as `name.%04d.png`; first: the first number. Raises `UserError`.
+    path: such as `name.%04d.png`; first: the first number; written: hears of each; resumed: there may be none left to
+    write. Raises `UserError`.
     """
-    pattern = Path(path)
-    number = first
-    with replacing_many(pattern.parent, pattern.name) as folder:
+    last = first - 1
 
-        def write(item: T) -> None:
-            nonlocal number
-            if cancel():
-                raise Cancelled
-            try:
-                write_one(folder / (pattern.name % number), item)
-            except UserError as error:  # the folder's temporary name says nothing to the user
-                raise UserError(str(error).replace(str(folder), str(pattern.parent)), error.status) from error
-            number += 1
+    def write(item: T, number: int | None = None, /) -> None:
+        nonlocal last
+        if cancel():
+            raise Cancelled
+        last = last + 1 if number is None else number
+        write_one(numbered(path, last), item)
+        written(last)
 
-        yield write
-        if number == first:
-            raise UserError(f"Cannot write {path}: the animation has no frame.")
+    yield write
+    if last == first - 1 and not resumed:
+        raise UserError(f"Cannot write {path}: the animation has no frame.")
 
 
 # Order of frames ----------------------------------------------------------------------------------------------------

@@ -6,16 +6,22 @@ import os
 import re
 import subprocess
 from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
+from app.media.clip import WHOLE, Clip, Part
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.losses import lost
+from app.media.record import digest_of_file
+from app.model.picture import Picture
 from app.progress import never
 
 CHANGED = 65  # exit status when a clip changes under the job
@@ -29,33 +35,44 @@ NAMES = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Clip:
+@dataclass(frozen=True, kw_only=True)
+class Video(Clip):
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
-    rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
-    pixel_format: ffmpeg's name of what it is stored in, such as yuv420p.
-    note: what of it is lost, in a sentence; "" if nothing. file_size, inode: of the file when it was looked into.
-    sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
-    as a rule after its sound; 0 where an older ffmpeg does not tell. bits: 8, or 16 for what has more than 8.
+    rotation: degrees clockwise that were undone. frames: by its duration. bits: 8, or 16 for what has more than 8.
+    file_size, inode: of the file when it was looked into.
     """
 
-    path: Path
-    width: int
-    height: int
     fps: Fraction
-    frames: int | None
     rotation: int
-    sound: str | None
-    late: float
-    bits: int
-    pixel_format: str
-    alpha: bool
     decoder: tuple[str, ...]
     filters: str
-    note: str
     file_size: int
     inode: tuple[int, int]
+
+    def pictures(
+        self,
+        part: Part = WHOLE,
+        is_kept: Callable[[int], bool] = lambda number: False,
+        cancel: Callable[[], bool] = never,
+        notice: Callable[[str], None] = lambda said: None,
+    ) -> Generator[tuple[int, Picture], None, None]:
+        """See `Clip`. Raises `UserError` if it ends before the part begins."""
+        (first, last), number = part, -1
+        with closing(self.read_frames(cancel, notice)) as frames:
+            for number, frame in enumerate(islice(frames, None if last is None else last + 1)):
+                if number >= first and not is_kept(number):
+                    yield number, Picture(frame)
+        if 0 <= number < first:
+            raise UserError(f"the clip has the frames 0-{number}, and none from {first} on")
+
+    @cached_property
+    def _digest(self) -> str:
+        return digest_of_file(self.path)
+
+    def digest(self, number: int) -> str:
+        """See `Clip`; its file is large, and is read for this once."""
+        return self._digest
 
     def read_frames(
         self, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
@@ -105,7 +122,7 @@ class Clip:
             )
 
 
-def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
+def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Video:
     """Look into a video file; raises `UserError` when it is none."""
     file = Path(path)
     with open_input(file, "video") as stream:
@@ -130,7 +147,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
     seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
     rotation = re.search(r"rotation of (-?[\d.]+) degrees", told)
-    return Clip(
+    return Video(
         path=file,
         width=width,
         height=height,
