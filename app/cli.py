@@ -137,7 +137,7 @@ Cluster = Annotated[
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
 Codec = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option(help="Instead of the usual one: av1 in .webm, prores-422-hq in .mov, piz, dwaa ... in .exr."),
+    typer.Option(help="Not the usual one: h265 in .mp4, av1 in .webm, prores-422-hq in .mov, piz, dwaa ... in .exr."),
 ]
 MapKind = Annotated[Optional[str], typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]  # noqa: UP045
 StGrid = Annotated[

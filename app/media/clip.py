@@ -19,6 +19,36 @@ SHALLOW, DEEP = ("gray", "ya8", "rgb24", "rgba"), ("gray16le", "ya16le", "rgb48l
 """ffmpeg's names of frames of 8 bits and of more, by channels."""
 
 
+@dataclass(frozen=True)
+class Colours:
+    """What the colours of a clip are, by ffmpeg's names; the usual ones are BT.709's."""
+
+    primaries: str = "bt709"
+    transfer: str = "bt709"
+    matrix: str = "bt709"
+
+    @property
+    def is_usual(self) -> bool:
+        return self == Colours()
+
+    @property
+    def is_high(self) -> bool:
+        """Of a high dynamic range, which 8 bits a channel would show in steps."""
+        return self.transfer in HIGH
+
+
+USUAL = Colours()
+HIGH = ("smpte2084", "arib-std-b67")
+CODES = {"bt709": 1, "bt2020": 9, "smpte431": 11, "smpte432": 12, "smpte2084": 16, "arib-std-b67": 18}  # of H.273
+
+
+def coded(colours: Colours) -> dict[bytes, bytes]:
+    """The chunk in which a PNG tells what its colours are; none for the usual ones (PNG, 11.3.2.6)."""
+    if colours.is_usual:
+        return {}
+    return {b"cICP": bytes([CODES[colours.primaries], CODES[colours.transfer], 0, 1])}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Clip:
     """Frames of one size and depth.
@@ -29,6 +59,7 @@ class Clip:
     sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
     as a rule after its sound; 0 where an older ffmpeg does not tell.
     durations: of the frames, in steps of 1 / fps, where they differ. loops: how often it is played, 0 for ever.
+    colours: what they are. timecode: of the first frame, as 01:00:00:00; None where there is none.
     is_whole: each frame is a picture of its own, with all that belongs to it.
     note: what of it is lost, in a sentence; "" if nothing.
     """
@@ -47,6 +78,8 @@ class Clip:
     durations: tuple[int, ...] | None = None
     loops: int = 0
     is_whole: bool = False
+    colours: Colours = USUAL
+    timecode: str | None = None
     note: str = ""
 
     def moment(self, number: int) -> int:
@@ -63,6 +96,20 @@ class Clip:
         if self.durations is None:
             return None
         return list(self.durations[part[0] : None if part[1] is None else part[1] + 1])
+
+    def timecode_at(self, number: int) -> str | None:
+        """The time code of a frame, if there is one (SMPTE ST 12-1): after a ";" some numbers are dropped."""
+        if self.timecode is None or self.fps is None:
+            return self.timecode
+        hours, minutes, seconds, frames = (int(part) for part in (*self.timecode[:-3].split(":"), self.timecode[-2:]))
+        base, mark = round(self.fps), self.timecode[-3]
+        drops = base // 15 if mark in ";." else 0  # at the start of every minute but each tenth
+        minute = hours * 60 + minutes
+        count = (minute * 60 + seconds) * base + frames - drops * (minute - minute // 10) + number - self.start
+        tens, rest = divmod(count, 600 * base - 9 * drops)
+        count += 9 * drops * tens + drops * max(0, (rest - drops) // (60 * base - drops)) if drops else 0
+        seconds, frames = divmod(count, base)
+        return f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}{mark}{frames:02d}"
 
     def check(self, part: Part) -> None:
         """Raise `UserError` if it is known beforehand that the frames of a part are not all there."""

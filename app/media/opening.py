@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.clip import Clip
+from app.media.clip import Clip, coded
 from app.media.files import is_sequence
 from app.media.formats import ENDINGS
 from app.media.inputs import MAX_PIXELS
@@ -59,7 +59,7 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
         first = next(frames, None)
     if first is None:
         raise UserError(f"Cannot read {path}: it has no frame that can be decoded; get it again.")
-    return Source(Picture(first, note=clip.note), clip)
+    return Source(Picture(first, note=clip.note, chunks=coded(clip.colours)), clip)
 
 
 def check_picture(picture: Picture, name: str = "the picture") -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.clip import WHOLE, Clip, Part
+from app.media.clip import HIGH, WHOLE, Clip, Colours, Part
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.losses import lost
 from app.media.record import digest_of_file
@@ -27,12 +27,15 @@ from app.progress import never
 CHANGED = 65  # exit status when a clip changes under the job
 
 # What ffmpeg calls colours that are BT.709 or sRGB, or nearly; and the others' usual names.
-USUAL_PRIMARIES = {"unknown", "reserved", "bt709", "gbr"}
+USUAL_PRIMARIES = {"", "unknown", "reserved", "bt709", "gbr"}
 USUAL_TRANSFERS = {*USUAL_PRIMARIES, "iec61966-2-1", "smpte170m", "bt2020-10", "bt2020-12"}
 NAMES = {
     "bt2020": "BT.2020", "smpte2084": "PQ", "arib-std-b67": "HLG", "smpte432": "Display P3", "smpte431": "DCI-P3",
     "smpte170m": "BT.601", "bt470bg": "BT.601",
 }  # fmt: skip
+
+KEPT_PRIMARIES = ("bt2020", "smpte432", "smpte431")
+TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULTILINE | re.IGNORECASE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,6 +165,8 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
         note=lost(file, _losses(told, video, fps)),
+        colours=_colours(video),
+        timecode=found[1] if (found := TIMECODE.search(told)) else None,
         file_size=seen.st_size,
         inode=(seen.st_dev, seen.st_ino),
     )
@@ -172,13 +177,15 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
     words = [word.strip() for word in found[1].split(",")] if found else []
     losses = []
-    if named := next((word for word in words if re.search(r"/|bt|smpte|arib|film|iec", word)), ""):
-        parts = named.split("/")
-        _, primaries, transfer = parts if len(parts) == 3 else [named] * 3
-        odd = [primaries] if primaries not in USUAL_PRIMARIES else []
-        odd += [transfer] if transfer not in USUAL_TRANSFERS and transfer not in odd else []
-        if odd:
-            losses.append(f"its colours are {' '.join(NAMES.get(name, name) for name in odd)} and are taken for BT.709")
+    _, primaries, transfer = _named_colours(video)
+    odd = [primaries] if primaries not in USUAL_PRIMARIES else []
+    odd += [transfer] if transfer not in USUAL_TRANSFERS and transfer not in odd else []
+    if odd:
+        named = " ".join(NAMES.get(name, name) for name in odd)
+        kept = all(name in (*KEPT_PRIMARIES, *HIGH) for name in odd)
+        losses.append(
+            f"its colours are {named} and are {'mixed' if kept else 'taken'} {'as if' if kept else 'for'} BT.709"
+        )
     if any(word.startswith(("top", "bottom")) for word in words):
         losses.append("it is interlaced, and its fields are taken for whole frames")
     if rates := re.search(r", ([\d.]+) fps, ([\d.]+)(k?) tbr", video):  # on average, and of the shortest frames
@@ -190,9 +197,24 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
         losses.append(f"of its {count} picture tracks the first is taken")
     if re.search(r"Stream #0.*: Subtitle: ", told):
         losses.append("its subtitles are not kept")
-    if re.search(r"^\s+timecode\s*: \d", told, re.MULTILINE | re.IGNORECASE):
-        losses.append("its time code is not kept")
     return losses
+
+
+def _named_colours(video: str) -> tuple[str, str, str]:
+    """ffmpeg's names of a stream's matrix, primaries and transfer, one for all where they are alike; "" if untold."""
+    found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
+    words = [word.strip() for word in found[1].split(",")] if found else []
+    named = next((word for word in words if re.search(r"/|bt|smpte|arib|film|iec", word)), "")
+    parts = named.split("/")
+    return (parts[0], parts[1], parts[2]) if len(parts) == 3 else (named, named, named)
+
+
+def _colours(video: str) -> Colours:
+    """What is written again of a stream's colours: the usual where they are taken for these."""
+    _, primaries, transfer = _named_colours(video)
+    primaries = primaries if primaries in KEPT_PRIMARIES else "bt709"
+    transfer = transfer if transfer in HIGH else "bt709"
+    return Colours(primaries, transfer, "bt2020nc" if primaries == "bt2020" else "bt709")
 
 
 def sound_codecs(path: str | os.PathLike[str]) -> list[str]:

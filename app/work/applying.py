@@ -17,12 +17,13 @@ from app.media import maps
 from app.media.animation import (
     Frame,
     animation_writer,
+    check_colours,
     check_output,
     crf_of,
     passes,
     unheld_of_clip,
 )
-from app.media.clip import WHOLE
+from app.media.clip import USUAL, WHOLE
 from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, writable
 from app.media.formats import picture_format, unheld
 from app.media.inputs import MAX_PIXELS
@@ -130,6 +131,8 @@ class Application(Piece):
         progress.enter("reading")
         source = open_source(self.picture, self.max_pixels).taken(self.outputs.is_animation)
         check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
+        if source.clip is not None:
+            check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)
         if self.outputs.is_animation != (self.maps.is_sequence or source.clip is not None):
             what = "a still" if not self.outputs.is_animation else "an animation"
             mend = "write f.%04d.png or .mp4" if not self.outputs.is_animation else "write a picture, such as out.png"
@@ -246,6 +249,8 @@ class _Applying:
                 resumed=outputs.resume,
                 durations=clip.lengths(outputs.part) if clip else None,
                 loops=clip.loops if clip else 0,
+                colours=clip.colours if clip else USUAL,
+                timecode=clip.timecode_at(first) if clip else None,
                 like=self.source.picture.stripped() if outputs.strip else self.source.picture,
                 cancel=progress.cancel,
                 passed=progress.advance,

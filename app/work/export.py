@@ -29,6 +29,7 @@ from app.media.animation import (
     unheld_of_clip,
 )
 from app.media.auxiliary import Pictures
+from app.media.clip import USUAL
 from app.media.files import is_sequence, replacing
 from app.media.formats import picture_format, unheld
 from app.media.maps import Displacement, map_writer, write_map
@@ -302,6 +303,8 @@ class _Export:
             resumed=self.outputs.resume,
             durations=job.clip.lengths(self.outputs.part) if job.clip else None,
             loops=job.clip.loops if job.clip else 0,
+            colours=job.clip.colours if job.clip else USUAL,
+            timecode=job.clip.timecode_at(first) if job.clip else None,
             like=self.like.stripped() if self.outputs.strip else self.like,
             cancel=self.progress.cancel,
             passed=self.progress.advance,

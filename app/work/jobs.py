@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.animation import check_output, is_animation
+from app.media.animation import check_colours, check_output, is_animation
 from app.media.clip import WHOLE, Clip, Part
 from app.media.files import cannot_write, is_sequence, writable
 from app.media.inputs import MAX_PIXELS
@@ -158,6 +158,8 @@ class Job:
                 bits=outputs.bits,
                 size=result_size(self.recipe, self.picture),
             )
+            if self.clip is not None:
+                check_colours(output, outputs.codec, self.clip, self.is_animation)
         if maps is not None:
             check_map(maps.path)
             self._check_map_size(maps)

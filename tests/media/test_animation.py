@@ -27,6 +27,7 @@ from app.media.animation import (
     order_length,
     reordered,
 )
+from app.media.clip import USUAL
 from app.media.depth import to_bits
 from app.media.pictures import read_picture
 from app.media.video import read_clip
@@ -635,10 +636,13 @@ def tagged(path: Path, setting: str, *options: str) -> str:
 def test_what_of_a_clip_is_not_understood_is_told(tmp_path: Path):
     ten, hdr = "format=yuv420p10le", "setparams=colorspace=bt2020nc:color_primaries=bt2020:color_trc="
     assert tagged(tmp_path / "a.mp4", "format=yuv420p") == ""
-    assert tagged(tmp_path / "a.mp4", f"format=yuv420p,{animation.BT709}") == ""
-    assert tagged(tmp_path / "a.mkv", f"format=gbrp,{animation.SRGB}", "-c:v", "ffv1") == ""
+    assert tagged(tmp_path / "a.mp4", f"format=yuv420p,{animation.tagged(USUAL)}") == ""
+    assert (
+        tagged(tmp_path / "a.mkv", "format=gbrp,setparams=color_primaries=bt709:color_trc=iec61966-2-1", "-c:v", "ffv1")
+        == ""
+    )
     said = tagged(tmp_path / "pq.mp4", f"{ten},{hdr}smpte2084")
-    assert said == "pq.mp4: its colours are BT.2020 PQ and are taken for BT.709"
+    assert said == "pq.mp4: its colours are BT.2020 PQ and are mixed as if BT.709"
     assert "BT.2020 HLG" in tagged(tmp_path / "hlg.mkv", f"{ten},{hdr}arib-std-b67")
     assert "BT.2020 and" in tagged(tmp_path / "sdr.mp4", f"{ten},{hdr}bt709")
     assert "BT.601 and" in tagged(
@@ -657,13 +661,6 @@ def test_further_tracks_of_a_clip_are_told(tmp_path: Path):
     tracks = ["-map", "0:v", "-map", "1:a", "-map", "1:a", "-map", "2:s", "-c:v", "ffv1"]
     clip = read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", *inputs, *tracks))
     assert clip.note == "a.mkv: its subtitles are not kept"
-
-
-@pytest.mark.parametrize("ending", [".mov", ".mp4", ".mkv"])
-def test_a_time_code_is_told(tmp_path: Path, ending: str):
-    pixels = "format=yuv422p10" if ending == ".mov" else "format=yuv420p"
-    codec = ["-c:v", "prores_ks" if ending == ".mov" else "libx264", "-metadata", "timecode=01:02:03:04"]
-    assert tagged(tmp_path / f"a{ending}", pixels, *codec) == f"a{ending}: its time code is not kept"
 
 
 @pytest.mark.parametrize(
