@@ -154,7 +154,7 @@ def test_codecs_that_are_asked_for(
 
 def test_a_codec_that_does_not_fit_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for name, codec, message in [
-        ("a.mp4", "av1", r"a\.mp4: \.mp4 holds h264, not av1; change --codec"),
+        ("a.mp4", "av1", r"a\.mp4: \.mp4 holds h264 or h265, not av1; change --codec"),
         ("a.mov", "x", "holds prores-4444 or prores-422-hq, not x"),
         ("a.%d.png", "av1", "a picture has no codec"),
     ]:
