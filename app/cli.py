@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Optional
 
@@ -14,9 +16,8 @@ from app.errors import Cancelled, UserError, shown
 from app.progress import INTERRUPTED
 
 if TYPE_CHECKING:
-    from app.media.opening import Opened
     from app.work.applying import MapSource
-    from app.work.tasks import Task
+    from app.work.tasks import Piece
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
@@ -119,10 +120,24 @@ def edit(
 
 MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse larger pictures, clips and maps.")]
 Bits = Annotated[Optional[int], typer.Option(help="8, 16 (half in EXR) or 32 bits a channel, not the picture's own.")]  # noqa: UP045
+Size = Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")]  # noqa: UP045
+Quality = Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")]  # noqa: UP045
+Frames = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(metavar="A-B", help="Only these frames of an animation, from 0 or by the numbers of its files."),
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Keep the files of a sequence that are whole and made of the same.")
+]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes for several pictures.")]
+Cluster = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(metavar="ADDRESS", help="The Dask scheduler that gets several pictures, as tcp://host:8786."),
+]
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
 Codec = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option(help="Instead of the usual one: av1 in .webm, prores-422-hq in .mov, piz, dwaa ... in .exr."),
+    typer.Option(help="Not the usual one: h265 in .mp4, av1 in .webm, prores-422-hq in .mov, piz, dwaa ... in .exr."),
 ]
 MapKind = Annotated[Optional[str], typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]  # noqa: UP045
 StGrid = Annotated[
@@ -142,7 +157,9 @@ def render(
     ],
     pictures: Annotated[
         Optional[list[Path]],  # noqa: UP045
-        typer.Argument(metavar="PICTURE", help="Pictures or clips instead of the recipe's own.", readable=False),
+        typer.Argument(
+            metavar="PICTURE", help="Pictures, clips or f.%04d.exr, instead of the recipe's own.", readable=False
+        ),
     ] = None,
     output: Annotated[
         Optional[Path],  # noqa: UP045
@@ -163,7 +180,7 @@ def render(
     offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in the map, instead of an ST map.")] = False,
     overscan: Annotated[int, typer.Option(min=0, help="Pixels of the map beyond each side.")] = 0,
     map_size: Annotated[Optional[int], typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,  # noqa: UP045
-    size: Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")] = None,  # noqa: UP045
+    size: Size = None,
     grid: Annotated[Optional[int], typer.Option(help="Cells along the longer side.")] = None,  # noqa: UP045
     solver: Annotated[Optional[str], typer.Option(help="mac or paper.")] = None,  # noqa: UP045
     duration: Annotated[Optional[float], typer.Option(help="Seconds to simulate.")] = None,  # noqa: UP045
@@ -171,13 +188,11 @@ def render(
         Optional[float],  # noqa: UP045
         typer.Option(help="Frames per second of a picture's animation; a clip keeps its own."),
     ] = None,
-    quality: Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")] = None,  # noqa: UP045
+    quality: Quality = None,
     start: Annotated[Optional[float], typer.Option("--from", help="First second of an animation.")] = None,  # noqa: UP045
     end: Annotated[Optional[float], typer.Option("--to", help="Last second.")] = None,  # noqa: UP045
-    frames: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(metavar="A-B", help="Only these frames of an animation, counted from 0."),
-    ] = None,
+    frames: Frames = None,
+    resume: Resume = False,
     states: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(metavar="DIR", help="Keep states of the simulation there; a later part begins with the nearest."),
@@ -187,43 +202,51 @@ def render(
     bits: Bits = None,
     strip: Strip = False,
     max_pixels: MaxPixels = 400_000_000,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes for several pictures.")] = 1,
-    cluster: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(metavar="ADDRESS", help="The Dask scheduler that gets several pictures, as tcp://host:8786."),
-    ] = None,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
 ) -> None:
     """Warp a picture by a recipe: OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its
     frames. A clip is warped frame by frame, and keeps its sound.
 
     Several pictures go into the folder OUT under their own names, or to OUT with {name} in it for the name of each.
     """
-    from app.media.opening import open_recipe
     from app.work.jobs import MapOutput, Outputs
-    from app.work.tasks import Edits, Task, spread
+    from app.work.tasks import Edits, Task, opened
 
-    opened = open_recipe(recipe, max_pixels)
     tables = {
         "fluid": {"grid": grid, "solver": solver},
         "output": {"size": size, "fps": fps, "quality": quality},
         "time": {"start": start, "end": end},
     }
     edits = Edits.of(tables, {"duration": duration})
-    edits.applied(opened.recipe)
+    edits.applied(opened(recipe, max_pixels).recipe)
     if output is None and map_ is None:
         output = Path("out.png")
     maps = MapOutput(map_, "offsets" if offsets else "st", forward, overscan, map_size) if map_ else None
     if maps is None and (forward or offsets or overscan or map_size):
         raise UserError("--forward, --offsets, --overscan and --map-size say what --map writes; give its name too")
     given = [*([image] if image else []), *(pictures or [])]
-    outputs = Outputs(output, stats, maps, _part(frames), animated, bits, strip, codec, states)
-    task = Task(recipe, edits, given[0] if given else None, outputs, max_pixels)
-    if len(given) < 2 and cluster is None and not (given and output and _is_folder(output)):
-        _render_one(task.named(), opened)
-        return
-    if not given:
+    outputs = Outputs(output, stats, maps, _part(frames), animated, bits, strip, codec, states, resume)
+    task = Task(recipe=recipe, edits=edits, picture=given[0] if given else None, outputs=outputs, max_pixels=max_pixels)
+    if not given and cluster is not None:
         raise UserError("a cluster is for many pictures: name them after the recipe")
-    _render_many(spread(task, given), jobs, cluster)
+    _perform(task, given, jobs, cluster)
+
+
+def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None) -> None:
+    """Do it for all that is given, one or many."""
+    from app.progress import on_terminal
+    from app.work.tasks import spread
+    from solver.gl.device import Device
+
+    output = piece.outputs.file
+    if len(given) > 1 or cluster is not None or (given and output and _is_folder(output)):
+        _perform_many(spread(piece, given), jobs, cluster)
+        return
+    piece = piece.named()
+    with ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None) as progress:
+        report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
+    _tell(*report.notices, *([report.verdict] if report.verdict else []))
 
 
 def _is_folder(output: Path) -> bool:
@@ -242,23 +265,8 @@ def _part(frames: str | None) -> tuple[int, int | None]:
     return int(first), (int(last) if last else None if dash else int(first))
 
 
-def _render_one(task: Task, opened: Opened) -> None:
-    from app.progress import on_terminal
-    from app.work.export import run
-    from solver.gl.device import Device
-
-    with on_terminal(task.outputs.files[0].name, None) as progress:
-        progress.enter("reading")  # a large picture takes its time too
-        job = task.job(opened)
-        job.check()
-        progress.enter("")
-        with Device.headless() as device:
-            report = run(device, job, progress)
-    _tell(*report.notices, *([report.verdict] if report.verdict else []))
-
-
-def _render_many(tasks: list[Task], jobs: int, cluster: str | None) -> None:
-    """Render all, with a line about each that fails."""
+def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> None:
+    """Do all, with a line about each that fails."""
     from app.progress import leave, on_terminal
     from app.work.batch import run_batch
     from app.work.worker import Outcome
@@ -300,46 +308,45 @@ def apply(
             metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: one for each frame.", readable=False
         ),
     ],
-    picture: Annotated[
-        Path, typer.Argument(metavar="PICTURE", help="The picture or clip to warp by it.", readable=False)
+    pictures: Annotated[
+        list[Path],
+        typer.Argument(metavar="PICTURE", help="The pictures, clips or f.%04d.exr to warp by it.", readable=False),
     ],
     output: Output,
     kind: MapKind = None,
     grid: StGrid = None,
     overscan: MapOverscan = None,
     edges: Annotated[str, typer.Option(help="transparent, black, clamp, mirror or wrap.")] = "transparent",
-    size: Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")] = None,  # noqa: UP045
+    size: Size = None,
     fps: Annotated[Optional[float], typer.Option(help="Frames per second of a picture's animation.")] = None,  # noqa: UP045
-    quality: Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")] = None,  # noqa: UP045
+    quality: Quality = None,
+    frames: Frames = None,
+    resume: Resume = False,
     codec: Codec = None,
     bits: Bits = None,
     strip: Strip = False,
     max_pixels: MaxPixels = 400_000_000,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
 ) -> None:
-    """Warp a picture or a clip by a map that was made before, or elsewhere."""
+    """Warp pictures or clips by a map that was made before, or elsewhere; several as `render` does."""
     from app.model.recipe import Recipe
-    from app.progress import on_terminal
     from app.work.applying import Application
+    from app.work.jobs import Outputs
     from app.work.tasks import Edits
-    from solver.gl.device import Device
 
     asked = Edits.of({"output": {"size": size, "fps": fps, "quality": quality}}, {"edges": edges}).applied(Recipe())
-    job = Application(
-        _map_source(map_, kind, grid, overscan, max_pixels),
-        picture,
-        output,
+    order = Application(
+        picture=pictures[0],
+        outputs=Outputs(output, part=_part(frames), bits=bits, strip=strip, codec=codec, resume=resume),
+        max_pixels=max_pixels,
+        maps=_map_source(map_, kind, grid, overscan, max_pixels),
         edges=asked.edges,
         size=asked.output.size,
         quality=asked.output.quality,
         fps=asked.output.fps,
-        bits=bits,
-        strip=strip,
-        codec=codec,
     )
-    job.check()
-    with on_terminal(output.name, None) as progress, Device.headless() as device:
-        notices = job.run(device, progress)
-    _tell(*notices)
+    _perform(order, pictures, jobs, cluster)
 
 
 def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:

@@ -18,7 +18,6 @@ SIGNALS = tuple(number for number in signal.Signals if number.name in ("SIGINT",
 GRACE = 0.2  # seconds that a job has to notice Ctrl+C between two of its steps
 INTERRUPTED = 130
 
-appearing = threading.Lock()  # held while files that belong together appear under their names
 _undoing: list[Callable[[], object]] = []
 
 
@@ -104,10 +103,9 @@ class Progress:
 
 def abandon() -> None:
     """Undo everything that is half done, for a process that is about to end at once."""
-    with appearing:
-        for undo in reversed(_undoing):
-            with suppress(OSError):
-                undo()
+    for undo in reversed(_undoing):
+        with suppress(OSError):
+            undo()
 
 
 @contextmanager

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -16,34 +17,48 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media import ffmpeg
+from app.media.clip import USUAL, Clip, Colours
 from app.media.depth import to_bits
 from app.media.files import (
     NUMBER,
     cannot_write,
     is_sequence,
+    numbered,
     replacing,
-    replacing_many,
     temporary_beside,
     temporary_file,
 )
 from app.media.formats import FORMATS, check_picture_output
 from app.media.losses import lost
 from app.media.pictures import write_picture
-from app.media.video import Clip, sound_codecs
+from app.media.video import NAMES, sound_codecs
 from app.model.picture import Picture
 from app.progress import never
 
+T_contra = TypeVar("T_contra", contravariant=True)
 T = TypeVar("T")
 
-FrameWriter = Callable[[np.ndarray], None]
-"""Takes a frame (h, w, c): uint8 or uint16 sRGB, or float32 linear light, all of one kind in one animation."""
+Frame = np.ndarray | Picture
+"""(h, w, c), uint8 or uint16 sRGB, or float32 linear light, all of one kind in one animation; or all that is written of
+one, with what belongs to it."""
+
+
+class NumberedWriter(Protocol[T_contra]):
+    """Takes a frame and, for a sequence, its number; None is the one after the last."""
+
+    def __call__(self, item: T_contra, number: int | None = None, /) -> None: ...
+
+
+FrameWriter = NumberedWriter[Frame]
+
 
 # What players take a video for. The filters set the tags: the frames' own overrule those given to the encoder.
-BT709 = (
-    "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+lanczos,"
-    "setparams=colorspace=bt709:color_primaries=bt709:color_trc=bt709:range=tv"
-)
-SRGB = "setparams=color_primaries=bt709:color_trc=iec61966-2-1"
+def tagged(colours: Colours) -> str:
+    matrix, tags = colours.matrix, f"color_primaries={colours.primaries}:color_trc={colours.transfer}"
+    scaled = f"scale=out_color_matrix={matrix}:out_range=tv:flags=accurate_rnd+full_chroma_int+lanczos"
+    return f"{scaled},setparams=colorspace={matrix}:{tags}:range=tv"
+
+
 # palettegen counts every colour it meets: among 64 levels a channel it is 20 times faster, as good, and bounded
 SIX_BITS = "lutrgb=" + ":".join(f"{channel}='round(val*63/255)*255/63'" for channel in "rgb")
 ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
@@ -52,24 +67,35 @@ ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
 class Encoding(Protocol):
     """ffmpeg's output options for frames with or without alpha, of 8 or 16 bits a channel."""
 
-    def __call__(self, alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]: ...
+    def __call__(self, alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]: ...
 
 
-def _mp4(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _mp4(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     quality = ["-c:v", "libx264", "-preset", "medium", "-crf", str(18 if crf is None else crf)]
     return [
-        *["-vf", (ON_BLACK if alpha else "") + BT709, "-pix_fmt", "yuv420p", *quality],
+        *["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-pix_fmt", "yuv420p", *quality],
         *["-movflags", "+faststart"],
     ]
 
 
-def _webm(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _h265(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    if "libx265" not in ffmpeg.encoders():
+        raise UserError(
+            "This ffmpeg has no encoder for H.265; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another."
+        )
+    kind = "yuv420p" if bits == 8 else "yuv420p10le"
+    quality = ["-c:v", "libx265", "-preset", "medium", "-crf", str(20 if crf is None else crf), "-tag:v", "hvc1"]
+    filters = (ON_BLACK if alpha else "") + tagged(colours)
+    return ["-vf", filters, "-pix_fmt", kind, *quality, "-x265-params", "log-level=error", "-movflags", "+faststart"]
+
+
+def _webm(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     quality = ["-c:v", "libvpx-vp9", "-b:v", "0", "-crf", str(24 if crf is None else crf), "-row-mt", "1"]
     speed = ["-deadline", "good", "-cpu-used", "4"]
-    return ["-vf", BT709, "-pix_fmt", "yuva420p" if alpha else "yuv420p", *quality, *speed]
+    return ["-vf", tagged(colours), "-pix_fmt", "yuva420p" if alpha else "yuv420p", *quality, *speed]
 
 
-def _av1(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _av1(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     quality = ["-crf", str(30 if crf is None else crf)]
     speed = {
         "libsvtav1": ["-c:v", "libsvtav1", "-preset", "8"],
@@ -79,29 +105,31 @@ def _av1(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
     if encoder is None:
         raise UserError("This ffmpeg has no encoder for AV1; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another.")
     kind = "yuv420p" if bits == 8 else "yuv420p10le"
-    return ["-vf", (ON_BLACK if alpha else "") + BT709, "-pix_fmt", kind, *speed[encoder], *quality]
+    return ["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-pix_fmt", kind, *speed[encoder], *quality]
 
 
-def _ffv1(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _ffv1(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     kind = {(False, 8): "bgr0", (True, 8): "bgra", (False, 16): "gbrp16le", (True, 16): "gbrap16le"}[alpha, bits]
-    return ["-vf", SRGB, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
+    transfer = "iec61966-2-1" if colours.transfer == "bt709" else colours.transfer
+    told = f"setparams=color_primaries={colours.primaries}:color_trc={transfer}"
+    return ["-vf", told, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
 
 
-def _prores(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _prores(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if alpha else "yuv444p10le", "-vendor", "apl0"]
-    return ["-vf", BT709, "-c:v", "prores_ks", *kind]
+    return ["-vf", tagged(colours), "-c:v", "prores_ks", *kind]
 
 
-def _prores_422_hq(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _prores_422_hq(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     kind = ["-profile:v", "hq", "-pix_fmt", "yuv422p10le", "-vendor", "apl0"]
-    return ["-vf", (ON_BLACK if alpha else "") + BT709, "-c:v", "prores_ks", *kind]
+    return ["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-c:v", "prores_ks", *kind]
 
 
-def _apng(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _apng(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     return ["-c:v", "apng", "-pix_fmt", "rgba" if alpha else "rgb24", "-plays", str(loops), "-f", "apng"]
 
 
-def _webp(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+def _webp(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
     kind = ["-pix_fmt", "yuva420p" if alpha else "yuv420p", "-quality", "90", "-compression_level", "3"]
     return ["-c:v", "libwebp_anim", *kind, "-loop", str(loops), "-f", "webp"]
 
@@ -127,13 +155,18 @@ class Container:
 
 # The widest and highest picture that an encoder, or what holds it, takes.
 LARGEST = {
-    "h264": (16384, 16384), "vp9": (65536, 65536), "av1": (16384, 8704), "prores-4444": (65534, 65534),
+    "h264": (16384, 16384), "h265": (8192, 8192), "vp9": (65536, 65536), "av1": (16384, 8704),
+    "prores-4444": (65534, 65534),
     "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (FORMATS[".webp"].longest,) * 2,
 }  # fmt: skip
 
 ANIMATIONS = {
     ".mp4": Container(
-        "MP4", {"h264": _mp4}, even=True, sound=("aac", "mp3", "ac3"), encoder=("-c", "aac", "-b", "192k")
+        "MP4",
+        {"h264": _mp4, "h265": _h265},
+        even=True,
+        sound=("aac", "mp3", "ac3"),
+        encoder=("-c", "aac", "-b", "192k"),
     ),
     ".webm": Container(
         "WebM",
@@ -179,7 +212,7 @@ def check_animation(
     if not 0 < fps <= 1000:
         raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
     if is_sequence(path):
-        if "%" in NUMBER.sub("", Path(path).name, count=1):
+        if NUMBER.search(NUMBER.sub("", Path(path).name, count=1)):
             raise UserError(f"Cannot write {path}: a sequence's name holds one number, as in name.%04d.png.")
         suffix = Path(path).suffix.lower()
         if suffix in ANIMATIONS and suffix not in FORMATS:
@@ -210,11 +243,30 @@ def unheld_of_clip(path: str | os.PathLike[str], codec: str | None, clip: Clip) 
     container = ANIMATIONS.get(Path(path).suffix.lower())
     if container is None or container.passes > 1 or is_sequence(path):
         return ""
-    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0)
+    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0, clip.colours)
     (bits, chroma), (room, kept) = map(_depth, (clip.pixel_format, options[options.index("-pix_fmt") + 1]))
     losses = [f"its {bits} bits a channel become {room}"] if bits > room else []
     losses += [f"its colours of 4:{chroma} become 4:{kept}"] if chroma > kept else []
     return lost(clip.path, losses)
+
+
+def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, animated: bool) -> None:
+    """Raise `UserError` if a file cannot tell what a clip's colours are, or has too few bits for their range."""
+    if clip.colours.is_usual:
+        return
+    suffix = Path(path).suffix.lower()
+    container = ANIMATIONS.get(suffix) if animated and not is_sequence(path) else None
+    named = " ".join(
+        NAMES.get(name, name) for name in (clip.colours.primaries, clip.colours.transfer) if name != "bt709"
+    )
+    mend = "write .mov, .mkv, .mp4 with --codec h265, .webm with --codec av1, or name.%04d.png"
+    if container is None and suffix == ".png":
+        return
+    if container is None or suffix not in (".mp4", ".webm", ".mkv", ".mov"):
+        raise UserError(f"Cannot write {path}: it cannot tell that the colours of {clip.path} are {named}; {mend}.")
+    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0, clip.colours)
+    if clip.colours.is_high and _depth(options[options.index("-pix_fmt") + 1])[0] < 10:
+        raise UserError(f"Cannot write {path}: the colours of {clip.path} are {named}, and 8 bits too few; {mend}.")
 
 
 def _depth(pixel_format: str) -> tuple[int, str]:
@@ -266,50 +318,67 @@ def animation_writer(
     sound_from: float = 0.0,
     frames: int | None = None,
     first: int = 0,
+    resumed: bool = False,
+    durations: Sequence[int] | None = None,
+    colours: Colours = USUAL,
+    timecode: str | None = None,
     like: Picture | None = None,
     cancel: Callable[[], bool] = never,
     passed: Callable[[int], None] = lambda frames: None,
+    written: Callable[[int], None] = lambda number: None,
 ) -> Iterator[FrameWriter]:
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
-    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on.
+    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on, each of
+        which appears as soon as it is written, and stays.
     codec: one of the container's; None is its first. crf: constant rate factor of H.264 (18), VP9 (24) or AV1 (30).
-    loops: GIF, APNG, WebP; 0 is for ever.
+    loops: GIF, APNG, WebP; 0 is for ever. durations: of the frames, in steps of 1 / fps; None is 1 for each.
+    colours, timecode: what a video is told to have, the latter of its first frame.
     quality, bits: of a sequence's pictures; see `write_picture`.
     sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
     like: the picture whose profile and metadata the pictures of a sequence get; whether its alpha is premultiplied, so
         that of the frames is.
     cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
     passed: hears of frames that a later pass has gone through, after all were given, in formats that have `passes`.
+    written: hears of each file of a sequence, by its number. resumed: it may be that none of them is left to write.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
     """
-    check_animation(path, fps, codec)
+    check_animation(path, fps / min(durations or [1]), codec)
     if is_sequence(path):
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
-        def write_one(file: Path, frame: np.ndarray) -> None:
-            write_picture(file, template.with_pixels(frame), bits=bits, quality=quality, codec=codec)
+        def write_one(file: Path, frame: Frame) -> None:
+            picture = frame if isinstance(frame, Picture) else template.with_pixels(frame)
+            write_picture(file, picture, bits=bits, quality=quality, codec=codec)
 
-        with sequence_writer(path, write_one, first, cancel) as write:
+        with sequence_writer(path, write_one, first, cancel, written, resumed) as write:
             yield write
         return
 
-    def straight(frame: np.ndarray) -> np.ndarray:
+    def straight(frame: Frame) -> np.ndarray:
+        if isinstance(frame, Picture):
+            return frame.straight().pixels
         return like.with_pixels(frame).straight().pixels if like else frame
 
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
     with replacing(path) as temporary:
         if container.name == "GIF":
-            with _gif_writer(temporary, str(path), rate, loops, cancel, passed) as write:
-                yield lambda frame: write(straight(frame))
+            with _gif_writer(temporary, str(path), rate, loops, durations, cancel, passed) as write:
+                yield lambda frame, number=None: write(straight(frame))
             return
         sound_in, sound_out = _sound(container, sound, rate, frames, sound_from)
+        if timecode is not None and container.even | (container.name == "FFV1"):
+            sound_out = [*sound_out, "-metadata", f"timecode={timecode}"]
         encoding = container.encoding(codec)
         even = container.even
-        with _Video(temporary, str(path), encoding, rate, even, crf, loops, sound_in, sound_out, cancel) as video:
-            yield lambda frame: video.write(straight(frame))
+        with _Video(
+            temporary, str(path), encoding, rate, even, crf, loops, sound_in, sound_out, cancel, durations, colours
+        ) as video:
+            yield lambda frame, number=None: video.write(straight(frame))
             video.finish()
+        if container.name == "animated WebP" and durations:
+            _end_webp(temporary, round(sum(durations) * 1000 / rate))
 
 
 class _Video:
@@ -327,7 +396,10 @@ class _Video:
         sound_in: list[str] | None = None,
         sound_out: list[str] | None = None,
         cancel: Callable[[], bool] = never,
+        durations: Sequence[int] | None = None,
+        colours: Colours = USUAL,
     ) -> None:
+        self._durations, self._colours = durations, colours
         self._temporary, self._label, self._encoding, self._rate, self._even = temporary, label, encoding, rate, even
         self._crf, self._loops, self._cancel = crf, loops, cancel
         self._sound_in, self._sound_out = sound_in or [], sound_out or []
@@ -366,7 +438,7 @@ class _Video:
             [
                 *["-f", "rawvideo", "-pix_fmt", names[channels - 1], "-s", f"{width}x{height}", "-r", str(self._rate)],
                 *["-i", "-", *self._sound_in, "-map", "0:v:0"],
-                *self._encoding(channels in (2, 4), bits, self._crf, self._loops),
+                *self._timed(self._encoding(channels in (2, 4), bits, self._crf, self._loops, self._colours)),
                 *self._sound_out,
                 f"file:{self._temporary}",
             ],
@@ -374,11 +446,49 @@ class _Video:
             cancel=self._cancel,
         )
 
+    def _timed(self, options: list[str]) -> list[str]:
+        """The options, for frames that are shown for as long as they are to be."""
+        if self._durations is None:
+            return options
+        options, filters = [*options], [shown_for(self._durations)]
+        if "-vf" in options:
+            place = options.index("-vf")
+            filters.append(options[place + 1])
+            del options[place : place + 2]
+        last = ["-final_delay", str(self._durations[-1] / self._rate)] if "apng" in options else []
+        return ["-vf", ",".join(filters), "-fps_mode", "passthrough", *options, *last]
+
     def finish(self) -> None:
         """Wait for the encoder to have written everything."""
         if self._process is None:
             raise UserError(f"Cannot write {self._label}: the animation has no frame.")
         self._process.finish()
+
+
+def shown_for(durations: Sequence[int]) -> str:
+    """A filter of ffmpeg's that shows each frame for so many steps of its time base."""
+    changes = [(at, after - before) for at, (before, after) in enumerate(pairwise(durations), 1) if after != before]
+    # the sum of the durations before frame N, from where these change
+    later = "".join(f"+gte(N\\,{at})*(N-{at})*({by})" for at, by in changes)
+    return f"setpts=N*{durations[0]}{later}"
+
+
+def _end_webp(file: Path, total: int) -> None:
+    """Let an animated WebP last `total` milliseconds: ffmpeg gives its last frame the mean of the others."""
+    with file.open("r+b") as stream:
+        place, size, last, before = 12, file.stat().st_size, 0, 0
+        while place + 8 <= size:
+            stream.seek(place)
+            kind, length = stream.read(4), int.from_bytes(stream.read(4), "little")
+            if kind == b"ANMF":
+                stream.seek(place + 8 + 12)  # after the frame's place and size
+                last, before = place + 8 + 12, before + int.from_bytes(stream.read(3), "little")
+            place += 8 + length + length % 2
+        if last:
+            stream.seek(last)
+            own = int.from_bytes(stream.read(3), "little")
+            stream.seek(last)
+            stream.write(min(max(1, total - before + own), 2**24 - 1).to_bytes(3, "little"))
 
 
 def _sound(
@@ -408,22 +518,27 @@ def _gif_writer(
     label: str,
     rate: Fraction,
     loops: int,
+    durations: Sequence[int] | None,
     cancel: Callable[[], bool],
     passed: Callable[[int], None],
-) -> Iterator[FrameWriter]:
+) -> Iterator[Callable[[np.ndarray], None]]:
     """Frames into a lossless file first: a palette of all colours needs all frames, which may not fit in memory."""
     name = temporary_beside(temporary.with_suffix(".mkv"))
     with temporary_file(name) as spool, temporary_file(name.with_suffix(".png")) as palette:
 
-        def with_palette(alpha: bool, bits: int, crf: int | None, loops: int) -> list[str]:
+        def with_palette(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
             generate = f"{SIX_BITS},palettegen=stats_mode=full:reserve_transparent={int(alpha)}"
             first = ["-vf", generate, "-update", "1", f"file:{palette}"]
-            return [*first, "-map", "0:v:0", *_ffv1(alpha, bits, crf, loops)]
+            return [*first, "-map", "0:v:0", *_ffv1(alpha, bits, crf, loops, colours)]
 
         with _Video(spool, label, with_palette, rate, cancel=cancel) as video:
             yield lambda frame: video.write(to_bits(frame, 8))
             video.finish()
-        use = ["-lavfi", "paletteuse=dither=sierra2_4a:diff_mode=rectangle"]
+        dithered, shown = "paletteuse=dither=sierra2_4a:diff_mode=rectangle", []
+        if durations is not None:
+            dithered = f"[0:v]settb={1 / rate},{shown_for(durations)}[shown];[shown][1:v]{dithered}"
+            shown = ["-fps_mode", "passthrough", "-final_delay", str(round(100 * durations[-1] / rate))]
+        use = ["-lavfi", dithered, *shown]
         # ffmpeg counts repetitions, and -1 means none
         repeat = ["-loop", str(loops - 1 if loops > 1 else -1 if loops == 1 else 0)]
         files = ["-i", f"file:{spool}", "-i", f"file:{palette}"]
@@ -436,28 +551,27 @@ def sequence_writer(
     write_one: Callable[[Path, T], None],
     first: int = 0,
     cancel: Callable[[], bool] = never,
-) -> Iterator[Callable[[T], None]]:
-    """Yield a function that writes one numbered file by `write_one`; all appear when the block ends well, or none.
+    written: Callable[[int], None] = lambda number: None,
+    resumed: bool = False,
+) -> Iterator[NumberedWriter[T]]:
+    """Yield a function that writes one numbered file by `write_one`, which lets it appear whole.
 
-    path: such as `name.%04d.png`; first: the first number. Raises `UserError`.
+    path: such as `name.%04d.png`; first: the first number; written: hears of each; resumed: there may be none left to
+    write. Raises `UserError`.
     """
-    pattern = Path(path)
-    number = first
-    with replacing_many(pattern.parent, pattern.name) as folder:
+    last = first - 1
 
-        def write(item: T) -> None:
-            nonlocal number
-            if cancel():
-                raise Cancelled
-            try:
-                write_one(folder / (pattern.name % number), item)
-            except UserError as error:  # the folder's temporary name says nothing to the user
-                raise UserError(str(error).replace(str(folder), str(pattern.parent)), error.status) from error
-            number += 1
+    def write(item: T, number: int | None = None, /) -> None:
+        nonlocal last
+        if cancel():
+            raise Cancelled
+        last = last + 1 if number is None else number
+        write_one(numbered(path, last), item)
+        written(last)
 
-        yield write
-        if number == first:
-            raise UserError(f"Cannot write {path}: the animation has no frame.")
+    yield write
+    if last == first - 1 and not resumed:
+        raise UserError(f"Cannot write {path}: the animation has no frame.")
 
 
 # Order of frames ----------------------------------------------------------------------------------------------------

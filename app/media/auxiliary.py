@@ -61,6 +61,11 @@ class Pictures:
                     f"{goes}; turn it round with: fluidwarp convert --invert",
                     in_window=f"{goes}, and what is needed is where it comes from; write it the other way round.",
                 )
+            if (nowhere := np.isnan(given.values).any(axis=2)).any():
+                raise UserError(
+                    f"Cannot use {name}: {int(nowhere.sum())} of its pixels are NaN, and a fluid is everywhere; "
+                    "fill them where the map was made."
+                )
             self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
             if folded := folds(self._maps[name]):
                 self.notice(f"{name} folds over itself in {folded} of its pixels")

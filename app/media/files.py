@@ -6,14 +6,15 @@ import errno
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 
 from app.errors import UserError
 from app.media.leftovers import sweep, temporary_name
-from app.progress import appearing, if_abandoned
+from app.progress import if_abandoned
 
 MENDS = {
     errno.ENOSPC: "the disk is full; free some space or choose another folder",
@@ -26,9 +27,10 @@ MENDS = {
     errno.ENOTDIR: "a part of its path is a file; choose another folder",
     errno.EFBIG: "the file grows larger than this disk allows; choose another folder or a smaller size",
 }
+MOST_RUNS = 8  # of missing numbers that are named
 
-
-NUMBER = re.compile(r"%(0\d+)?d")
+NUMBER = re.compile(r"%(?:0(\d{1,2}))?d|#{2,}")
+"""What stands for the number in the name of a sequence's files: %d, %04d, or #### for %04d."""
 
 
 @contextmanager
@@ -68,28 +70,75 @@ def writable(path: str | os.PathLike[str]) -> Path:
 
 
 def is_sequence(path: str | os.PathLike[str]) -> bool:
-    """Whether `path` numbers its files, as `name.%04d.png` does."""
+    """Whether `path` numbers its files, as `name.%04d.png` and `name.####.png` do."""
     return NUMBER.search(Path(path).name) is not None
 
 
+def numbered(pattern: str | os.PathLike[str], number: int) -> Path:
+    """The file of a sequence that has this number."""
+    path = Path(pattern)
+    return path.with_name(NUMBER.sub(lambda found: f"{number:0{_digits(found)}d}", path.name, count=1))
+
+
+def _digits(found: re.Match[str]) -> int:
+    """How many a number has at least."""
+    return len(found[0]) if found[0].startswith("#") else int(found[1] or 0)
+
+
+def unnumbered(pattern: str | os.PathLike[str]) -> str:
+    """The stem of a sequence's name without the number and what parts it from the rest: `plate` of `plate.%04d.exr`."""
+    stem = Path(pattern).stem
+    return NUMBER.sub("", stem, count=1).strip("._- ") or "frames" if is_sequence(pattern) else stem
+
+
 def number_in(pattern: str | os.PathLike[str], name: str) -> int | None:
-    """What stands in a file's name where the sequence `pattern` has its %d; None if it is none of its files."""
+    """The number of a file of the sequence `pattern`, by its name; None if it is none of its files."""
     wanted = Path(pattern).name
     found = NUMBER.search(wanted)
     if found is None:
         return None
-    match = re.fullmatch(rf"{re.escape(wanted[: found.start()])}(\d+){re.escape(wanted[found.end() :])}", name)
-    return int(match[1]) if match else None
+    match = re.fullmatch(
+        rf"{re.escape(wanted[: found.start()])}([0-9]{{1,18}}){re.escape(wanted[found.end() :])}", name
+    )
+    return int(match[1]) if match and numbered(wanted, int(match[1])).name == name else None
+
+
+def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
+    """The files of a sequence that are there, in the order of their numbers. Raises `UserError` if there are none."""
+    folder = Path(pattern).parent
+    try:
+        names = os.listdir(folder)
+    except OSError as error:
+        raise UserError(f"Cannot read {pattern}: {error.strerror or error}.") from None
+    found = sorted((number, name) for name in names if (number := number_in(pattern, name)) is not None)
+    if not found:
+        raise UserError(f"Cannot read {pattern}: there is no such file; check the name.")
+    return {number: folder / name for number, name in found}
+
+
+def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wanted: range) -> None:
+    """Raise `UserError`, naming the numbers, if some of the `wanted` files of a sequence are not there."""
+    missing = [number for number in wanted if number not in there]
+    if not missing:
+        return
+    runs = [[number for _, number in run] for _, run in groupby(enumerate(missing), lambda at: at[1] - at[0])]
+    named = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
+    told = ", ".join(named[:MOST_RUNS]) + (f" and others, {len(missing)} in all" if len(named) > MOST_RUNS else "")
+    wants = f"{wanted[0]}-{wanted[-1]}" if len(wanted) > 1 else f"{wanted[0]}"
+    frames = "frames" if len(missing) > 1 else "frame"
+    raise UserError(f"Cannot read {pattern}: of {wants} it lacks the {frames} {told}; make them, or give --frames.")
 
 
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:
-    """Whether writing `output`, a file or all the files of a sequence, can replace `source`; both are real paths."""
+    """Whether writing `output` can replace `source`; both are real paths of a file or of a sequence."""
     folder, name = os.path.split(source)
     if os.path.dirname(output) != folder:
         return False
     pattern = os.path.basename(output)
-    number = number_in(pattern, name)
-    return name == (pattern if number is None else NUMBER.sub(lambda found: found[0] % number, pattern, count=1))
+    if is_sequence(name):
+        # with so many digits two that differ in nothing but their padding are alike
+        return number_in(name, pattern) is not None or numbered(name, 10**17) == numbered(pattern, 10**17)
+    return name == pattern or number_in(pattern, name) is not None
 
 
 def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> None:
@@ -149,26 +198,3 @@ def _keep(path: Path, backup: Path) -> None:
             shutil.copy2(path, temporary)
             sync(temporary)
         os.replace(temporary, backup)
-
-
-@contextmanager
-def replacing_many(folder: str | os.PathLike[str], label: str) -> Iterator[Path]:
-    """Yield a temporary folder in `folder`, whose files move up into `folder` once the block has ended well.
-
-    When the block raises, they all go and `folder` is as it was. `label` names the output in errors.
-    """
-    target = writable(Path(folder) / label).parent
-    sweep(target)
-    temporary = temporary_beside(target / "sequence")
-    remove = partial(shutil.rmtree, temporary, ignore_errors=True)
-    with if_abandoned(remove):
-        try:
-            temporary.mkdir()
-            yield temporary
-            with appearing:
-                for file in sorted(temporary.iterdir()):
-                    os.replace(file, target / file.name)
-        except OSError as error:
-            raise cannot_write(Path(folder) / label, error) from error
-        finally:
-            remove()

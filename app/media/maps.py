@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from app.errors import UserError
-from app.media.animation import sequence_writer
+from app.media.animation import NumberedWriter, sequence_writer
 from app.media.codecs import exr
 from app.media.files import replacing
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
@@ -30,6 +30,7 @@ Grid = Literal["centres", "corners", "pixels"]
 """The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
 
 FLO_MAGIC = np.float32(202021.25)
+FLO_UNKNOWN = np.float32(1e10)  # what is written where nothing is known, beyond 1e9 (Middlebury's flowIO.h)
 MAP_ENDINGS = (".exr", ".tif", ".tiff", ".flo", ".npy")
 
 # Names of the channels of an EXR that hold a map, whatever layer they are in.
@@ -49,6 +50,7 @@ class Displacement:
 
     values: (height + 2 overscan, width + 2 overscan, 2), x right and y down, in longer sides of width x height;
     float32, or float64 when read from a file, so that conversions lose nothing.
+    It is NaN for what is nowhere: a pixel of the result that shows nothing.
     overscan: pixels beyond each side of the picture.
     forward: the other way, from places of the original to places of the result.
     """
@@ -224,7 +226,8 @@ def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Ki
                 else:
                     stream.write(FLO_MAGIC.tobytes())
                     stream.write(np.array([displacement.width, displacement.height], np.int32).tobytes())
-                    stream.write(to_offsets(displacement, up=False).data)
+                    offsets = to_offsets(displacement, up=False)
+                    stream.write(np.where(np.isnan(offsets), FLO_UNKNOWN, offsets).data)
             return
         values = to_st(displacement) if kind == "st" else to_offsets(displacement, up=True)
         told = {
@@ -270,11 +273,21 @@ def _write_tiff(temporary: Path, values: np.ndarray, told: dict[str, Any]) -> No
 
 
 def map_writer(
-    path: str | os.PathLike[str], kind: Kind = "st", *, first: int = 0, cancel: Callable[[], bool] = never
-) -> AbstractContextManager[Callable[[Displacement], None]]:
+    path: str | os.PathLike[str],
+    kind: Kind = "st",
+    *,
+    first: int = 0,
+    cancel: Callable[[], bool] = never,
+    written: Callable[[int], None] = lambda number: None,
+    resumed: bool = False,
+) -> AbstractContextManager[NumberedWriter[Displacement]]:
     """A context that yields a function appending a map to the sequence `name.%04d.exr`; see `animation_writer`."""
     check_map(path)
-    return sequence_writer(path, lambda file, displacement: write_map(file, displacement, kind), first, cancel)
+
+    def write_one(file: Path, displacement: Displacement) -> None:
+        write_map(file, displacement, kind)
+
+    return sequence_writer(path, write_one, first, cancel, written, resumed)
 
 
 def read_map(
@@ -288,18 +301,19 @@ def read_map(
     """Read a map, also one made elsewhere.
 
     kind, grid, overscan: what an EXR or TIFF holds; None believes its metadata, and takes it for an ST map on pixel
-    centres when there is none. Raises `UserError` for what is no map, damaged, or holds NaN.
+    centres when there is none. What is NaN, unknown in a .flo, or not in an EXR's data window is NaN in x and y.
+    Raises `UserError` for what is no map, damaged, infinite, or NaN everywhere.
     """
     check_map(path)
     suffix = Path(path).suffix.lower()
     if suffix in (".flo", ".npy"):
         offsets = _read_flo(Path(path), max_pixels) if suffix == ".flo" else _read_npy(Path(path), max_pixels)
-        _check_finite(path, offsets)
+        offsets = _known(path, offsets)
         if suffix == ".npy":
             return Displacement(offsets)
         return from_offsets(offsets, up=False)
     values, told, edge = _read_exr(Path(path), max_pixels) if suffix == ".exr" else _read_tiff(Path(path), max_pixels)
-    _check_finite(path, values)
+    values = _known(path, values)
     edge = edge if overscan is None else overscan
     if edge < 0 or 2 * edge >= min(values.shape[:2]):
         height, width = values.shape[:2]
@@ -313,14 +327,19 @@ def read_map(
     return Displacement(read.values, edge, forward=told.get("direction") == "forward")
 
 
-def _check_finite(path: str | os.PathLike[str], values: np.ndarray) -> None:
-    bad = ~np.isfinite(values).all(axis=2)
+def _known(path: str | os.PathLike[str], values: np.ndarray) -> np.ndarray:
+    """The values, both NaN where one is; raises `UserError` for infinite ones, or if none is left."""
+    bad = np.isinf(values).any(axis=2)
     if bad.any():
         row, column = np.argwhere(bad)[0]
         raise UserError(
-            f"Cannot use {path}: {int(bad.sum())} of its pixels are NaN or infinite, "
+            f"Cannot use {path}: {int(bad.sum())} of its pixels are infinite, "
             f"the first at x {column}, y {row}; fill them where the map was made."
         )
+    nowhere = np.asarray(np.isnan(values).any(axis=2))
+    if nowhere.all():
+        raise UserError(f"Cannot use {path}: all of it is NaN or outside of its picture; make it again.")
+    return np.where(nowhere[..., None], values.dtype.type(np.nan), values) if nowhere.any() else values
 
 
 def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
@@ -335,7 +354,8 @@ def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
             raise UserError(
                 f"Cannot read {file}: {width} x {height} offsets need another length of file; get it again."
             )
-        return _in_memory(file, lambda: np.fromfile(stream, "<f4", 2 * width * height)).reshape(height, width, 2)
+        offsets = _in_memory(file, lambda: np.fromfile(stream, "<f4", 2 * width * height)).reshape(height, width, 2)
+        return np.where((np.abs(offsets) > FLO_UNKNOWN / 10).any(axis=2, keepdims=True), np.float32(np.nan), offsets)
 
 
 def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
@@ -380,15 +400,14 @@ def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], 
     else:
         raise UserError(f"Cannot read {file}: its channels {' '.join(channels)} are no map; it needs R and G.")
     told = {key.removeprefix("fluidwarp/"): value for key, value in header.items() if key.startswith("fluidwarp/")}
-    (left, top), (right, bottom) = header["dataWindow"]
-    (first_x, first_y), (last_x, last_y) = header["displayWindow"]
-    edges = [int(edge) for edge in (first_x - left, first_y - top, right - last_x, bottom - last_y)]
-    edge = min(edges)
-    if edge < 0:
-        raise UserError(f"Cannot read {file}: its data window does not cover the picture; write all of it.")
+    (left, top), (right, bottom) = ((int(x), int(y)) for x, y in header["dataWindow"])
+    (first_x, first_y), (last_x, last_y) = ((int(x), int(y)) for x, y in header["displayWindow"])
     # as much overscan as all four sides have
-    rows = slice(edges[1] - edge, values.shape[0] - (edges[3] - edge))
-    return values[rows, edges[0] - edge : values.shape[1] - (edges[2] - edge)], told, edge
+    edge = max(0, min(first_x - left, first_y - top, right - last_x, bottom - last_y))
+    width, height = last_x - first_x + 1 + 2 * edge, last_y - first_y + 1 + 2 * edge
+    shown = np.full((height, width, 2), np.nan, np.float32)
+    exr.place_window(values, (left - first_x + edge, top - first_y + edge), shown)
+    return shown, told, edge
 
 
 def _read_tiff(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:

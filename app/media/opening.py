@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import os
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
 from app.errors import UserError
+from app.media.clip import Clip, coded
+from app.media.files import is_sequence
 from app.media.formats import ENDINGS
 from app.media.inputs import MAX_PIXELS
+from app.media.pages import read_pages
 from app.media.pictures import read_picture
 from app.media.project import Project, is_project, load
 from app.media.recipes import read_recipe
-from app.media.video import Clip, read_clip
+from app.media.sequence import read_sequence
+from app.media.video import Video, read_clip
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from solver.grid import MOST_ALONG, SMALLEST_GRID
@@ -31,21 +35,31 @@ class Source:
     picture: Picture
     clip: Clip | None = None
 
+    def taken(self, animated: bool) -> Source:
+        """What of it becomes an animation, or a still: of a file of pictures no more than the first."""
+        if self.clip is None or isinstance(self.clip, Video):
+            return self
+        return Source(replace(self.picture, note=self.clip.note), self.clip) if animated else Source(self.picture)
+
 
 def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
-    """The picture or, by its ending, the clip in a file.
+    """The picture or, by its ending, the clip in a file; or the clip whose frames are the files `name.%04d.png`.
 
     Raises:
         UserError: if it cannot be read.
     """
+    if is_sequence(path) and not os.path.lexists(path):
+        clip, first = read_sequence(path, max_pixels)
+        return Source(first, clip)
     if path.suffix.lower() not in CLIP_ENDINGS:
-        return Source(read_picture(path, max_pixels))
+        picture = read_picture(path, max_pixels)
+        return Source(picture, read_pages(path, picture, max_pixels))
     clip = read_clip(path, max_pixels)
     with closing(clip.read_frames()) as frames:
         first = next(frames, None)
     if first is None:
         raise UserError(f"Cannot read {path}: it has no frame that can be decoded; get it again.")
-    return Source(Picture(first, note=clip.note), clip)
+    return Source(Picture(first, note=clip.note, chunks=coded(clip.colours)), clip)
 
 
 def check_picture(picture: Picture, name: str = "the picture") -> None:

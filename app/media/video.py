@@ -6,56 +6,76 @@ import os
 import re
 import subprocess
 from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
+from app.media.clip import HIGH, WHOLE, Clip, Colours, Part
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.losses import lost
+from app.media.record import digest_of_file
+from app.model.picture import Picture
 from app.progress import never
 
 CHANGED = 65  # exit status when a clip changes under the job
 
 # What ffmpeg calls colours that are BT.709 or sRGB, or nearly; and the others' usual names.
-USUAL_PRIMARIES = {"unknown", "reserved", "bt709", "gbr"}
+USUAL_PRIMARIES = {"", "unknown", "reserved", "bt709", "gbr"}
 USUAL_TRANSFERS = {*USUAL_PRIMARIES, "iec61966-2-1", "smpte170m", "bt2020-10", "bt2020-12"}
 NAMES = {
     "bt2020": "BT.2020", "smpte2084": "PQ", "arib-std-b67": "HLG", "smpte432": "Display P3", "smpte431": "DCI-P3",
     "smpte170m": "BT.601", "bt470bg": "BT.601",
 }  # fmt: skip
 
+KEPT_PRIMARIES = ("bt2020", "smpte432", "smpte431")
+TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULTILINE | re.IGNORECASE)
 
-@dataclass(frozen=True)
-class Clip:
+
+@dataclass(frozen=True, kw_only=True)
+class Video(Clip):
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
-    rotation: degrees clockwise that were undone. frames: about how many, by its duration; None when unknown.
-    pixel_format: ffmpeg's name of what it is stored in, such as yuv420p.
-    note: what of it is lost, in a sentence; "" if nothing. file_size, inode: of the file when it was looked into.
-    sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
-    as a rule after its sound; 0 where an older ffmpeg does not tell. bits: 8, or 16 for what has more than 8.
+    rotation: degrees clockwise that were undone. frames: by its duration. bits: 8, or 16 for what has more than 8.
+    file_size, inode: of the file when it was looked into.
     """
 
-    path: Path
-    width: int
-    height: int
     fps: Fraction
-    frames: int | None
     rotation: int
-    sound: str | None
-    late: float
-    bits: int
-    pixel_format: str
-    alpha: bool
     decoder: tuple[str, ...]
     filters: str
-    note: str
     file_size: int
     inode: tuple[int, int]
+
+    def pictures(
+        self,
+        part: Part = WHOLE,
+        is_kept: Callable[[int], bool] = lambda number: False,
+        cancel: Callable[[], bool] = never,
+        notice: Callable[[str], None] = lambda said: None,
+    ) -> Generator[tuple[int, Picture], None, None]:
+        """See `Clip`. Raises `UserError` if it ends before the part begins."""
+        (first, last), number = part, -1
+        with closing(self.read_frames(cancel, notice)) as frames:
+            for number, frame in enumerate(islice(frames, None if last is None else last + 1)):
+                if number >= first and not is_kept(number):
+                    yield number, Picture(frame)
+        if 0 <= number < first:
+            raise UserError(f"the clip has the frames 0-{number}, and none from {first} on")
+
+    @cached_property
+    def _digest(self) -> str:
+        return digest_of_file(self.path)
+
+    def digest(self, number: int) -> str:
+        """See `Clip`; its file is large, and is read for this once."""
+        return self._digest
 
     def read_frames(
         self, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
@@ -105,7 +125,7 @@ class Clip:
             )
 
 
-def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Clip:
+def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Video:
     """Look into a video file; raises `UserError` when it is none."""
     file = Path(path)
     with open_input(file, "video") as stream:
@@ -130,7 +150,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
     seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
     rotation = re.search(r"rotation of (-?[\d.]+) degrees", told)
-    return Clip(
+    return Video(
         path=file,
         width=width,
         height=height,
@@ -145,6 +165,8 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Cli
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
         note=lost(file, _losses(told, video, fps)),
+        colours=_colours(video),
+        timecode=found[1] if (found := TIMECODE.search(told)) else None,
         file_size=seen.st_size,
         inode=(seen.st_dev, seen.st_ino),
     )
@@ -155,13 +177,15 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
     words = [word.strip() for word in found[1].split(",")] if found else []
     losses = []
-    if named := next((word for word in words if re.search(r"/|bt|smpte|arib|film|iec", word)), ""):
-        parts = named.split("/")
-        _, primaries, transfer = parts if len(parts) == 3 else [named] * 3
-        odd = [primaries] if primaries not in USUAL_PRIMARIES else []
-        odd += [transfer] if transfer not in USUAL_TRANSFERS and transfer not in odd else []
-        if odd:
-            losses.append(f"its colours are {' '.join(NAMES.get(name, name) for name in odd)} and are taken for BT.709")
+    _, primaries, transfer = _named_colours(video)
+    odd = [primaries] if primaries not in USUAL_PRIMARIES else []
+    odd += [transfer] if transfer not in USUAL_TRANSFERS and transfer not in odd else []
+    if odd:
+        named = " ".join(NAMES.get(name, name) for name in odd)
+        kept = all(name in (*KEPT_PRIMARIES, *HIGH) for name in odd)
+        losses.append(
+            f"its colours are {named} and are {'mixed' if kept else 'taken'} {'as if' if kept else 'for'} BT.709"
+        )
     if any(word.startswith(("top", "bottom")) for word in words):
         losses.append("it is interlaced, and its fields are taken for whole frames")
     if rates := re.search(r", ([\d.]+) fps, ([\d.]+)(k?) tbr", video):  # on average, and of the shortest frames
@@ -173,9 +197,24 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
         losses.append(f"of its {count} picture tracks the first is taken")
     if re.search(r"Stream #0.*: Subtitle: ", told):
         losses.append("its subtitles are not kept")
-    if re.search(r"^\s+timecode\s*: \d", told, re.MULTILINE | re.IGNORECASE):
-        losses.append("its time code is not kept")
     return losses
+
+
+def _named_colours(video: str) -> tuple[str, str, str]:
+    """ffmpeg's names of a stream's matrix, primaries and transfer, one for all where they are alike; "" if untold."""
+    found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
+    words = [word.strip() for word in found[1].split(",")] if found else []
+    named = next((word for word in words if re.search(r"/|bt|smpte|arib|film|iec", word)), "")
+    parts = named.split("/")
+    return (parts[0], parts[1], parts[2]) if len(parts) == 3 else (named, named, named)
+
+
+def _colours(video: str) -> Colours:
+    """What is written again of a stream's colours: the usual where they are taken for these."""
+    _, primaries, transfer = _named_colours(video)
+    primaries = primaries if primaries in KEPT_PRIMARIES else "bt709"
+    transfer = transfer if transfer in HIGH else "bt709"
+    return Colours(primaries, transfer, "bt2020nc" if primaries == "bt2020" else "bt709")
 
 
 def sound_codecs(path: str | os.PathLike[str]) -> list[str]:

@@ -266,7 +266,9 @@ class StillExporting(Dialog):
                 self._leave()
             return False
         words = (
-            "fluidwarp closes as soon as it is finished." if self._waits else "Nothing of it is kept if it is stopped."
+            "fluidwarp closes as soon as it is finished."
+            if self._waits
+            else "Nothing half-written is kept if it is stopped."
         )
         ui.wrapped(f"{self._exports.name} is {self._exports.part:.0%} done. {words}", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(8)))
@@ -355,4 +357,4 @@ class Exports:
             imgui.same_line(0, ui.px(16))
             if ui.button("Cancel##export", height=30):
                 self.cancel()
-                self.messages.say("Export cancelled; nothing was written.")
+                self.messages.say("Export cancelled; nothing half-written is left.")

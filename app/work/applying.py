@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import repeat
+from functools import cache, partial
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from app.errors import UserError
 from app.media import maps
-from app.media.animation import animation_writer, check_output, crf_of, is_animation, passes, unheld_of_clip
-from app.media.files import check_kept, is_sequence, number_in, writable
+from app.media.animation import (
+    Frame,
+    animation_writer,
+    check_colours,
+    check_output,
+    crf_of,
+    passes,
+    unheld_of_clip,
+)
+from app.media.clip import USUAL, WHOLE
+from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, writable
 from app.media.formats import picture_format, unheld
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Displacement, Kind, cropped, folds, read_map
 from app.media.opening import Source, open_source
 from app.media.pictures import write_picture
+from app.media.record import Record, digest_of, digest_of_file
 from app.model.picture import Picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
 from app.work.along import along, widened
-from app.work.export import looked_up, steps_for, write_all
+from app.work.export import Kept, Report, looked_up, opaque_value, steps_for, with_alpha, write_all
 from app.work.jobs import longer_side
+from app.work.states import code
+from app.work.tasks import Piece
 from app.work.threads import ahead
 from solver.gl.device import Device
 from solver.gl.field import FieldError
@@ -36,6 +49,7 @@ from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 MOST_CELLS = 1024  # along the longer side, for turning a map round
+REACH = 4  # pixels of a map that interpolation and the stretch reach beyond a place
 
 
 @dataclass(frozen=True)
@@ -50,156 +64,228 @@ class MapSource:
 
     @property
     def is_sequence(self) -> bool:
-        return is_sequence(self.path)
+        return is_sequence(self.path) and not os.path.lexists(self.path)
 
     def files(self) -> dict[int, Path]:
         """The map's file, or those of the sequence in the order of their numbers.
 
         Raises:
-            UserError: if there is none.
+            UserError: if there is none, or one is missing among them.
         """
         if not self.is_sequence:
             return {0: self.path}
-        try:
-            numbers = [(number_in(self.path, file.name), file) for file in self.path.parent.iterdir()]
-        except OSError as error:
-            raise UserError(f"Cannot read {self.path}: {error.strerror}.") from None
-        numbered = sorted((number, file) for number, file in numbers if number is not None)
-        if not numbered:
-            raise UserError(f"Cannot read {self.path}: there is no such file; check the name.")
-        return dict(numbered)
+        files = numbered_files(self.path)
+        check_numbers(self.path, files, range(min(files), max(files) + 1))
+        return files
 
-    def read(self) -> Iterator[Displacement]:
-        """The maps, one after the other. Raises `UserError`."""
-        for file in self.files().values():
-            yield read_map(file, kind=self.kind, grid=self.grid, overscan=self.overscan, max_pixels=self.max_pixels)
+    def read(self, file: Path) -> Displacement:
+        """One of the maps. Raises `UserError`."""
+        return read_map(file, kind=self.kind, grid=self.grid, overscan=self.overscan, max_pixels=self.max_pixels)
 
 
-@dataclass(frozen=True)
-class Application:
-    """What is warped by which map, and what is written.
+@dataclass(frozen=True, kw_only=True)
+class Application(Piece):
+    """A picture or clip that is warped by a map.
 
     Attributes:
-        maps: of a sequence, map k warps frame k, or makes frame k of a picture's animation; the last one stays.
-        source: the picture or clip.
-        output: a picture's file, an animation's, or the pattern of a sequence.
-        edges, size, quality, bits, strip, codec: as in a recipe's job.
+        maps: of a sequence, each map warps the frame of its number, or makes that frame of a picture's animation; where
+            the frames have other numbers, they go in order. The last one stays.
+        edges, size, quality: as in a recipe's job.
         fps: of a picture's animation; a clip keeps its own rate.
     """
 
     maps: MapSource
-    source: Path
-    output: Path
     edges: Edges = "transparent"
     size: int | None = None
     quality: int = 90
     fps: float = 30.0
-    bits: int | None = None
-    strip: bool = False
-    codec: str | None = None
+
+    def located(self) -> Self:
+        return replace(super().located(), maps=replace(self.maps, path=self.maps.path.absolute()))
+
+    @property
+    def _output(self) -> Path:
+        assert self.outputs.file is not None
+        return self.outputs.file
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written. Raises `UserError`."""
-        check_output(self.output, fps=self.fps, codec=self.codec, bits=self.bits)
+        outputs, output = self.outputs, self._output
+        check_output(output, animated=outputs.animated, fps=self.fps, codec=outputs.codec, bits=outputs.bits)
         maps.check_map(self.maps.path)
-        writable(self.output)
-        for source in (self.source, *self.maps.files().values()):
-            check_kept(source, self.output)
+        writable(output)
+        self.check_names([*self.maps.files().values(), *([self.picture] if self.picture else [])])
+        if outputs.resume and not is_sequence(output):
+            raise UserError(f"only the files of a sequence can be kept by --resume, and {output} is none")
+        if outputs.part != WHOLE and not self.outputs.is_animation:
+            raise UserError(f"only an animation has --frames, and {output} is a picture; write f.%04d.png or .mp4")
 
-    def run(self, device: Device, progress: Progress) -> tuple[str, ...]:
-        """Do it, once it has been checked; nothing is left behind if it is cancelled or fails.
-
-        Says what the user should hear of.
+    def perform(self, device: Callable[[], Device], progress: Progress) -> Report:
+        """Do it; but for the frames of a sequence, nothing is left behind if it is cancelled or fails.
 
         Raises:
             UserError: if a map has other proportions than the picture, or anything cannot be read or written.
         """
+        self.check()
+        assert self.picture is not None
         progress.enter("reading")
-        animated = is_animation(self.output)
-        source = open_source(self.source, self.maps.max_pixels)
-        notices = [source.picture.note]
-        check_output(self.output, size=self._size(source))
-        if animated != (self.maps.is_sequence or source.clip is not None):
-            what = "a still" if not animated else "an animation"
-            mend = "write f.%04d.png or .mp4" if not animated else "write a picture, such as out.png"
-            given = "several maps or a clip" if not animated else "one map and one picture"
-            raise UserError(f"Cannot write {self.output}: {given} do not make {what}; {mend}.")
-        with Applier(device, self.edges, source.picture.premultiplied) as applier:
-            if animated:
-                notices.append(unheld(self.output, source.picture, with_layers=False, with_margins=False))
-                notices += [unheld_of_clip(self.output, self.codec, source.clip)] if source.clip else []
-                self._write_frames(applier, source, progress, notices)
-            else:
-                self._write_still(applier, source.picture, self._size(source), progress, notices)
-            notices.extend(applier.notices(self.maps.path))
-        return tuple(filter(None, notices))
+        source = open_source(self.picture, self.max_pixels).taken(self.outputs.is_animation)
+        check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
+        if source.clip is not None:
+            check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)
+        if self.outputs.is_animation != (self.maps.is_sequence or source.clip is not None):
+            what = "a still" if not self.outputs.is_animation else "an animation"
+            mend = "write f.%04d.png or .mp4" if not self.outputs.is_animation else "write a picture, such as out.png"
+            given = "several maps or a clip" if not self.outputs.is_animation else "one map and one picture"
+            raise UserError(f"Cannot write {self._output}: {given} do not make {what}; {mend}.")
+        with Applier(device(), self.edges, source.picture.premultiplied) as applier:
+            work = _Applying(self, source, applier, progress)
+            count = work.write_frames() if self.outputs.is_animation else work.write_still()
+            work.notices.extend(applier.notices(self.maps.path))
+        return Report(count, 0, None, tuple(filter(None, work.notices)))
 
-    def _write_still(
-        self, applier: Applier, picture: Picture, size: tuple[int, int], progress: Progress, notices: list[str]
-    ) -> None:
-        steps = steps_for(size)
-        progress.total = 2 * steps
-        given = next(self.maps.read())
-        # what lies beyond the display window has a place in a map of the same pixels only
-        fits = not given.forward and size == (given.width, given.height) == (picture.width, picture.height)
-        notices.append(unheld(self.output, picture, with_margins=fits))
-        keeps = picture_format(self.output).keeps
-        if not fits or "wide" not in keeps:
+    def _size(self, picture: Picture) -> tuple[int, int]:
+        own = picture.width, picture.height
+        return own if self.size is None else longer_side(own, self.size)
+
+
+class _Applying:
+    """An `Application` at work on its source."""
+
+    def __init__(self, order: Application, source: Source, applier: Applier, progress: Progress) -> None:
+        self.order, self.source, self.applier, self.progress = order, source, applier, progress
+        self.outputs, self.output = order.outputs, order._output
+        self.size = order._size(source.picture)
+        self.notices = [source.picture.note]
+        self._files = order.maps.files()
+        self._read: tuple[Path, Displacement] | None = None
+
+    def _map(self, file: Path) -> Displacement:
+        """The map in a file, which as a rule is the one of the frame before."""
+        if self._read is None or self._read[0] != file:
+            self._read = file, self.order.maps.read(file)
+        return self._read[1]
+
+    def write_still(self) -> int:
+        steps = steps_for(self.size)
+        self.progress.total = 2 * steps
+        given, picture = self._map(self._files[0]), self.source.picture
+        self.notices.append(unheld(self.output, picture, with_margins=self._fits(given, picture)))
+        self.progress.enter("")
+        warped = self._warped(given, picture, lambda height: self.progress.parts(steps, height), alpha=True)
+        self.progress.enter("writing")
+        how = self.outputs
+        write_picture(self.output, warped, bits=how.bits, quality=self.order.quality, strip=how.strip, codec=how.codec)
+        self.progress.count(steps)
+        return 1
+
+    def _fits(self, given: Displacement, picture: Picture) -> bool:
+        """Whether what lies beyond the display window has a place in the map: in one of the same pixels only."""
+        return not given.forward and self.size == (given.width, given.height) == (picture.width, picture.height)
+
+    def _warped(
+        self, given: Displacement, picture: Picture, parts: Callable[[int], Callable[[int], None]], alpha: bool
+    ) -> Picture:
+        """A picture with all that is written of it; for `parts` see `Progress`."""
+        kind, size = picture_format(self.output), self.size
+        if not self._fits(given, picture) or "wide" not in kind.keeps:
             picture = picture.cropped()
         pixels = picture.pixels
         if picture.wide is not None:
-            pixels, given = picture.wide, Displacement(widened(given, picture.margins))
+            pixels, given = picture.wide, self.applier.widened(given, picture.margins)
             size = pixels.shape[1], pixels.shape[0]
-        heard = progress.parts(steps, size[1])
-        progress.enter("")
-        found = applier.warped(given, pixels, size, self._alpha, heard)
-        look_up = partial(applier.looked_up, given, size, lambda rows: progress.check())
-        layers = along(picture.layers, look_up) if "layers" in keeps else ()
+        found = self.applier.warped(given, pixels, size, alpha and kind.alpha, parts(size[1]))
+        look_up = partial(self.applier.looked_up, given, size, lambda rows: self.progress.check())
+        layers = along(picture.layers, look_up) if "layers" in kind.keeps else ()
         if picture.wide is None:
-            picture = replace(picture.with_pixels(found), layers=layers)
+            return replace(picture.with_pixels(found), layers=layers)
+        return picture.with_wide(found, layers)
+
+    def write_frames(self) -> int:
+        order, outputs, clip, progress = self.order, self.outputs, self.source.clip, self.progress
+        (first, last), is_own = outputs.part, clip is not None and clip.is_whole and is_sequence(self.output)
+        if clip is not None:
+            clip.check(outputs.part)
+            start, count = clip.start, clip.frames
         else:
-            picture = picture.with_wide(found, layers)
-        progress.enter("writing")
-        write_picture(self.output, picture, bits=self.bits, quality=self.quality, strip=self.strip, codec=self.codec)
-        progress.count(steps)
-
-    @property
-    def _alpha(self) -> bool:
-        return not is_animation(self.output) and picture_format(self.output).alpha
-
-    def _size(self, source: Source) -> tuple[int, int]:
-        own = source.picture.width, source.picture.height
-        return own if self.size is None else longer_side(own, self.size)
-
-    def _write_frames(self, applier: Applier, source: Source, progress: Progress, notices: list[str]) -> None:
-        clip = source.clip
-        frames = clip.frames if clip else len(self.maps.files())
-        progress.total = frames and frames * passes(self.output)
-        progress.enter("")
-        size, like = self._size(source), source.picture.stripped() if self.strip else source.picture
-        writer = animation_writer(
-            self.output,
-            clip.fps if clip else frame_rate(self.fps),
-            codec=self.codec,
-            crf=crf_of(self.quality),
-            quality=self.quality,
-            bits=self.bits,
-            sound=clip.path if clip and clip.sound else None,
-            sound_from=clip.late if clip else 0.0,
-            like=like,
-            cancel=progress.cancel,
-            passed=progress.advance,
-        )
-        with ExitStack() as stack:
-            given_maps, source_frames = self.maps.read(), repeat(source.picture.pixels)
-            if clip:
-                source_frames = stack.enter_context(ahead(clip.read_frames(progress.cancel, notices.append)))
-                given_maps = _staying(given_maps)
-            warped = (
-                applier.warped(given, pixels, size, self._alpha, lambda rows: progress.check())
-                for given, pixels in zip(given_maps, source_frames, strict=False)
+            start, count = min(self._files), len(self._files)
+            if outputs.part != WHOLE:
+                until = max(self._files) if last is None else last
+                check_numbers(order.maps.path, self._files, range(first, until + 1))
+        self.notices.append(
+            unheld(
+                self.output,
+                self.source.picture,
+                with_layers=is_own,
+                with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
             )
-            write_all(warped, writer, progress)
+        )
+        self.notices += [unheld_of_clip(self.output, outputs.codec, clip)] if clip else []
+        first = max(first, start)
+        wanted = len(range(count)[first - start : None if last is None else last + 1 - start]) if count else None
+        progress.total = wanted and wanted * passes(self.output)
+        progress.enter("")
+        record = self._record() if is_sequence(self.output) else None
+        kept = Kept([record] if record and outputs.resume else [])
+        rate = (clip and clip.fps) or frame_rate(order.fps)
+        with ExitStack() as stack:
+            pictures: Iterator[tuple[int, Picture]]
+            if clip:
+                frames = clip.pictures(outputs.part, kept, progress.cancel, self.notices.append)
+                pictures = stack.enter_context(ahead(frames))
+            else:
+                numbers = [number for number in self._files if first <= number and (last is None or number <= last)]
+                pictures = ((number, self.source.picture) for number in numbers if not kept(number))
+            writer = animation_writer(
+                self.output,
+                rate,
+                codec=outputs.codec,
+                crf=crf_of(order.quality),
+                quality=order.quality,
+                bits=outputs.bits,
+                sound=clip.path if clip and clip.sound else None,
+                sound_from=float((first - start) / rate) + clip.late if clip else 0.0,
+                frames=None if last is None else last + 1 - first,
+                resumed=outputs.resume,
+                durations=clip.lengths(outputs.part) if clip else None,
+                loops=clip.loops if clip else 0,
+                colours=clip.colours if clip else USUAL,
+                timecode=clip.timecode_at(first) if clip else None,
+                like=self.source.picture.stripped() if outputs.strip else self.source.picture,
+                cancel=progress.cancel,
+                passed=progress.advance,
+                written=record.add if record else lambda number: None,
+            )
+            written = write_all(((n, self._frame(n, one, is_own)) for n, one in pictures), writer, progress)
+        progress.expect(-kept.count)
+        self.notices.append(kept.said(written))
+        return written
+
+    def _frame(self, number: int, picture: Picture, is_own: bool) -> Frame:
+        given = self._map(self._file(number))
+        if not is_own:
+            return self.applier.warped(given, picture.pixels, self.size, False, lambda rows: self.progress.check())
+        frame = self._warped(given, picture, lambda height: lambda rows: self.progress.check(), alpha=False)
+        return frame.stripped() if self.outputs.strip else frame
+
+    def _file(self, number: int) -> Path:
+        """The map of a frame."""
+        clip, last = self.source.clip, max(self._files)
+        if clip is None or (is_sequence(clip.path) and clip.start in self._files):
+            return self._files[min(number, last)]
+        return self._files[min(min(self._files) + number - clip.start, last)]
+
+    def _record(self) -> Record:
+        """What is known of the files of the sequence that is written."""
+        order, outputs, clip = self.order, self.outputs, self.source.clip
+        how = order.edges, order.size, order.quality, outputs.bits, outputs.strip, outputs.codec
+        common = digest_of(code(), how, replace(order.maps, path=Path()), self.source.picture)
+        digest = cache(digest_of_file)
+
+        def made_of(number: int) -> str:
+            return digest_of(common, number, digest(self._file(number)), clip.digest(number) if clip else "")
+
+        return Record(self.output, made_of)
 
 
 class Applier:
@@ -211,6 +297,8 @@ class Applier:
         self._sampler = Sampler(device)
         self._given: Displacement | None = None
         self._map: GivenMap | None = None
+        self._outside: np.ndarray | None = None
+        self._wide: tuple[Displacement, tuple[int, int, int, int], Displacement] | None = None
         self._folds: list[int] = []  # of the maps that fold over themselves, in how many pixels each
 
     def __enter__(self) -> Applier:
@@ -250,16 +338,29 @@ class Applier:
     ) -> np.ndarray:
         try:
             if given is not self._given or self._map is None:
-                if self._map is not None:
-                    self._map.release()
-                inverse = inverted(self._device, given) if given.forward else given
-                values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
-                if folded := folds(values):
-                    self._folds.append(folded)
-                self._map, self._given = GivenMap(self._device, values), given
-            return looked_up(self._sampler, self._map, pixels, size, how, alpha, heard)
+                self._take(given, pixels)
+            assert self._map is not None
+            found = looked_up(self._sampler, self._map, pixels, size, how, alpha, heard)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
+        return found if self._outside is None else emptied(found, self._outside, how.edges, alpha)
+
+    def _take(self, given: Displacement, pixels: np.ndarray) -> None:
+        if self._map is not None:
+            self._map.release()
+        inverse = inverted(self._device, given) if given.forward else given
+        values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
+        if folded := folds(values):
+            self._folds.append(folded)
+        outside = np.asarray(np.isnan(values).any(axis=2))
+        self._outside = outside if outside.any() else None
+        self._map, self._given = GivenMap(self._device, filled(values, outside)), given
+
+    def widened(self, given: Displacement, margins: tuple[int, int, int, int]) -> Displacement:
+        """A map with margins around it; the same again where both are the same."""
+        if self._wide is None or self._wide[0] is not given or self._wide[1] != margins:
+            self._wide = given, margins, Displacement(widened(given, margins))
+        return self._wide[2]
 
     def notices(self, path: Path) -> list[str]:
         """What the user should hear of the maps of `path`."""
@@ -279,6 +380,8 @@ def inverted(device: Device, given: Displacement) -> Displacement:
         UserError: if the map is too small, too narrow or too large to be looked up.
     """
     values = cropped(given).values
+    if np.isnan(values).any():
+        raise UserError("the map is NaN in places, and what is nowhere cannot be turned round; fill it first")
     width, height = given.width, given.height
     grid = Grid.for_picture(width, height, min(max(width, height), MOST_CELLS))
     warp = WarpMap(device, grid, (width, height))
@@ -293,13 +396,33 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     return Displacement(found.astype(np.float32), 0, not given.forward)
 
 
-def _staying(given: Iterator[Displacement]) -> Iterator[Displacement]:
-    """The maps, and then the last of them for ever."""
-    last = next(given)
-    yield last
-    for last in given:
-        yield last
-    yield from repeat(last)
+def filled(values: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """The values of a map, and where there are none those nearby, as far as looking up beside them reaches."""
+    if not outside.any():
+        return values
+    values, empty = np.where(outside[..., None], 0, values), outside.copy()
+    for _ in range(REACH):
+        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            there = np.roll(~empty, step, axis)
+            there[(slice(None),) * axis + (0 if step > 0 else -1,)] = False  # what was rolled round the edge
+            there &= empty
+            values[there] = np.roll(values, step, axis)[there]
+            empty &= ~there
+    return values
+
+
+def emptied(pixels: np.ndarray, outside: np.ndarray, edges: Edges, alpha: bool) -> np.ndarray:
+    """Pixels with nothing in those whose nearest one of the map is `outside`; `alpha` as in `looked_up`."""
+    if alpha and edges != "black":
+        pixels = with_alpha(pixels)
+    (height, width), (rows, columns) = pixels.shape[:2], outside.shape
+    row = (np.arange(height) * 2 + 1) * rows // (2 * height)
+    column = (np.arange(width) * 2 + 1) * columns // (2 * width)
+    here = outside[row[:, None], column]
+    pixels[here] = 0
+    if pixels.shape[2] in (2, 4) and edges == "black":
+        pixels[here, -1] = opaque_value(pixels)
+    return pixels
 
 
 def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progress: Progress) -> tuple[str, ...]:
@@ -316,19 +439,19 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
     progress.total = len(files)
     if is_sequence(output) != source.is_sequence:
         raise UserError(f"{source.path} and {output} must both be sequences, or neither")
+    notices = []
+    one = nullcontext(lambda given, number: maps.write_map(output, given, kind))
     with ExitStack() as stack:
         device = stack.enter_context(Device.headless()) if invert else None
-        if source.is_sequence:
-            writer = maps.map_writer(output, kind, first=next(iter(files)), cancel=progress.cancel)
-            write = stack.enter_context(writer)
-        else:
-            write = partial(maps.write_map, output, kind=kind)
-        notices = []
-        for file, given in zip(files.values(), source.read(), strict=True):
+        write = stack.enter_context(
+            maps.map_writer(output, kind, cancel=progress.cancel) if source.is_sequence else one
+        )
+        for number, file in files.items():
+            given = source.read(file)
             if device and (folded := folds(cropped(given).values)):
                 notices.append(
                     f"{file.name} folds over itself in {folded} of its pixels, where no inverse can be right"
                 )
-            write(inverted(device, given) if device else given)
+            write(inverted(device, given) if device else given, number)
             progress.advance()
     return tuple(notices)

@@ -8,14 +8,14 @@ from collections.abc import Callable, Sequence
 
 from app.progress import Progress
 from app.work.cluster import run_on_cluster
-from app.work.tasks import Task
+from app.work.tasks import Piece
 from app.work.worker import ATTEMPTS, DIED, LOOK, Heard, Outcome, Part, Worker, perform
 
 Report = Callable[[Outcome], None]
 
 
 def run_batch(
-    tasks: Sequence[Task],
+    tasks: Sequence[Piece],
     report: Report,
     progress: Progress,
     jobs: int = 1,
@@ -50,9 +50,9 @@ def run_batch(
     return failures
 
 
-def _run_in_processes(tasks: Sequence[Task], jobs: int, report: Report, progress: Progress) -> None:
+def _run_in_processes(tasks: Sequence[Piece], jobs: int, report: Report, progress: Progress) -> None:
     waiting = deque((task, 1) for task in tasks)
-    busy: dict[Worker, tuple[Task, int]] = {}
+    busy: dict[Worker, tuple[Piece, int]] = {}
     idle: list[Worker] = []
     inbox: queue.SimpleQueue[tuple[Worker, Heard]] = queue.SimpleQueue()
     try:

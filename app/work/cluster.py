@@ -14,7 +14,7 @@ from typing import Any
 
 from app.errors import Cancelled, UserError
 from app.progress import Progress
-from app.work.tasks import Task
+from app.work.tasks import Piece
 from app.work.worker import ATTEMPTS, DIED, LOOK, Heard, Outcome, Part, Worker, in_a_line
 
 CONNECTING = 10  # seconds that a scheduler has to answer
@@ -24,7 +24,7 @@ SCHEMES = ("tcp", "tls", "ws", "wss", "ucx")  # what a scheduler's address may b
 _here = threading.local()
 
 
-def _perform_on_worker(task: Task) -> Outcome:
+def _perform_on_worker(task: Piece) -> Outcome:
     """In a thread of a Dask worker, which forgets a task that its client has cancelled.
 
     A GL context wants a process whose other threads leave its objects alone; Dask's collect garbage at any time. And a
@@ -72,7 +72,7 @@ def _end_worker() -> None:
 
 
 def run_on_cluster(
-    tasks: Sequence[Task],
+    tasks: Sequence[Piece],
     address: str,
     report: Callable[[Outcome], None],
     progress: Progress,
@@ -87,7 +87,7 @@ def run_on_cluster(
     """
     ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
     before = {task: _stamps(task) for task in tasks}
-    heard: set[Task] = set()
+    heard: set[Piece] = set()
     watched, idle = time.monotonic(), False
     with _client(address) as client:
         # Dask gives the tasks of a worker that dies to the others, as often as its allowed-failures says.
@@ -131,7 +131,7 @@ class _Gone(Exception):
     """The scheduler does not know of our tasks any more."""
 
 
-def _outcome(future: Any, task: Task) -> Outcome:
+def _outcome(future: Any, task: Piece) -> Outcome:
     if future.status == "finished":
         try:
             return future.result(CONNECTING)
@@ -148,7 +148,7 @@ def _outcome(future: Any, task: Task) -> Outcome:
 Stamps = tuple[tuple[int, int] | None, ...]
 
 
-def _stamps(task: Task) -> Stamps:
+def _stamps(task: Piece) -> Stamps:
     """What changes when the files of a task are replaced; None for one that is not there."""
     found = []
     for path in task.outputs.files:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import gc
 import json
-from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import partial
-from itertools import chain, count, groupby, islice, pairwise, repeat
+from itertools import groupby, pairwise
 from math import ceil
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from app.errors import UserError
 from app.media.animation import (
+    Frame,
     FrameWriter,
+    NumberedWriter,
     animation_writer,
     crf_of,
     frame_order,
@@ -26,10 +29,12 @@ from app.media.animation import (
     unheld_of_clip,
 )
 from app.media.auxiliary import Pictures
-from app.media.files import replacing
+from app.media.clip import USUAL
+from app.media.files import is_sequence, replacing
 from app.media.formats import picture_format, unheld
 from app.media.maps import Displacement, map_writer, write_map
 from app.media.pictures import write_picture
+from app.media.record import Record, digest_of
 from app.model.handles import ARRIVED
 from app.model.picture import Picture
 from app.model.recipe import Recipe
@@ -39,13 +44,17 @@ from app.work.along import along, widened
 from app.work.checkpoints import DEFAULT_BUDGET
 from app.work.jobs import Job, MapOutput, longer_side, result_size
 from app.work.replay import Replay
-from app.work.states import StoredStates
+from app.work.states import StoredStates, code
 from app.work.threads import ahead, behind
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
+
+T = TypeVar("T")
+Numbered = tuple[int, Frame]
+TakeMap = Callable[[tuple[int, Displacement]], None]
 
 POINTS_AT_ONCE = 1_000_000  # of a map
 PIXELS_A_STEP = 100_000  # whose look-up, or writing as PNG, takes about as long on a CPU as a step on 256 cells
@@ -140,7 +149,7 @@ class _Export:
             self._go_to(Fraction(end))
             if outputs.file is not None:
                 steps = steps_for(self.size)
-                picture = self._still(lambda height: self.progress.parts(steps, height))
+                picture = self._still(self.like, lambda height: self.progress.parts(steps, height))
                 self.progress.enter("writing")
                 write_picture(
                     outputs.file,
@@ -208,83 +217,119 @@ class _Export:
     def _write_frames(self, shown: list[Fraction], end: int) -> int:
         """Write the frames, each warped by the map at its position in `shown`; says how many there were."""
         job, file, maps, (first, last) = self.job, self.outputs.file, self.outputs.maps, self.outputs.part
-        if job.clip is None and first >= len(shown):
+        clip, start = job.clip, job.clip.start if job.clip else 0
+        if clip is None and first >= len(shown):
             raise UserError(f"the animation has the frames 0-{len(shown) - 1}, and none from {first} on")
-        until = None if last is None else last + 1
-        wanted = shown[first:until]
+        first = max(first, start)
+        until = None if last is None else last + 1 - start
+        moment = clip.moment if clip else lambda number: number
+        wanted = shown[moment(first) : None if last is None else moment(last) + 1]
         self.progress.expect(ceil(max(wanted, default=shown[-1])) - end)
+        count = len(range(clip.frames or len(shown))[first - start : until]) if clip else len(wanted)
+        self.progress.expect(count * (passes(file) if file is not None else 1))
+        records = self._records()
         with ExitStack() as stack:
-            take_map, times = None, passes(file) if file is not None else 1
+            take_map = None
             if maps is not None and maps.is_sequence:
-                writer = map_writer(maps.path, maps.kind, first=first, cancel=self.progress.cancel)
-                take_map = stack.enter_context(behind(stack.enter_context(writer)))
-            if job.clip is not None:
-                clip_frames = job.clip.read_frames(self.progress.cancel, self.pictures.notice)
-                source = stack.enter_context(ahead(part_of(clip_frames, first, until)))
-                self.progress.expect(len(range(job.clip.frames or len(shown))[first:until]) * times)
+                cancel, note = self.progress.cancel, records[maps.path].add
+                writer = map_writer(maps.path, maps.kind, cancel=cancel, written=note, resumed=self.outputs.resume)
+                take_map = stack.enter_context(in_order(stack.enter_context(writer)))
+            kept = Kept(records.values() if self.outputs.resume else [])
+            if clip is not None:
+                pictures = clip.pictures(self.outputs.part, kept, self.progress.cancel, self.pictures.notice)
+                source = stack.enter_context(ahead(pictures))
                 # Once the fluid has come to its end, the clip goes on with the last warp.
-                positions = islice(chain(shown, repeat(shown[-1])), first, None)
-                frames = self._frames(zip(count(first), positions, strict=False), source, take_map)
+                at = ((number, shown[min(moment(number), len(shown) - 1)], one) for number, one in source)
+                frames = self._frames(at, take_map)
             else:
-                self.progress.expect(len(wanted) * times)
-                frames = self._frames_of_picture(wanted, take_map)
-            written = write_all(frames, self._writer() if file is not None else None, self.progress)
+                missing = [(number, position) for number, position in enumerate(wanted, first) if not kept(number)]
+                frames = self._frames_of_picture(missing, take_map)
+            written = write_all(frames, self._writer(first, records) if file is not None else None, self.progress)
+            self.progress.expect(-kept.count)
+            if said := kept.said(written):
+                self.pictures.notice(said)
         if maps is not None and not maps.is_sequence:
             self._go_to(max(wanted, default=shown[-1]))
         return written
 
-    def _frames_of_picture(
-        self, wanted: list[Fraction], take_map: Callable[[Displacement], None] | None
-    ) -> Iterator[np.ndarray]:
+    def _records(self) -> dict[Path, Record]:
+        """What is known of the files of each sequence that is written."""
+        outputs, maps = self.outputs, self.outputs.maps
+        written: dict[Path, tuple[Any, ...]] = {}
+        if outputs.file is not None and is_sequence(outputs.file):
+            written[outputs.file] = "picture", outputs.bits, outputs.strip, outputs.codec
+        if maps is not None and maps.is_sequence:
+            written[maps.path] = "map", replace(maps, path=Path())
+        if not written:
+            return {}
+        clip, recipe = self.job.clip, self.recipe.model_dump_json(exclude={"name", "picture"})
+        common = digest_of(code(), recipe, self.job.picture, *self.pictures.values())
+
+        def made_of(how: tuple[Any, ...], number: int) -> str:
+            return digest_of(common, how, number, clip.digest(number) if clip else "")
+
+        return {path: Record(path, partial(made_of, how)) for path, how in written.items()}
+
+    def _frames_of_picture(self, wanted: list[tuple[int, Fraction]], take_map: TakeMap | None) -> Iterator[Numbered]:
         """The picture warped by the maps at these positions; one that is shown again is not made again."""
-        first, source = self.outputs.part[0], repeat(self.job.picture.pixels)
+        picture = self.job.picture
         if not self.is_spooled or self.outputs.file is None:
-            return self._frames(zip(count(first), wanted, strict=False), source, take_map)
+            return self._frames(((number, position, picture) for number, position in wanted), take_map)
         numbers: dict[Fraction, int] = {}
-        for number, position in enumerate(wanted, first):
+        for number, position in wanted:
             numbers.setdefault(position, number)
         distinct = sorted(numbers)
         places = {position: place for place, position in enumerate(distinct)}
-        order = [places[position] for position in wanted]
-        frames = self._frames(((numbers[position], position) for position in distinct), source, take_map)
+        order = [places[position] for _, position in wanted]
+        numbered = self._frames(((numbers[at], at, picture) for at in distinct), take_map)
+        made = (frame for _, frame in numbered if isinstance(frame, np.ndarray))
         goes_back = any(later < earlier for earlier, later in pairwise(order))
-        return reordered(frames, order, self.outputs.file.parent) if goes_back else held(frames, order)
+        frames = reordered(made, order, self.outputs.file.parent) if goes_back else held(made, order)
+        return zip((number for number, _ in wanted), frames, strict=True)
 
-    def _writer(self) -> AbstractContextManager[FrameWriter]:
-        job, output, (first, last) = self.job, self.recipe.output, self.outputs.part
-        assert self.outputs.file is not None
+    def _writer(self, first: int, records: dict[Path, Record]) -> AbstractContextManager[FrameWriter]:
+        job, output, file, last = self.job, self.recipe.output, self.outputs.file, self.outputs.part[1]
+        assert file is not None
         return animation_writer(
-            self.outputs.file,
+            file,
             job.rate,
             codec=self.outputs.codec,
             crf=crf_of(output.quality),
             quality=output.quality,
             bits=self.outputs.bits,
             sound=job.clip.path if job.clip and job.clip.sound else None,
-            sound_from=float(first / job.rate) + (job.clip.late if job.clip else 0),
+            sound_from=float(first / job.rate) + job.clip.late if job.clip else 0,
             frames=None if last is None else last + 1 - first,
-            first=first,
+            resumed=self.outputs.resume,
+            durations=job.clip.lengths(self.outputs.part) if job.clip else None,
+            loops=job.clip.loops if job.clip else 0,
+            colours=job.clip.colours if job.clip else USUAL,
+            timecode=job.clip.timecode_at(first) if job.clip else None,
             like=self.like.stripped() if self.outputs.strip else self.like,
             cancel=self.progress.cancel,
             passed=self.progress.advance,
+            written=records[file].add if file in records else lambda number: None,
         )
 
     def _frames(
-        self,
-        positions: Iterable[tuple[int, Fraction]],
-        source: Iterator[np.ndarray],
-        take_map: Callable[[Displacement], None] | None,
-    ) -> Iterator[np.ndarray]:
-        """The frames of the source, (h, w, c) each, warped by the maps at the numbered positions."""
+        self, positions: Iterable[tuple[int, Fraction, Picture]], take_map: TakeMap | None
+    ) -> Iterator[Numbered]:
+        """The pictures, each warped by the map at its position, with their numbers."""
         nothing = np.empty((0, 0, 1), np.uint8)
-        for (number, position), pixels in zip(positions, source, strict=False):
+        for number, position, picture in positions:
             self._go_to(position)
             if take_map is not None and self.outputs.maps is not None:
-                take_map(self._map(self.outputs.maps))
-            frame = self._frame(pixels) if self.outputs.file is not None else nothing
+                take_map((number, self._map(self.outputs.maps)))
+            frame = self._frame_of(picture) if self.outputs.file is not None else nothing
             self._note(number, position)
             gc.collect(1)
-            yield frame
+            yield number, frame
+
+    def _frame_of(self, picture: Picture) -> Frame:
+        if not self._has_own:
+            return self._frame(picture)
+        frame = self._still(picture, lambda height: lambda rows: self.progress.check())
+        return frame.stripped() if self.outputs.strip else frame
 
     def _go_to(self, position: Fraction) -> None:
         if position == self._position:
@@ -300,7 +345,7 @@ class _Export:
         self.replay.seek(position)
         self._position = position
 
-    def _frame(self, pixels: np.ndarray, heard: Callable[[int], None] | None = None) -> np.ndarray:
+    def _frame(self, picture: Picture, heard: Callable[[int], None] | None = None) -> np.ndarray:
         """The pixels warped by the map as it is; for `heard` see `looked_up`."""
         heard = heard or (lambda rows: self.progress.check())
         if self.replay.density is not None:
@@ -311,9 +356,9 @@ class _Export:
         file = self.outputs.file
         alpha = not self.job.is_animation and file is not None and picture_format(file).alpha
         with self.device.stage("sample picture"):
-            how = replace(self._how, premultiplied=self.job.picture.premultiplied)
+            how = replace(self._how, premultiplied=picture.premultiplied)
             try:
-                return looked_up(self.sampler, self.replay.warp, pixels, self.size, how, alpha, heard)
+                return looked_up(self.sampler, self.replay.warp, picture.pixels, self.size, how, alpha, heard)
             except SamplingError as error:
                 raise UserError(f"The map cannot be applied: {error}.") from None
 
@@ -322,10 +367,17 @@ class _Export:
         return Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
 
     @property
+    def _has_own(self) -> bool:
+        """Whether each frame is a file made from one, with all that belongs to it."""
+        file, clip = self.outputs.file, self.job.clip
+        return file is not None and is_sequence(file) and clip is not None and clip.is_whole
+
+    @property
     def _has_layers(self) -> bool:
-        """Whether the picture's layers are warped along: of a still, where its own pixels are moved."""
+        """Whether layers are warped along: of what is written as it is read, where its own pixels are moved."""
         job = self.job
-        return self.outputs.file is not None and not job.has_frames and self.recipe.mode != "density"
+        is_whole = self.outputs.file is not None and (self._has_own or not job.has_frames)
+        return is_whole and self.recipe.mode != "density"
 
     @property
     def _has_margins(self) -> bool:
@@ -336,13 +388,13 @@ class _Export:
     def _along(self) -> dict[str, bool]:
         return {"with_layers": self._has_layers, "with_margins": self._has_margins}
 
-    def _still(self, parts: Callable[[int], Callable[[int], None]]) -> Picture:
-        """The picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""
-        output, picture = self.outputs.file, self.like
+    def _still(self, picture: Picture, parts: Callable[[int], Callable[[int], None]]) -> Picture:
+        """A picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""
+        output = self.outputs.file
         assert output is not None
         keeps = picture_format(output).keeps
         if picture.wide is None or not self._has_margins or "wide" not in keeps:
-            still = picture.with_pixels(self._frame(picture.pixels, parts(self.size[1])))
+            still = picture.with_pixels(self._frame(picture, parts(self.size[1])))
             if not self._has_layers or "layers" not in keeps:
                 return still
             layers = picture.cropped().layers
@@ -352,7 +404,8 @@ class _Export:
         try:
             height, width = picture.wide.shape[:2]
             how = replace(self._how, premultiplied=picture.premultiplied)
-            wide = looked_up(self.sampler, warp, picture.wide, (width, height), how, True, parts(height))
+            alpha = not self.job.is_animation
+            wide = looked_up(self.sampler, warp, picture.wide, (width, height), how, alpha, parts(height))
             return picture.with_wide(wide, along(picture.layers, partial(self._look_up, warp, (width, height))))
         except SamplingError as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
@@ -423,16 +476,38 @@ class _Export:
         }
 
 
+class Kept:
+    """Which frames need not be made again, as the records of all their files hold them; how many were asked for."""
+
+    def __init__(self, records: Collection[Record]) -> None:
+        self.count = 0
+        self._records = records
+
+    def __call__(self, number: int) -> bool:
+        is_kept = bool(self._records) and all(record.holds(number) for record in self._records)
+        self.count += is_kept
+        return is_kept
+
+    def said(self, written: int) -> str:
+        """How many were kept, in a sentence; "" if none was."""
+        return f"{self.count} of {self.count + written} frames were whole and are kept" if self.count else ""
+
+
+def in_order(write: NumberedWriter[T]) -> AbstractContextManager[Callable[[tuple[int, T]], None]]:
+    """`write`, in a thread of its own; see `behind`."""
+    return behind(lambda item: write(item[1], item[0]))
+
+
 def write_all(
-    frames: Iterable[np.ndarray], writer: AbstractContextManager[FrameWriter] | None, progress: Progress
+    frames: Iterable[Numbered], writer: AbstractContextManager[FrameWriter] | None, progress: Progress
 ) -> int:
-    """Write the frames of an animation, each while the next one is made; says how many there were.
+    """Write the numbered frames of an animation, each while the next one is made; says how many there were.
 
     writer: None if they are made for something else.
     """
     count = 0
     with ExitStack() as stack:
-        write = stack.enter_context(behind(stack.enter_context(writer))) if writer is not None else None
+        write = stack.enter_context(in_order(stack.enter_context(writer))) if writer is not None else None
         for frame in frames:
             if write is not None:
                 write(frame)
@@ -440,23 +515,6 @@ def write_all(
             progress.advance()
         progress.enter("writing")  # what the encoder still holds, and what it does with all frames
     return count
-
-
-def part_of(
-    frames: Generator[np.ndarray, None, None], first: int, until: int | None
-) -> Generator[np.ndarray, None, None]:
-    """The frames of a clip from `first` to before `until`, or to its end.
-
-    Raises:
-        UserError: if it ends before the first.
-    """
-    number = -1
-    with closing(frames):
-        for number, frame in enumerate(islice(frames, until)):
-            if number >= first:
-                yield frame
-    if 0 <= number < first:
-        raise UserError(f"the clip has the frames 0-{number}, and none from {first} on")
 
 
 def held(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]:

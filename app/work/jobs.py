@@ -10,12 +10,12 @@ from fractions import Fraction
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.animation import check_output, is_animation
+from app.media.animation import check_colours, check_output, is_animation
+from app.media.clip import WHOLE, Clip, Part
 from app.media.files import cannot_write, is_sequence, writable
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map
 from app.media.opening import check_picture
-from app.media.video import Clip
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.timeline import frame_rate
@@ -52,28 +52,40 @@ class Outputs:
         file: the result, or the pattern of a sequence's files; None for maps alone.
         stats: a JSON file for numbers about every frame.
         maps: what is written of the warp map.
-        part: the first and the last frame of the animation that are written, from 0; None is to the end.
+        part: the first and the last frame of the animation that are written, from 0, or by the numbers of the files
+            that it is made from; None is to the end.
         animated: for endings that stand for both, as .webp does: an animation is wanted.
         bits: a channel, of pictures; None keeps the source's.
         strip: leave out the source's metadata.
         codec: of a video; None is the usual one of its ending.
         states: a folder of states of the simulation, for parts to begin with and to leave for others.
+        resume: keep the files of a sequence that are whole, and were made of the same.
     """
 
     file: Path | None
     stats: Path | None = None
     maps: MapOutput | None = None
-    part: tuple[int, int | None] = (0, None)
+    part: Part = WHOLE
     animated: bool = False
     bits: int | None = None
     strip: bool = False
     codec: str | None = None
     states: Path | None = None
+    resume: bool = False
 
     @property
     def files(self) -> list[Path]:
         """The names of all that is written; states, which others may use as well, are not among them."""
         return [path for path in (self.file, self.stats, self.maps and self.maps.path) if path is not None]
+
+    @property
+    def is_animation(self) -> bool:
+        return self.file is not None and (self.animated or is_animation(self.file))
+
+    @property
+    def has_frames(self) -> bool:
+        """True if more than the end is written."""
+        return self.is_animation or (self.file is None and self.maps is not None and self.maps.is_sequence)
 
     def renamed(self, name: Callable[[Path], Path]) -> Outputs:
         """The same written to other files, each as `name` says."""
@@ -115,19 +127,18 @@ class Job:
 
     @property
     def is_animation(self) -> bool:
-        output = self.outputs.file
-        return output is not None and (self.outputs.animated or is_animation(output))
+        return self.outputs.is_animation
 
     @property
     def has_frames(self) -> bool:
         """True if more than the end is written."""
-        output, maps = self.outputs.file, self.outputs.maps
-        return self.is_animation or (output is None and maps is not None and maps.is_sequence)
+        return self.outputs.has_frames
 
     @property
     def rate(self) -> Fraction:
         """Frames per second."""
-        return self.clip.fps if self.clip else frame_rate(self.recipe.output.fps)
+        own = self.clip.fps if self.clip else None
+        return own or frame_rate(self.recipe.output.fps)
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written.
@@ -142,11 +153,13 @@ class Job:
             check_output(
                 output,
                 animated=outputs.animated,
-                fps=self.rate,
+                fps=self.rate / (self.clip.shortest if self.clip else 1),
                 codec=outputs.codec,
                 bits=outputs.bits,
                 size=result_size(self.recipe, self.picture),
             )
+            if self.clip is not None:
+                check_colours(output, outputs.codec, self.clip, self.is_animation)
         if maps is not None:
             check_map(maps.path)
             self._check_map_size(maps)
@@ -159,7 +172,11 @@ class Job:
         if self.has_frames and start > end:
             late = f"the animation ends at {end:g} s, and cannot begin at {start:g} s"
             raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
-        if outputs.part != (0, None) and not self.has_frames:
+        if self.clip is not None and self.has_frames:
+            self.clip.check(outputs.part)
+        if outputs.resume:
+            self._check_resumable()
+        if outputs.part != WHOLE and not self.has_frames:
             raise UserError(f"only an animation has --frames, and {output} is a picture; write f.%04d.png or .mp4")
         if self.clip is not None and self.recipe.mode == "density":
             raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
@@ -167,6 +184,13 @@ class Job:
             writable(path)
         if outputs.states is not None and os.path.exists(outputs.states) and not os.path.isdir(outputs.states):
             raise cannot_write(outputs.states, FileExistsError(errno.EEXIST, "it is a file"))
+
+    def _check_resumable(self) -> None:
+        outputs = self.outputs
+        if not any(is_sequence(path) for path in (outputs.file, outputs.maps and outputs.maps.path) if path):
+            raise UserError(f"only the files of a sequence can be kept by --resume, and {self.target} is none")
+        if outputs.stats is not None:
+            raise UserError("--stats has the numbers of all frames, and --resume makes only those that are missing")
 
     def _check_map_size(self, maps: MapOutput) -> None:
         size = result_size(self.recipe, self.picture)

@@ -127,7 +127,7 @@ class StoredStates:
 
 def _digest(replay: Replay) -> str:
     """What stands for a simulation: the same for two that come to the same bits."""
-    told = hashlib.sha256(_code().encode())
+    told = hashlib.sha256(code().encode())
     told.update(replay.device.limits.renderer.encode() + replay.device.limits.version.encode())
     told.update(_simulated(replay.recipe).encode())
     for part in replay.pictures.values():
@@ -141,7 +141,7 @@ def _simulated(recipe: Recipe) -> str:
 
 
 @cache
-def _code() -> str:
+def code() -> str:
     """A digest of everything that decides what a step does; a version's number would not tell a change in between."""
     told = hashlib.sha256()
     for package in ("app", "solver", "shaders"):

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self, TypeVar
 
 from app.errors import UserError
 from app.media.animation import ANIMATIONS
-from app.media.files import cannot_write, check_kept, is_sequence, takes_place
+from app.media.files import cannot_write, check_kept, is_sequence, takes_place, unnumbered
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
 from app.media.opening import CLIP_ENDINGS, Opened, open_recipe
 from app.media.project import picture_names
 from app.model.recipe import Recipe
+from app.progress import Progress
+from app.work.export import Report, run
 from app.work.jobs import Job, Outputs
+from solver.gl.device import Device
+
+P = TypeVar("P", bound="Piece")
 
 NAME = "{name}"
 """What stands for the name of each picture in the name of an output."""
@@ -60,20 +65,16 @@ class Edits:
             raise UserError(said) from None
 
 
-@dataclass(frozen=True)
-class Task:
+@dataclass(frozen=True, kw_only=True)
+class Piece:
     """One picture of a batch, in names only, so that any process that sees the same files can do it.
 
     Attributes:
-        recipe: its file, or the name of one that comes with fluidwarp.
-        edits: to the recipe.
-        picture: the picture or clip; None is the recipe's own.
+        picture: the picture or clip; of a recipe, None is its own.
         outputs: what is written; "{name}" in their names stands for the picture's.
         max_pixels: larger pictures are refused.
     """
 
-    recipe: str
-    edits: Edits
     picture: Path | None
     outputs: Outputs
     max_pixels: int = MAX_PIXELS
@@ -81,14 +82,19 @@ class Task:
     @property
     def label(self) -> str:
         """What the user calls it."""
-        return str(self.picture or self.recipe)
+        return str(self.picture or self.outputs.file)
 
-    def named(self) -> Task:
-        """The task with the picture's name where "{name}" stands in the names of what it writes."""
+    def named(self) -> Self:
+        """The same with the picture's name where "{name}" stands in the names of what it writes."""
         picture = self.picture
         if picture is None:
             return self
         return replace(self, outputs=self.outputs.renamed(lambda path: named(path, picture)))
+
+    def located(self) -> Self:
+        """The same with names that do not depend on the present folder: a cluster's workers do not start from it."""
+        picture = self.picture and self.picture.absolute()
+        return replace(self, picture=picture, outputs=self.outputs.renamed(Path.absolute))
 
     def check_names(self, read: Sequence[Path]) -> None:
         """Raise `UserError` if two of its outputs are one file, or one of them is among the files `read`."""
@@ -101,77 +107,119 @@ class Task:
                 raise UserError(f"{path} cannot hold two results; give --output, --map and --stats different names")
             seen.add(real)
 
-    def job(self, opened: Opened | None = None) -> Job:
+    def perform(self, device: Callable[[], Device], progress: Progress) -> Report:
+        """Do it, with a `device` once all is read and checked.
+
+        Raises:
+            UserError: what is wrong with what is read or written.
+            Cancelled: if `progress` says so.
+        """
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task(Piece):
+    """A picture that is warped by a recipe.
+
+    Attributes:
+        recipe: its file, or the name of one that comes with fluidwarp.
+        edits: to the recipe.
+    """
+
+    recipe: str
+    edits: Edits
+
+    @property
+    def label(self) -> str:
+        return str(self.picture or self.recipe)
+
+    def located(self) -> Self:
+        recipe = str(Path(self.recipe).absolute()) if os.path.exists(self.recipe) else self.recipe
+        return replace(super().located(), recipe=recipe)
+
+    def perform(self, device: Callable[[], Device], progress: Progress) -> Report:
+        progress.enter("reading")  # a large picture takes its time too
+        job = self.job()
+        job.check()
+        progress.enter("")
+        return run(device(), job, progress)
+
+    def job(self) -> Job:
         """The job, with its picture read. Raises `UserError`."""
-        opened = opened or _opened(self.recipe, self.max_pixels)
-        file = opened.source_file(self.picture)
-        own = opened.recipe if self.picture is None else opened.recipe.edited(picture=None)
-        read = [Path(opened.label), *(opened.folder / name for name in picture_names(own))]
+        found = opened(self.recipe, self.max_pixels)
+        file = found.source_file(self.picture)
+        own = found.recipe if self.picture is None else found.recipe.edited(picture=None)
+        read = [Path(found.label), *(found.folder / name for name in picture_names(own))]
         self.check_names(read if file is None else [*read, file])
-        source = opened.source(self.picture, self.max_pixels)
-        return Job(self.edits.applied(opened.recipe), source.picture, opened.folder, self.outputs, source.clip)
+        source = found.source(self.picture, self.max_pixels).taken(self.outputs.has_frames)
+        return Job(self.edits.applied(found.recipe), source.picture, found.folder, self.outputs, source.clip)
 
 
 @lru_cache(maxsize=4)
-def _opened(name: str, max_pixels: int) -> Opened:
+def opened(name: str, max_pixels: int) -> Opened:
+    """See `open_recipe`; read once in a process. Raises `UserError`."""
     return open_recipe(name, max_pixels)
 
 
-def spread(task: Task, pictures: Sequence[Path]) -> list[Task]:
-    """The task for each of the pictures: its output is a folder, which is made, or a name with "{name}" in it.
+def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
+    """The piece of work for each of the pictures: its output is a folder, which is made, or a name with "{name}" in it.
 
     In a folder they keep their names and endings, or get .png where theirs cannot be written.
 
     Raises:
         UserError: if two would be written to the same file, or one to where it is read from.
     """
-    recipe = str(Path(task.recipe).absolute()) if os.path.exists(task.recipe) else task.recipe
-    output, stats, maps = task.outputs.file, task.outputs.stats, task.outputs.maps
+    output, stats, maps = piece.outputs.file, piece.outputs.stats, piece.outputs.maps
     folder = output if NAME not in str(output) else None
     if folder is not None and folder.suffix and not os.path.isdir(folder):
         raise UserError(f"{len(pictures)} pictures cannot all become {output}; write a folder, or out/{NAME}.png")
     for path in (stats, maps and maps.path):
         if path is not None and NAME not in str(path) and len(pictures) > 1:
             raise UserError(f"{len(pictures)} pictures cannot all write {path}; put {NAME} into its name")
-    tasks = []
+    pieces = []
     for picture in pictures:
         into = output and (output if NAME in str(output) else output / (picture.stem + _ending(picture)))
-        one = replace(task, recipe=recipe, picture=picture, outputs=replace(task.outputs, file=into)).named()
-        tasks.append(replace(one, outputs=one.outputs.renamed(Path.absolute)))
-    _check_apart(tasks)
+        one = replace(piece, picture=picture, outputs=replace(piece.outputs, file=into)).named()
+        pieces.append(replace(one, outputs=one.outputs.renamed(Path.absolute)))
+    _check_apart(pieces)
     if folder is not None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise cannot_write(folder, error) from None
-    # A cluster's workers do not start from this folder.
-    return [replace(one, picture=one.picture and one.picture.absolute()) for one in tasks]
+    return [one.located() for one in pieces]
 
 
 def _ending(picture: Path) -> str:
     suffix = picture.suffix.lower()
-    if suffix in CLIP_ENDINGS:
+    if suffix in CLIP_ENDINGS and not is_sequence(picture):
         return picture.suffix if suffix in ANIMATIONS else ".mp4"
     return picture.suffix if suffix in FORMATS else ".png"
 
 
-def _check_apart(tasks: Sequence[Task]) -> None:
+def _check_apart(tasks: Sequence[Piece]) -> None:
     """Raise `UserError` if two would be written to one file, or one to where any is read from."""
     pictures = {os.path.realpath(task.picture): task.picture for task in tasks if task.picture is not None}
+    sequences = [real for real in pictures if is_sequence(real)]
     seen: dict[str, Path | None] = {}
     for task in tasks:
         task.check_names([] if task.picture is None else [task.picture])
         for path in task.outputs.files:
             real = os.path.realpath(path)
-            replaced = [real] if real in pictures else pictures if is_sequence(real) else []
+            replaced = [real] if real in pictures else pictures if is_sequence(real) else sequences
             for other in replaced:
                 if takes_place(real, other):
                     raise UserError(f"{pictures[other]} would be replaced by what {task.picture} becomes; rename one")
             if real in seen:
                 raise UserError(f"{seen[real]} and {task.picture} would both become {path}; rename one")
             seen[real] = task.picture
+    for pattern in filter(is_sequence, seen):
+        for path, picture in seen.items():
+            if path != pattern and takes_place(pattern, path):
+                raise UserError(f"{seen[pattern]} and {picture} would both become {path}; rename one")
 
 
 def named(path: Path, picture: Path) -> Path:
-    """`path` with the picture's name in place of "{name}"."""
-    return Path(str(path).replace(NAME, picture.stem))
+    """`path` with the picture's name in place of "{name}": of a sequence with its number, if it is to be one too."""
+    whole = is_sequence(picture) and Path(path).suffix.lower() in FORMATS
+    return Path(str(path).replace(NAME, picture.stem if whole else unnumbered(picture)))

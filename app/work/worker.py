@@ -18,7 +18,7 @@ from app.errors import Cancelled, UserError
 from app.progress import GRACE, INTERRUPTED, Progress, abandon, interruptible
 from app.work.export import run
 from app.work.jobs import Job
-from app.work.tasks import Task
+from app.work.tasks import Piece
 from solver.gl.device import Device
 
 SERVING = "from app.work.worker import serve; serve()"
@@ -26,7 +26,7 @@ ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
 DIED = "its process died each time, perhaps for want of memory; use fewer --jobs or a smaller --size"
 LOOK = 0.1  # seconds between two looks at the wish to stop
 
-Work = Task | Job
+Work = Piece | Job
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,11 @@ def perform(work: Work, progress: Progress) -> Outcome:
     """Do it here, on the device that is kept for the next one. Raises nothing but `Cancelled`."""
     label = work.label
     try:
-        job = work.job() if isinstance(work, Task) else work
-        job.check()
-        report = run(own_device(), job, progress)
+        if isinstance(work, Piece):
+            report = work.perform(own_device, progress)
+        else:
+            work.check()
+            report = run(own_device(), work, progress)
     except Cancelled:
         raise
     except UserError as error:

@@ -93,9 +93,9 @@ def processor_time() -> float:
 
 
 @contextmanager
-def nowhere(*_: object, **__: object) -> Iterator[Callable[[np.ndarray], None]]:
+def nowhere(*_: object, **__: object) -> Iterator[Callable[[np.ndarray, int], None]]:
     """A writer that takes everything at once."""
-    yield lambda frame: None
+    yield lambda frame, number: None
 
 
 def render(device: Device, job: Job) -> None:

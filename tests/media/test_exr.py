@@ -126,8 +126,9 @@ def test_layers_go_where_the_colours_go_and_ids_stay_ids(device: Device, tmp_pat
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
     values = np.stack([3.3 + 2 * np.sin(y / 5), 1.7 * np.cos(x / 7)], axis=-1) / WIDTH
     write_map(tmp_path / "map.npy", Displacement(values))
-    job = Application(MapSource(tmp_path / "map.npy"), source, tmp_path / "out.exr", edges="clamp", codec="none")
-    assert job.run(device, Progress()) == ()
+    outputs = Outputs(tmp_path / "out.exr", codec="none")
+    job = Application(maps=MapSource(tmp_path / "map.npy"), picture=source, outputs=outputs, edges="clamp")
+    assert job.perform(lambda: device, Progress()).notices == ()
     (found,) = read_exr(tmp_path / "out.exr")
     seen = found.channels
     np.testing.assert_array_equal(seen["spec.R"], seen["R"])
@@ -249,8 +250,9 @@ def test_what_enters_at_an_edge_comes_from_the_overscan(device: Device, tmp_path
     shift = np.zeros((HEIGHT, WIDTH, 2))
     shift[..., 0] = -4 / WIDTH  # looked up 4 pixels to the left
     write_map(tmp_path / "map.npy", Displacement(shift))
-    job = Application(MapSource(tmp_path / "map.npy"), source, tmp_path / "out.exr", codec="none", bits=32)
-    assert job.run(device, Progress()) == ()
+    outputs = Outputs(tmp_path / "out.exr", codec="none", bits=32)
+    job = Application(maps=MapSource(tmp_path / "map.npy"), picture=source, outputs=outputs)
+    assert job.perform(lambda: device, Progress()).notices == ()
     (found,) = read_exr(tmp_path / "out.exr")
     assert found.window("dataWindow") == (4, 20, 65, 63)
     np.testing.assert_allclose(found.channels["R"][:, 6:], red[:, 2:-4], atol=1e-5)

@@ -198,7 +198,8 @@ def test_the_smallest_pictures_come_back_through_a_map_that_does_nothing(
     pixels = noise(4, np.uint16 if ending == ".png" else np.float32, size)
     write_map(tmp_path / "map.npy", Displacement(np.zeros((8 * size[1], 8 * size[0], 2), np.float32)))
     source = written(tmp_path / f"in{ending}", pixels)
-    Application(MapSource(tmp_path / "map.npy"), source, tmp_path / f"out{ending}").run(device, Progress())
+    job = Application(maps=MapSource(tmp_path / "map.npy"), picture=source, outputs=Outputs(tmp_path / f"out{ending}"))
+    job.perform(lambda: device, Progress())
     read = {".exr": in_exr, ".tif": in_tiff, ".png": in_png}[ending]
     assert_same_bits(read(tmp_path / f"out{ending}"), pixels)
 

@@ -20,6 +20,7 @@ from app.media.maps import (
     Displacement,
     Grid,
     Kind,
+    cropped,
     folds,
     from_offsets,
     from_st,
@@ -243,14 +244,67 @@ def test_a_map_fitted_to_other_proportions_keeps_its_fractions():
     np.testing.assert_allclose(fitted.values[..., 1], 0.5 * 100 / 202)
 
 
-@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
-def test_nan_is_refused(tmp_path: Path, ending: str):
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".npy"])
+def test_infinite_places_are_refused(tmp_path: Path, ending: str):
     map_ = swirl(8, 9)
     map_.values[3, 5] = np.nan
     map_.values[4, 6, 0] = np.inf
     write_map(tmp_path / f"a{ending}", map_)
-    with pytest.raises(UserError, match=r"2 of its pixels are NaN or infinite, the first at x 5, y 3"):
+    with pytest.raises(UserError, match=r"1 of its pixels are infinite, the first at x 6, y 4"):
         read_map(tmp_path / f"a{ending}")
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
+def test_nan_is_kept(tmp_path: Path, ending: str):
+    map_ = swirl(8, 9)
+    map_.values[3, 5] = np.nan
+    map_.values[4, 6, 0] = np.nan
+    write_map(tmp_path / f"a{ending}", map_)
+    read = read_map(tmp_path / f"a{ending}").values
+    assert np.argwhere(np.isnan(read)).tolist() == [[3, 5, 0], [3, 5, 1], [4, 6, 0], [4, 6, 1]]
+    write_map(tmp_path / f"none{ending}", Displacement(np.full((8, 9, 2), np.nan, np.float32)))
+    with pytest.raises(UserError, match="all of it is NaN"):
+        read_map(tmp_path / f"none{ending}")
+
+
+def test_a_flo_of_middlebury_has_what_is_unknown(tmp_path: Path):
+    """As their flowIO.h marks it: a component beyond 1e9, as a rule both 1e10."""
+    values = np.zeros((6, 7, 2), np.float32)
+    values[2, 3] = 1e10
+    header = np.float32(202021.25).tobytes() + np.array([7, 6], np.int32).tobytes()
+    (tmp_path / "a.flo").write_bytes(header + values.tobytes())
+    assert np.argwhere(np.isnan(read_map(tmp_path / "a.flo").values[..., 0])).tolist() == [[2, 3]]
+    write_map(tmp_path / "b.flo", read_map(tmp_path / "a.flo"))
+    assert (tmp_path / "b.flo").read_bytes() == (tmp_path / "a.flo").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "cut", [(2, 0, 0, 0), (0, 3, 0, 0), (0, 0, 1, 0), (0, 0, 0, 2), (1, 2, -3, 4), (-2, -2, -2, -2)]
+)
+def test_an_exr_map_cropped_on_any_side(tmp_path: Path, cut: tuple[int, int, int, int]):
+    """Its data window within the display window on the left, at the top, on the right or below, or beyond it."""
+    import OpenEXR
+
+    width, height = 16, 12
+    y, x = np.mgrid[-4 : height + 4, -4 : width + 4]
+    u, v = (x + 0.5) / width + 0.01 * y, 1 - (y + 0.5) / height
+    left, top, right, bottom = cut
+    data = slice(4 + top, 4 + height - bottom), slice(4 + left, 4 + width - right)
+    header = {
+        "type": OpenEXR.scanlineimage,
+        "displayWindow": (np.array([0, 0], np.int32), np.array([width - 1, height - 1], np.int32)),
+        "dataWindow": (np.array([left, top], np.int32), np.array([width - 1 - right, height - 1 - bottom], np.int32)),
+    }
+    channels = {name: np.ascontiguousarray(plane[data], np.float32) for name, plane in (("R", u), ("G", v))}
+    OpenEXR.File(header, channels).write(str(tmp_path / "a.exr"))
+    read = read_map(tmp_path / "a.exr")
+    edge = 2 if cut == (-2, -2, -2, -2) else 0
+    assert (read.width, read.height, read.overscan) == (width, height, edge)
+    there = np.zeros((height, width), bool)
+    there[max(0, top) : height - max(0, bottom), max(0, left) : width - max(0, right)] = True
+    inner = cropped(read).values
+    assert (np.isnan(inner).any(axis=2) == ~there).all()
+    np.testing.assert_allclose((inner[..., 0] * width)[there], (0.01 * width * y[4:-4, 4:-4])[there], atol=1e-5)
 
 
 @pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])

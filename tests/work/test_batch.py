@@ -61,13 +61,17 @@ def _shared(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "own_device", lambda: device)
 
 
+def order(recipe: str | Path, picture: Path | None, outputs: Outputs) -> Task:
+    return Task(recipe=str(recipe), edits=Edits(), picture=picture, outputs=outputs)
+
+
 def draw(path: Path, number: int, width: int = 64) -> None:
     y, x = np.mgrid[0:48, 0:width]
     write_picture(path, Picture(np.stack([x * 3, y * 4, (x + y + 40 * number) % 256], axis=-1).astype(np.uint8)))
 
 
 def tasks(folder: Path, pictures: list[Path], **options: object) -> list[Task]:
-    task = Task(str(folder / "a.toml"), Edits(), None, Outputs(folder / "out", **options))  # type: ignore[arg-type]
+    task = order(folder / "a.toml", None, Outputs(folder / "out", **options))  # type: ignore[arg-type]
     return spread(task, pictures)
 
 
@@ -77,26 +81,26 @@ def alone(folder: Path, pictures: list[Path]) -> dict[str, bytes]:
     made = {}
     for picture in pictures:
         output = folder / "alone" / picture.name
-        assert perform(Task(str(folder / "a.toml"), Edits(), picture, Outputs(output)), Progress()).error == ""
+        assert perform(order(folder / "a.toml", picture, Outputs(output)), Progress()).error == ""
         made[picture.name] = output.read_bytes()
     return made
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {path.name: path.read_bytes() for path in folder.iterdir() if not path.name.startswith(".fluidwarp-frames")}
 
 
 # Names --------------------------------------------------------------------------------------------------------------
 
 
 def test_names_of_the_results(tmp_path: Path):
-    task = Task("coffee", Edits(), None, Outputs(tmp_path / "new/out"))
+    task = order("coffee", None, Outputs(tmp_path / "new/out"))
     pictures = [Path(name) for name in ("a.JPG", "b.bmp", "c.mov", "d.avi")]
     made = [one.outputs.file for one in spread(task, pictures)]
     assert made == [tmp_path / "new/out" / name for name in ("a.JPG", "b.png", "c.mov", "d.mp4")]
     assert (tmp_path / "new/out").is_dir()
 
-    pattern = Task("coffee", Edits(), None, Outputs(tmp_path / "{name} new.tif", stats=tmp_path / "{name}.json"))
+    pattern = order("coffee", None, Outputs(tmp_path / "{name} new.tif", stats=tmp_path / "{name}.json"))
     (one,) = spread(pattern, [Path("x/e.png")])
     assert (one.outputs.file, one.outputs.stats) == (tmp_path / "e new.tif", tmp_path / "e.json")
     assert one.picture == Path("x/e.png").absolute()
@@ -116,20 +120,18 @@ def test_names_that_cannot_be(
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=message):
-        spread(Task("coffee", Edits(), None, Outputs(Path(output))), [Path(name) for name in pictures])
+        spread(order("coffee", None, Outputs(Path(output))), [Path(name) for name in pictures])
 
 
 def test_one_file_of_numbers_for_many_pictures_is_refused(tmp_path: Path):
     with pytest.raises(UserError, match=r"put \{name\} into its name"):
-        spread(
-            Task("coffee", Edits(), None, Outputs(tmp_path, stats=tmp_path / "s.json")), [Path("a.png"), Path("b.png")]
-        )
+        spread(order("coffee", None, Outputs(tmp_path, stats=tmp_path / "s.json")), [Path("a.png"), Path("b.png")])
 
 
 def test_numbers_of_two_pictures_in_one_file_are_refused(tmp_path: Path):
     with pytest.raises(UserError, match="would both become"):
         spread(
-            Task("coffee", Edits(), None, Outputs(tmp_path, stats=tmp_path / "{name}.json")),
+            order("coffee", None, Outputs(tmp_path, stats=tmp_path / "{name}.json")),
             [Path("a.png"), Path("a.jpg")],
         )
 
@@ -389,15 +391,13 @@ def test_the_parts_are_the_whole(folder: Path, playback: str):
     for path in (whole, parts):
         path.mkdir()
     recipe, picture = str(folder / "b.toml"), folder / "p0.png"
-    assert perform(Task(recipe, Edits(), picture, Outputs(whole / "f.%03d.png")), Progress()).error == ""
+    assert perform(order(recipe, picture, Outputs(whole / "f.%03d.png")), Progress()).error == ""
     count = len(contents(whole))
     for first in range(0, count, 4):
-        outcome = perform(
-            Task(recipe, Edits(), picture, Outputs(parts / "f.%03d.png", part=(first, first + 3))), Progress()
-        )
+        outcome = perform(order(recipe, picture, Outputs(parts / "f.%03d.png", part=(first, first + 3))), Progress())
         assert outcome.error == ""
     assert contents(parts) == contents(whole)
-    told = perform(Task(recipe, Edits(), picture, Outputs(parts / "f.%03d.png", part=(count, None))), Progress())
+    told = perform(order(recipe, picture, Outputs(parts / "f.%03d.png", part=(count, None))), Progress())
     assert f"the frames 0-{count - 1}, and none from {count} on" in told.error
     assert read_picture(whole / "f.000.png").pixels.shape == (48, 64, 3)
 
@@ -434,12 +434,8 @@ def part(
 ) -> tuple[int, Outcome]:
     """A part of the animation in a folder of its own, and how many steps were simulated for it."""
     (folder / output).mkdir(exist_ok=True)
-    task = Task(
-        str(folder / recipe),
-        Edits(),
-        folder / "p0.png",
-        Outputs(folder / output / "f.%03d.png", part=(first, last), **options),
-    )
+    outputs = Outputs(folder / output / "f.%03d.png", part=(first, last), **options)
+    task = order(folder / recipe, folder / "p0.png", outputs)
     steps: list[int] = []
     advance = Replay.advance
     with pytest.MonkeyPatch.context() as patched:

@@ -85,9 +85,16 @@ def render(device: Device, recipe: str, source: Path, output: Path | None, **opt
 
 
 def apply(device: Device, maps: Path, source: Path, output: Path, **options: object) -> None:
-    job = Application(MapSource(maps), source, output, edges="clamp", **options)  # type: ignore[arg-type]
-    job.check()
-    job.run(device, Progress())
+    applied(maps, source, output, **options).perform(lambda: device, Progress())
+
+
+def applied(maps: Path, source: Path, output: Path, **options: object) -> Application:
+    return Application(
+        maps=MapSource(maps),
+        picture=source,
+        outputs=Outputs(output),
+        **{"edges": "clamp", **options},  # type: ignore[arg-type]
+    )
 
 
 def files(folder: Path, start: str) -> list[str]:
@@ -378,7 +385,7 @@ def test_a_large_still_says_how_far_it_is(
     assert heard.steps[-1] == (20 + 2 * 15 + 2, 20 + 2 * 15 + 2)
     assert heard.states == ["writing", "making the map", "writing the map"]
     again = Heard()
-    Application(MapSource(tmp_path / "m.exr"), picture, tmp_path / "again.png", size=1500).run(device, again.progress)
+    applied(tmp_path / "m.exr", picture, tmp_path / "again.png", size=1500).perform(lambda: device, again.progress)
     again.check()
     assert [done for done, _ in again.steps] == [0, 1, 3, 5, 7, 9, 11, 13, 15, 30]
     assert again.states == ["reading", "", "writing"]
@@ -404,7 +411,7 @@ def test_an_animation_says_how_far_it_is(
         assert heard.states == ["writing"]
     write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
     again = Heard()
-    Application(MapSource(tmp_path / "m.npy"), clip, tmp_path / name).run(device, again.progress)
+    applied(tmp_path / "m.npy", clip, tmp_path / name).perform(lambda: device, again.progress)
     again.check()
     assert again.steps[-1][0] == 9 * passes
 
@@ -438,12 +445,14 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
     with pytest.raises(UserError, match=r"m\.npy would be replaced by its own result"):
         converted(MapSource(tmp_path / "m.npy"), tmp_path / "m.npy", "st", False, Progress())
     (tmp_path / "m.npy").rename(tmp_path / "m.02.npy")
-    for pattern in ("m.%02d.npy", "m.%d.npy"):  # the same file is read by both, and replaced by one
+    for pattern in ("m.%02d.npy", "m.##.npy"):  # two names of the same files
         maps = MapSource(tmp_path / pattern)
         with pytest.raises(UserError, match=r"m\.02\.npy would be replaced by its own result"):
             converted(maps, tmp_path / "m.%02d.npy", "st", False, Progress())
     assert takes_place("/a/f.%03d.png", "/a/f.012.png")
     assert takes_place("/a/f.%d.png", "/a/f.12.png")
+    for output, source in (("f.###.png", "f.012.png"), ("f.012.png", "f.###.png"), ("f.%03d.png", "f.###.png")):
+        assert takes_place(f"/a/{output}", f"/a/{source}")
     for other in ("/a/f.12.png", "/a/f.0012.png", "/a/f.png", "/b/f.012.png", "/a/f.012.jpg"):
         assert not takes_place("/a/f.%03d.png", other)
     (tmp_path / "m.02.npy").unlink()
@@ -482,7 +491,8 @@ def test_what_is_opaque_stays_so(device: Device, tmp_path: Path):
     outward = np.zeros((HEIGHT, WIDTH, 2), np.float32)
     outward[..., 0] = 0.2
     write_map(tmp_path / "out.npy", Displacement(outward))
-    Application(MapSource(tmp_path / "out.npy"), tmp_path / "light.exr", tmp_path / "out.exr").run(device, Progress())
+    light = applied(tmp_path / "out.npy", tmp_path / "light.exr", tmp_path / "out.exr", edges="transparent")
+    light.perform(lambda: device, Progress())
     assert (read_picture(tmp_path / "out.exr").pixels[:, -10:, 3] == 0).all()
 
 

@@ -29,14 +29,24 @@ TEXTS = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
 LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
 
 
-def read(file: Path, max_pixels: int) -> Picture:
-    """Read the first page of a TIFF."""
+def pages_of(file: Path) -> list[int]:
+    """Which of a TIFF's pages are pictures: neither smaller versions nor masks."""
+    import tifffile
+
+    tifffile.logger().setLevel(logging.CRITICAL)
+    with tifffile.TiffFile(file) as tiff:
+        pages: Any = tiff.pages
+        return [place for place, page in enumerate(pages) if not page.subfiletype & 5]
+
+
+def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
+    """Read a page of a TIFF; where none is asked for the first, and what is lost of the others is told."""
     import tifffile
     from PIL import Image
 
     tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
     with tifffile.TiffFile(file) as tiff:
-        page = tiff.pages.first
+        page: Any = tiff.pages[place or 0]
         check_size(file, page.imagewidth, page.imagelength, max_pixels)
         tags = {tag.code: tag.value for tag in page.tags}
         samples = [axis for axis in page.axes if axis in "YXS"]
@@ -45,7 +55,7 @@ def read(file: Path, max_pixels: int) -> Picture:
         pieces = math.prod(page.chunked)
         if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
             raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
-        losses = _losses(tiff)
+        losses = _losses(tiff) if place is None else []
         pixels = page.asarray()
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
     pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)

@@ -1,0 +1,132 @@
+"""What moves: the pictures of a video, or of a sequence of files, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from app.model.picture import Picture
+from app.progress import never
+
+Part = tuple[int, int | None]
+"""The first and the last number of the frames that are wanted; None is to the end."""
+
+WHOLE: Part = (0, None)
+
+SHALLOW, DEEP = ("gray", "ya8", "rgb24", "rgba"), ("gray16le", "ya16le", "rgb48le", "rgba64le")
+"""ffmpeg's names of frames of 8 bits and of more, by channels."""
+
+
+@dataclass(frozen=True)
+class Colours:
+    """What the colours of a clip are, by ffmpeg's names; the usual ones are BT.709's."""
+
+    primaries: str = "bt709"
+    transfer: str = "bt709"
+    matrix: str = "bt709"
+
+    @property
+    def is_usual(self) -> bool:
+        return self == Colours()
+
+    @property
+    def is_high(self) -> bool:
+        """Of a high dynamic range, which 8 bits a channel would show in steps."""
+        return self.transfer in HIGH
+
+
+USUAL = Colours()
+HIGH = ("smpte2084", "arib-std-b67")
+CODES = {"bt709": 1, "bt2020": 9, "smpte431": 11, "smpte432": 12, "smpte2084": 16, "arib-std-b67": 18}  # of H.273
+
+
+def coded(colours: Colours) -> dict[bytes, bytes]:
+    """The chunk in which a PNG tells what its colours are; none for the usual ones (PNG, 11.3.2.6)."""
+    if colours.is_usual:
+        return {}
+    return {b"cICP": bytes([CODES[colours.primaries], CODES[colours.transfer], 0, 1])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clip:
+    """Frames of one size and depth.
+
+    fps: frames a second; None where the recipe says it. frames: about how many; None when unknown.
+    start: the number of the first. bits, alpha: of a frame as it is read; pixel_format: ffmpeg's name of what it is
+    stored in, such as yuv420p.
+    sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
+    as a rule after its sound; 0 where an older ffmpeg does not tell.
+    durations: of the frames, in steps of 1 / fps, where they differ. loops: how often it is played, 0 for ever.
+    colours: what they are. timecode: of the first frame, as 01:00:00:00; None where there is none.
+    is_whole: each frame is a picture of its own, with all that belongs to it.
+    note: what of it is lost, in a sentence; "" if nothing.
+    """
+
+    path: Path
+    width: int
+    height: int
+    bits: int
+    alpha: bool
+    pixel_format: str
+    fps: Fraction | None
+    frames: int | None = None
+    start: int = 0
+    sound: str | None = None
+    late: float = 0.0
+    durations: tuple[int, ...] | None = None
+    loops: int = 0
+    is_whole: bool = False
+    colours: Colours = USUAL
+    timecode: str | None = None
+    note: str = ""
+
+    def moment(self, number: int) -> int:
+        """When a frame is shown, in steps of 1 / fps after the first."""
+        return number - self.start
+
+    @property
+    def shortest(self) -> int:
+        """Of its frames, in steps of 1 / fps."""
+        return min(self.durations or [1])
+
+    def lengths(self, part: Part) -> list[int] | None:
+        """The durations of the frames of a part, where they differ."""
+        if self.durations is None:
+            return None
+        return list(self.durations[part[0] : None if part[1] is None else part[1] + 1])
+
+    def timecode_at(self, number: int) -> str | None:
+        """The time code of a frame, if there is one (SMPTE ST 12-1): after a ";" some numbers are dropped."""
+        if self.timecode is None or self.fps is None:
+            return self.timecode
+        hours, minutes, seconds, frames = (int(part) for part in (*self.timecode[:-3].split(":"), self.timecode[-2:]))
+        base, mark = round(self.fps), self.timecode[-3]
+        drops = base // 15 if mark in ";." else 0  # at the start of every minute but each tenth
+        minute = hours * 60 + minutes
+        count = (minute * 60 + seconds) * base + frames - drops * (minute - minute // 10) + number - self.start
+        tens, rest = divmod(count, 600 * base - 9 * drops)
+        count += 9 * drops * tens + drops * max(0, (rest - drops) // (60 * base - drops)) if drops else 0
+        seconds, frames = divmod(count, base)
+        return f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}{mark}{frames:02d}"
+
+    def check(self, part: Part) -> None:
+        """Raise `UserError` if it is known beforehand that the frames of a part are not all there."""
+
+    def pictures(
+        self,
+        part: Part = WHOLE,
+        is_kept: Callable[[int], bool] = lambda number: False,
+        cancel: Callable[[], bool] = never,
+        notice: Callable[[str], None] = lambda said: None,
+    ) -> Generator[tuple[int, Picture], None, None]:
+        """Yield the number and the picture of each frame of a part, but for those that are kept as they are.
+
+        cancel: asked with each; true raises `Cancelled`. notice: hears of what is lost. Raises `UserError`.
+        """
+        raise NotImplementedError
+
+    def digest(self, number: int) -> str:
+        """What a frame is made of: the bytes of its file. Raises `UserError` or `OSError`."""
+        raise NotImplementedError

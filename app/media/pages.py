@@ -1,0 +1,160 @@
+"""Reading a clip out of one file of pictures: an animated GIF, PNG or WebP, or the pages of a TIFF."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import accumulate
+from math import gcd, lcm
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import Cancelled, UserError
+from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, Part
+from app.media.codecs import pillow, tiff
+from app.media.codecs.decoding import decoding, head_of
+from app.media.formats import kind_of
+from app.media.inputs import MAX_PIXELS
+from app.media.losses import lost
+from app.media.record import digest_of_file
+from app.model.picture import Picture
+from app.progress import never
+
+ANIMATED = {"GIF": "GIF", "PNG": "PNG", "WebP": "WEBP"}  # and Pillow's names of them
+UNTOLD = 100  # milliseconds of a frame of no length, as browsers show it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pages(Clip):
+    """The frames or pages of a file, all of one size.
+
+    kind: of the file, as in the table of formats. places: of the frames in the file, without what is none.
+    """
+
+    kind: str
+    places: tuple[int, ...]
+    max_pixels: int
+
+    def check(self, part: Part) -> None:
+        """Raise `UserError` if the part begins after the last frame."""
+        if part[0] >= len(self.places):
+            told = f"it has the frames 0-{len(self.places) - 1}, and none from {part[0]} on"
+            raise UserError(f"Cannot read {self.path}: {told}; give --frames.")
+
+    def moment(self, number: int) -> int:
+        """See `Clip`."""
+        return self._moments[min(number, len(self.places) - 1)]
+
+    @cached_property
+    def _moments(self) -> list[int]:
+        return [0, *accumulate(self.durations or [1] * len(self.places))]
+
+    def pictures(
+        self,
+        part: Part = WHOLE,
+        is_kept: Callable[[int], bool] = lambda number: False,
+        cancel: Callable[[], bool] = never,
+        notice: Callable[[str], None] = lambda said: None,
+    ) -> Generator[tuple[int, Picture], None, None]:
+        """See `Clip`."""
+        first, last = part
+        with decoding(self.path, self.kind):
+            for number in range(first, min(len(self.places) if last is None else last + 1, len(self.places))):
+                if cancel():
+                    raise Cancelled
+                if is_kept(number):
+                    continue
+                picture = self._page(self.places[number])
+                mine = picture.width, picture.height, picture.bits, picture.has_alpha
+                if mine != (self.width, self.height, self.bits, self.alpha):
+                    raise UserError(
+                        f"Cannot read {self.path}: frame {number} has {picture.width} x {picture.height} pixels of "
+                        f"{picture.pixels.shape[2]} x {picture.bits} bits, unlike the first; make them alike."
+                    )
+                yield number, picture
+
+    def _page(self, place: int) -> Picture:
+        if self.kind == "TIFF":
+            return tiff.read(self.path, self.max_pixels, place)
+        with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:
+            image.seek(place)
+            return Picture(_pixels(image, self.alpha))
+
+    @cached_property
+    def _digest(self) -> str:
+        return digest_of_file(self.path)
+
+    def digest(self, number: int) -> str:
+        """See `Clip`."""
+        return self._digest
+
+
+def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Pages | None:
+    """The clip in a file whose first frame is `first`; None if that is all there is. Raises `UserError`."""
+    kind = kind_of(path, head_of(path))
+    if kind is None or kind.name not in (*ANIMATED, "TIFF"):
+        return None
+    with decoding(path, kind.name):
+        if kind.name == "TIFF":
+            places, durations, alpha, loops = tiff.pages_of(path), None, first.has_alpha, 0
+        else:
+            places, durations, alpha, loops = _animation(ANIMATED[kind.name], path, max_pixels)
+    if len(places) < 2:
+        return None
+    channels = first.pixels.shape[2] if kind.name == "TIFF" else 3 + alpha
+    bits = first.bits if kind.name == "TIFF" else 8
+    rate, steps = _steps(durations) if durations else (None, None)
+    return Pages(
+        path=path,
+        width=first.width,
+        height=first.height,
+        bits=bits,
+        alpha=alpha,
+        pixel_format=(SHALLOW if bits == 8 else DEEP)[channels - 1],
+        fps=rate,
+        frames=len(places),
+        durations=steps if steps and len(set(steps)) > 1 else None,
+        loops=loops,
+        is_whole=kind.name == "TIFF",
+        note=lost(path, ["its 16 bits a channel become 8"] if first.bits > bits else []),
+        kind=kind.name,
+        places=tuple(places),
+        max_pixels=max_pixels,
+    )
+
+
+def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[Fraction], bool, int]:
+    """The places and durations, in seconds, of an animation's frames, whether any has alpha, and how often it plays."""
+    with pillow.opened(name, path, max_pixels) as image:
+        if not getattr(image, "is_animated", False):
+            return [], [], False, 0
+        places = list(range(int(getattr(image, "default_image", False)), image.n_frames))  # a PNG for other readers
+        durations, alpha = [], False
+        for place in places:
+            image.seek(place)
+            image.load()
+            durations.append(Fraction(image.info.get("duration") or UNTOLD).limit_denominator(1000) / 1000)
+            alpha = alpha or _pixels(image, True)[..., 3].min() < 255
+        loops = image.info.get("loop")
+        # a GIF tells how often it begins again, or nothing if it does not
+        plays = loops or 0 if name != "GIF" else 1 if loops is None else loops + 1 if loops else 0
+        return places, durations, bool(alpha), plays
+
+
+def _pixels(image: Any, alpha: bool) -> np.ndarray:
+    return np.asarray(image.convert("RGBA" if alpha else "RGB"))
+
+
+def _steps(durations: Sequence[Fraction]) -> tuple[Fraction, tuple[int, ...]]:
+    """A rate of which all durations are whole numbers of frames, and these; to the millisecond if need be."""
+    below = lcm(*(duration.denominator for duration in durations))
+    wholes = [int(duration * below) for duration in durations]
+    step = gcd(*wholes)
+    rate = Fraction(below, step)
+    if rate > 1000:
+        return _steps([max(1, round(duration * 1000)) / Fraction(1000) for duration in durations])
+    return rate, tuple(whole // step for whole in wholes)

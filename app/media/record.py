@@ -1,0 +1,108 @@
+"""What the files of a sequence were made of, kept beside them, so that those that are whole need not be made again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.files import cannot_write, numbered
+from app.media.inputs import open_input, read_input
+
+MOST = 256 * 2**20  # bytes of a record: two million frames
+
+
+class Record:
+    """A line for each file of a sequence that was written: its number, what it was made of, and a digest of its bytes.
+
+    It is a hidden file in the folder of the sequence. Each line is appended in one piece, so that several tasks can
+    write to it at a time; one that is damaged means no more than that its file is made again.
+
+    Args:
+        pattern: of the sequence, such as `name.%04d.png`.
+        made_of: a digest of all that a file is made of, by its number.
+    """
+
+    def __init__(self, pattern: Path, made_of: Callable[[int], str]) -> None:
+        self._pattern = pattern
+        self._made_of = made_of
+        name = hashlib.sha256(numbered(pattern, 0).name.encode("utf-8", "surrogateescape")).hexdigest()[:16]
+        self._path = pattern.parent / f".fluidwarp-frames-{name}"
+        self._lines: dict[int, str] | None = None
+
+    def holds(self, number: int) -> bool:
+        """Whether the file of this number is there, byte for byte as it was made of what it would be made of now."""
+        if self._lines is None:
+            self._lines = dict(self._read())
+        told = self._lines.get(number)
+        with suppress(OSError, UserError):
+            return told is not None and told == self._line(number)
+        return False
+
+    def add(self, number: int) -> None:
+        """Note that the file of this number was written. Raises `UserError`."""
+        try:
+            line = f"{number} {self._line(number)}\n".encode()
+            file = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+            try:
+                # a line that was cut by a full disk or a kill ends here
+                os.write(file, line if self._ends_whole() else b"\n" + line)
+            finally:
+                os.close(file)
+        except OSError as error:
+            raise cannot_write(self._path, error) from error
+
+    def _line(self, number: int) -> str:
+        return f"{self._made_of(number)} {digest_of_file(numbered(self._pattern, number))}"
+
+    def _ends_whole(self) -> bool:
+        with self._path.open("rb") as stream:
+            if not stream.seek(0, os.SEEK_END):
+                return True
+            stream.seek(-1, os.SEEK_END)
+            return stream.read(1) == b"\n"
+
+    def _read(self) -> Iterable[tuple[int, str]]:
+        if not self._path.exists():
+            return
+        for line in read_input(self._path, "record", MOST).decode("ascii", "replace").splitlines():
+            number, _, told = line.partition(" ")
+            if number.isdecimal() and len(number) < 19:
+                yield int(number), told
+
+
+def digest_of_file(path: Path) -> str:
+    """A digest of the bytes of a file. Raises `UserError` or `OSError`."""
+    told = hashlib.sha256()
+    with open_input(path) as stream:
+        while block := stream.read(2**20):
+            told.update(block)
+    return told.hexdigest()
+
+
+def digest_of(*parts: Any) -> str:
+    """A digest of values: arrays by their elements, what has parts by these, all else by how it is shown."""
+    told = hashlib.sha256()
+    for part in parts:
+        told.update(_bytes_of(part))
+    return told.hexdigest()
+
+
+def _bytes_of(part: Any) -> bytes:
+    if isinstance(part, np.ndarray):
+        values = np.ascontiguousarray(part)
+        return digest_of(part.shape, str(part.dtype)).encode() + hashlib.sha256(values.data.cast("B")).digest()
+    if is_dataclass(part) and not isinstance(part, type):
+        return digest_of(*(getattr(part, field.name) for field in fields(part))).encode()
+    if isinstance(part, (list, tuple)):
+        return digest_of(type(part).__name__, *part).encode()
+    if isinstance(part, Mapping):
+        return digest_of(*part.items()).encode()
+    return hashlib.sha256(repr(part).encode("utf-8", "surrogateescape")).digest()

@@ -1,0 +1,116 @@
+"""Reading a clip whose frames are numbered files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.errors import Cancelled, UserError
+from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, Part
+from app.media.files import check_numbers, numbered_files
+from app.media.inputs import MAX_PIXELS
+from app.media.pictures import read_picture
+from app.media.record import digest_of_file
+from app.model.picture import Picture
+from app.progress import never
+
+
+@dataclass(frozen=True, kw_only=True)
+class PictureSequence(Clip):
+    """The files of `name.%04d.exr`, each a picture of its own with all that belongs to it.
+
+    files: those that are there, by number. channels: of each. max_pixels: larger ones are refused.
+    """
+
+    files: Mapping[int, Path]
+    channels: int
+    max_pixels: int
+
+    def check(self, part: Part) -> None:
+        """Raise `UserError`, naming them, if files of the part are missing."""
+        if part != WHOLE and part[0] > max(self.files):
+            raise UserError(
+                f"Cannot read {self.path}: it has the frames {self.start}-{max(self.files)}, and none from {part[0]} on"
+            )
+        check_numbers(self.path, self.files, self._numbers(part))
+
+    def _numbers(self, part: Part) -> range:
+        first, last = part
+        return range(self.start if part == WHOLE else first, (max(self.files) if last is None else last) + 1)
+
+    def pictures(
+        self,
+        part: Part = WHOLE,
+        is_kept: Callable[[int], bool] = lambda number: False,
+        cancel: Callable[[], bool] = never,
+        notice: Callable[[str], None] = lambda said: None,
+    ) -> Generator[tuple[int, Picture], None, None]:
+        """See `Clip`."""
+        told = {_said(self.note)}
+        for number in self._numbers(part):
+            if cancel():
+                raise Cancelled
+            if is_kept(number):
+                continue
+            picture = read_picture(self.files[number], self.max_pixels)
+            self._check_alike(self.files[number], picture)
+            if picture.note and _said(picture.note) not in told:  # what is lost of every frame is told once
+                told.add(_said(picture.note))
+                notice(picture.note)
+            yield number, picture
+
+    def _check_alike(self, file: Path, picture: Picture) -> None:
+        mine, wanted = _shape(picture), (self.width, self.height, self.bits, self.channels)
+        if mine != wanted:
+            raise UserError(
+                f"Cannot read {file}: it has {_told(*mine)}, and the first of its sequence {_told(*wanted)}; "
+                "make them alike."
+            )
+
+    def digest(self, number: int) -> str:
+        """See `Clip`."""
+        return digest_of_file(self.files[number])
+
+
+def read_sequence(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> tuple[PictureSequence, Picture]:
+    """The sequence of files `path`, such as `name.%04d.exr` or `name.####.exr`, and its first picture.
+
+    Raises:
+        UserError: if there is none, or the first cannot be read.
+    """
+    files = numbered_files(path)
+    start = next(iter(files))
+    first = read_picture(files[start], max_pixels)
+    width, height, bits, channels = _shape(first)
+    clip = PictureSequence(
+        path=Path(path),
+        width=width,
+        height=height,
+        bits=bits,
+        channels=channels,
+        alpha=first.has_alpha,
+        fps=None,
+        is_whole=True,
+        pixel_format=(SHALLOW if bits == 8 else DEEP)[channels - 1],
+        frames=len(files),
+        start=start,
+        note=first.note,
+        files=files,
+        max_pixels=max_pixels,
+    )
+    return clip, first
+
+
+def _said(note: str) -> str:
+    """What is said of a file, without its name."""
+    return note.partition(": ")[2]
+
+
+def _shape(picture: Picture) -> tuple[int, int, int, int]:
+    return picture.width, picture.height, picture.bits, picture.pixels.shape[2]
+
+
+def _told(width: int, height: int, bits: int, channels: int) -> str:
+    return f"{width} x {height} pixels of {channels} x {bits} bits"

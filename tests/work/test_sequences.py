@@ -1,0 +1,329 @@
+"""Sequences of pictures as a pipeline has them: numbers kept, what is missing named, what is whole not made again."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from app.media.maps import Displacement, write_map
+from app.media.pictures import read_picture, write_picture
+from app.model.picture import Picture
+
+ROOT = Path(__file__).parents[2]
+WIDTH, HEIGHT = 48, 32
+RECIPE = """
+duration = 0.3
+edges = "clamp"
+[fluid]
+grid = 32
+dt = 0.02
+[[force]]
+kind = "vortex"
+point = [0.45, 0.5]
+radius = 0.3
+strength = 6
+[output]
+fps = 10
+"""
+
+
+def plate(number: int) -> np.ndarray:
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    return np.stack([x / WIDTH, y / HEIGHT, np.full_like(x, number / 10, float)], axis=-1).astype(np.float32)
+
+
+def write_exr(path: Path, number: int) -> None:
+    header = {"type": OpenEXR.scanlineimage, "shot": f"frame {number}"}
+    depth = np.full((HEIGHT, WIDTH), number, np.float32)
+    OpenEXR.File(header, {"RGB": plate(number), "Z": depth}).write(str(path))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "a.toml").write_text(RECIPE)
+    for number in range(1001, 1005):
+        write_exr(tmp_path / f"plate.{number:04d}.exr", number - 1000)
+    return tmp_path
+
+
+def fluidwarp(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "app", *words]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100)
+
+
+def made(folder: Path, start: str = "w.") -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.name.startswith(start))
+
+
+def channels(path: Path) -> dict[str, np.ndarray]:
+    return {
+        name: channel.pixels for name, channel in OpenEXR.File(str(path), separate_channels=True).channels().items()
+    }
+
+
+@pytest.mark.parametrize("name", ["plate.%04d.exr", "plate.####.exr"])
+def test_each_file_is_warped_by_the_state_of_its_frame(folder: Path, name: str):
+    """As the same picture is, alone, by the map of that frame; with its own layers and attributes, under its number."""
+    ran = fluidwarp(folder, "render", "a.toml", name, "-o", "w.%04d.exr", "--map", "m.%04d.exr")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert made(folder) == [f"w.{number}.exr" for number in range(1001, 1005)]
+    for number in (1001, 1002, 1004):
+        ran = fluidwarp(folder, "apply", f"m.{number}.exr", f"plate.{number}.exr", "-o", "one.exr", "--edges", "clamp")
+        assert ran.returncode == 0, ran.stderr
+        one, warped = channels(folder / "one.exr"), channels(folder / f"w.{number}.exr")
+        assert sorted(warped) == ["B", "G", "R", "Z"]
+        for channel, values in warped.items():
+            np.testing.assert_allclose(values, one[channel], atol=2e-3)
+        assert (
+            OpenEXR.File(str(folder / f"w.{number}.exr"), header_only=True).header()["shot"] == f"frame {number - 1000}"
+        )
+    np.testing.assert_allclose(channels(folder / "w.1001.exr")["R"], plate(1)[..., 0], atol=1e-6)  # W_0 is nothing
+    assert np.abs(channels(folder / "w.1004.exr")["R"] - plate(4)[..., 0]).max() > 0.05
+
+
+def test_a_range_has_the_same_frames_as_the_whole(folder: Path):
+    for words in (["-o", "whole.%05d.png"], ["-o", "part.#####.png", "--frames", "1002-1003"]):
+        ran = fluidwarp(folder, "render", "a.toml", "plate.%04d.exr", *words, "--bits", "16")
+        assert ran.returncode == 0, ran.stderr
+    assert made(folder, "part.") == ["part.01002.png", "part.01003.png"]
+    for number in (1002, 1003):
+        whole, part = (folder / f"{name}.{number:05d}.png" for name in ("whole", "part"))
+        assert whole.read_bytes() == part.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("remove", "words", "told"),
+    [
+        ((1002,), [], "of 1001-1004 it lacks the frame 1002; make them, or give --frames"),
+        ((), ["--frames", "990-1010"], "of 990-1010 it lacks the frames 990-1000, 1005-1010;"),
+        ((), ["--frames", "2000-"], "it has the frames 1001-1004, and none from 2000 on"),
+        ((1001, 1002, 1003, 1004), [], "there is no such file"),
+    ],
+)
+@pytest.mark.parametrize("command", ["render", "apply"])
+def test_missing_frames_are_named(folder: Path, command: str, remove: tuple[int, ...], words: list[str], told: str):
+    write_map(folder / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    for number in remove:
+        (folder / f"plate.{number}.exr").unlink()
+    by = "a.toml" if command == "render" else "m.npy"
+    ran = fluidwarp(folder, command, by, "plate.%04d.exr", "-o", "w.%04d.exr", *words)
+    assert ran.returncode == 1
+    assert told in ran.stderr
+    assert ran.stderr.count("\n") == 1
+    assert made(folder) == []
+
+
+def test_frames_of_another_kind_are_told(folder: Path):
+    write_picture(folder / "plate.1003.exr", Picture(np.zeros((HEIGHT, WIDTH + 1, 3), np.float32)))
+    ran = fluidwarp(folder, "render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr")
+    assert ran.returncode == 1
+    assert "plate.1003.exr: it has 49 x 32 pixels of 3 x 32 bits, and the first of its sequence 48 x 32" in ran.stderr
+    assert made(folder)[0] == "w.1001.exr"
+    assert "w.1003.exr" not in made(folder)
+
+
+def test_files_are_not_replaced_by_their_own_results(folder: Path):
+    for name in ("plate.%04d.exr", "plate.####.exr", "plate.1002.exr"):
+        ran = fluidwarp(folder, "render", "a.toml", "plate.####.exr", "-o", name)
+        assert ran.returncode == 1
+        assert "would be replaced by its own result" in ran.stderr
+
+
+# --resume -----------------------------------------------------------------------------------------------------------
+
+
+def inodes(folder: Path) -> dict[str, int]:
+    return {name: (folder / name).stat().st_ino for name in made(folder)}
+
+
+def test_what_is_whole_is_not_made_again(folder: Path):
+    """But what is cut, gone, of another source, recipe, depth or option is."""
+    words = ["plate.%04d.exr", "-o", "w.%04d.exr", "--resume"]
+    assert fluidwarp(folder, "render", "a.toml", *words[:-1]).returncode == 0
+    first, before = {name: (folder / name).read_bytes() for name in made(folder)}, inodes(folder)
+
+    ran = fluidwarp(folder, "render", "a.toml", *words)
+    assert (ran.returncode, ran.stderr) == (0, "fluidwarp: 4 of 4 frames were whole and are kept\n")
+    assert inodes(folder) == before
+
+    (folder / "w.1002.exr").write_bytes(first["w.1002.exr"][:-1])
+    (folder / "w.1003.exr").unlink()
+    write_exr(folder / "plate.1004.exr", 9)
+    ran = fluidwarp(folder, "render", "a.toml", *words)
+    assert (ran.returncode, ran.stderr) == (0, "fluidwarp: 1 of 4 frames were whole and are kept\n")
+    assert inodes(folder)["w.1001.exr"] == before["w.1001.exr"]
+    for name in ("w.1002.exr", "w.1003.exr"):
+        assert (folder / name).read_bytes() == first[name]
+    assert (folder / "w.1004.exr").read_bytes() != first["w.1004.exr"]
+
+    for change in (["--bits", "16"], ["--bits", "16", "--size", "40"], ["--duration", "0.2"]):
+        ran = fluidwarp(folder, "render", "a.toml", *words, *change)
+        assert (ran.returncode, ran.stderr) == (0, "")
+    part = fluidwarp(folder, "render", "a.toml", *words, "--duration", "0.2", "--frames", "1002-1003")
+    assert part.stderr == "fluidwarp: 2 of 2 frames were whole and are kept\n"
+
+
+def test_a_damaged_record_costs_no_more_than_the_work(folder: Path):
+    words = ["render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr"]
+    assert fluidwarp(folder, *words).returncode == 0
+    (record,) = folder.glob(".fluidwarp-frames-*")
+    lines = record.read_bytes().splitlines(keepends=True)
+    record.write_bytes(b"\xff\xfe junk\n" + lines[0] + lines[1][:30] + b"\0" * 40)
+    ran = fluidwarp(folder, *words, "--resume")
+    assert ran.stderr == "fluidwarp: 1 of 4 frames were whole and are kept\n"
+    assert fluidwarp(folder, *words, "--resume").stderr == "fluidwarp: 4 of 4 frames were whole and are kept\n"
+
+
+def test_a_picture_there_and_back_and_its_maps_go_on(folder: Path):
+    """Frames that are shown twice, of one picture; and files of maps beside them, of which one is gone."""
+    (folder / "a.toml").write_text(RECIPE + "[time]\nping_pong = true\n")
+    write_picture(folder / "p.png", Picture((plate(1) * 255).astype(np.uint8)))
+    words = ["render", "a.toml", "p.png", "-o", "w.%02d.png", "--resume"]
+    assert fluidwarp(folder, *words).returncode == 0
+    first = {name: (folder / name).read_bytes() for name in made(folder)}
+    assert len(first) == 6
+    for name in ("w.01.png", "w.04.png"):
+        (folder / name).unlink()
+    ran = fluidwarp(folder, *words)
+    assert ran.stderr == "fluidwarp: 4 of 6 frames were whole and are kept\n"
+    assert {name: (folder / name).read_bytes() for name in made(folder)} == first
+
+    words += ["--map", "m.%02d.npy"]
+    assert fluidwarp(folder, *words).stderr == ""
+    (folder / "m.02.npy").unlink()
+    assert fluidwarp(folder, *words).stderr == "fluidwarp: 5 of 6 frames were whole and are kept\n"
+    assert len(made(folder, "m.")) == 6
+
+
+def test_a_killed_task_keeps_its_frames(folder: Path):
+    (folder / "a.toml").write_text(RECIPE.replace("duration = 0.3", "duration = 20"))
+    command = [sys.executable, "-m", "app", "render", "a.toml", "plate.1001.exr", "-o", "w.%03d.png"]
+    job = subprocess.Popen(command, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    asked = time.monotonic()
+    while len(made(folder)) < 5:
+        assert time.monotonic() < asked + 60
+        assert job.poll() is None
+        time.sleep(0.01)
+    job.send_signal(signal.SIGKILL)
+    job.wait()
+    there = made(folder)
+    for name in there:
+        assert read_picture(folder / name).width == WIDTH
+    ran = fluidwarp(folder, *command[3:], "--resume", "--frames", f"0-{len(there) + 1}")
+    kept = int(ran.stderr.split()[1])
+    assert kept >= len(there) - 1  # of the last one the line may be missing
+    assert made(folder) == [f"w.{number:03d}.png" for number in range(len(there) + 2)]
+    assert not list(folder.glob(".w*"))  # what was half written is swept
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["-o", "w.mp4"], "only the files of a sequence can be kept by --resume, and w.mp4 is none"),
+        (["-o", "w.%04d.exr", "--stats", "s.json"], "--stats has the numbers of all frames"),
+    ],
+)
+def test_what_cannot_be_resumed_is_told(folder: Path, words: list[str], told: str):
+    ran = fluidwarp(folder, "render", "a.toml", "plate.%04d.exr", *words, "--resume")
+    assert ran.returncode == 1
+    assert told in ran.stderr
+
+
+# Maps ---------------------------------------------------------------------------------------------------------------
+
+
+def test_maps_and_frames_go_together_by_their_numbers(folder: Path):
+    """A shift by as many pixels as the map's number says; maps that begin elsewhere go in order."""
+    for first in (0, 1000):
+        for number in range(first, first + 5):
+            shift = np.zeros((HEIGHT, WIDTH, 2), np.float32)
+            shift[..., 0] = (number - first) / WIDTH
+            write_map(folder / f"m{first}.{number}.npy", Displacement(shift))
+    for maps, shifts in (("m1000.%d.npy", (1, 2, 3, 4)), ("m0.%d.npy", (0, 1, 2, 3))):
+        ran = fluidwarp(folder, "apply", maps, "plate.####.exr", "-o", "w.####.exr", "--edges", "clamp")
+        assert (ran.returncode, ran.stderr) == (0, "")
+        for number, shift in zip(range(1001, 1005), shifts, strict=True):
+            expected = plate(number - 1000)[:, np.minimum(np.arange(WIDTH) + shift, WIDTH - 1), 0]
+            np.testing.assert_allclose(channels(folder / f"w.{number}.exr")["R"], expected, atol=1e-6)
+            assert (channels(folder / f"w.{number}.exr")["Z"] == number - 1000).all()
+    ran = fluidwarp(folder, "apply", "m1000.%d.npy", "plate.1001.exr", "-o", "p.%d.png", "--frames", "1002-1003")
+    assert (ran.returncode, made(folder, "p.")) == (0, ["p.1002.png", "p.1003.png"])
+    (folder / "m1000.1002.npy").unlink()
+    ran = fluidwarp(folder, "apply", "m1000.%d.npy", "plate.####.exr", "-o", "x.####.exr")
+    assert "it lacks the frame 1002" in ran.stderr
+
+
+def test_apply_goes_on(folder: Path):
+    write_map(folder / "m.npy", Displacement(np.full((HEIGHT, WIDTH, 2), 0.05, np.float32)))
+    words = ["apply", "m.npy", "plate.%04d.exr", "-o", "w.%04d.exr"]
+    assert fluidwarp(folder, *words).returncode == 0
+    (folder / "w.1003.exr").unlink()
+    before = inodes(folder)
+    assert fluidwarp(folder, *words, "--resume").stderr == "fluidwarp: 3 of 4 frames were whole and are kept\n"
+    assert len(made(folder)) == 4
+    assert before.items() <= inodes(folder).items()
+    write_map(folder / "m.npy", Displacement(np.full((HEIGHT, WIDTH, 2), 0.06, np.float32)))
+    assert fluidwarp(folder, *words, "--resume").stderr == ""
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_apply_takes_many(folder: Path, jobs: str):
+    """Into a folder, in processes, each under its own name; a sequence as one of them; what fails is told in a line."""
+    write_map(folder / "m.npy", Displacement(np.full((HEIGHT, WIDTH, 2), 0.05, np.float32)))
+    write_picture(folder / "p.png", Picture((plate(1) * 255).astype(np.uint8)))
+    given = ["p.png", "gone.png", "plate.%04d.exr"]
+    ran = fluidwarp(folder, "apply", "m.npy", *given, "-o", "out", "--jobs", jobs)
+    assert ran.returncode == 1
+    assert "gone.png" in ran.stderr
+    assert ran.stderr.endswith("fluidwarp: 1 of 3 pictures failed; all others are written\n")
+    assert made(folder / "out", "p") == ["p.png", *(f"plate.{number}.exr" for number in range(1001, 1005))]
+    ran = fluidwarp(folder, "apply", "m.npy", "plate.1001.exr", "plate.####.exr", "-o", "out")
+    assert (ran.returncode, "would both become" in ran.stderr) == (1, True)
+
+
+@pytest.mark.parametrize("edges", ["transparent", "clamp", "black"])
+def test_nan_in_a_map_is_outside(folder: Path, edges: str):
+    """Pixel for pixel, and what is beside it is as if the map went on there."""
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    values = np.stack([0.05 * np.sin(y / 5), 0.04 * np.cos(x / 6)], axis=-1).astype(np.float32)
+    hole = (x - 20) ** 2 + (y - 15) ** 2 < 40
+    write_map(folder / "whole.npy", Displacement(values))
+    values[hole] = np.nan
+    write_map(folder / "m.exr", Displacement(values))
+    for name in ("whole.npy", "m.exr"):
+        ran = fluidwarp(
+            folder, "apply", name, "plate.1002.exr", "-o", f"w.{Path(name).stem}.exr", "--edges", edges, "--bits", "32"
+        )
+        assert (ran.returncode, ran.stderr) == (0, "")
+    whole, seen = channels(folder / "w.whole.exr"), channels(folder / "w.m.exr")
+    away = (x - 20) ** 2 + (y - 15) ** 2 > 80
+    for channel in "RGB":
+        assert (seen[channel][hole] == 0).all()
+        np.testing.assert_allclose(seen[channel][away], whole[channel][away], atol=1e-6)
+        np.testing.assert_allclose(seen[channel][~hole], whole[channel][~hole], atol=0.02)
+    assert (seen["Z"][hole] == 0).all()
+    if edges == "black":
+        assert "A" not in seen
+    else:
+        assert (seen["A"][hole] == 0).all()
+        np.testing.assert_allclose(seen["A"][away], whole["A"][away] if "A" in whole else 1, atol=1e-4)
+
+
+def test_what_is_nowhere_cannot_be_turned_round_or_flow(folder: Path):
+    values = np.zeros((HEIGHT, WIDTH, 2), np.float32)
+    values[3, 4] = np.nan
+    write_map(folder / "m.npy", Displacement(values))
+    ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy", "--invert")
+    assert (ran.returncode, "cannot be turned round" in ran.stderr) == (1, True)
+    (folder / "b.toml").write_text('map = "m.npy"\n' + RECIPE)
+    ran = fluidwarp(folder, "render", "b.toml", "plate.1001.exr", "-o", "w.png")
+    assert (ran.returncode, "1 of its pixels are NaN" in ran.stderr) == (1, True)
