@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ RATE = 8.0  # 1 / s: at which what is left of a way is gone
 FARTHEST_STEP = 0.25
 # Radii of a handle's way at most: farther, a push draws what it leads out into threads finer than the map.
 LONGEST_WAY = 2.0
+SAME_TIME = 1e-6  # steps between two times that are the same but for their rounding
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
@@ -43,13 +44,15 @@ class Handle:
 
     Attributes:
         at: the place in the original of what is led.
-        to: where to; None for a pin, which stays where it is at its start.
+        to: where to; None if it stays where it is at its start, as a pin does.
         radius: how far its brush reaches.
         start: when it begins.
-        duration: of the way, which begins and ends softly.
+        duration: of that way, which begins and ends softly.
         end: when it lets go; until then it stays where it has arrived.
         stiffness: 1 is led exactly; with less it gives way to the fluid and to the others.
         local: the part of its motion, 0-1, that carries what is under it alone; see `Push`.
+        keys: times and places (t, x, y), in order and none before its first way has ended: where it is led after that,
+            at an even speed from one to the next.
 
     Raises:
         ValueError: if a number is not finite (but for `end`) or out of its range.
@@ -63,9 +66,11 @@ class Handle:
     end: float = math.inf
     stiffness: float = 1.0
     local: float = 0.0
+    keys: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        if not all(abs(place) <= FARTHEST for place in (*self.at, *(self.to or ()))):
+        places = (*self.at, *(self.to or ()), *(side for key in self.keys for side in key[1:]))
+        if not all(abs(place) <= FARTHEST for place in places):
             raise ValueError(f"a handle from {self.at} to {self.to} is off the picture by more than {FARTHEST:g} sides")
         if not 1e-6 <= self.radius <= 1:
             raise ValueError(f"a handle of radius {self.radius} was given; it must be from 1e-06 to 1")
@@ -75,6 +80,36 @@ class Handle:
             raise ValueError(f"a handle of stiffness {self.stiffness} was given; it must be from 0.001 to 1")
         if not 0 <= self.local <= 1:
             raise ValueError("the local part of a handle must be from 0 to 1")
+        times = [self.ready, *(key[0] for key in self.keys), math.inf]
+        if not all(earlier <= later for earlier, later in pairwise(times)):
+            raise ValueError("the times of a handle's keys must not go backwards, nor begin before its way has ended")
+
+    @property
+    def ready(self) -> float:
+        """When it has gone its first way, and its keys may begin."""
+        return self.start if self.to is None else self.start + self.duration
+
+    @property
+    def goal(self) -> Point | None:
+        """Where it is led in the end; None if it stays where it is at its start."""
+        return self.keys[-1][1:] if self.keys else self.to
+
+    def wanted(self, start: np.ndarray, time: float, dt: float) -> np.ndarray:
+        """Where it shall be at a time, (2,), if it was at `start` when it began; `dt` says how exact the time is."""
+
+        def within(place: Sequence[float]) -> np.ndarray:
+            way = np.subtract(place, start)
+            return way * min(1.0, LONGEST_WAY * self.radius / max(float(np.hypot(*way)), 1e-30))
+
+        if not self.keys or time < self.ready:
+            return start if self.to is None else start + self.passed(time) * within(self.to)
+        stations = [(self.ready, *(start if self.to is None else self.to)), *self.keys]
+        number = max(number for number, (since, *_) in enumerate(stations) if since <= time + SAME_TIME * dt)
+        (since, *here), (until, *there) = stations[number], stations[min(number + 1, len(stations) - 1)]
+        if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
+            return start + within(here)
+        part = (time - since) / (until - since)
+        return start + (1 - part) * within(here) + part * within(there)
 
     def passed(self, time: float) -> float:
         """The part of its way, 0-1, that it shall have gone at a time."""
@@ -200,11 +235,16 @@ class Handles:
         return found
 
     @property
+    def starts(self) -> np.ndarray:
+        """Where they were when they began, (n, 2) in longer sides; NaN where they have not."""
+        return self._starts.copy()
+
+    @property
     def away(self) -> np.ndarray:
         """How far each is from where it shall be in the end, (n,) in longer sides; 0 of pins that have not begun."""
         places = self.places
         starts = np.where(np.isnan(self._starts), places, self._starts)
-        ends = [start if handle.to is None else handle.to for handle, start in zip(self.handles, starts, strict=True)]
+        ends = [handle.goal or start for handle, start in zip(self.handles, starts, strict=True)]
         return np.hypot(*(places - np.reshape(ends, (-1, 2))).T)
 
     # -- its state --------------------------------------------------------------------------------------------------
@@ -224,6 +264,7 @@ class Handles:
             if kept is None or kept.dtype != np.float64 or kept.ndim != 2 or kept.shape[1] != 2:
                 raise ValueError("the state of handles is missing")
         self._places, self._starts = (self._fitted(state.values[name]) for name in ("places", "starts"))
+        self._lead = None
 
     def release(self) -> None:
         """Free the textures."""
@@ -269,13 +310,11 @@ class Handles:
         wanted, slower = np.zeros((len(numbers), 2)), self._slower(numbers)
         for row, number in enumerate(numbers):
             handle, start, place = self.handles[number], self._starts[number], self._places[number]
-            way = np.zeros(2) if handle.to is None else np.subtract(handle.to, start)
-            way = way * min(1.0, LONGEST_WAY * handle.radius / max(float(np.hypot(*way)), 1e-30))
-            now, then = handle.passed(time), handle.passed(time + dt)
-            back = start + now * way - place
+            now, then = handle.wanted(start, time, dt), handle.wanted(start, time + dt, dt)
+            back = now - place
             most = FARTHEST_STEP * handle.radius
             back = back * -math.expm1(-RATE * dt) * min(1.0, most / max(float(np.hypot(*back)), 1e-30))
-            step = slower[row] * ((then - now) * way + back)
+            step = slower[row] * (then - now + back)
             wanted[row] = step * min(1.0, most / max(float(np.hypot(*step)), 1e-30)) / dt
         return wanted
 
@@ -293,7 +332,7 @@ class Handles:
             apart, far = (np.linalg.norm(np.diff(places, axis=axis), axis=-1) for places in (original, points))
             ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
             most = np.maximum(most, ratio.reshape(count, -1).max(axis=1))
-        local = float(self._local.max())
+        local = self._local[numbers]
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
         return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
