@@ -18,8 +18,9 @@ from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
-# Radii that a handle goes in a tick at most: what lies under its brush must still do so in the next.
-FARTHEST_STEP = 0.25
+# Radii that a handle goes in a tick at most, and that its push alone would carry it: that strains what is beside it by
+# up to 7 times as much (H2), and a step of the map follows a strain of 1/2.
+FARTHEST_STEP = 0.07
 # Radii of a handle's way at most: farther, a push draws what it leads out into threads finer than the map.
 LONGEST_WAY = 2.0
 SAME_TIME = 1e-6  # steps between two times that are the same but for their rounding
@@ -27,12 +28,14 @@ SAME_TIME = 1e-6  # steps between two times that are the same but for their roun
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
 # Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
-# and how many times farther apart in the original two neighbours on a lattice over the brush lie. From the first of
+# and how many times farther apart in the original two neighbours on a lattice lie. From the first of
 # each on it goes slower, at the second it stops: before anything folds.
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 5.0, 7.5
-LATTICE = 17  # places along the brush's box where that is looked at
+PLACES = 256  # along the longer side of the picture where that is looked at, or as many as there are cells
+RINGS = (1 / 64, 1 / 32, 1 / 16)  # radii of rings of `AROUND` places around its middle, likewise: what two handles that
+AROUND = 16  # nearly meet lead apart is less than that far across
 # Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
 FOUND, LOST = 1e-7, 1e-4
 MOST_ROUNDS = 8
@@ -130,6 +133,7 @@ class Lead(NamedTuple):
         influence: how the push of each moves each, (n, n, 2, 2): see `_influences`.
         wanted: how the fluid shall move at them, (n, 2), longer sides / s.
         local: what of their motion carries the picture and not the fluid, (n, 2).
+        dt: of the step.
     """
 
     active: np.ndarray
@@ -138,6 +142,7 @@ class Lead(NamedTuple):
     influence: np.ndarray
     wanted: np.ndarray
     local: np.ndarray
+    dt: float
 
 
 class Handles:
@@ -194,13 +199,15 @@ class Handles:
             self._starts[new] = self._places[new]
         numbers = np.flatnonzero(active)
         places, radii, share = self._places[numbers], self._radii[numbers], self._local[numbers]
-        wanted = self._wanted_velocities(numbers, time, dt)
+        slower = self._slower(numbers)
+        self._calm(places, radii, 1 - slower)
+        wanted = self._wanted_velocities(numbers, slower, time, dt)
         push, local = self._influences(places, radii)
         # What is local is shared out first: the fluid would else do all of it, going on by itself.
         both = (1 - share[:, None, None]) * push + share[:, None, None] * local
-        carried = share[:, None] * self._solved(numbers, both, wanted)
+        carried = share[:, None] * self._solved(numbers, both, wanted, dt)
         wanted = wanted - np.einsum("ijab,jb->ia", local, carried)
-        lead = self._lead = Lead(numbers, places, radii, push, wanted, carried)
+        lead = self._lead = Lead(numbers, places, radii, push, wanted, carried, dt)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -305,16 +312,15 @@ class Handles:
         places[begun] = best
         return places
 
-    def _wanted_velocities(self, numbers: np.ndarray, time: float, dt: float) -> np.ndarray:
+    def _wanted_velocities(self, numbers: np.ndarray, slower: np.ndarray, time: float, dt: float) -> np.ndarray:
         """How the handles of these numbers shall move in this step, longer sides / s."""
-        wanted, slower = np.zeros((len(numbers), 2)), self._slower(numbers)
+        wanted = np.zeros((len(numbers), 2))
         for row, number in enumerate(numbers):
             handle, start, place = self.handles[number], self._starts[number], self._places[number]
             now, then = handle.wanted(start, time, dt), handle.wanted(start, time + dt, dt)
             back = now - place
             most = FARTHEST_STEP * handle.radius
-            back = back * -math.expm1(-RATE * dt) * min(1.0, most / max(float(np.hypot(*back)), 1e-30))
-            step = slower[row] * (then - now + back)
+            step = slower[row] * (then - now - math.expm1(-RATE * dt) * back)
             wanted[row] = step * min(1.0, most / max(float(np.hypot(*step)), 1e-30)) / dt
         return wanted
 
@@ -322,22 +328,40 @@ class Handles:
         """The part of its speed, 0-1, that the map around each of these handles still allows."""
         if not len(numbers):
             return np.zeros(0)
-        along, count = np.linspace(-1, 1, LATTICE), len(numbers)
-        lattice = np.stack(np.meshgrid(along, along), axis=-1) * self._radii[numbers, None, None, None]
-        points = np.clip(self._places[numbers, None, None] + lattice, 0.0, self._warp.extent)
-        listed = points.reshape(-1, 2)
-        least = self._warp.determinants(listed).reshape(count, -1).min(axis=1)
-        original, most = points + self._warp.at(listed).reshape(points.shape), np.zeros(count)
-        for axis in (1, 2):
-            apart, far = (np.linalg.norm(np.diff(places, axis=axis), axis=-1) for places in (original, points))
-            ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
-            most = np.maximum(most, ratio.reshape(count, -1).max(axis=1))
+        extent, radii = np.array(self._warp.extent), self._radii[numbers]
+        count = np.maximum(self._fluid.grid.size, PLACES * extent / extent.max()).astype(int)
+        columns, rows = ((np.arange(n) + 0.5) * side / n for n, side in zip(count, extent, strict=True))
+        over = _distorted(self._warp, np.stack(np.meshgrid(columns, rows), axis=-1)[None])[0]
+        angles = 2 * np.pi * np.arange(AROUND + 1) / AROUND
+        rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        close = self._places[numbers, None, None] + rings * radii[:, None, None, None]
+        near = _distorted(self._warp, np.clip(close, 0.0, extent)).reshape(len(numbers), -1, 2)
+        least, most = near[..., 0].min(axis=1), near[..., 1].max(axis=1)
+        low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
+        high = np.ceil((self._places[numbers] + radii[:, None]) / extent * count).astype(int)
+        for row, ((left, top), (right, bottom)) in enumerate(zip(low, high, strict=True)):
+            box = over[top : max(bottom, top + 1), left : max(right, left + 1)]
+            least[row] = min(least[row], box[..., 0].min())
+            most[row] = max(most[row], box[..., 1].max())
         local = self._local[numbers]
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
         return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
 
     # -- what they do to the fluid ----------------------------------------------------------------------------------
+
+    def _calm(self, places: np.ndarray, radii: np.ndarray, share: np.ndarray) -> None:
+        """Take that share of what flows under handles: those that halt, as the map bears no more, halt the fluid."""
+        if not share.any():
+            return
+        fluid = self._fluid
+        listed = np.column_stack([places - fluid.grid.origin, radii, share])
+        handles = fluid.device.upload(listed[None].astype(np.float32), "handles that halt")
+        calm = fluid.device.pass_("brush/calm.frag")
+        fluid.impulse.add(
+            lambda faces: calm(faces, add=True, handles=handles, velocity=fluid.faces(), spacing=fluid.grid.spacing)
+        )
+        handles.release()
 
     def _influences(self, places: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How the push and the local brush of each handle move each: velocities (i, a) for forces (j, b)."""
@@ -356,13 +380,15 @@ class Handles:
                 local += (np.maximum(1 - q**2, 0.0) ** 3)[..., None, None] * np.diag(sign)
         return push, local
 
-    def _solved(self, numbers: np.ndarray, influence: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    def _solved(self, numbers: np.ndarray, influence: np.ndarray, wanted: np.ndarray, dt: float) -> np.ndarray:
         """The forces that together make the wanted velocities, as far as the ridge and stiffness let them: (H3)."""
         count = 2 * len(wanted)
         matrix = influence.transpose(0, 2, 1, 3).reshape(count, count)
         soft = [1 / self.handles[number].stiffness - 1 + RIDGE for number in numbers for _ in (0, 1)]
         dual = np.linalg.solve(matrix @ matrix.T + np.diag(soft), wanted.reshape(count))
-        return (matrix.T @ dual).reshape(-1, 2)
+        forces = (matrix.T @ dual).reshape(-1, 2)
+        most = FARTHEST_STEP * self._radii[numbers] / dt
+        return forces * np.minimum(1.0, most / np.maximum(np.hypot(*forces.T), 1e-30))[:, None]
 
     def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
         """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
@@ -389,7 +415,7 @@ class Handles:
             return
         fluid, grid = self._fluid, self._fluid.grid
         found = self._probed(lead, faces)
-        lacking = self._solved(lead.active, lead.influence, lead.wanted - found[:, :2])
+        lacking = self._solved(lead.active, lead.influence, lead.wanted - found[:, :2], lead.dt)
         masks: dict[str, Any] = {}
         if attenuated:
             lacking *= found[:, 2:3]
@@ -414,6 +440,19 @@ class Handles:
 def _brushes(lead: Lead) -> tuple[list[Point], list[float]]:
     """Places and radii of the active handles."""
     return [(x, y) for x, y in lead.places.tolist()], lead.radii.tolist()
+
+
+def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
+    """At lattices of places (k, n, m, 2): det J, and how many times nearer than in the original a neighbour lies."""
+    listed, found = points.reshape(-1, 2), np.zeros(points.shape)
+    found[..., 0] = warp.determinants(listed).reshape(points.shape[:-1])
+    original = points + warp.at(listed).reshape(points.shape)
+    for axis in (1, 2):
+        apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, points))
+        ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
+        after = [slice(None), slice(1, None)] if axis == 1 else [slice(None), slice(None), slice(1, None)]
+        found[(*after, ..., 1)] = np.maximum(found[(*after, ..., 1)], ratio)
+    return found
 
 
 def _smoothstep(part: np.ndarray) -> np.ndarray:
