@@ -18,8 +18,8 @@ from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
-# Radii that a handle goes in a tick at most, and that its push alone would carry it: that strains what is beside it by
-# up to 7 times as much (H2), and a step of the map follows a strain of 1/2.
+# Radii that a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
+# step of the map follows a strain of 1/2.
 FARTHEST_STEP = 0.07
 # Radii of a handle's way at most: farther, a push draws what it leads out into threads finer than the map.
 LONGEST_WAY = 2.0
@@ -32,7 +32,7 @@ RIDGE = 1e-3
 # each on it goes slower, at the second it stops: before anything folds.
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
-STRETCHING, TORN = 5.0, 7.5
+STRETCHING, TORN = 8.0, 12.0
 PLACES = 256  # along the longer side of the picture where that is looked at, or as many as there are cells
 RINGS = (1 / 64, 1 / 32, 1 / 16)  # radii of rings of `AROUND` places around its middle, likewise: what two handles that
 AROUND = 16  # nearly meet lead apart is less than that far across
@@ -133,7 +133,6 @@ class Lead(NamedTuple):
         influence: how the push of each moves each, (n, n, 2, 2): see `_influences`.
         wanted: how the fluid shall move at them, (n, 2), longer sides / s.
         local: what of their motion carries the picture and not the fluid, (n, 2).
-        dt: of the step.
     """
 
     active: np.ndarray
@@ -142,7 +141,6 @@ class Lead(NamedTuple):
     influence: np.ndarray
     wanted: np.ndarray
     local: np.ndarray
-    dt: float
 
 
 class Handles:
@@ -205,9 +203,9 @@ class Handles:
         push, local = self._influences(places, radii)
         # What is local is shared out first: the fluid would else do all of it, going on by itself.
         both = (1 - share[:, None, None]) * push + share[:, None, None] * local
-        carried = share[:, None] * self._solved(numbers, both, wanted, dt)
+        carried = share[:, None] * self._solved(numbers, both, wanted)
         wanted = wanted - np.einsum("ijab,jb->ia", local, carried)
-        lead = self._lead = Lead(numbers, places, radii, push, wanted, carried, dt)
+        lead = self._lead = Lead(numbers, places, radii, push, wanted, carried)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -380,15 +378,13 @@ class Handles:
                 local += (np.maximum(1 - q**2, 0.0) ** 3)[..., None, None] * np.diag(sign)
         return push, local
 
-    def _solved(self, numbers: np.ndarray, influence: np.ndarray, wanted: np.ndarray, dt: float) -> np.ndarray:
+    def _solved(self, numbers: np.ndarray, influence: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """The forces that together make the wanted velocities, as far as the ridge and stiffness let them: (H3)."""
         count = 2 * len(wanted)
         matrix = influence.transpose(0, 2, 1, 3).reshape(count, count)
         soft = [1 / self.handles[number].stiffness - 1 + RIDGE for number in numbers for _ in (0, 1)]
         dual = np.linalg.solve(matrix @ matrix.T + np.diag(soft), wanted.reshape(count))
-        forces = (matrix.T @ dual).reshape(-1, 2)
-        most = FARTHEST_STEP * self._radii[numbers] / dt
-        return forces * np.minimum(1.0, most / np.maximum(np.hypot(*forces.T), 1e-30))[:, None]
+        return (matrix.T @ dual).reshape(-1, 2)
 
     def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
         """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
@@ -415,7 +411,7 @@ class Handles:
             return
         fluid, grid = self._fluid, self._fluid.grid
         found = self._probed(lead, faces)
-        lacking = self._solved(lead.active, lead.influence, lead.wanted - found[:, :2], lead.dt)
+        lacking = self._solved(lead.active, lead.influence, lead.wanted - found[:, :2])
         masks: dict[str, Any] = {}
         if attenuated:
             lacking *= found[:, 2:3]
