@@ -127,12 +127,12 @@ class History:
 def _own_bytes(recipe: Recipe, before: Recipe | None) -> int:
     """Bytes that `recipe` needs beside `before`: the parts that are not the same objects, roughly."""
     size = 1024
-    for name in ("viscosity", "freeze", "force", "change", "stroke"):
+    for name in ("viscosity", "freeze", "force", "handle", "pin", "change", "stroke"):
         known = {id(part) for part in getattr(before, name)} if before is not None else set()
         parts = getattr(recipe, name)
         size += 8 * len(parts)
         for part in parts:
             if id(part) not in known:
                 # A sample is a tuple of four numbers: 96 bytes and three floats of 24.
-                size += 1024 + 170 * len(getattr(part, "samples", ()))
+                size += 1024 + 170 * len(getattr(part, "samples", None) or getattr(part, "keys", None) or ())
     return size

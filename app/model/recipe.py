@@ -318,7 +318,9 @@ class Recipe(Model):
         for mine, theirs in zip_longest(self.handle, other.handle):
             if mine is not None and theirs is not None:
                 renumbered |= is_inside(mine.at) != is_inside(theirs.at)  # those behind it
-            if mine != theirs or renumbered:
+            if mine is not None and theirs is not None and mine != theirs and not renumbered:
+                agreed = min(agreed, mine.agrees_until(theirs, self.fluid.dt))
+            elif mine != theirs or renumbered:
                 agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (mine, theirs) if led is not None)])
         if self.pin != other.pin:
             agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (*self.pin, *other.pin))])
@@ -334,7 +336,7 @@ class Recipe(Model):
     def _set_up(self) -> tuple[object, ...]:
         """What is in force from the first tick on."""
         layers = self.viscosity, self.freeze, self.force
-        return self.picture, self.map, self.mode, self.density, self.fluid, *layers, self.leads
+        return self.picture, self.map, self.mode, self.density, self.fluid, *layers
 
 
 def _inline(value: Any) -> Any:

@@ -8,6 +8,7 @@ from itertools import pairwise
 from math import hypot
 from typing import NamedTuple
 
+from app.model.handles import RecipeHandle
 from app.model.strokes import Stroke
 from app.model.strokes import Tool as StrokeTool
 from app.model.windows import FLOWING
@@ -28,12 +29,13 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True)
 class BrushSettings:
-    """A brush as the person sets it: radius in longer sides, the rest 0-1; see `Stroke`."""
+    """A brush as the person sets it: radius in longer sides, the rest 0-1; see `Stroke` and `RecipeHandle`."""
 
     radius: float = 0.15
     hardness: float = 0.0
     strength: float = 1.0
     local: float = 0.0
+    stiffness: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,9 @@ class Press:
         dt: seconds a tick.
         last: where the last stroke ended, for a straight line from there.
         detail: how finely the flow of such a brush is solved; see `app.model.windows`.
+        slack: how far the pointer may shake, in longer sides, and is not moved yet.
+        at: the place in the original of what was pressed on.
+        held: the handle that was taken hold of, and `rests`, where it is led.
     """
 
     brush: BrushSettings
@@ -55,10 +60,17 @@ class Press:
     dt: float
     last: tuple[float, float] | None = None
     detail: int = 0
+    slack: float = 0.0
+    at: tuple[float, float] = (0.0, 0.0)
+    held: RecipeHandle | None = None
+    rests: tuple[float, float] | None = None
 
 
-Gesture = Generator[Stroke | None, Touch | None, Stroke | None]
-"""Sent a touch, it yields the stroke so far (None while nothing is to be applied); sent None, it returns the stroke."""
+Made = Stroke | RecipeHandle
+"""What a gesture makes."""
+
+Gesture = Generator[Made | None, Touch | None, Made | None]
+"""Sent a touch, it yields what it has made so far (None while nothing is to be applied); sent None, it returns it."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +84,7 @@ class Tool:
         gesture: from a press to its strokes; None for tools that move the view and not the picture.
         directions: what its two directions are called.
         masks: it paints a mask, which then is shown.
-        own: what of the brush is set for it alone.
+        settings: what of the brush is set for it.
     """
 
     name: str
@@ -82,7 +94,7 @@ class Tool:
     gesture: Callable[[Press, Touch], Gesture] | None = None
     directions: tuple[str, str] | None = None
     masks: bool = False
-    own: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ("radius", "hardness", "strength")
 
 
 def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke:
@@ -211,12 +223,39 @@ def _curve(press: Press, first: Touch) -> Gesture:
     return _stroke(press, "curve", False, *(point._replace(tick=last.tick) for point in points))
 
 
+def _lead(press: Press, first: Touch) -> Gesture:
+    """What was pressed on goes where the pointer does and stays there; if that does not move, it is pinned."""
+    brush, start = press.brush, (first.x, first.y)
+    handle, rests = press.held, press.rests or start
+    if handle is None:
+        handle = RecipeHandle(
+            at=press.at,
+            keys=(),
+            radius=brush.radius,
+            start=first.tick * press.dt,
+            stiffness=brush.stiffness,
+            local=brush.local,
+        )
+    place, moved = rests, False
+    while (touch := (yield handle)) is not None:
+        x, y = rests[0] + touch.x - start[0], rests[1] + touch.y - start[1]
+        moved |= hypot((x - rests[0]) * press.extent[0], (y - rests[1]) * press.extent[1]) > press.slack
+        to = round(min(max(x, 0.0), 1.0), 5), round(min(max(y, 0.0), 1.0), 5)
+        if moved and to != place:
+            handle, place = handle.led_to(touch.tick, press.dt, to, place), to
+    return handle
+
+
 TOOLS = (
     Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
-         own=("local",)),
+         settings=("radius", "hardness", "strength", "local")),
     Tool("curve", "Curve", "c", "Draw a path: the picture is blown along it", _curve, ("Forwards", "Backwards")),
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
     Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),
+    Tool(
+        "handle", "Handle", "g", "Drag a point where it shall go; click to pin it where it is", _lead,
+        settings=("radius", "stiffness", "local"),
+    ),
     Tool(
         "thicken", "Thicken", "v", "Paint where the fluid is thick and hardly bends",
         painting("thicken", "thin"), ("Thicken", "Thin"), masks=True,

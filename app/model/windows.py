@@ -41,7 +41,7 @@ def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
         recipe: which the stroke is made in.
         settings: the fluid's at that tick.
     """
-    if not may_have_windows(recipe):
+    if not may_have_windows(recipe) or recipe.handle or recipe.pin:
         return 0
     fading = settings.drag + SLOWEST * settings.viscosity / radius**2
     if fading * LONGEST_FLOW < 1.0:
@@ -52,12 +52,8 @@ def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
 
 
 def may_have_windows(recipe: Recipe) -> bool:
-    """True if nothing in it acts on the whole picture at once, as its forces, handles and a density do."""
-    return (
-        not (recipe.force or recipe.handle or recipe.pin)
-        and recipe.mode == "coordinates"
-        and recipe.fluid.solver == "mac"
-    )
+    """True if nothing in it acts on the whole picture from the start, as its forces and a density do."""
+    return not recipe.force and recipe.mode == "coordinates" and recipe.fluid.solver == "mac"
 
 
 class Window(NamedTuple):

@@ -62,6 +62,7 @@ def _table() -> list[Action]:
         ("clear_masks", "Clear the masks", "ctrl+d"),
     ):
         add("Edit", name, label, key, lambda c, n=name, label=label: c.workspace.change(label, **{n: True}))
+    add("Edit", "remove", "Remove the handle", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "cancel", "Give up the stroke", "escape", lambda c: c.workspace.session.cancel())
 
     for tool in TOOLS:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
+from app.model.handles import labelled
 from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialogs, Preferring
 from app.ui.editor_state import EditorState
@@ -60,6 +61,13 @@ class Commands:
     def toggle_statistics(self) -> None:
         self.state.statistics = not self.state.statistics
         self.workspace.session.device.timings.enabled = self.state.statistics
+
+    def remove_selected(self) -> None:
+        """Take away the handle or the pin that is selected."""
+        session, selected = self.workspace.session, self.state.selected
+        if selected in dict(labelled(session.recipe.handle, session.recipe.pin)):
+            session.let_go(selected)
+        self.state.selected = ""
 
     def copy_recipe(self) -> None:
         self.clipboard(self.workspace.session.recipe.text())

@@ -270,7 +270,7 @@ class Editor:
         strip.draw(ui, layout, state)
         if layout.inspector is not None:
             inspector.draw(ui, layout.inspector, workspace, state, self.quality, self.clock, self.do)
-        timebar.draw(ui, layout.timebar, self.session, self.do)
+        timebar.draw(ui, layout.timebar, self.session, state, self.do)
         bar.draw(ui, layout, workspace, state, likes.recent, self.files.open_work, self.do)
 
     def _draw_over_canvas(self) -> None:

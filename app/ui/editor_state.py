@@ -45,6 +45,7 @@ class EditorState:
         over_narrow: it is open in one that has not.
         sections: which of its sections are open.
         history_seen: the entry of the history that was scrolled to last.
+        selected: what messages call the handle or pin that the inspector is about; "" where there is none.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
         statistics: numbers are shown over the canvas.
@@ -60,6 +61,7 @@ class EditorState:
     over_narrow: bool = False
     sections: dict[str, bool] = field(default_factory=dict)
     history_seen: int = -1
+    selected: str = ""
     before: bool = False
     split: float | None = None
     statistics: bool = False

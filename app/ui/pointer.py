@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import exp
+from math import exp, hypot
 
+from app.model.handles import RecipeHandle, labelled
 from app.model.tools import Press
 from app.ui.dialogs import Dialogs
 from app.ui.editor_state import LARGEST, SMALLEST, EditorState
@@ -13,8 +14,11 @@ from app.ui.events import LEFT, MIDDLE, RIGHT, Button, Event, Key, Mods, Move, W
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
+from app.work.session import Held
 
 SPLIT_REACH = 8.0  # points from the split's line at which it is taken hold of
+GRIP = 11.0  # points from a handle's middle, likewise
+SHAKE = 3.0  # points that the pointer may move and is not dragged yet
 
 
 @dataclass
@@ -24,7 +28,8 @@ class PointerController:
     Attributes:
         play: called where Space was tapped.
         x, y: where the pointer is, in points.
-        drag: what the button that is down does: "paint", "pan", "zoom", "brush", "split", or None.
+        drag: what the button that is down does: "paint", "hold" a handle that may be dragged, "pan", "zoom", "brush",
+            "split", or None.
         space: Space is held, so that any tool pans.
     """
 
@@ -44,6 +49,7 @@ class PointerController:
     _space_used: bool = field(default=False, init=False)
     _start: tuple[float, float] = field(default=(0.0, 0.0), init=False)
     _moved: bool = field(default=False, init=False)
+    _pressed: Held | None = field(default=None, init=False)
 
     @property
     def is_over_canvas(self) -> bool:
@@ -59,7 +65,25 @@ class PointerController:
     def shows_ring(self) -> bool:
         """The brush's ring is drawn where the pointer is."""
         has_ring = self.state.tool.gesture is not None and self.drag in (None, "paint", "brush")
-        return has_ring and self.is_over_canvas
+        return has_ring and self.is_over_canvas and self.hovered is None
+
+    @property
+    def hovered(self) -> Held | None:
+        """The handle or pin under the pointer, if the tool takes hold of them and nothing is held yet."""
+        if self.state.tool_name != "handle" or self.drag is not None or self.space or not self._could_begin:
+            return None
+        return self._nearest()
+
+    def _nearest(self) -> Held | None:
+        """The handle or pin nearest to the pointer, by where it is and where it shall be, within its grip."""
+        view = self.workspace.view
+
+        def far(held: Held) -> float:
+            places = (view.to_screen(*place) for place in (held.target, held.now))
+            return min(hypot(x - self.x, y - self.y) for x, y in places)
+
+        held = min(self.workspace.session.held, key=far, default=None)
+        return held if held is not None and far(held) <= self.ui.px(GRIP) else None
 
     @property
     def ring_at(self) -> tuple[float, float]:
@@ -122,19 +146,35 @@ class PointerController:
             self.drag = "split"
         elif button == LEFT and tool.name == "zoom":
             self.drag = "zoom"
+        elif button == LEFT and (held := self.hovered) is not None:
+            if self.mods.alt:
+                self.workspace.session.let_go(held.label)
+                self.state.selected = ""
+            else:
+                self.drag, self._pressed, self.state.selected = "hold", held, held.label
         elif button == LEFT:
+            self._paint(None)
             self.drag = "paint"
-            self.preferences.dismiss_hint()
-            session, place = self.workspace.session, self.workspace.view.to_picture(self.x, self.y)
-            press = Press(self.state.brush, self.is_opposite, session.extent, session.dt)
-            session.press(tool, press, *place, self.pressure, self.mods.shift)
+
+    def _paint(self, held: Held | None) -> None:
+        """A gesture begins where the button went down; with a handle that is there, if one was taken hold of."""
+        self.preferences.dismiss_hint()
+        view, session, state = self.workspace.view, self.workspace.session, self.state
+        press = Press(state.brush, self.is_opposite, session.extent, session.dt, slack=SHAKE / view.longer)
+        session.press(state.tool, press, *view.to_picture(*self._start), self.pressure, self.mods.shift, held)
+        if isinstance(session.made, RecipeHandle):
+            recipe = session.recipe
+            state.selected = next(label for label, led in labelled(recipe.handle, recipe.pin) if led == session.made)
 
     def _move(self, x: float, y: float, pressure: float, mods: Mods) -> None:
         dx, dy = x - self.x, y - self.y
         self.x, self.y, self.pressure, self.mods = x, y, pressure, mods
         workspace, view, brush = self.workspace, self.workspace.view, self.state.brush
-        if abs(x - self._start[0]) + abs(y - self._start[1]) > 3:
+        if abs(x - self._start[0]) + abs(y - self._start[1]) > SHAKE:
             self._moved = True
+        if self.drag == "hold" and self._moved:
+            self.drag = "paint"
+            self._paint(self._pressed)
         match self.drag:
             case "paint":
                 workspace.session.move(*view.to_picture(x, y), pressure, mods.shift)
@@ -188,4 +228,6 @@ class PointerController:
             return "resize_ew"
         if self.state.tool_name == "zoom":
             return "crosshair"
+        if self.drag == "hold" or self.hovered is not None:
+            return "hand"
         return "none" if self.shows_ring else "arrow"

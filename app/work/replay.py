@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import ceil, hypot, inf
+from typing import Any
 
 import numpy as np
 
@@ -253,12 +254,20 @@ class Replay:
             extent=self.grid.extent,
         )
 
+    @property
+    def led(self) -> list[tuple[str, RecipeHandle | RecipePin]]:
+        """The recipe's pins and handles that take hold of something, with what messages call them; pins come first."""
+        led = labelled(self.recipe.handle, self.recipe.pin)
+        return sorted(
+            (each for each in led if is_inside(each[1].at)), key=lambda each: isinstance(each[1], RecipeHandle)
+        )
+
     def unmet(self, within: float) -> Iterator[str]:
         """Which handles are farther than `within` from where they are led at this moment, and how far."""
         if not self.handles.handles:
             return
         solid = self.fluid.solid.get()
-        for (label, _), far, (x, y) in zip(self._in_picture(), self.handles.away, self.handles.places, strict=True):
+        for (label, _), far, (x, y) in zip(self.led, self.handles.away, self.handles.places, strict=True):
             if not far <= within:
                 (nx, ny), (hx, hy) = self.grid.size, self.grid.spacing
                 frozen = solid[min(int(y / hy), ny - 1), min(int(x / hx), nx - 1)] > 0
@@ -292,9 +301,9 @@ class Replay:
         for change in self.recipe.change:
             if change.tick == self.tick:
                 self._change(change)
-        leads = any(handle.start <= self.tick * dt + dt / 2 for handle in self.handles.handles)
+        leads = any(led.is_in_force(self.tick, dt) for _, led in self.led)
         at_work = [(stroke, dabs) for stroke in self.recipe.stroke if (dabs := stroke.at(self.tick))]
-        self._follow([(stroke, dabs) for stroke, dabs in at_work if stroke.tool in FLOWING])
+        self._follow([(stroke, dabs) for stroke, dabs in at_work if stroke.tool in FLOWING], leads)
         self._set_parameters(self.settings)
         painted = False
         self._leading.clear()
@@ -305,8 +314,9 @@ class Replay:
                 self._apply_masks()
             if leads:
                 self.handles.lead(dt, self.tick * dt)
-        self.fluid.step(dt, self._forces(dt), self._steer if self._leading or leads else None)
-        self._carry()
+        steer = (lambda velocity: self._steer(velocity, leads)) if self._leading or leads else None
+        self.fluid.step(dt, self._forces(dt), steer)
+        self._carry(leads)
         with self.device.stage("warp map"):
             self.warp.follow(self.fluid, dt * part)
         if self.density is not None:
@@ -332,10 +342,13 @@ class Replay:
             self._use_viscosity(settings.viscosity)
             self._apply_masks()
 
-    def _follow(self, at_work: list[tuple[Stroke, tuple[Dab, ...]]]) -> None:
-        """Let the flow be solved where the strokes of this tick want it; without any it stays where it is."""
-        if at_work and self._has_windows:
-            window = Window.of(at_work, self.tick, self.window, self.grid)
+    def _follow(self, at_work: list[tuple[Stroke, tuple[Dab, ...]]], leads: bool) -> None:
+        """Let the flow be solved where the strokes of this tick want it; without any it stays where it is.
+
+        Handles act on the whole picture.
+        """
+        if (at_work or leads) and self._has_windows:
+            window = None if leads else Window.of(at_work, self.tick, self.window, self.grid)
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
@@ -434,19 +447,21 @@ class Replay:
         self._brush.lead(self.fluid, motion, gain, self.warp)
         self._leading.append(motion)
 
-    def _steer(self, velocity: Field) -> None:
+    def _steer(self, velocity: Field, leads: bool) -> None:
         with self.device.stage("brush"):
             for motion in self._leading:
                 self._brush.make_up(self.fluid, motion, velocity, self.warp)
-            self.handles.make_up(velocity)
+            if leads:
+                self.handles.make_up(velocity)
 
-    def _carry(self) -> None:
+    def _carry(self, leads: bool) -> None:
         """Let what is local of brushes and forces carry the picture besides the fluid."""
         with self.device.stage("brush"):
             for motion in self._leading:
                 if isinstance(motion, Push):
                     self._brush.carry(self.fluid, motion, self.warp)
-            self.handles.carry()
+            if leads:
+                self.handles.carry()
             for field, amount in self._motions:
                 self.fluid.add_local(field, amount)
 
@@ -498,29 +513,27 @@ class Replay:
         self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters(recipe.fluid)  # changes come with the tick
 
-    def _in_picture(self) -> list[tuple[str, RecipeHandle | RecipePin]]:
-        """The recipe's pins and handles that take hold of something, with what messages call them; pins come first."""
-        led = labelled(self.recipe.handle, self.recipe.pin)
-        return sorted(
-            (each for each in led if is_inside(each[1].at)), key=lambda each: isinstance(each[1], RecipeHandle)
-        )
-
     def _handles_in_picture(self) -> list[Handle]:
         made, extent = [], self.grid.extent
-        for _, led in self._in_picture():
+        for _, led in self.led:
             at = led.at[0] * extent[0], led.at[1] * extent[1]
             end = inf if led.end is None else led.end
+            way: dict[str, Any] = {}
             if isinstance(led, RecipeHandle):
-                x, y = (min(max(part, 0.0), 1.0) * side for part, side in zip(led.to, extent, strict=True))
-                way = {"to": (x, y), "duration": led.duration, "local": led.local}
-            else:
-                way = {}
+                way = {"duration": led.duration, "local": led.local}
+                way |= {"to": led.to and self._in_longer_sides(led.to)}
+                way |= {"keys": tuple((time, *self._in_longer_sides((x, y))) for time, x, y in led.keys or ())}
             made.append(Handle(at, radius=led.radius, start=led.start, end=end, stiffness=led.stiffness, **way))
         return made
 
+    def _in_longer_sides(self, place: tuple[float, float]) -> tuple[float, float]:
+        """A place in fractions of the picture, within it."""
+        x, y = (min(max(part, 0.0), 1.0) * side for part, side in zip(place, self.grid.extent, strict=True))
+        return x, y
+
     def _farthest_handle(self) -> float | None:
         """How far the handle that is farthest from where it is led is from there; None if there is none."""
-        led = [isinstance(led, RecipeHandle) for _, led in self._in_picture()]
+        led = [isinstance(led, RecipeHandle) for _, led in self.led]
         return float(self.handles.away[led].max()) if any(led) else None
 
     def _begin_with(self, name: str) -> None:
@@ -562,7 +575,7 @@ class Replay:
     def _parts(self) -> dict[str, Fluid | PaperFluid | Masks | Density | WarpMap | Handles]:
         """All that has a state, by name."""
         parts = {"fluid": self.fluid, "masks": self.masks, "density": self.density, "warp": self.warp}
-        parts |= {"handles": self.handles if self.recipe.leads else None}
+        parts |= {"handles": self.handles}
         return {name: part for name, part in parts.items() if part is not None}
 
     def _save(self) -> Moment:

@@ -6,7 +6,9 @@ Knows the solver and no window; the clock comes in from outside, as ticks.
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import ceil, hypot
 from typing import Any
 
 import numpy as np
@@ -15,9 +17,11 @@ from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.media.project import Project
 from app.model.document import Document
+from app.model.handles import ARRIVED, MOST_HANDLES, RecipeHandle, RecipePin, is_inside, labelled
 from app.model.recipe import Recipe
+from app.model.sampling import Point
 from app.model.strokes import Change, Stroke
-from app.model.tools import Gesture, Press, Tool, Touch
+from app.model.tools import Gesture, Made, Press, Tool, Touch
 from app.model.windows import detail_for
 from app.work.replay import Replay
 from solver.gl.device import Device
@@ -28,6 +32,27 @@ KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
 MOST_COASTING = 60.0  # seconds
 PATIENCE = 0.05  # seconds of a frame for getting to where the playhead was sent
 QUICK = 0.01  # seconds a tick may take for another one in the same frame: rather a slower fluid than fewer frames
+
+
+@dataclass(frozen=True)
+class Held:
+    """A handle or a pin that is in force at the playhead; places as fractions of the picture.
+
+    Attributes:
+        led: as the recipe has it.
+        label: what messages call it.
+        start, now, target: where it was when it began, is, and shall be.
+    """
+
+    led: RecipeHandle | RecipePin
+    label: str
+    start: Point
+    now: Point
+    target: Point
+
+    def is_away(self, extent: Point) -> bool:
+        """True if it is not where it is led."""
+        return hypot(*(np.subtract(self.now, self.target) * extent)) > ARRIVED
 
 
 class Session:
@@ -45,7 +70,7 @@ class Session:
         playing: the recording is being played.
         coasting: time goes on because the fluid still moves.
         path: where the gesture that is under way has been, as fractions of the picture.
-        stroke: the stroke that is open.
+        made: the stroke that is open, or the handle in hand.
         is_rebuilding: all is made again on another grid; what is seen in between is of no interest.
         notice: something the person should hear of, for the window to take.
         is_grid_automatic: nobody has chosen the grid, and it may follow the machine.
@@ -61,7 +86,7 @@ class Session:
         self.playing = False
         self.coasting = False
         self.path: list[tuple[float, float]] = []
-        self.stroke: Stroke | None = None
+        self.made: Made | None = None
         self.notice: str | None = None
         self.changes = 0
         self.is_rebuilding = False
@@ -75,7 +100,9 @@ class Session:
         self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
         self._tool: Tool | None = None
         self._opposite = False
+        self._taken: int | None = None  # the number of the handle in hand, if there was one where it was pressed
         self._touch: Touch | None = None
+        self._held: tuple[object, list[Held]] = (None, [])
         # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
         self._base = project.recipe
         self._live = project.recipe
@@ -142,16 +169,36 @@ class Session:
 
     # -- painting ---------------------------------------------------------------------------------------------------
 
-    def press(self, tool: Tool, press: Press, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
+    def press(
+        self,
+        tool: Tool,
+        press: Press,
+        x: float,
+        y: float,
+        pressure: float = 1.0,
+        shift: bool = False,
+        held: Held | None = None,
+    ) -> None:
         """The pointer went down at (x, y), fractions of the picture: a gesture begins, and time with it.
 
         Where strokes before it are not yet simulated to their ends, it is recorded behind them.
+
+        Args:
+            held: what was taken hold of, by a tool that does that.
+
+        Raises:
+            UserError: if there is nothing to take hold of, or too much is held already.
         """
         if tool.gesture is None:
             return
         self.release()
+        self._taken = None
+        if tool.name == "handle" and held is None:
+            press = replace(press, at=self._under(x, y))
         self.playing = False
         self._pen = self._go_on()
+        if held is not None:
+            press = replace(press, held=self._take(held.led), rests=held.target)
         self._target = None
         self._tool, self._opposite = tool, press.opposite
         self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
@@ -174,21 +221,24 @@ class Session:
         if self._gesture is None:
             return
         gesture, self._gesture = self._gesture, None
-        stroke = self.stroke
+        made = self.made
         try:
             gesture.send(None)
         except StopIteration as finished:
-            stroke = finished.value
-        self.stroke, path, self.path = None, self.path, []
-        if stroke is None:
+            made = finished.value
+        self.made, path, self.path = None, self.path, []
+        if made is None:
             if not self.coasting:
                 self._show(self.document.recipe)
             return
-        self.last_place = path[-1]
-        ticks = max(self._pen, stroke.last_tick + 1)
-        self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=ticks * self.dt)
+        if isinstance(made, Stroke):
+            self.last_place = path[-1]
+            last = made.last_tick
+        else:
+            last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
+        self._live = self._with(made, max(self._pen, last + 1))
         self.replay.use(self._live)
-        self.commit(self._label(stroke))
+        self.commit(self._label(made))
         self._coast()
 
     def cancel(self) -> None:
@@ -196,21 +246,31 @@ class Session:
         if self._gesture is None:
             return
         self._gesture.close()
-        self._gesture = self.stroke = None
+        self._gesture = self.made = None
         self.path, coasting = [], self.coasting
         self._show(self.document.recipe)
         if coasting:
             self._coast()
 
-    def _hear(self, stroke: Stroke | None) -> None:
-        self.stroke = stroke
-        if stroke is not None:
-            duration = (self._pen + 1) * self.dt
-            self._live = self._base.edited(stroke=(*self._base.stroke, stroke), duration=duration)
+    def _hear(self, made: Made | None) -> None:
+        self.made = made
+        if made is not None:
+            self._live = self._with(made, self._pen + 1)
             self.replay.use(self._live)
         self.changes += 1
 
-    def _label(self, stroke: Stroke) -> str:
+    def _with(self, made: Made, ticks: int) -> Recipe:
+        """What is made now with a gesture's, and so many ticks."""
+        base, duration = self._base, ticks * self.dt
+        if isinstance(made, Stroke):
+            return base.edited(stroke=(*base.stroke, made), duration=duration)
+        at = len(base.handle) if self._taken is None else self._taken
+        return base.edited(handle=(*base.handle[:at], made, *base.handle[at + 1 :]), duration=duration)
+
+    def _label(self, made: Made) -> str:
+        if isinstance(made, RecipeHandle):
+            return "Lead on" if self._taken is not None else "Handle" if made.keys else "Pin"
+        stroke = made
         if self._tool is None:
             return stroke.tool.capitalize()
         if (self._tool.directions and self._tool.masks) or stroke.tool in ("bloat", "pinch"):
@@ -221,6 +281,78 @@ class Session:
         """Places are kept within half a picture of it, and with as many digits as a recipe needs."""
         return round(min(max(x, -0.5), 1.5), 5), round(min(max(y, -0.5), 1.5), 5)
 
+    # -- handles ----------------------------------------------------------------------------------------------------
+
+    @property
+    def held(self) -> list[Held]:
+        """The handles and pins in force at the playhead; looking reads back from the GPU where something has moved."""
+        replay, tick, dt = self.replay, self.replay.tick, self.dt
+        seen = replay, replay.recipe, tick, replay.warp.version
+        if self._held[0] != seen:
+            found, extent = [], replay.grid.extent
+            if any(led.is_in_force(tick, dt) for _, led in replay.led):
+                handles = replay.handles
+                for (label, led), handle, now, start in zip(
+                    replay.led, handles.handles, handles.places, handles.starts, strict=True
+                ):
+                    if led.is_in_force(tick, dt):
+                        start = now if np.isnan(start[0]) else start
+                        target = handle.wanted(start, max(replay.time, handle.ready), dt) if handle.goal else start
+                        places = ((float(x), float(y)) for x, y in (start / extent, now / extent, target / extent))
+                        found.append(Held(led, label, *places))
+            self._held = seen, found
+        return self._held[1]
+
+    def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:
+        """Set something about the handle or pin that messages call so, from its start on.
+
+        `commit`: as an entry of the history; not while a slider is dragged.
+        """
+        self.preview(**self._with_led(label, lambda led: (led.model_copy(update=settings),)))
+        if commit:
+            self.commit(name)
+
+    def let_go(self, label: str) -> None:
+        """Take a handle or a pin away, as if it had never been."""
+        self.release()
+        parts = self._with_led(label, lambda _: ())
+        if not parts["handle"]:
+            parts["stop"] = self._base.stop.model_copy(update={"handles_within": None})
+        self.edit(f"Remove {label.partition('[')[0]}", **parts)
+
+    def _with_led(
+        self, label: str, changed: Callable[[RecipeHandle | RecipePin], tuple[RecipeHandle | RecipePin, ...]]
+    ) -> dict[str, Any]:
+        """The handles and pins of now, with others in the place of one."""
+        recipe, parts = self._live, dict[str, Any](handle=(), pin=())
+        for name, led in labelled(recipe.handle, recipe.pin):
+            parts[led.kind] = *parts[led.kind], *(changed(led) if name == label else (led,))
+        return parts
+
+    def _under(self, x: float, y: float) -> Point:
+        """The place in the original of what is seen at a place."""
+        extent = self.extent
+        moved = self.replay.warp.at(np.multiply([(x, y)], extent))[0] / extent
+        at = round(float(x + moved[0]), 6), round(float(y + moved[1]), 6)
+        if not is_inside((x, y)) or not is_inside(at):
+            raise UserError("There is nothing of the picture here to take hold of.")
+        if len(self._base.handle) + len(self._base.pin) >= MOST_HANDLES:
+            raise UserError(f"There are {MOST_HANDLES} handles and pins already; remove one to set another.")
+        return at
+
+    def _take(self, led: RecipeHandle | RecipePin) -> RecipeHandle | None:
+        """Take a handle in hand; a pin becomes one, for good if it is led."""
+        base = self._base
+        kept = led if isinstance(led, RecipePin) else led.before(self._pen, self.dt)
+        if isinstance(led, RecipePin) and led in base.pin:
+            handle = RecipeHandle.model_validate(led.model_dump() | {"keys": ()})
+            base = base.edited(pin=tuple(pin for pin in base.pin if pin != led), handle=(*base.handle, handle))
+            self._base, kept = base, handle
+        if kept not in base.handle:
+            return None
+        self._taken = base.handle.index(kept)
+        return base.handle[self._taken]
+
     # -- time -------------------------------------------------------------------------------------------------------
 
     def advance(self, ticks: int) -> None:
@@ -230,7 +362,7 @@ class Session:
             self._approach(start + PATIENCE)
             return
         while ticks > 0 or self.is_behind:
-            if self.is_painting and ticks > 0 and (self.stroke is not None or self.coasting):
+            if self.is_painting and ticks > 0 and (self.made is not None or self.coasting):
                 self._record()
             elif self.is_behind:
                 self._step()
@@ -321,7 +453,7 @@ class Session:
         """
         if self._gesture is not None:
             assert self._touch is not None
-            if self.stroke is None or self.stroke.last_tick < self._pen:
+            if not isinstance(self.made, Stroke) or self.made.last_tick < self._pen:
                 self._touch = self._touch._replace(tick=self._pen)
                 self._hear(self._gesture.send(self._touch))
             self._pen += 1
@@ -329,7 +461,7 @@ class Session:
         if self._live.ticks < ticks:
             self._live = self._live.edited(duration=ticks * self.dt)
             self.replay.use(self._live)
-            if self.stroke is None:
+            if self.made is None:
                 self.document.history.amend(self._live)
                 self._base = self._live
         self._step()
@@ -398,6 +530,10 @@ class Session:
         before = [change for change in base.change if change.tick != tick]
         here = [change for change in base.change if change.tick == tick]
         made = (here[-1] if here else Change(tick=tick)).model_copy(update=settings)
+        if settings.get("reset_warp"):  # what holds the picture lets go of it
+            now = tick * self.dt
+            handles, pins = (tuple(_ended(led, now) for led in all_) for all_ in (base.handle, base.pin))
+            base = base.edited(handle=handles, pin=pins)
         # What is done at once needs a tick to be done in.
         duration = base.duration if lasts else (tick + 1) * self.dt
         self._use(base.edited(change=(*before, made), duration=duration))
@@ -556,12 +692,16 @@ class Session:
     def _cut(self, tick: int) -> None:
         base = self._base
         strokes = (stroke.before(tick) for stroke in base.stroke)
+        handles = (handle.before(tick, self.dt) for handle in base.handle)
         cut = base.edited(
             stroke=tuple(stroke for stroke in strokes if stroke is not None),
+            handle=tuple(handle for handle in handles if handle is not None),
+            pin=tuple(pin for pin in base.pin if pin.first_tick(self.dt) < tick),
             change=tuple(change for change in base.change if change.tick < tick),
             duration=max(tick, 1) * self.dt,
         )
-        if cut.stroke != base.stroke or cut.change != base.change:
+        parts = ("stroke", "handle", "pin", "change")
+        if any(getattr(cut, part) != getattr(base, part) for part in parts):
             self.notice = f"Going on from {tick * self.dt:.1f} s. What came after it is one Undo away."
         self._base = self._live = cut
         self.replay.use(cut)
@@ -584,3 +724,9 @@ class Session:
         """Free the textures."""
         self.forget_grid()
         self.replay.release()
+
+
+def _ended(led: RecipeHandle | RecipePin, time: float) -> RecipeHandle | RecipePin:
+    """A handle or a pin that lets go at a time, unless it has before."""
+    ends = led.end is not None and led.end <= time
+    return led if ends else led.model_copy(update={"end": max(time, led.start)})

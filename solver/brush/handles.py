@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,18 +21,22 @@ from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
-# Radii that a handle goes in a tick at most: what lies under its brush must still do so in the next.
-FARTHEST_STEP = 0.25
+# Radii that a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
+# step of the map follows a strain of 1/2.
+FARTHEST_STEP = 0.07
+SAME_TIME = 1e-6  # steps between two times that are the same but for their rounding
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
 # Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
-# and how many times farther apart in the original two neighbours on a lattice over the brush lie. From the first of
+# and how many times farther apart in the original two neighbours on a lattice lie. From the first of
 # each on it goes slower, at the second it stops: before anything folds.
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
-STRETCHING, TORN = 5.0, 7.5
-LATTICE = 17  # places along the brush's box where that is looked at
+STRETCHING, TORN = 8.0, 12.0
+PLACES = 256  # along the longer side of the picture where that is looked at, or as many as there are cells
+RINGS = (1 / 64, 1 / 32, 1 / 16)  # radii of rings of `AROUND` places around its middle, likewise: what two handles that
+AROUND = 16  # nearly meet lead apart is less than that far across
 # Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
 FOUND, LOST = 1e-7, 1e-4
 MOST_ROUNDS = 8
@@ -44,13 +48,15 @@ class Handle:
 
     Attributes:
         at: the place in the original of what is led.
-        to: where to; None for a pin, which stays where it is at its start.
+        to: where to; None if it stays where it is at its start, as a pin does.
         radius: how far its brush reaches.
         start: when it begins.
         duration: of the path, which begins and ends softly.
         end: when it lets go; until then it stays where it has arrived.
         stiffness: 1 is led exactly; with less it gives way to the fluid and to the others.
         local: the part of its motion, 0-1, that carries what is under it alone; see `Push`.
+        keys: times and places (t, x, y), in order and none before its first way has ended: where it is led after that,
+            at an even speed from one to the next.
 
     Raises:
         ValueError: if a number is not finite (but for `end`) or out of its range.
@@ -64,9 +70,11 @@ class Handle:
     end: float = math.inf
     stiffness: float = 1.0
     local: float = 0.0
+    keys: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        if not all(abs(place) <= FARTHEST for place in (*self.at, *(self.to or ()))):
+        places = (*self.at, *(self.to or ()), *(side for key in self.keys for side in key[1:]))
+        if not all(abs(place) <= FARTHEST for place in places):
             raise ValueError(f"a handle from {self.at} to {self.to} is off the picture by more than {FARTHEST:g} sides")
         if not 1e-6 <= self.radius <= 1:
             raise ValueError(f"a handle of radius {self.radius} was given; it must be from 1e-06 to 1")
@@ -76,6 +84,36 @@ class Handle:
             raise ValueError(f"a handle of stiffness {self.stiffness} was given; it must be from 0.001 to 1")
         if not 0 <= self.local <= 1:
             raise ValueError("the local part of a handle must be from 0 to 1")
+        times = [self.ready, *(key[0] for key in self.keys), math.inf]
+        if not all(earlier <= later for earlier, later in pairwise(times)):
+            raise ValueError("the times of a handle's keys must not go backwards, nor begin before its way has ended")
+
+    @property
+    def ready(self) -> float:
+        """When it has gone its first way, and its keys may begin."""
+        return self.start if self.to is None else self.start + self.duration
+
+    @property
+    def goal(self) -> Point | None:
+        """Where it is led in the end; None if it stays where it is at its start."""
+        return self.keys[-1][1:] if self.keys else self.to
+
+    def wanted(self, start: np.ndarray, time: float, dt: float) -> np.ndarray:
+        """Where it shall be at a time, (2,), if it was at `start` when it began; `dt` says how exact the time is."""
+
+        def within(place: Sequence[float]) -> np.ndarray:
+            way = np.subtract(place, start)
+            return way * min(1.0, LARGEST_LEAD * self.radius / max(float(np.hypot(*way)), 1e-30))
+
+        if not self.keys or time < self.ready:
+            return start if self.to is None else start + self.passed(time) * within(self.to)
+        stations = [(self.ready, *(start if self.to is None else self.to)), *self.keys]
+        number = max(number for number, (since, *_) in enumerate(stations) if since <= time + SAME_TIME * dt)
+        (since, *here), (until, *there) = stations[number], stations[min(number + 1, len(stations) - 1)]
+        if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
+            return start + within(here)
+        part = (time - since) / (until - since)
+        return start + (1 - part) * within(here) + part * within(there)
 
     def passed(self, time: float) -> float:
         """The part of its way, 0-1, that it shall have gone at a time."""
@@ -160,7 +198,9 @@ class Handles:
             self._starts[new] = self._places[new]
         numbers = np.flatnonzero(active)
         places, radii, share = self._places[numbers], self._radii[numbers], self._local[numbers]
-        wanted = self._wanted_velocities(numbers, time, dt)
+        slower = self._slower(numbers)
+        self._calm(places, radii, 1 - slower)
+        wanted = self._wanted_velocities(numbers, slower, time, dt)
         push, local = self._influences(places, radii)
         # What is local is shared out first: the fluid would else do all of it, going on by itself.
         both = (1 - share[:, None, None]) * push + share[:, None, None] * local
@@ -201,11 +241,16 @@ class Handles:
         return found
 
     @property
+    def starts(self) -> np.ndarray:
+        """Where they were when they began, (n, 2) in longer sides; NaN where they have not."""
+        return self._starts.copy()
+
+    @property
     def away(self) -> np.ndarray:
         """How far each is from where it shall be in the end, (n,) in longer sides; 0 of pins that have not begun."""
         places = self.places
         starts = np.where(np.isnan(self._starts), places, self._starts)
-        ends = [start if handle.to is None else handle.to for handle, start in zip(self.handles, starts, strict=True)]
+        ends = [handle.goal or start for handle, start in zip(self.handles, starts, strict=True)]
         return np.hypot(*(places - np.reshape(ends, (-1, 2))).T)
 
     # -- its state --------------------------------------------------------------------------------------------------
@@ -225,6 +270,7 @@ class Handles:
             if kept is None or kept.dtype != np.float64 or kept.ndim != 2 or kept.shape[1] != 2:
                 raise ValueError("the state of handles is missing")
         self._places, self._starts = (self._fitted(state.values[name]) for name in ("places", "starts"))
+        self._lead = None
 
     def release(self) -> None:
         """Free the textures."""
@@ -265,18 +311,15 @@ class Handles:
         places[begun] = best
         return places
 
-    def _wanted_velocities(self, numbers: np.ndarray, time: float, dt: float) -> np.ndarray:
+    def _wanted_velocities(self, numbers: np.ndarray, slower: np.ndarray, time: float, dt: float) -> np.ndarray:
         """How the handles of these numbers shall move in this step, longer sides / s."""
-        wanted, slower = np.zeros((len(numbers), 2)), self._slower(numbers)
+        wanted = np.zeros((len(numbers), 2))
         for row, number in enumerate(numbers):
             handle, start, place = self.handles[number], self._starts[number], self._places[number]
-            way = np.zeros(2) if handle.to is None else np.subtract(handle.to, start)
-            way = way * min(1.0, LARGEST_LEAD * handle.radius / max(float(np.hypot(*way)), 1e-30))
-            now, then = handle.passed(time), handle.passed(time + dt)
-            back = start + now * way - place
+            now, then = handle.wanted(start, time, dt), handle.wanted(start, time + dt, dt)
+            back = now - place
             most = FARTHEST_STEP * handle.radius
-            back = back * -math.expm1(-RATE * dt) * min(1.0, most / max(float(np.hypot(*back)), 1e-30))
-            step = slower[row] * ((then - now) * way + back)
+            step = slower[row] * (then - now - math.expm1(-RATE * dt) * back)
             wanted[row] = step * min(1.0, most / max(float(np.hypot(*step)), 1e-30)) / dt
         return wanted
 
@@ -284,22 +327,40 @@ class Handles:
         """The part of its speed, 0-1, that the map around each of these handles still allows."""
         if not len(numbers):
             return np.zeros(0)
-        along, count = np.linspace(-1, 1, LATTICE), len(numbers)
-        lattice = np.stack(np.meshgrid(along, along), axis=-1) * self._radii[numbers, None, None, None]
-        points = np.clip(self._places[numbers, None, None] + lattice, 0.0, self._warp.extent)
-        listed = points.reshape(-1, 2)
-        least = self._warp.determinants(listed).reshape(count, -1).min(axis=1)
-        original, most = points + self._warp.at(listed).reshape(points.shape), np.zeros(count)
-        for axis in (1, 2):
-            apart, far = (np.linalg.norm(np.diff(places, axis=axis), axis=-1) for places in (original, points))
-            ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
-            most = np.maximum(most, ratio.reshape(count, -1).max(axis=1))
-        local = float(self._local.max())
+        extent, radii = np.array(self._warp.extent), self._radii[numbers]
+        count = np.maximum(self._fluid.grid.size, PLACES * extent / extent.max()).astype(int)
+        columns, rows = ((np.arange(n) + 0.5) * side / n for n, side in zip(count, extent, strict=True))
+        over = _distorted(self._warp, np.stack(np.meshgrid(columns, rows), axis=-1)[None])[0]
+        angles = 2 * np.pi * np.arange(AROUND + 1) / AROUND
+        rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        close = self._places[numbers, None, None] + rings * radii[:, None, None, None]
+        near = _distorted(self._warp, np.clip(close, 0.0, extent)).reshape(len(numbers), -1, 2)
+        least, most = near[..., 0].min(axis=1), near[..., 1].max(axis=1)
+        low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
+        high = np.ceil((self._places[numbers] + radii[:, None]) / extent * count).astype(int)
+        for row, ((left, top), (right, bottom)) in enumerate(zip(low, high, strict=True)):
+            box = over[top : max(bottom, top + 1), left : max(right, left + 1)]
+            least[row] = min(least[row], box[..., 0].min())
+            most[row] = max(most[row], box[..., 1].max())
+        local = self._local[numbers]
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
         return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
 
     # -- what they do to the fluid ----------------------------------------------------------------------------------
+
+    def _calm(self, places: np.ndarray, radii: np.ndarray, share: np.ndarray) -> None:
+        """Take that share of what flows under handles: those that halt, as the map bears no more, halt the fluid."""
+        if not share.any():
+            return
+        fluid = self._fluid
+        listed = np.column_stack([places - fluid.grid.origin, radii, share])
+        handles = fluid.device.upload(listed[None].astype(np.float32), "handles that halt")
+        calm = fluid.device.pass_("brush/calm.frag")
+        fluid.impulse.add(
+            lambda faces: calm(faces, add=True, handles=handles, velocity=fluid.faces(), spacing=fluid.grid.spacing)
+        )
+        handles.release()
 
     def _influences(self, places: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How the push and the local brush of each handle move each: velocities (i, a) for forces (j, b)."""
@@ -376,6 +437,19 @@ class Handles:
 def _brushes(lead: Lead) -> tuple[list[Point], list[float]]:
     """Places and radii of the active handles."""
     return [(x, y) for x, y in lead.places.tolist()], lead.radii.tolist()
+
+
+def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
+    """At lattices of places (k, n, m, 2): det J, and how many times nearer than in the original a neighbour lies."""
+    listed, found = points.reshape(-1, 2), np.zeros(points.shape)
+    found[..., 0] = warp.determinants(listed).reshape(points.shape[:-1])
+    original = points + warp.at(listed).reshape(points.shape)
+    for axis in (1, 2):
+        apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, points))
+        ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
+        after = [slice(None), slice(1, None)] if axis == 1 else [slice(None), slice(None), slice(1, None)]
+        found[(*after, ..., 1)] = np.maximum(found[(*after, ..., 1)], ratio)
+    return found
 
 
 def _smoothstep(part: np.ndarray) -> np.ndarray:

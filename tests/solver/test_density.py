@@ -26,7 +26,7 @@ def advanced(device: Device, values: np.ndarray, dt: float, velocity: np.ndarray
 @pytest.mark.parametrize("shape", [(24, 32), (24, 32, 3), (30, 40, 4)])
 def test_it_is_carried_downstream_and_mixed_between_four(device: Device, shape: tuple[int, ...]) -> None:
     values = np.random.default_rng(0).random(shape, np.float32)
-    velocity = np.broadcast_to(np.float32([0.3, -0.2]), STILL.shape)
+    velocity = np.broadcast_to(np.array([0.3, -0.2], np.float32), STILL.shape)
     dt = 0.25
     found = advanced(device, values, dt, velocity)
     # In texels; those whose way lies inside, away from the walls' own faces.

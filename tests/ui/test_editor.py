@@ -912,7 +912,7 @@ def test_every_action_can_be_done_at_any_time(robot: Robot, name: str) -> None:
 
 @pytest.mark.parametrize("tool", [tool.name for tool in TOOLS])
 def test_the_strip_chooses_tools(robot: Robot, tool: str) -> None:
-    ends = ("pinch", "bloat", "smooth", "restore")
+    ends = ("pinch", "handle", "smooth", "restore")
     strip = robot.editor.layout.strip
     assert strip is not None
     y = strip.y + 8.0

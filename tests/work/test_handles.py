@@ -135,6 +135,14 @@ def test_a_handle_that_comes_into_the_picture_gives_the_same_as_one_that_was_the
         each.release()
 
 
+def test_a_local_handle_moves_nothing_before_it_begins_once_the_playhead_has_gone_back(device: Device):
+    replay = replay_of(device, handle=[led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=1.0)])
+    replay.seek(20)
+    replay.seek(7)
+    assert not replay.warp.read().any()
+    replay.release()
+
+
 @pytest.mark.parametrize("dt", [1 / 60, 0.02, 0.1, 1e-308])
 def test_a_handle_begins_in_the_tick_that_it_says(dt: float):
     """In the middle of a tick, too, however that is rounded."""

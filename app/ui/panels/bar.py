@@ -44,6 +44,8 @@ SETTINGS = (
             "} makes it harder. A soft brush bends the picture gently."),
     Setting("strength", "Strength", "Strength", 0.05, 1.0, ";",
             "' makes it stronger. Full strength moves the picture with the pointer."),
+    Setting("stiffness", "Stiffness", "Stiffness", 0.01, 1.0, "",
+            "At 100 % a handle is led exactly. With less it gives way to the fluid and to the others."),
     Setting("local", "Local", "Local", 0.0, 1.0, "",
             "At 0 % the picture flows back beside the brush, as a fluid does. At 100 % only what is under it moves."),
 )  # fmt: skip
@@ -99,8 +101,7 @@ def _title(ui: Ui, tool: Tool, room: float) -> None:
 def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, room: float) -> None:
     """What can be set about the brush, up to `room`; for the rest there is a button."""
     across = 148 if imgui.get_window_width() > ui.px(1080) else 112
-    own = state.tool.own
-    settings = [setting for setting in SETTINGS if setting.name in ("radius", "hardness", "strength", *own)]
+    settings = [setting for setting in SETTINGS if setting.name in state.tool.settings]
     parts: list[tuple[float, Callable[[float], None]]] = [
         (ui.px(across), lambda width, setting=setting: _slider(ui, workspace, state, setting, width))
         for setting in settings

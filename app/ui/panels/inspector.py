@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import hypot
 from pathlib import PurePath
 
+import numpy as np
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.model.handles import ARRIVED, RecipeHandle, labelled
 from app.model.presets import DEFAULT
 from app.ui.actions import Do
 from app.ui.clock import Clock
-from app.ui.editor_state import EditorState
+from app.ui.editor_state import SMALLEST, EditorState
 from app.ui.panels import feels
 from app.ui.quality import Quality
 from app.ui.theme import packed
-from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS
+from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS, Unit
 from app.ui.viewport import Rect
 from app.ui.widgets import Slid, Ui
 from app.ui.workspace import Workspace
@@ -31,6 +35,7 @@ def draw(ui: Ui, rect: Rect, workspace: Workspace, state: EditorState, quality: 
     with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none):
         imgui.begin_child("sections")
         for name, label, section, opened in (
+            *_about_handles(ui, workspace, state, do),
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("view", "Overlays", lambda: _view(ui, state), True),
             ("quality", "Picture and quality", lambda: _quality(ui, workspace, quality), False),
@@ -44,6 +49,71 @@ def draw(ui: Ui, rect: Rect, workspace: Workspace, state: EditorState, quality: 
                 imgui.dummy(ImVec2(0, 0))
             ui.line()
         imgui.end_child()
+
+
+def _about_handles(
+    ui: Ui, workspace: Workspace, state: EditorState, do: Do
+) -> list[tuple[str, str, Callable[[], None], bool]]:
+    """The section about handles, where there is something to say."""
+    session = workspace.session
+    if state.tool_name != "handle" and not session.recipe.leads:
+        return []
+    return [("handles", "Handles and pins", lambda: _handles(ui, workspace, state, do), True)]
+
+
+def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
+    session = workspace.session
+    pixels = Unit(" px", max(workspace.canvas.size))
+    label, recipe = state.selected, session.recipe
+    if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
+        ui.wrapped(
+            "Drag a point of the picture where it shall go; a click pins one. Click one to select it.",
+            ui.palette.dim,
+            13,
+        )
+    else:
+        ui.text(label.capitalize(), size=14)
+        imgui.same_line()
+        ui.dim(_whereabouts(workspace, label))
+        slid = ui.slider(
+            "held radius", "Reach", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
+            title="How far it reaches", more="It is led two of that at most.",
+        )  # fmt: skip
+        _set_held(session, label, "Reach of a handle", slid, radius=slid.value)
+        slid = ui.slider(
+            "held stiffness", "Stiffness", led.stiffness, 0.01, 1.0, PERCENT, 1.0,
+            title="Stiffness", more="With less it gives way to the fluid and to the others.",
+        )  # fmt: skip
+        _set_held(session, label, "Stiffness of a handle", slid, stiffness=slid.value)
+        if isinstance(led, RecipeHandle):
+            slid = ui.slider(
+                "held local", "Local", led.local, 0.0, 1.0, PERCENT, 0.0,
+                title="Local", more="At 0 % the picture flows back beside it. At 100 % only what is under it moves.",
+            )  # fmt: skip
+            _set_held(session, label, "Flow of a handle", slid, local=slid.value)
+        if ui.button("Remove", width=-1, height=30):
+            do("remove")
+        ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
+    away = sum(held.is_away(session.extent) for held in session.held)
+    ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all" + (f", {away} not where led" if away else ""))
+
+
+def _whereabouts(workspace: Workspace, label: str) -> str:
+    """How far the handle that is called so is led, and what is left of that, in pixels; of one that is in force."""
+    session, pixels = workspace.session, max(workspace.canvas.size)
+    for held in session.held:
+        if held.label == label:
+            led, left = (hypot(*np.subtract(a, held.target) * session.extent) for a in (held.start, held.now))
+            rest = f", {pixels * left:.0f} px left" if left > ARRIVED else ""
+            return f"led {pixels * led:.0f} px{rest}" if led > 1e-9 else f"stays{rest}"
+    return ""
+
+
+def _set_held(session: Session, label: str, name: str, slid: Slid, **setting: float) -> None:
+    if slid.again:
+        session.undo()
+    if slid.changed or slid.done:
+        session.edit_held(name, label, slid.done, **setting)
 
 
 def _fluid(ui: Ui, session: Session, state: EditorState) -> None:

@@ -17,7 +17,7 @@ from app.work.session import Session
 
 BEHIND = 12  # ticks from which on it is told that the simulation is behind
 MOST_WAITING = 100  # strokes that are drawn
-WHITE, BLACK = rgb("ffffff"), rgb("000000")
+WHITE, BLACK, WARN = rgb("ffffff"), rgb("000000"), rgb("f2a93b")
 
 
 def draw(ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: PointerController) -> None:
@@ -31,6 +31,8 @@ def draw(ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: 
         _split(ui, view, state.split, lines)
     _path(ui, view, session, lines)
     _waiting(ui, view, session, lines)
+    if not state.before:
+        _handles(ui, view, session, state, pointer, lines)
     if pointer.shows_ring:
         _ring(ui, view, state, pointer, lines)
     lines.pop_clip_rect()
@@ -60,9 +62,40 @@ def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController
         lines.add_line(ImVec2(x - reach, y), ImVec2(x + reach, y), packed(WHITE), ui.px(1.6))
 
 
+def _handles(
+    ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList
+) -> None:
+    """Where handles were, are and shall be; faint while another tool is in hand. A pin is a dot in a ring."""
+    in_hand = state.tool_name == "handle"
+    alpha, hovered = 1.0 if in_hand else 0.45, pointer.hovered
+    for held in session.held:
+        start, now, target = (ImVec2(*view.to_screen(*place)) for place in (held.start, held.now, held.target))
+        selected = in_hand and held.label == state.selected
+        ink = ui.palette.accent if selected or held is hovered else WHITE
+        if selected:
+            reach = held.led.radius * view.longer
+            lines.add_circle(target, reach, packed(BLACK, 0.3), max(32, min(int(reach), 96)), ui.px(2.0))
+            lines.add_circle(target, reach, packed(ink, 0.6), max(32, min(int(reach), 96)), ui.px(1.0))
+        if hypot(target.x - start.x, target.y - start.y) > ui.px(8):
+            for colour, width in ((packed(BLACK, 0.45 * alpha), 3.6), (packed(ink, 0.8 * alpha), 1.6)):
+                lines.add_line(start, target, colour, ui.px(width))
+            lines.add_circle_filled(start, ui.px(3.2), packed(BLACK, 0.45 * alpha), 16)
+            lines.add_circle_filled(start, ui.px(2.2), packed(ink, alpha), 16)
+        radius = ui.px(7 if selected or held is hovered else 6)
+        lines.add_circle_filled(target, radius + ui.px(1.4), packed(BLACK, 0.45 * alpha), 24)
+        lines.add_circle_filled(target, radius, packed(ui.palette.panel, 0.85 * alpha), 24)
+        lines.add_circle(target, radius, packed(ink, alpha), 24, ui.px(1.8))
+        if held.is_away(session.extent):
+            lines.add_line(now, target, packed(WARN, alpha), ui.px(1.6))
+            lines.add_circle_filled(now, ui.px(4), packed(BLACK, 0.45 * alpha), 16)
+            lines.add_circle_filled(now, ui.px(3), packed(WARN, alpha), 16)
+        else:
+            lines.add_circle_filled(target, ui.px(2.6), packed(ink, alpha), 16)
+
+
 def _path(ui: Ui, view: Viewport, session: Session, lines: imgui.ImDrawList) -> None:
     """The path of a curve that is being drawn."""
-    if session.stroke is not None or len(session.path) < 2:
+    if session.made is not None or len(session.path) < 2:
         return
     points: list[Any] = [ImVec2(*view.to_screen(*place)) for place in session.path]
     lines.add_polyline(points, packed(BLACK, 0.45), ui.px(5), 0)

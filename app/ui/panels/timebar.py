@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.model.handles import RecipeHandle, labelled
 from app.ui.actions import Do
+from app.ui.editor_state import EditorState
 from app.ui.theme import Colour, blend, packed, rgb
 from app.ui.units import PERCENT
 from app.ui.viewport import Rect
@@ -18,9 +22,11 @@ KINDS: dict[str, Colour] = {
     "pinch": rgb("56b4e9"), "restore": rgb("bdbdbd"),
 }  # fmt: skip
 MASKS = rgb("0f86c9")
+HANDLES = rgb("4fc1a6")
+LANES = 4  # of bars of handles, one below the other
 
 
-def draw(ui: Ui, rect: Rect, session: Session, do: Do) -> None:
+def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> None:
     """Buttons, the time, the track, and how much of the warp is seen."""
     with ui.panel("timeline", rect, (8, 12)):
         some = session.end > 0
@@ -40,7 +46,7 @@ def draw(ui: Ui, rect: Rect, session: Session, do: Do) -> None:
             imgui.same_line(0, ui.px(16))
         across = min(168, 0.3 * imgui.get_window_width() / ui.scale)
         amount = ui.px(across)
-        _track(ui, session, imgui.get_content_region_avail().x - amount - ui.px(16))
+        _track(ui, session, state, imgui.get_content_region_avail().x - amount - ui.px(16))
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(14))
         part = session.target / session.end if some else 1.0
@@ -66,7 +72,7 @@ def _time(ui: Ui, now: float, end: float) -> None:
     imgui.dummy(ImVec2(ui.px(108), ui.px(32)))
 
 
-def _track(ui: Ui, session: Session, width: float) -> None:
+def _track(ui: Ui, session: Session, state: EditorState, width: float) -> None:
     palette = ui.palette
     width = max(width, ui.px(40))
     corner, height = imgui.get_cursor_screen_pos(), ui.px(32)
@@ -98,6 +104,7 @@ def _track(ui: Ui, session: Session, width: float) -> None:
         faded = 1.0 if stroke.first_tick < min(session.tick, session.target) else 0.45
         low, high = ImVec2(a, top + ui.px(3)), ImVec2(max(b - ui.px(1), a + ui.px(2)), bottom - ui.px(3))
         draw.add_rect_filled(low, high, packed(colour, faded), ui.px(2))
+    _handles(ui, session, state, across, top, bottom, draw)
     for change in session.recipe.change:
         x = across(change.tick)
         draw.add_line(ImVec2(x, top), ImVec2(x, bottom), packed(palette.dim), ui.px(1))
@@ -107,3 +114,28 @@ def _track(ui: Ui, session: Session, width: float) -> None:
     draw.add_circle_filled(ImVec2(now, (top + bottom) / 2), radius, packed(ink), 24)
     if hovered and not held:
         ui.tooltip("The recording", more="Drag to go through it both ways. Paint anywhere to go on from there.")
+
+
+def _handles(
+    ui: Ui,
+    session: Session,
+    state: EditorState,
+    across: Callable[[float], float],
+    top: float,
+    bottom: float,
+    draw: imgui.ImDrawList,
+) -> None:
+    """A bar for each handle and pin: bright while it is led, faint while it only holds; the selected one is white."""
+    recipe, dt = session.recipe, session.dt
+    led = labelled(recipe.handle, recipe.pin)
+    lanes = min(len(led), LANES)
+    for number, (label, one) in enumerate(led):
+        last = one.last if isinstance(one, RecipeHandle) else one.start
+        ways = [(one.start, session.end * dt if one.end is None else one.end, 0.4), (one.start, last, 1.0)]
+        y = top + ui.px(2) + (bottom - top - ui.px(4)) * (number % lanes) / lanes
+        height = max((bottom - top - ui.px(4)) / lanes - ui.px(1), ui.px(1.5))
+        colour = ui.palette.text if label == state.selected else HANDLES
+        for start, end, alpha in ways:
+            low = ImVec2(across(start / dt), y)
+            high = ImVec2(max(across(end / dt), low.x + ui.px(2)), y + height)
+            draw.add_rect_filled(low, high, packed(colour, alpha), ui.px(1))

@@ -1,0 +1,225 @@
+"""The Handle tool: points that are dragged, pinned, led on and removed; and the same bytes whoever replays them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.media import project as projects
+from app.media.pictures import read_picture
+from app.model.handles import ARRIVED, MOST_HANDLES
+from app.model.recipe import Recipe
+from app.progress import Progress
+from app.ui.events import Mods
+from app.work import journal
+from app.work.export import run
+from app.work.jobs import Job, Outputs
+from app.work.journal import Origin, Work
+from app.work.replay import Replay
+from app.work.session import Session
+from solver.gl.device import Device
+from support.editing import Robot, command_line, small_project
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    robot = Robot(device, small_project(tmp_path, grid=64))
+    robot.key("g")
+    yield robot
+    robot.close()
+
+
+def names(robot: Robot) -> list[str]:
+    return [entry.name for entry in robot.editor.session.document.history.entries]
+
+
+def drag(robot: Robot, start: tuple[float, float], end: tuple[float, float]) -> None:
+    robot.drag(start, end, steps=6)
+    robot.rest()
+
+
+def test_a_point_is_dragged_where_it_shall_go_and_stays_there(robot: Robot) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.47))
+    session = robot.editor.session
+    assert names(robot) == ["Open", "Handle"]
+    (handle,) = session.recipe.handle
+    assert handle.at == pytest.approx((0.4, 0.5), abs=2e-3)
+    assert handle.goal == pytest.approx((0.45, 0.47), abs=2e-3)
+    (held,) = session.held
+    assert held.now == pytest.approx(handle.goal, abs=2 * ARRIVED)
+    for _ in range(20):
+        session.step()
+    assert session.held[0].now == pytest.approx(handle.goal, abs=2 * ARRIVED)
+
+
+def test_it_is_driven_while_the_pointer_still_drags(robot: Robot) -> None:
+    x, y = robot.at(0.4, 0.5)
+    robot.move(x, y)
+    robot.press()
+    for step in range(8):
+        robot.move(x + 4 * step, y)
+    assert robot.editor.session.held[0].now[0] > 0.41
+    robot.release()
+
+
+def test_a_click_pins_a_point(robot: Robot) -> None:
+    robot.click(*robot.at(0.5, 0.5))
+    drag(robot, (0.4, 0.5), (0.43, 0.55))
+    assert names(robot) == ["Open", "Pin", "Handle"]
+    pin, handle = robot.editor.session.recipe.handle
+    assert pin.keys == ()
+    assert handle.keys
+    for held in robot.editor.session.held:
+        assert not held.is_away(robot.editor.session.extent)
+    assert robot.editor.session.held[0].now == pytest.approx((0.5, 0.5), abs=3e-3)
+
+
+def test_a_handle_is_picked_again_and_led_on(robot: Robot) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    drag(robot, (0.45, 0.5), (0.45, 0.56))
+    assert names(robot) == ["Open", "Handle", "Lead on"]
+    (handle,) = robot.editor.session.recipe.handle
+    assert handle.at == pytest.approx((0.4, 0.5), abs=2e-3)
+    assert robot.editor.session.held[0].now == pytest.approx((0.45, 0.56), abs=4e-3)
+    robot.key("ctrl+z")
+    robot.rest()
+    assert robot.editor.session.held[0].now == pytest.approx((0.45, 0.5), abs=4e-3)
+
+
+def test_a_click_on_a_handle_selects_it_and_changes_nothing(robot: Robot) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    robot.click(*robot.at(0.7, 0.7))
+    robot.rest()
+    recipe = robot.editor.session.recipe
+    robot.click(*robot.at(0.45, 0.5))
+    assert robot.editor.state.selected == "handle[1]"
+    assert robot.editor.session.recipe == recipe
+    assert names(robot) == ["Open", "Handle", "Pin"]
+
+
+@pytest.mark.parametrize("way", ["delete", "alt", "inspector"])
+def test_a_handle_is_removed_as_if_it_had_never_been(robot: Robot, way: str) -> None:
+    robot.click(*robot.at(0.6, 0.5))
+    robot.rest()
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    led = robot.warp()
+    if way == "delete":
+        robot.key("delete")
+    elif way == "alt":
+        robot.mods = Mods(alt=True)
+        robot.click(*robot.at(0.45, 0.5))
+    else:
+        robot.editor.do("remove")
+    robot.rest()
+    assert names(robot)[-1] == "Remove handle"
+    assert len(robot.editor.session.recipe.handle) == 1
+    assert np.abs(robot.warp()).max() < ARRIVED
+    robot.key("ctrl+z")
+    robot.rest()
+    assert np.array_equal(robot.warp(), led)
+
+
+def test_escape_gives_a_handle_up(robot: Robot) -> None:
+    x, y = robot.at(0.4, 0.5)
+    robot.move(x, y)
+    robot.press()
+    robot.move(x + 30, y)
+    robot.key("escape")
+    robot.release()
+    robot.rest()
+    assert names(robot) == ["Open"]
+    assert not robot.editor.session.recipe.handle
+
+
+def test_nothing_is_held_outside_the_picture_nor_too_much_in_it(robot: Robot) -> None:
+    robot.click(*robot.at(-0.05, 0.5))
+    assert "nothing of the picture" in robot.editor.messages.shown[-1].text
+    pin = {"at": (0.5, 0.5), "keys": ()}
+    full = Recipe.model_validate({"handle": tuple(pin for _ in range(MOST_HANDLES))})
+    robot.editor.session.edit("Many", handle=full.handle)
+    robot.click(*robot.at(0.2, 0.2))
+    assert f"{MOST_HANDLES} handles" in robot.editor.messages.shown[-1].text
+    assert len(robot.editor.session.recipe.handle) == MOST_HANDLES
+
+
+def test_going_on_from_an_earlier_moment_takes_back_what_was_led_after_it(robot: Robot) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    session = robot.editor.session
+    middle = session.end
+    robot.click(*robot.at(0.7, 0.7))
+    drag(robot, (0.45, 0.5), (0.45, 0.56))
+    session.seek(middle)
+    robot.rest()
+    drag(robot, (0.2, 0.3), (0.22, 0.3))
+    first, second = session.recipe.handle
+    assert first.goal == pytest.approx((0.45, 0.5), abs=2e-3)
+    assert second.at == pytest.approx((0.2, 0.3), abs=2e-3)
+    assert not any(held.is_away(session.extent) for held in session.held)
+
+
+def test_the_inspector_s_settings_hold_from_the_start(robot: Robot, device: Device) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    session = robot.editor.session
+    for radius in (0.2, 0.25, 0.3):
+        session.edit_held("Reach of a handle", "handle[1]", radius == 0.3, radius=radius)
+        robot.frame()
+    robot.rest()
+    assert names(robot) == ["Open", "Handle", "Reach of a handle"]
+    again = Replay(device, session.recipe, session.pictures)
+    again.seek(session.tick)
+    assert np.array_equal(again.warp.read(), robot.warp())
+    again.release()
+
+
+def test_a_pin_of_a_recipe_becomes_a_handle_when_it_is_led(robot: Robot) -> None:
+    robot.drag((0.8, 0.8), (0.82, 0.8))
+    robot.rest()
+    pins = Recipe.model_validate({"pin": ({"at": (0.4, 0.5)},)}).pin
+    robot.editor.session.edit("Pinned", pin=pins)
+    robot.rest()
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    recipe = robot.editor.session.recipe
+    assert recipe.pin == ()
+    assert recipe.handle[1].at == (0.4, 0.5)
+    assert recipe.handle[1].goal == pytest.approx((0.45, 0.5), abs=2e-3)
+
+
+def test_reset_lets_go(robot: Robot) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    robot.key("ctrl+r")
+    robot.rest()
+    assert robot.editor.session.held == []
+    assert np.abs(robot.warp()).max() < ARRIVED
+
+
+def test_the_window_a_file_the_journal_and_the_command_line_give_the_same_bytes(
+    robot: Robot, device: Device, tmp_path: Path
+) -> None:
+    session = robot.editor.session
+    robot.click(*robot.at(0.6, 0.5))
+    drag(robot, (0.4, 0.5), (0.45, 0.47))
+    robot.key("p")
+    drag(robot, (0.3, 0.7), (0.35, 0.75))
+    robot.key("g")
+    drag(robot, (0.45, 0.47), (0.43, 0.42))
+    seen = robot.warp()
+    project = projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "w.fluidwarp")
+    loaded = projects.load(tmp_path / "w.fluidwarp")
+    assert loaded.recipe == session.recipe == Recipe.parse(session.recipe.text())
+    again = Session(device, loaded)
+    again.settle()
+    assert np.array_equal(again.replay.warp.read(), seen)
+    again.release_gpu()
+    history = session.document.history
+    work = Work(history.entries, history.index, session.document.saved_recipe)
+    first = Work(history.entries[:2], 1, session.document.saved_recipe)
+    lines = [*journal.beginning(Origin.of(project), first), journal.continuation(work, first)]
+    assert journal.read(b"".join(lines))[1].recipe == session.recipe
+    files = [tmp_path / "a.png", tmp_path / "b.png"]
+    command_line("render", str(tmp_path / "w.fluidwarp"), "-o", str(files[0]))
+    run(device, Job(session.recipe, session.project.picture, session.project.folder, Outputs(files[1])), Progress())
+    assert np.array_equal(read_picture(files[0]).pixels, read_picture(files[1]).pixels)
