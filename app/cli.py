@@ -392,14 +392,17 @@ def gallery(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="The folder to write to.")] = Path(
         "gallery"
     ),
+    strokes: Annotated[
+        bool, typer.Option("--strokes", help="What a hand does instead: three retouching jobs and three posters.")
+    ] = False,
 ) -> None:
     """Make the paper's figures again: results, animations and contact sheets."""
-    from app.gallery import make
+    from app import gallery, retouching
     from app.progress import on_terminal
     from solver.gl.device import Device
 
     with on_terminal("gallery", None) as progress, Device.headless() as device:
-        measured = make(device, output, progress)
+        measured = (retouching if strokes else gallery).make(device, output, progress)
     for figure, numbers in measured.items():
         print(f"{figure}: {', '.join(f'{name} {number}' for name, number in numbers.items())}")
 

@@ -1,0 +1,148 @@
+"""What strokes of the hand do: three retouching jobs on a photograph of 24 megapixels, and three posters."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from app.gallery import Numbers, Studio, load, recipes_folder, source_of, writable
+from app.media.auxiliary import Pictures
+from app.media.pictures import write_picture
+from app.model.picture import Picture
+from app.model.recipe import Recipe
+from app.model.strokes import Stroke
+from app.progress import Progress
+from app.work.replay import Replay
+from solver.gl.device import Device
+from solver.resample.plan import Sampling
+
+PHOTOGRAPH = 6000, 4000  # pixels
+PORTRAIT = 1200  # pixels along a side of the portrait in its middle; a face in it is some 900 high
+POSTER = 2000  # pixels along the longer side
+SHOWN = 520  # rows of a poster on its sheet
+
+Box = tuple[int, int, int, int]
+
+# What is shown of the photograph at 100 %: left, top, right, bottom.
+JOBS: dict[str, tuple[str, Box]] = {
+    "retouching-mouth": ("Lifting the corner of a mouth", (2640, 1980, 3340, 2500)),
+    "retouching-jaw": ("Slimming a jaw with ten small dabs", (2600, 1880, 3340, 2590)),
+    "retouching-eye": ("Enlarging an eye; the rim of the glasses is frozen", (2540, 1580, 3140, 1980)),
+}
+POSTERS = ("poster-terrace", "poster-tanguy", "poster-night-cafe")
+
+
+def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]:
+    """Play every job and poster, write what comes of them into `folder`, and return what was measured on each.
+
+    Raises:
+        UserError: if the folder cannot be written to.
+        Cancelled: if `progress` says so.
+    """
+    writable(folder)
+    progress.total = sum(load(name).ticks for name in (*JOBS, *POSTERS))
+    studio = Studio(device, folder, progress)
+    try:
+        return {name: retouch(studio, name) for name in JOBS} | {name: poster(studio, name) for name in POSTERS}
+    finally:
+        studio.release()
+
+
+def retouch(studio: Studio, name: str, smaller: int = 1) -> Numbers:
+    """Play a job and write its sheet, cut from the whole photograph before and after.
+
+    Args:
+        studio: where.
+        name: of the job.
+        smaller: times smaller than `PHOTOGRAPH` the photograph is.
+    """
+    title, box = JOBS[name]
+    left, top, right, bottom = (side // smaller for side in box)
+    recipe = load(name)
+    before = photograph(source_of(recipe), smaller)
+    after, moved, numbers = _played(studio, recipe, before, before.shape[1::-1])
+    shown = np.zeros(before.shape[:2], bool)
+    shown[top:bottom, left:right] = True
+    changed = (after != before).any(axis=-1)
+    numbers["pixels changed"] = f"{changed.sum()}"
+    numbers["px beyond the sheet, most"] = f"{moved[~shown].max():.3f}"
+    frozen = np.zeros(before.shape[:2], bool)
+    for stroke in recipe.stroke:
+        if stroke.tool == "freeze":
+            frozen |= beneath(stroke, before.shape[1::-1])
+    if frozen.any():
+        numbers["pixels frozen"] = f"{frozen.sum()}"
+        numbers["frozen pixels changed"] = f"{changed[frozen].sum()}"
+    panels = [("before", before[top:bottom, left:right]), ("after", after[top:bottom, left:right])]
+    studio.sheet(name, title, panels, bottom - top)
+    return numbers
+
+
+def poster(studio: Studio, name: str) -> Numbers:
+    """Play a poster, and write it and its sheet."""
+    recipe = load(name)
+    source = source_of(recipe)
+    part = POSTER / max(source.shape)
+    after, _, numbers = _played(studio, recipe, source, (round(source.shape[1] * part), round(source.shape[0] * part)))
+    write_picture(studio.folder / f"{name}.png", Picture(after))
+    studio.sheet(name, recipe.name, [("before", source), ("after", after)], SHOWN)
+    return numbers
+
+
+def photograph(portrait: np.ndarray, smaller: int = 1) -> np.ndarray:
+    """A portrait (n, n, 3) uint8, enlarged into the middle of a photograph, its edges drawn out; (h, w, 3) uint8."""
+    width, height = (side // smaller for side in PHOTOGRAPH)
+    side = PORTRAIT // smaller
+    enlarged = np.asarray(Image.fromarray(portrait).resize((side, side), Image.Resampling.LANCZOS))
+    around = [((whole - side) // 2, (whole - side + 1) // 2) for whole in (height, width)]
+    return np.pad(enlarged, (*around, (0, 0)), "edge")
+
+
+def beneath(stroke: Stroke, size: tuple[int, int]) -> np.ndarray:
+    """The pixels of a picture of `size` that the ring of a stroke's brush has passed over, a pixel within it.
+
+    Returns:
+        bool (height, width).
+    """
+    width, height = size
+    passed = np.zeros((height, width), bool)
+    places = [np.array([x * width, y * height]) for _, x, y, _ in stroke.samples]
+    reach = stroke.radius * max(size) - 1
+    for start, end in pairwise([places[0], *places]):
+        low, high = np.minimum(start, end) - reach - 1, np.maximum(start, end) + reach + 1
+        (x0, y0), (x1, y1) = np.maximum(low, 0).astype(int), np.minimum(np.ceil(high), size).astype(int)
+        centre = np.stack(np.meshgrid(np.arange(x0, x1) + 0.5, np.arange(y0, y1) + 0.5), axis=-1) - start
+        way = end - start
+        part = np.clip(centre @ way / max(way @ way, 1e-9), 0, 1)
+        passed[y0:y1, x0:x1] |= np.linalg.norm(centre - part[..., None] * way, axis=-1) < reach
+    return passed
+
+
+def _played(
+    studio: Studio, recipe: Recipe, source: np.ndarray, size: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray, Numbers]:
+    """The result of a recipe on a picture, (h, w, 3) uint8 of `size`; how far each pixel of it is looked up from
+    itself, in pixels (h, w); and what is measured on the whole map.
+    """
+    replay = Replay(studio.device, recipe, Pictures(Picture(source), recipes_folder()), budget=0)
+    try:
+        for _ in range(recipe.ticks):
+            replay.advance()
+            studio.progress.advance()
+        result = studio.sampler.apply(replay.warp, source, size, Sampling(edges=recipe.edges))
+        found = replay.warp.statistics()
+        moved = np.linalg.norm(replay.warp.read(size), axis=-1) * max(size)
+        return (
+            result,
+            moved,
+            {
+                "px, most": f"{found.displacement_max * max(size):.1f}",
+                "det J": f"{found.det_min:.2f} to {found.det_max:.2f}",
+                "folds": f"{found.folds} of {found.places} places",
+            },
+        )
+    finally:
+        replay.release()
