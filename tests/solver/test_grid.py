@@ -85,6 +85,23 @@ def test_through_each_face_of_a_coarser_grid_goes_as_much_as_before(device: Devi
     fluid.release()
 
 
+def test_a_window_moved_by_whole_cells_takes_the_pressure_along(device: Device):
+    whole = Grid(64, 48)
+    here, there = (Grid(24, 20, (24 / 64, 20 / 64), (left / 64, 12 / 64), whole.picture) for left in (16, 20))
+    fluid = Fluid(device, here)
+    fluid.set_velocity(np.random.default_rng(6).standard_normal((20, 24, 2)))
+    fluid.step(1e-3)
+    before = fluid._carried.read.get()
+    flow = fluid.flow_on(there)
+    fluid.lay_on(there)
+    fluid.go_on_with(flow)
+    after = fluid._carried.read.get()
+    assert np.abs(before).max() > 0
+    np.testing.assert_allclose(after[:, 1:20], before[:, 5:], atol=1e-6 * np.abs(before).max())
+    flow.release()
+    fluid.release()
+
+
 @pytest.mark.parametrize("viscosity", [1e-4, 0.01])
 @pytest.mark.parametrize("left", [0, 60], ids=["at the picture's edge", "within it"])
 def test_the_flow_in_a_window_is_that_of_the_whole(device: Device, left: int, viscosity: float):

@@ -184,6 +184,13 @@ def test_a_local_push_moves_what_is_under_it_and_nothing_else(device: Device, ki
         np.testing.assert_allclose(carrier[..., axis], wanted, atol=1e-5)
 
 
+def test_half_a_local_push_is_half_as_fast(device: Device) -> None:
+    tip = Tip((0.5, 0.3), (0.51, 0.295), radius=0.15)
+    whole, half = (pushed(device, Push(tip, 1 / 60, strength, local=1.0))[0] for strength in (1.0, 0.5))
+    assert whole.max() > 0.1
+    np.testing.assert_allclose(half, whole / 2, atol=1e-6)
+
+
 @pytest.mark.parametrize("inwards", [True, False])
 def test_a_local_push_at_the_edge_does_not_fold(device: Device, inwards: bool) -> None:
     fluid, warp, brush = Fluid(device, Grid(48, 32)), WarpMap(device, Grid(48, 32)), Brush(device)
