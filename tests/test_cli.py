@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from app import cli, doctor
-from app.media.maps import Displacement, write_map
+from app.media.maps import Displacement, read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import from_recipe, save
 from app.model.picture import Picture
@@ -465,6 +465,19 @@ def test_a_fold_is_told(folder: Path):
     write_map(folder / "m.0008.npy", Displacement(values))
     ran = fluidwarp(folder, "apply", "m.%04d.npy", "cat.png", "-o", "z.%04d.png")
     assert ran.stderr == "fluidwarp: folds in 1 of the maps m.%04d.npy, the worst in 96 of its pixels\n"
+
+
+def test_a_map_is_turned_round(folder: Path):
+    """What is looked up at x + D(x) goes from there to x, by -D(x)."""
+    x = (np.arange(64) + 0.5) / 64
+    values = np.zeros((48, 64, 2), np.float32)
+    values[..., 0] = moved = 0.4 * x * (1 - x)
+    write_map(folder / "m.npy", Displacement(values))
+    ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy", "--invert")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    turned = read_map(folder / "n.npy").values
+    np.testing.assert_allclose(turned[:, 4:-4, 0], np.tile(np.interp(x, x + moved, -moved)[4:-4], (48, 1)), atol=1e-3)
+    np.testing.assert_allclose(turned[..., 1], 0, atol=1e-5)
 
 
 def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(folder: Path):

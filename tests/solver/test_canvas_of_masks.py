@@ -209,6 +209,15 @@ def test_smoothing_takes_a_mask_to_the_means_around(masks: Masks) -> None:
     assert after.min() == 0
 
 
+def test_a_smoothing_of_full_strength_leaves_nothing_but_the_means(masks: Masks) -> None:
+    """A dot is spread over a mean's 15 x 15 texels."""
+    masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.005, 1.0), 2)
+    before = decades(masks)
+    masks.smooth(Tip((0.5, 0.3), (0.5, 0.3), 0.2, 1.0), 1)
+    assert before.max() == 2
+    assert 0 < decades(masks).max() < 2 * before.sum() / 15**2
+
+
 def test_states_go_back_to_the_bit_and_through_arrays(device: Device, masks: Masks) -> None:
     empty = masks.save()
     masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.1), 2)

@@ -73,6 +73,35 @@ def test_a_window_of_a_grid_is_its_part(device: Device):
     np.testing.assert_allclose(drawn[1], drawn[0][part], atol=2e-6 * np.abs(drawn[1]).max())
 
 
+def test_through_each_face_of_a_coarser_grid_goes_as_much_as_before(device: Device):
+    fluid = Fluid(device, Grid(72, 48))
+    fluid.set_velocity(np.random.default_rng(5).standard_normal((48, 72, 2)))
+    flow, fine = fluid.flow_on(Grid(24, 16)), fluid.velocity.read.get()
+    assert flow.carried is None
+    found = flow.velocity.get()
+    np.testing.assert_allclose(found[..., 0], fine[:, ::3, 0].reshape(16, 3, 24).mean(axis=1), atol=1e-5)
+    np.testing.assert_allclose(found[..., 1], fine[::3, :, 1].reshape(16, 24, 3).mean(axis=2), atol=1e-5)
+    flow.release()
+    fluid.release()
+
+
+def test_a_window_moved_by_whole_cells_takes_the_pressure_along(device: Device):
+    whole = Grid(64, 48)
+    here, there = (Grid(24, 20, (24 / 64, 20 / 64), (left / 64, 12 / 64), whole.picture) for left in (16, 20))
+    fluid = Fluid(device, here)
+    fluid.set_velocity(np.random.default_rng(6).standard_normal((20, 24, 2)))
+    fluid.step(1e-3)
+    before = fluid._carried.read.get()
+    flow = fluid.flow_on(there)
+    fluid.lay_on(there)
+    fluid.go_on_with(flow)
+    after = fluid._carried.read.get()
+    assert np.abs(before).max() > 0
+    np.testing.assert_allclose(after[:, 1:20], before[:, 5:], atol=1e-6 * np.abs(before).max())
+    flow.release()
+    fluid.release()
+
+
 @pytest.mark.parametrize("viscosity", [1e-4, 0.01])
 @pytest.mark.parametrize("left", [0, 60], ids=["at the picture's edge", "within it"])
 def test_the_flow_in_a_window_is_that_of_the_whole(device: Device, left: int, viscosity: float):

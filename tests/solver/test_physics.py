@@ -9,7 +9,7 @@ import pytest
 from scipy import fft, ndimage
 
 from solver.brush.brush import Brush, Tip
-from solver.brush.push import Push
+from solver.brush.push import FIRM_CARRIED, LOOSEST_CARRIED, Push, Slip
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -184,6 +184,13 @@ def test_a_local_push_moves_what_is_under_it_and_nothing_else(device: Device, ki
         np.testing.assert_allclose(carrier[..., axis], wanted, atol=1e-5)
 
 
+def test_half_a_local_push_is_half_as_fast(device: Device) -> None:
+    tip = Tip((0.5, 0.3), (0.51, 0.295), radius=0.15)
+    whole, half = (pushed(device, Push(tip, 1 / 60, strength, local=1.0))[0] for strength in (1.0, 0.5))
+    assert whole.max() > 0.1
+    np.testing.assert_allclose(half, whole / 2, atol=1e-6)
+
+
 @pytest.mark.parametrize("inwards", [True, False])
 def test_a_local_push_at_the_edge_does_not_fold(device: Device, inwards: bool) -> None:
     fluid, warp, brush = Fluid(device, Grid(48, 32)), WarpMap(device, Grid(48, 32)), Brush(device)
@@ -196,6 +203,28 @@ def test_a_local_push_at_the_edge_does_not_fold(device: Device, inwards: bool) -
     assert warp.statistics().det_min > 0
     for thing in (fluid, warp, brush):
         thing.release()
+
+
+def test_a_local_push_from_beyond_the_edge_moves_nothing_against_it(device: Device) -> None:
+    """Where the brush's image beyond the wall weighs more than the brush itself."""
+    carrier, _ = pushed(device, Push(Tip((-0.1, 0.3), (-0.05, 0.32), radius=0.25), 1 / 60, local=1.0))
+    assert carrier.min() == 0
+    assert carrier.max() > 0.1
+
+
+@pytest.mark.parametrize("radii", [0.3, 1.0, 3.0])
+def test_a_push_slips_by_the_path_that_the_picture_has_come_with_it(device: Device, radii: float) -> None:
+    """What lies where a push to the right has brought it, unstrained, is pushed on, or back."""
+    warp, slip = WarpMap(device, Grid(48, 32)), Slip(device)
+    warp.set(np.broadcast_to((-0.1 * radii, 0.0), (32, 48, 2)))
+    slip.find(Push(Tip((0.5, 0.3), (0.51, 0.3), 0.1), 1 / 60), warp)
+    beyond = max(radii - FIRM_CARRIED, 0.0)
+    wanted = LOOSEST_CARRIED + (1 - LOOSEST_CARRIED) / (1 + 2 * beyond**2)
+    assert slip.factor.get().item() == pytest.approx(wanted, abs=1e-3)
+    slip.find(Push(Tip((0.5, 0.3), (0.49, 0.3), 0.1), 1 / 60), warp)
+    assert slip.factor.get().item() == pytest.approx(1.0, abs=1e-3)
+    slip.release()
+    warp.release()
 
 
 def test_between_fluid_and_local_a_push_is_a_mixture(device: Device) -> None:

@@ -47,6 +47,7 @@ def fluid(device: Device) -> Any:
 
 WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
     "a step of NaN": (lambda fluid: fluid.step(float("nan")), "step"),
+    "a step of a day": (lambda fluid: fluid.step(86400.0), "step"),
     "a negative step": (lambda fluid: fluid.step(-0.1), "step"),
     "an endless step": (lambda fluid: fluid.step(np.inf), "step"),
     "a negative diffusion": (lambda fluid: fluid.diffuse(-0.1), "step"),

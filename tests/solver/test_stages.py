@@ -74,6 +74,22 @@ def test_paper_diffusion_sweep_is_appendix_a(device: Device, nx: int, ny: int) -
     assert relative(out.get(), reference.paper_diffuse_sweep(velocity, before, viscosity, 0.7)) < 1e-4
 
 
+def test_the_papers_velocity_loses_the_gradient_of_its_pressure(device: Device) -> None:
+    rng = np.random.default_rng(4)
+    velocity, pressure, solid = (
+        rng.standard_normal((14, 20, 2)),
+        rng.standard_normal((14, 20)),
+        rng.random((14, 20)) < 0.1,
+    )
+    out, h = device.field((20, 14), 2), 0.05
+    device.pass_("paper/subtract_gradient.frag")(
+        out, velocity=device.upload(velocity), pressure=device.upload(pressure), solid=device.upload(solid * 1.0), h=h
+    )
+    padded = reference.paper_padded(pressure)
+    gradient = np.stack([padded[1:-1, 2:] - padded[1:-1, :-2], padded[2:, 1:-1] - padded[:-2, 1:-1]], axis=-1) / (2 * h)
+    assert relative(out.get(), np.where(solid[..., None], 0, velocity - gradient)) < 1e-5
+
+
 TWO_DEVICES = """
 import gc
 import numpy as np

@@ -9,6 +9,7 @@ import pytest
 
 from solver.components import connected_components
 from solver.gl.device import Device
+from solver.packing import packed, unpacked
 from solver.params import NoSlip
 from solver.viscosity.clusters import ClusterMatrix
 from solver.viscosity.multigrid import Multigrid
@@ -29,15 +30,41 @@ def across(count: int) -> np.ndarray:
     return weights
 
 
-@pytest.mark.parametrize("aspect", [1.0, 1.3])
-def test_coarse_operators_are_galerkin_products(device: Device, aspect: float) -> None:
-    """(A - I) of a level is P' (A - I) P / 4 of the next finer one: cell by cell random viscosity, free-slip walls."""
-    rng = np.random.default_rng(3)
-    nx, ny = size = 32, 16
+SIZE = 32, 16
+
+
+def of_random_viscosity(device: Device, aspect: float) -> Multigrid:
+    """Random viscosity cell by cell, free-slip walls."""
+    rng, (nx, ny) = np.random.default_rng(3), SIZE
     viscosity, solid = (10 ** rng.uniform(-2, 4, (ny, nx))).astype(np.float32), np.zeros((ny, nx), bool)
     fields = device.upload(viscosity), device.upload(solid.astype(np.uint8))
-    multigrid = Multigrid(device, size, (1 / nx, aspect / nx))
+    multigrid = Multigrid(device, SIZE, (1 / nx, aspect / nx))
     multigrid.set_coefficients(*fields, viscosity, solid, 1 / nx**2, NoSlip(*5 * [False]))
+    return multigrid
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.3])
+def test_a_coarse_residual_is_that_of_the_matrix(device: Device, aspect: float) -> None:
+    rng, multigrid = np.random.default_rng(4), of_random_viscosity(device, aspect)
+    for level in multigrid.levels:
+        coefficients, (columns, rows) = level.coefficients(), level.texels
+        is_open = np.stack([coefficients.open_u, coefficients.open_v])
+        faces = is_open * rng.standard_normal((2, 2 * rows, 2 * columns))
+        for field, cells in zip(level.faces.read.fields, faces, strict=True):
+            field.set(np.pad(packed(cells), ((1, 1), (1, 1), (0, 0))).astype(np.float32))
+        for field in level.rhs.fields:
+            field.clear()
+        multigrid.residual(level, level.faces.read, level.rhs, level.faces.write)
+        found = np.stack([unpacked(field.get(level.region)) for field in level.faces.write.fields])
+        wanted = is_open * (-coefficients.matrix() @ faces.ravel()).reshape(faces.shape)
+        np.testing.assert_allclose(found, wanted, atol=1e-5 * abs(wanted).max())
+    multigrid.release()
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.3])
+def test_coarse_operators_are_galerkin_products(device: Device, aspect: float) -> None:
+    """(A - I) of a level is P' (A - I) P / 4 of the next finer one."""
+    (nx, ny), multigrid = SIZE, of_random_viscosity(device, aspect)
     strains = [
         level.coefficients().matrix() - np.eye(8 * level.texels[0] * level.texels[1]) for level in multigrid.levels
     ]

@@ -210,6 +210,17 @@ def test_a_remap_touches_only_what_has_moved(device: Device) -> None:
     second.release()
 
 
+def test_statistics_tell_the_smallest_and_the_largest_area(device: Device) -> None:
+    """det = 1 + .6 (x - 1/2), at places half a cell apart."""
+    grid = Grid(64, 32)
+    x, y = grid.centres()
+    warp = WarpMap(device, grid)
+    warp.set(np.stack([0.3 * (x - 0.5) ** 2, 0 * y], axis=-1))
+    found = warp.statistics()
+    assert (found.det_min, found.det_max) == pytest.approx((0.7, 1.3), abs=0.02)
+    warp.release()
+
+
 def test_statistics_of_linear_maps(device: Device) -> None:
     grid = Grid(32, 16)
     x, y = grid.centres()
