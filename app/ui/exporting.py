@@ -125,7 +125,7 @@ class ExportDialog(Dialog):
         if self.kind == MAP:
             maps = MapOutput(self.output, "offsets" if self.offsets else "st", self.forward)
             return Job(recipe, self.picture, session.project.folder, Outputs(None, maps=maps))
-        return Job(recipe, self.picture, session.project.folder, Outputs(self.output))
+        return Job(recipe, self.picture, session.project.folder, Outputs(self.output, recorded=False))
 
     def body(self, ui: Ui) -> bool:
         # Enter belongs to the field that is being typed in, or to what the arrows have gone to.

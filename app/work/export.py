@@ -231,7 +231,7 @@ class _Export:
         with ExitStack() as stack:
             take_map = None
             if maps is not None and maps.is_sequence:
-                cancel, note = self.progress.cancel, records[maps.path].add
+                cancel, note = self.progress.cancel, noting(records, maps.path)
                 writer = map_writer(maps.path, maps.kind, cancel=cancel, written=note, resumed=self.outputs.resume)
                 take_map = stack.enter_context(in_order(stack.enter_context(writer)))
             kept = Kept(records.values() if self.outputs.resume else [])
@@ -260,7 +260,7 @@ class _Export:
             written[outputs.file] = "picture", outputs.bits, outputs.strip, outputs.codec
         if maps is not None and maps.is_sequence:
             written[maps.path] = "map", replace(maps, path=Path())
-        if not written:
+        if not written or not outputs.recorded:
             return {}
         clip, recipe = self.job.clip, self.recipe.model_dump_json(exclude={"name", "picture"})
         common = digest_of(code(), recipe, self.job.picture, *self.pictures.values())
@@ -308,7 +308,7 @@ class _Export:
             like=self.like.stripped() if self.outputs.strip else self.like,
             cancel=self.progress.cancel,
             passed=self.progress.advance,
-            written=records[file].add if file in records else lambda number: None,
+            written=noting(records, file),
         )
 
     def _frames(
@@ -474,6 +474,11 @@ class _Export:
             "stopped": verdict,
             "frames": self.numbers,
         }
+
+
+def noting(records: dict[Path, Record], path: Path) -> Callable[[int], None]:
+    """What hears of each frame that is written of a sequence: its record, if it has one."""
+    return records[path].add if path in records else lambda number: None
 
 
 class Kept:

@@ -60,6 +60,7 @@ class Outputs:
         codec: of a video; None is the usual one of its ending.
         states: a folder of states of the simulation, for parts to begin with and to leave for others.
         resume: keep the files of a sequence that are whole, and were made of the same.
+        recorded: leave beside the files of a sequence what resuming looks at.
     """
 
     file: Path | None
@@ -72,6 +73,7 @@ class Outputs:
     codec: str | None = None
     states: Path | None = None
     resume: bool = False
+    recorded: bool = True
 
     @property
     def files(self) -> list[Path]:

@@ -155,9 +155,17 @@ class Task(Piece):
         return Job(self.edits.applied(found.recipe), source.picture, found.folder, self.outputs, source.clip)
 
 
-@lru_cache(maxsize=4)
 def opened(name: str, max_pixels: int) -> Opened:
-    """See `open_recipe`; read once in a process. Raises `UserError`."""
+    """See `open_recipe`; read once in a process while the file stays as it is. Raises `UserError`."""
+    try:
+        file = os.stat(name)
+    except (OSError, ValueError):  # one that is shipped, or none
+        return open_recipe(name, max_pixels)
+    return _opened(name, max_pixels, (file.st_ino, file.st_size, file.st_mtime_ns, file.st_ctime_ns))
+
+
+@lru_cache(maxsize=4)
+def _opened(name: str, max_pixels: int, state: tuple[int, ...]) -> Opened:
     return open_recipe(name, max_pixels)
 
 

@@ -104,9 +104,9 @@ class Multigrid:
         for level in self.levels:
             level.set_uniform(self._kappa(level), no_slip)
         self.has_transform = not any(no_slip)
-        # A level that is the coarsest is solved at once, and the finest has a plan of its own.
-        alone = (level for level in self.levels[1:-1] if self._sweeps_alone(level) <= MOST_ALONE)
-        self._alone = None if self.direct_level is self.finest else next(alone, None)
+        # The direct level is solved at once, and the finest has a plan of its own.
+        between = self.levels[1 : self.direct_level.depth]
+        self._alone = next((level for level in between if self._sweeps_alone(level) <= MOST_ALONE), None)
         last = self.last
         if not self.has_transform and last is self.levels[-1]:
             stiffness = last.operator["stiffness"]

@@ -374,6 +374,19 @@ def test_one_viscosity_is_solved_exactly_on_a_coarser_grid(
     assert np.linalg.norm(left) <= 2e-5 * np.linalg.norm(wanted)
 
 
+@pytest.mark.parametrize("size", [(32, 24), (61, 40), (150, 90)])
+@pytest.mark.parametrize("walls", [Walls(), Walls("none")], ids=["free", "sticky"])
+@pytest.mark.parametrize("kappa", [0.5, 1.0, 5.0])
+def test_a_cycle_begins_from_rest(device: Device, size: tuple[int, int], walls: Walls, kappa: float) -> None:
+    """Whatever its levels hold of what was solved before."""
+    shape = size[1], size[0]
+    step = Step(device, np.full(shape, kappa), walls=walls)
+    wanted = step(noise(*shape))
+    step(push(*shape))
+    step.solver.forget()
+    np.testing.assert_array_equal(step(noise(*shape)), wanted)
+
+
 def test_what_was_solved_before_does_not_matter(device: Device) -> None:
     """A barely viscous mask after one viscosity, and at once: the same bytes."""
     size, rng = (32, 24), np.random.default_rng(5)
