@@ -238,7 +238,7 @@ def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
     assert read_recipe(tmp_path / "a.toml").duration == 2
 
 
-@pytest.mark.parametrize("page", ["README.md", "assets/guide/README.md"])
+@pytest.mark.parametrize("page", ["README.md", "assets/guide/README.md", "assets/guide/motion.md"])
 def test_examples_of_the_documentation_are_recipes(page: str):
     text = (Path(__file__).parents[2] / page).read_text("utf-8")
     examples = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
