@@ -6,7 +6,7 @@ import os
 import tempfile
 import threading
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import moderngl
@@ -29,11 +29,71 @@ from app.work.jobs import Job, MapOutput, Outputs
 from app.work.session import Session
 from solver.gl.device import Device
 
-PICTURES = (("PNG", ".png"), ("JPEG", ".jpg"), ("TIFF", ".tif"))
-ANIMATIONS = (("MP4", ".mp4"), ("GIF", ".gif"), ("PNG sequence", ".%04d.png"))
-MAPS = (("EXR", ".exr"), ("TIFF", ".tif"), ("FLO", ".flo"), ("NPY", ".npy"))
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to write a kind of file: what the second row of choices calls it, and what a job's `Outputs` calls it."""
+
+    label: str
+    ending: str
+    codec: str | None = None
+    bits: int | None = None
+    animated: bool = False
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """A kind of file that can be exported, and what it is good for."""
+
+    name: str
+    use: str
+    variants: tuple[Variant, ...]
+
+
+def _depths(ending: str, *bits: int) -> tuple[Variant, ...]:
+    return (Variant("As the picture", ending), *(Variant(f"{n} bits", ending, bits=n) for n in bits))
+
+
+def _as_it_is(ending: str, animated: bool = False) -> tuple[Variant, ...]:
+    return (Variant("", ending, animated=animated),)
+
+
+PICTURES = (
+    FileKind("PNG", "Exact, with alpha.", _depths(".png", 8, 16)),
+    FileKind("JPEG", "Small; 8 bits a channel, no alpha.", _as_it_is(".jpg")),
+    FileKind("WebP", "Small; 8 bits a channel, with alpha. Quality 100 is exact.", _as_it_is(".webp")),
+    FileKind("AVIF", "The smallest; 8 bits a channel, with alpha.", _as_it_is(".avif")),
+    FileKind("TIFF", "Exact, with alpha; for print.", _depths(".tif", 8, 16, 32)),
+    FileKind("EXR", "Linear light, with alpha; for compositing.", _depths(".exr", 16, 32)),
+)
+ANIMATIONS = (
+    FileKind("MP4", "Plays nearly everywhere; no alpha.", (Variant("H.264", ".mp4"), Variant("H.265", ".mp4", "h265"))),
+    FileKind(
+        "MOV",
+        "For editing programs.",
+        (Variant("ProRes 4444, with alpha", ".mov"), Variant("ProRes 422 HQ", ".mov", "prores-422-hq")),
+    ),
+    FileKind("WebM", "For web pages.", (Variant("VP9, with alpha", ".webm"), Variant("AV1", ".webm", "av1"))),
+    FileKind("MKV", "Every frame exact, with alpha; large.", _as_it_is(".mkv")),
+    FileKind("GIF", "256 colours a frame, at most 50 frames a second.", _as_it_is(".gif")),
+    FileKind("WebP", "A moving picture of all colours, with alpha; for web pages.", _as_it_is(".webp", True)),
+    FileKind("APNG", "A moving picture, exact, with alpha.", _as_it_is(".apng")),
+    FileKind(
+        "Frames",
+        "A numbered file for each frame.",
+        tuple(Variant(kind, f".%04d{ending}") for kind, ending in
+              (("PNG", ".png"), ("TIFF", ".tif"), ("EXR", ".exr"), ("JPEG", ".jpg"))),
+    ),
+)  # fmt: skip
+MAPS = (
+    FileKind("EXR", "ST map or offsets, for Nuke and its like.", _as_it_is(".exr")),
+    FileKind("TIFF", "The same values.", _as_it_is(".tif")),
+    FileKind("FLO", "Offsets in pixels, as optical flow has them.", _as_it_is(".flo")),
+    FileKind("NPY", "Offsets in pixels, for NumPy.", _as_it_is(".npy")),
+)
 KINDS = (("Picture", PICTURES), ("Animation", ANIMATIONS), ("Warp map", MAPS))
 PICTURE, ANIMATION, MAP = range(3)
+RATED = (".jpg", ".webp", ".avif", ".mp4", ".webm", ".%04d.jpg")  # endings of files that have a quality
 PREVIEW = 640  # pixels along the longer side
 FINER = (("As seen", 1), ("2 x", 2))
 
@@ -49,12 +109,14 @@ class ExportDialog(Dialog):
 
     Attributes:
         kind: PICTURE, ANIMATION or MAP.
-        format: which of its formats, for each kind.
+        format: which of its kinds of file, for each of these.
+        variant: which of the variants, for each kind of file.
+        returns: an animation goes there and back again.
         forward: the map tells where the points of the original go.
         offsets: an EXR or TIFF map holds offsets in pixels.
     """
 
-    width, tallest = 500, 560
+    width, tallest = 500, 664
 
     def __init__(self, session: Session, exports: Exports, chooser: FileChooser, preferences: Preferences) -> None:
         super().__init__("Export")
@@ -64,6 +126,9 @@ class ExportDialog(Dialog):
         self._preferences = preferences
         self.kind = PICTURE
         self.format = [0 for _ in KINDS]
+        self.variant = [[0 for _ in files] for _, files in KINDS]
+        self._take_up(preferences.export_as)
+        self.returns = session.recipe.time.ping_pong
         self.forward = self.offsets = False
         self.picture = replace(session.project.picture, note="")  # it was told when the picture was opened
         self.size = max(self.picture.width, self.picture.height)
@@ -96,8 +161,27 @@ class ExportDialog(Dialog):
         return self.kind == ANIMATION
 
     @property
+    def file_kind(self) -> FileKind:
+        return KINDS[self.kind][1][self.format[self.kind]]
+
+    @property
+    def how(self) -> Variant:
+        return self.file_kind.variants[self.variant[self.kind][self.format[self.kind]]]
+
+    @property
     def ending(self) -> str:
-        return KINDS[self.kind][1][self.format[self.kind]][1]
+        return self.how.ending
+
+    def _take_up(self, last: str) -> None:
+        """Begin with what was exported last, as `_told` tells it."""
+        for kind, (label, files) in enumerate(KINDS):
+            for number, file in enumerate(files):
+                if last == f"{label} {file.name}":
+                    self.kind, self.format[kind] = kind, number
+
+    @property
+    def _told(self) -> str:
+        return f"{KINDS[self.kind][0]} {self.file_kind.name}"
 
     @property
     def output(self) -> Path:
@@ -116,7 +200,9 @@ class ExportDialog(Dialog):
         output = recipe.output.model_copy(
             update={"size": None if self.size == own else self.size, "fps": self.fps, "quality": self.quality}
         )
-        part = recipe.time.model_copy(update={"start": self.start, "end": max(self.end, self.start)})
+        part = recipe.time.model_copy(
+            update={"start": self.start, "end": max(self.end, self.start), "ping_pong": self.returns}
+        )
         recipe = recipe.edited(
             output=output,
             time=part if self.animation else recipe.time,
@@ -125,21 +211,27 @@ class ExportDialog(Dialog):
         if self.kind == MAP:
             maps = MapOutput(self.output, "offsets" if self.offsets else "st", self.forward)
             return Job(recipe, self.picture, session.project.folder, Outputs(None, maps=maps))
-        return Job(recipe, self.picture, session.project.folder, Outputs(self.output, recorded=False))
+        how = self.how
+        outputs = Outputs(self.output, animated=how.animated, bits=how.bits, codec=how.codec, recorded=False)
+        return Job(recipe, self.picture, session.project.folder, outputs)
 
     def body(self, ui: Ui) -> bool:
         # Enter belongs to the field that is being typed in, or to what the arrows have gone to.
         entered = imgui.is_key_pressed(imgui.Key.enter, False)
         entered = entered and not imgui.is_any_item_active() and not imgui.get_io().nav_visible
         self._choose(ui.segmented("kind", [label for label, _ in KINDS], self.kind, -1))
-        choices = KINDS[self.kind][1]
-        self.format[self.kind] = ui.segmented("format", [label for label, _ in choices], self.format[self.kind], -1)
+        files, chosen = KINDS[self.kind][1], self.format[self.kind]
+        chosen = self.format[self.kind] = ui.segmented("format", [file.name for file in files], chosen, -1)
+        if len(variants := self.file_kind.variants) > 1:
+            labels, now = [variant.label for variant in variants], self.variant[self.kind][chosen]
+            self.variant[self.kind][chosen] = ui.segmented("variant", labels, now, -1)
+        ui.dim(self.file_kind.use)
         own = max(self.picture.width, self.picture.height)
         width, height = (round(side * self.size / own) for side in (self.picture.width, self.picture.height))
         unit, shown = Unit(" pixels", self.picture.width / own), f"{width} x {height} pixels"
         slid = ui.slider("size", "Size", self.size, 16, max(own * 2, 64), unit, own, shown)
         self.size = round(slid.value)
-        if self.ending in (".jpg", ".mp4"):
+        if self.ending in RATED and not self.how.animated:
             slid = ui.slider("quality", "Quality", self.quality, 1, 100, default=90)
             self.quality = round(slid.value)
         if self.kind == MAP:
@@ -151,6 +243,7 @@ class ExportDialog(Dialog):
             if seconds > 0:
                 self.start = ui.slider("from", "From", self.start, 0, seconds, SECONDS, 0.0).value
                 self.end = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds).value
+            self.returns = ui.check("There and back again", self.returns)
         ui.dim("Simulate on the grid")
         self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
         if self.finer and self.kind != MAP:
@@ -225,7 +318,7 @@ class ExportDialog(Dialog):
 
     def _start(self) -> None:
         self._exports.start(self.job())
-        self._preferences.exported(self.output)
+        self._preferences.exported(self.output, self._told)
 
     def _chosen(self, path: Path) -> None:
         name = path.name

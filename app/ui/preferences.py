@@ -26,7 +26,7 @@ class Preferences:
         recent: paths of what was opened lately, newest first.
         embed: projects hold their picture.
         folder: of what was opened or saved last.
-        export_folder: of what was exported last.
+        export_folder, export_as: of what was exported last, and as what.
     """
 
     theme: str = "dark"
@@ -38,6 +38,7 @@ class Preferences:
     recent: list[str] = field(default_factory=list)
     folder: str = ""
     export_folder: str = ""
+    export_as: str = ""
     path: Path | None = field(default=None, compare=False)
 
     @classmethod
@@ -81,9 +82,9 @@ class Preferences:
         self.folder = str(path.resolve().parent)
         self.save()
 
-    def exported(self, path: Path) -> None:
-        """Take note of where something was exported to."""
-        self.export_folder = str(path.resolve().parent)
+    def exported(self, path: Path, kind: str) -> None:
+        """Take note of where something was exported to, and as what kind of file."""
+        self.export_folder, self.export_as = str(path.resolve().parent), kind
         self.save()
 
     def dismiss_hint(self) -> None:

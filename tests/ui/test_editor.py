@@ -843,7 +843,7 @@ def test_a_map_exported_from_the_window_is_the_command_line_s(
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     dialog = export_dialog(robot, tmp_path)
     dialog.kind, dialog.name, dialog.forward, dialog.size = MAP, "m", forward, 120
-    dialog.format[MAP] = [ending for _, ending in KINDS[MAP][1]].index(Path(name).suffix)
+    dialog.format[MAP] = [file.variants[0].ending for file in KINDS[MAP][1]].index(Path(name).suffix)
     robot.editor.exports.start(dialog.job())
     robot.until(lambda: not robot.editor.exports.is_running)
     line = tmp_path / f"line{Path(name).suffix}"

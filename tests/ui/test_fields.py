@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.media.animation import ANIMATIONS as CONTAINERS
+from app.media.formats import FORMATS
+from app.media.maps import MAP_ENDINGS
 from app.model.strokes import Change
-from app.ui.exporting import ANIMATION, MAP, PICTURE, ExportDialog
+from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, ExportDialog
 from app.ui.panels import inspector
+from app.ui.preferences import Preferences
 from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import Robot, export_dialog, small_project
 from support.widgets import Widgets
 
 
@@ -207,6 +211,8 @@ def test_an_exported_picture_is_what_is_asked_for(
     robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     widgets = Widgets(robot, monkeypatch)
+    widgets.click("16 bits")
+    assert (dialog.job().target.suffix, dialog.job().outputs.bits) == (".png", 16)
     widgets.click("JPEG")
     widgets.type("Quality", "35")
     widgets.type("Size", "120")
@@ -223,9 +229,13 @@ def test_an_exported_animation_is_what_is_asked_for(
 ) -> None:
     widgets = Widgets(robot, monkeypatch)
     widgets.click("Animation")
-    for words, ending in (("GIF", ".gif"), ("PNG sequence", ".%04d.png"), ("MP4", ".mp4")):
+    for words, ending in (("GIF", ".gif"), ("Frames", ".%04d.png"), ("EXR", ".%04d.exr"), ("MP4", ".mp4")):
         widgets.click(words)
         assert dialog.job().target.name.endswith(ending)
+    widgets.click("H.265")
+    assert dialog.job().outputs.codec == "h265"
+    widgets.click("There and back again")
+    assert dialog.job().recipe.time.ping_pong
     widgets.type("Frames a second", "24")
     widgets.type("From", "0.1")
     widgets.type("To", "0.2")
@@ -248,3 +258,36 @@ def test_an_exported_map_is_what_is_asked_for(
     maps = dialog.job().outputs.maps
     assert maps is not None
     assert (maps.kind, maps.forward, maps.path.suffix) == ("offsets", True, ".tif")
+
+
+def test_every_file_that_the_command_line_writes_can_be_exported(robot: Robot, tmp_path: Path) -> None:
+    """Each is found writable by the job itself; maps are those of `--map`."""
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=6)
+    robot.rest()
+    dialog = export_dialog(robot, tmp_path)
+    written, codecs = set[str](), set[str]()
+    for kind, (_, files) in enumerate(KINDS):
+        for number, file in enumerate(files):
+            for variant in range(len(file.variants)):
+                dialog.kind, dialog.format[kind], dialog.variant[kind][number] = kind, number, variant
+                job = dialog.job()
+                job.check()
+                assert job.is_animation == (kind == ANIMATION)
+                written.add(dialog.ending)
+                if kind == ANIMATION and dialog.ending in CONTAINERS:
+                    codecs.add(job.outputs.codec or next(iter(CONTAINERS[dialog.ending].codecs)))
+    same = {".tiff", ".jpeg"}
+    assert written >= (set(FORMATS) | set(CONTAINERS) | set(MAP_ENDINGS)) - same
+    assert codecs == {codec for container in CONTAINERS.values() for codec in container.codecs}
+
+
+def test_the_next_export_begins_with_the_kind_of_the_last(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=6)
+    robot.rest()
+    preferences = Preferences(export_folder=str(tmp_path))
+    preferences.exported(tmp_path / "a.webm", "Animation WebM")
+    editor = robot.editor
+    dialog = ExportDialog(editor.session, editor.exports, editor.chooser, preferences)
+    assert (dialog.kind, dialog.ending) == (ANIMATION, ".webm")
+    preferences.export_as = "Something of another version"
+    assert ExportDialog(editor.session, editor.exports, editor.chooser, preferences).kind == PICTURE

@@ -177,7 +177,7 @@ def test_the_size_of_an_export_is_typed_as_it_is_shown(
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 146, f"{typed} pixels")
+    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 202, f"{typed} pixels")
     assert dialog.size == 120
     robot.close()
 
@@ -200,10 +200,10 @@ def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robo
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 146, "100")
+    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 202, "100")
     assert dialog.size == 100
     assert not robot.editor.exports.is_running
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 268)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 325)
     robot.key("end")
     robot.type("2")
     robot.frame(count=2)
@@ -432,7 +432,7 @@ def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 268)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 325)
     robot.key("end")
     robot.type("2")
     robot.frame(count=2)
@@ -440,7 +440,7 @@ def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
     robot.key("escape")
     robot.frame(count=2)
     assert robot.editor.dialogs.shown == [dialog]
-    ctrl_click(robot, dialog.rect.x + 250, dialog.rect.y + 146)
+    ctrl_click(robot, dialog.rect.x + 250, dialog.rect.y + 202)
     robot.frame(count=2)
     robot.key("escape")
     robot.frame(count=2)
