@@ -36,7 +36,7 @@ def draw(
     if state.tool_name == "handle" and not session.recipe.leads and canvas.width > ui.px(HINT):
         with ui.floating("how", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
             ui.text("  Drag a point where it shall go. Click to pin one where it is.  ", size=14)
-    if preferences.hint and canvas.width > ui.px(HINT):
+    elif preferences.hint and canvas.width > ui.px(HINT):
         _hint(ui, canvas, preferences)
     if state.statistics:
         _statistics(ui, canvas, session, numbers, clock)
@@ -91,7 +91,7 @@ def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:
 
 def _statistics(ui: Ui, canvas: Rect, session: Session, numbers: Numbers, clock: Clock) -> None:
     stats = numbers.take(session)
-    with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85):
+    with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85, clicked=False):
         spent = clock.milliseconds
         ui.text(f"Frame  {spent.get('frame', 0):.1f} ms", size=13)
         for name in ("simulate", "canvas", "panels", "interface"):

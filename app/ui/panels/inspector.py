@@ -72,25 +72,25 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             13,
         )
     else:
-        ui.text(label.capitalize(), size=14)
+        ui.text(label.capitalize().replace("[", " ").replace("]", ""), size=14)
         imgui.same_line()
         ui.dim(_whereabouts(workspace, label))
         slid = ui.slider(
             "held radius", "Reach", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
             title="How far it reaches", more="It is led two of that at most.",
         )  # fmt: skip
-        _set_held(session, label, "Reach of a handle", slid, radius=slid.value)
+        _set_held(session, label, f"Reach of a {led.kind}", slid, radius=slid.value)
         slid = ui.slider(
             "held stiffness", "Stiffness", led.stiffness, 0.01, 1.0, PERCENT, 1.0,
             title="Stiffness", more="With less it gives way to the fluid and to the others.",
         )  # fmt: skip
-        _set_held(session, label, "Stiffness of a handle", slid, stiffness=slid.value)
+        _set_held(session, label, f"Stiffness of a {led.kind}", slid, stiffness=slid.value)
         if isinstance(led, RecipeHandle):
             slid = ui.slider(
                 "held local", "Local", led.local, 0.0, 1.0, PERCENT, 0.0,
                 title="Local", more="At 0 % the picture flows back beside it. At 100 % only what is under it moves.",
             )  # fmt: skip
-            _set_held(session, label, "Flow of a handle", slid, local=slid.value)
+            _set_held(session, label, f"Flow of a {led.kind}", slid, local=slid.value)
         if ui.button("Remove", width=-1, height=30):
             do("remove")
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
