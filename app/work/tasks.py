@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from app.errors import UserError
-from app.media.animation import ANIMATIONS
+from app.media.encoders import ANIMATIONS
 from app.media.files import cannot_write, check_kept, is_sequence, takes_place, unnumbered
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
