@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from app.errors import UserError
 from app.media.animation import animation_writer
 from app.media.auxiliary import Pictures
 from app.media.depth import to_bits
-from app.media.files import MENDS
+from app.media.files import make_folder
 from app.media.pictures import read_picture, write_picture
 from app.media.recipes import read_recipe
 from app.model.forces import CurveForce, GradientForce, PointForce
@@ -334,15 +333,6 @@ def _range(played: Played) -> str:
     return f"{played.statistics.det_min:.2f} to {played.statistics.det_max:.2f}"
 
 
-def writable(folder: Path) -> None:
-    """Make a folder if there is none. Raises `UserError` if it cannot be made."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = MENDS.get(error.errno or 0, error.strerror or str(error))
-        raise UserError(f"Cannot write to {folder}: {reason}.") from None
-
-
 def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]:
     """Render every figure into `folder`; returns what was measured on each.
 
@@ -350,7 +340,7 @@ def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]
         UserError: if the folder cannot be written to.
         Cancelled: if `progress` says so.
     """
-    writable(folder)
+    make_folder(folder)
     progress.total = sum(load(name).ticks for name in RECIPES) + sum(_panels(load(name)) for name in GUIDE)
     studio = Studio(device, folder, progress)
     try:

@@ -7,7 +7,6 @@ import signal
 import socket
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
@@ -45,7 +44,6 @@ class Progress:
         self.cancel = cancel
         self._report = report
         self._tell = tell
-        self._started = time.monotonic()
 
     @property
     def total(self) -> int | None:
@@ -92,13 +90,6 @@ class Progress:
             self.advance(heard * steps // count - before * steps // count)
 
         return hear
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Seconds the rest takes at the speed so far; None before the first step or without a total."""
-        if not self.done or self.total is None:
-            return None
-        return (time.monotonic() - self._started) / self.done * max(0, self.total - self.done)
 
 
 def abandon() -> None:

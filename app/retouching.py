@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from app.gallery import Numbers, Studio, load, recipes_folder, source_of, writable
+from app.gallery import Numbers, Studio, load, recipes_folder, source_of
 from app.media.auxiliary import Pictures
+from app.media.files import make_folder
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.recipe import Recipe
@@ -42,7 +43,7 @@ def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]
         UserError: if the folder cannot be written to.
         Cancelled: if `progress` says so.
     """
-    writable(folder)
+    make_folder(folder)
     progress.total = sum(load(name).ticks for name in (*JOBS, *POSTERS))
     studio = Studio(device, folder, progress)
     try:

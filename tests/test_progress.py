@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -39,13 +38,9 @@ def test_progress_reports_and_stops():
     heard: list[tuple[int, int | None]] = []
     wish = threading.Event()
     progress = Progress(4, lambda done, total: heard.append((done, total)), wish.is_set)
-    assert progress.seconds_left is None
     progress.advance()
-    time.sleep(0.02)
     progress.advance(2)
     assert heard == [(1, 4), (3, 4)]
-    assert progress.seconds_left is not None
-    assert 0 < progress.seconds_left < 1
     wish.set()
     with pytest.raises(Cancelled):
         progress.advance()

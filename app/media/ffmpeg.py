@@ -18,13 +18,6 @@ from app.errors import Cancelled, UserError
 from app.media.files import cannot_write
 from app.progress import if_abandoned, never
 
-EMPTY_WORDS = (
-    "Conversion failed",
-    "Error opening output",
-    "Error opening input",
-    "Nothing was written",
-    "Task finished",
-)
 PATIENCE = 0.1  # seconds between two looks at the wish to stop
 
 
@@ -186,12 +179,11 @@ def run(
     arguments: Sequence[str],
     label: str,
     *,
-    doing: str = "write",
     cancel: Callable[[], bool] = never,
     passed: Callable[[int], None] = lambda frames: None,
 ) -> None:
     """Run ffmpeg to its end; `passed` hears of frames that it has put out. Raises `UserError` or `Cancelled`."""
-    with Ffmpeg(["-progress", "pipe:1", *arguments], label, doing=doing, cancel=cancel) as process:
+    with Ffmpeg(["-progress", "pipe:1", *arguments], label, cancel=cancel) as process:
         frames, line = 0, b""
         for byte in process.blocks(1):
             line += byte

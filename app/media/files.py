@@ -69,6 +69,14 @@ def writable(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder, if there is none. Raises `UserError`."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
 def is_sequence(path: str | os.PathLike[str]) -> bool:
     """Whether `path` numbers its files, as `name.%04d.png` and `name.####.png` do."""
     return NUMBER.search(Path(path).name) is not None

@@ -42,12 +42,11 @@ TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULT
 class Video(Clip):
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
-    rotation: degrees clockwise that were undone. frames: by its duration. bits: 8, or 16 for what has more than 8.
+    frames: by its duration. bits: 8, or 16 for what has more than 8.
     file_size, inode: of the file when it was looked into.
     """
 
     fps: Fraction
-    rotation: int
     decoder: tuple[str, ...]
     filters: str
     file_size: int
@@ -149,14 +148,12 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     check_size(file, width, height, max_pixels)
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
     seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
-    rotation = re.search(r"rotation of (-?[\d.]+) degrees", told)
     return Video(
         path=file,
         width=width,
         height=height,
         fps=fps,
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
-        rotation=round(-float(rotation.group(1))) % 360 if rotation else 0,
         sound=next(iter(_sound_codecs(told)), None),
         late=late,
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,

@@ -31,7 +31,7 @@ from app.model.sampling import (
     places,
     to_grid,
 )
-from app.model.schema import Fraction01, Radius, Several
+from app.model.schema import Fraction01, Radius, Several, label_of
 from app.model.timelaws import Law, Timed
 from solver.grid import Grid
 
@@ -367,8 +367,8 @@ def build(forces: Sequence[Force], grid: Grid, pictures: NamedPictures, duration
         UserError: naming the force by its index and name, and what is wrong with it.
     """
     built = []
-    for index, force in enumerate(forces):
-        label = f'force[{index + 1}] "{force.name}"' if force.name else f"force[{index + 1}]"
+    for number, force in enumerate(forces, 1):
+        label = label_of("force", number, force.name)
         try:
             if remark := force.law.check(duration):
                 pictures.notice(f"{label} {remark}")

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from app.model.sampling import Point
-from app.model.schema import Fraction01, Model, Place, Several
+from app.model.schema import Fraction01, Model, Place, Several, label_of
 from solver.limits import LARGEST_LEAD
 
 MOST_HANDLES = 64  # with the pins
@@ -141,7 +141,7 @@ class RecipePin(_Led):
 def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list[tuple[str, RecipeHandle | RecipePin]]:
     """All of them, handles first, with what messages call them: handle[1] "smile", counted from 1."""
     return [
-        (f"{led.kind}[{number}]" + (f' "{led.name}"' if led.name else ""), led)
+        (label_of(led.kind, number, led.name), led)
         for several in (handles, pins)
         for number, led in enumerate(several, 1)
     ]

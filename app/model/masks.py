@@ -36,7 +36,7 @@ from app.model.sampling import (
     quantised,
     to_grid,
 )
-from app.model.schema import Fraction01, Model, Radius, Several
+from app.model.schema import Fraction01, Model, Radius, Several, label_of
 from solver.grid import Grid
 
 MOST_VISCOUS = 1e6
@@ -240,13 +240,13 @@ def viscosity(layers: Sequence[ViscosityLayer], base: float, grid: Grid, picture
         UserError: naming the layer by its index and name, and what is wrong with it.
     """
     result = np.full((grid.ny, grid.nx), float(base))
-    for index, layer in enumerate(layers):
+    for number, layer in enumerate(layers, 1):
         try:
             result = layer.onto(result, layer.intensity(grid, pictures), layer.coverage(grid))
             if result.max() > MOST_VISCOUS:
                 raise ValueError(f"the viscosity reaches {result.max():.3g}; the most is {MOST_VISCOUS:g}")
         except (ValueError, UserError) as error:
-            raise UserError(f"{_label('viscosity', index, layer)}: {error}") from None
+            raise UserError(f"{label_of('viscosity', number, layer.name)}: {error}") from None
     return result.astype(np.float32)
 
 
@@ -263,16 +263,12 @@ def solid(layers: Sequence[FreezeLayer], grid: Grid, pictures: NamedPictures) ->
         coarse = solid(layers, Grid.for_picture(width, height, FINEST), pictures)
         return to_grid(coarse.astype(np.float32), grid) >= 0.5
     result = np.zeros((height, width), bool)
-    for index, layer in enumerate(layers):
+    for number, layer in enumerate(layers, 1):
         try:
             result = layer.onto(result, layer.intensity(grid, pictures), layer.coverage(grid))
         except (ValueError, UserError) as error:
-            raise UserError(f"{_label('freeze', index, layer)}: {error}") from None
+            raise UserError(f"{label_of('freeze', number, layer.name)}: {error}") from None
     return result
-
-
-def _label(key: str, index: int, layer: _Layer) -> str:
-    return f'{key}[{index + 1}] "{layer.name}"' if layer.name else f"{key}[{index + 1}]"
 
 
 def _mixed(below: np.ndarray, above: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from app.model.picture import Picture, linear_to_srgb
-from app.model.schema import FileName, Fraction01, Model, Place, Radius
+from app.model.schema import FileName, Fraction01, Model, Place
 from solver.grid import Grid
 
 SOURCE = "source"
@@ -245,24 +245,3 @@ class Segment(Model):
         low = -1.0 if self.above is None else self.above
         high = 2.0 if self.below is None else self.below
         return (grey > low) & (grey < high)
-
-
-__all__ = [
-    "SOURCE",
-    "Box",
-    "NamedPictures",
-    "PictureName",
-    "Point",
-    "Radius",
-    "Segment",
-    "Window",
-    "blurred",
-    "channels",
-    "distance_to_path",
-    "falloff",
-    "intensity",
-    "places",
-    "quantised",
-    "smoothstep",
-    "to_grid",
-]  # fmt: skip

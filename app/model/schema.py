@@ -119,11 +119,15 @@ def named(path: list[int | str], data: Any) -> tuple[str, str]:
     for item in path:
         data = _item(data, item)
         if isinstance(item, int) and isinstance(data, dict):
-            title = data.get("name")
-            table, key = f"{table}{key}[{item + 1}]" + (f' "{title}"' if title else "") + ": ", ""
+            table, key = f"{table}{label_of(key, item + 1, data.get('name', ''))}: ", ""
         else:
             key += f"[{item + 1}]" if isinstance(item, int) else f".{item}" if key else item
     return table, key
+
+
+def label_of(key: str, number: int, name: str) -> str:
+    """What messages call an item of a list, counted from 1: force[2] "wind"."""
+    return f'{key}[{number}] "{name}"' if name else f"{key}[{number}]"
 
 
 def _item(data: Any, item: int | str) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from itertools import pairwise
 from math import hypot
 from typing import NamedTuple
 
@@ -270,9 +269,3 @@ TOOLS = (
     Tool("zoom", "Zoom", "z", "Click to zoom in, with Alt to zoom out; drag left or right"),
 )  # fmt: skip
 TOOL = {tool.name: tool for tool in TOOLS}
-
-
-def path_length(stroke: Stroke, extent: tuple[float, float]) -> float:
-    """How long a stroke's path is, in longer sides."""
-    points = ((sample[1] * extent[0], sample[2] * extent[1]) for sample in stroke.samples)
-    return sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(points))

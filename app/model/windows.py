@@ -110,7 +110,7 @@ class Window(NamedTuple):
                 return None
             if now is not None and now.detail == detail and _holds(now, lattice, room, whole.picture):
                 return now
-            if found := _laid(detail, lattice, room, ends, whole.picture):
+            if found := _laid(lattice, room, ends, whole.picture):
                 return cls(detail, *found)
             detail = round(detail / STEP)
         return None
@@ -145,7 +145,6 @@ def _holds(window: Window, lattice: tuple[int, int], room: list[float], picture:
 
 
 def _laid(
-    detail: int,
     lattice: tuple[int, int],
     room: list[float],
     ends: list[tuple[float, float]],

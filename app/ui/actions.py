@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from app.model.tools import TOOLS
 from app.ui.commands import Commands
 from app.ui.dialogs import Shortcuts
+from app.ui.editor_state import overlays
 
 Do = Callable[[str], None]
 """Does the action of a name."""
@@ -86,10 +87,8 @@ def _table() -> list[Action]:
     add("View", "inspector", "Inspector", "tab", lambda c: c.toggle_inspector())
     add("View", "statistics", "Statistics", "ctrl+i", lambda c: c.toggle_statistics())
     add("View", "theme", "Dark or light", "ctrl+l", lambda c: c.preferences.toggle_theme())
-    for name in ("grid", "viscosity", "frozen", "velocity", "forces"):
-        key = str(1 + ("grid", "viscosity", "frozen", "velocity", "forces").index(name))
-        label = {"grid": "Warp grid"}.get(name, name.capitalize())
-        add("View", f"overlay_{name}", label, key, lambda c, n=name: c.state.toggle_overlay(n))
+    for name, overlay in overlays().items():
+        add("View", f"overlay_{name}", overlay.label, overlay.key, lambda c, n=name: c.state.toggle_overlay(n))
 
     add("Time", "play", "Play or pause", "space", lambda c: c.workspace.session.play())
     add("Time", "step", "One step on", ".", lambda c: c.workspace.session.step(), repeats=True)

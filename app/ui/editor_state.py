@@ -20,7 +20,8 @@ class Overlay:
     opacity: float = 0.7
 
 
-def _overlays() -> dict[str, Overlay]:
+def overlays() -> dict[str, Overlay]:
+    """All of them, hidden, by name, in the order of their keys."""
     names = (
         ("grid", "Warp grid"),
         ("viscosity", "Viscosity"),
@@ -55,7 +56,7 @@ class EditorState:
     tool_name: str = "push"
     brush: BrushSettings = field(default_factory=BrushSettings)
     opposite: dict[str, bool] = field(default_factory=dict)
-    overlays: dict[str, Overlay] = field(default_factory=_overlays)
+    overlays: dict[str, Overlay] = field(default_factory=overlays)
     is_narrow: bool = False
     inspector: bool = True
     over_narrow: bool = False

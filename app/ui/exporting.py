@@ -407,7 +407,6 @@ class Exports:
             UserError: if it cannot be written, as far as that can be known beforehand.
         """
         job.check()
-        job = replace(job, picture=job.picture)
         self._process = ExportProcess(job)
 
     def cancel(self) -> None:

@@ -26,19 +26,16 @@ class ImGuiBackend:
 
     Args:
         device: the GL it draws with; its context must be current.
-        layout: where imgui keeps the layout of its windows; None keeps none.
     """
 
-    def __init__(self, device: Device, layout: str = "") -> None:
+    def __init__(self, device: Device) -> None:
         self.device = device
         self._context = imgui.create_context()
         io = imgui.get_io()
-        io.set_ini_filename(layout)
+        io.set_ini_filename("")
         # An exception in the middle of a frame must end in a message, not in an assertion about a missing End().
         io.config_error_recovery_enable_assert = False
         io.config_error_recovery_enable_tooltip = False
-        # Events are taken as they come: spread over frames by imgui, a fast drag would lag behind the pointer.
-        io.config_input_trickle_event_queue = True
         io.config_nav_cursor_visible_auto = True
         # At rest nothing is drawn, and a cursor that blinks might rest while it is not to be seen.
         io.config_input_text_cursor_blink = False
@@ -75,10 +72,6 @@ class ImGuiBackend:
         target.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         self.device.fences.hold()
-
-    def abandon(self) -> None:
-        """End a frame in which something went wrong, without drawing it."""
-        imgui.end_frame()
 
     def release(self) -> None:
         imgui.backends.opengl3_shutdown()

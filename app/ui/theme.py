@@ -36,7 +36,6 @@ class Palette:
     on_accent: Colour
     accent_soft: Colour
     checker: tuple[Colour, Colour]
-    shadow: Colour
     dark: bool
 
 
@@ -54,7 +53,6 @@ DARK = Palette(
     on_accent=rgb("241700"),
     accent_soft=rgb("f2a93b", 0.16),
     checker=(rgb("2a2a2a"), rgb("353535")),
-    shadow=rgb("000000", 0.35),
     dark=True,
 )
 LIGHT = Palette(
@@ -71,7 +69,6 @@ LIGHT = Palette(
     on_accent=rgb("ffffff"),
     accent_soft=rgb("a35d00", 0.14),
     checker=(rgb("ffffff"), rgb("e4e4e4")),
-    shadow=rgb("000000", 0.18),
     dark=False,
 )
 PALETTES = {"dark": DARK, "light": LIGHT}

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from math import isfinite
+from math import isfinite, log
 from typing import Any
 
 from imgui_bundle import imgui
@@ -63,9 +63,6 @@ class Ui:
     def px(self, points: float) -> float:
         """Points of the design on this screen."""
         return points * self.scale
-
-    def colour(self, colour: Colour, alpha: float = 1.0) -> int:
-        return packed(colour, alpha)
 
     # -- containers -------------------------------------------------------------------------------------------------
 
@@ -421,8 +418,6 @@ class Ui:
 
 
 def _fraction(value: float, low: float, high: float, logarithmic: bool) -> float:
-    from math import log
-
     if logarithmic:
         floor = max(low, high * 1e-6)
         return min(max(log(max(value, floor) / floor) / log(high / floor), 0.0), 1.0)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import time
+from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -239,10 +241,7 @@ def run(file: Path | None = None) -> None:
 
 def sample() -> Path:
     """The picture the editor opens with."""
-    from importlib import resources
-
-    folder = Path(str(resources.files("assets")))
-    return next(path for path in (folder / "sample.webp", folder / "sample.jpg") if path.exists())
+    return Path(str(resources.files("assets"))) / "sample.webp"
 
 
 def _mods(bits: int) -> Mods:
@@ -251,8 +250,6 @@ def _mods(bits: int) -> Mods:
 
 
 def _with_own(mods: Mods, key: int, action: int) -> Mods:
-    from dataclasses import replace
-
     down = action != glfw.RELEASE
     own = {
         glfw.KEY_LEFT_ALT: "alt", glfw.KEY_RIGHT_ALT: "alt", glfw.KEY_LEFT_SHIFT: "shift",

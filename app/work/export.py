@@ -17,19 +17,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from app.errors import UserError
-from app.media.animation import (
-    Frame,
-    FrameWriter,
-    NumberedWriter,
-    animation_writer,
-    crf_of,
-    frame_order,
-    passes,
-    reordered,
-    unheld_of_clip,
-)
+from app.media.animation import Frame, FrameWriter, NumberedWriter, animation_writer, frame_order, reordered
 from app.media.auxiliary import Pictures
 from app.media.clip import USUAL
+from app.media.encoders import crf_of, passes, unheld_of_clip
 from app.media.files import is_sequence, replacing
 from app.media.formats import picture_format, unheld
 from app.media.maps import Displacement, map_writer, write_map

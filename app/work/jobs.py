@@ -10,8 +10,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.animation import check_colours, check_output, is_animation
 from app.media.clip import WHOLE, Clip, Part
+from app.media.encoders import check_colours, check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.media.files import cannot_write, replacing
+from app.media.files import make_folder, replacing
 from app.media.inputs import Archive, open_input
 from app.model.recipe import Recipe
 from app.work.replay import Replay
@@ -48,10 +48,7 @@ class StoredStates:
         self._failed = False
         self._damaged: set[int] = set()
         self._key = _digest(replay)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(folder, error) from None
+        make_folder(folder)
 
     def resume(self, tick: int) -> bool:
         """Take the simulation to the last state after the present one and not after `tick`; True if there is one."""

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from app.errors import UserError
-from app.media.animation import ANIMATIONS
-from app.media.files import cannot_write, check_kept, is_sequence, takes_place, unnumbered
+from app.media.encoders import ANIMATIONS
+from app.media.files import check_kept, is_sequence, make_folder, takes_place, unnumbered
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
 from app.media.opening import CLIP_ENDINGS, Opened, open_recipe
@@ -191,10 +191,7 @@ def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
         pieces.append(replace(one, outputs=one.outputs.renamed(Path.absolute)))
     _check_apart(pieces)
     if folder is not None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(folder, error) from None
+        make_folder(folder)
     return [one.located() for one in pieces]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from app.media.animation import ANIMATIONS
+from app.media.encoders import ANIMATIONS
 from app.media.formats import FORMATS, TABLE, Format
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Layer, Picture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.model.strokes import Stroke
-from app.model.tools import TOOL, BrushSettings, Press, Touch, path_length
+from app.model.tools import TOOL, BrushSettings, Press, Touch
 
 EXTENT = (1.0, 0.75)
 DT = 1 / 30
@@ -77,7 +77,7 @@ def test_a_fast_pointer_is_followed_along_its_path() -> None:
     stroke = play("push", *corner)
     assert stroke is not None
     assert (0.8, 0.2) in {sample[1:3] for sample in stroke.samples}
-    assert path_length(stroke, EXTENT) == pytest.approx(0.6 + 0.6 * 0.75, abs=1e-3)
+    assert stroke.travelled(stroke.last_tick + 1, EXTENT) == pytest.approx(0.6 + 0.6 * 0.75, abs=1e-3)
 
 
 def test_shift_keeps_to_the_axis_it_set_out_on() -> None:

@@ -10,7 +10,6 @@ from app.model.picture import Picture
 from app.model.presets import HONEY, PUTTY, WATER, Feel
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Dab, Stroke
-from app.model.tools import path_length
 from app.model.windows import CELLS, Window, detail_for
 from app.work.replay import Replay
 from solver.gl.device import Device
@@ -128,7 +127,7 @@ def a_stroke(rng: np.random.Generator, first: int = 0, tool: str = "push", detai
 
 
 def length(stroke: Stroke) -> float:
-    return path_length(stroke, (1.0, SIZE[1] / SIZE[0]))
+    return stroke.travelled(stroke.last_tick + 1, (1.0, SIZE[1] / SIZE[0]))
 
 
 def off_the_whole(device: Device, stroke: Stroke, feel: Feel) -> tuple[float, float]:

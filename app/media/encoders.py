@@ -1,0 +1,271 @@
+"""What each kind of animation file is encoded with: its containers and codecs, their quality, and what they hold."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Protocol
+
+from app.errors import UserError
+from app.media import ffmpeg
+from app.media.clip import Clip, Colours
+from app.media.files import NUMBER, is_sequence
+from app.media.formats import FORMATS, check_picture_output
+from app.media.losses import lost
+from app.media.video import NAMES
+
+
+# What players take a video for. The filters set the tags: the frames' own overrule those given to the encoder.
+def tagged(colours: Colours) -> str:
+    matrix, tags = colours.matrix, f"color_primaries={colours.primaries}:color_trc={colours.transfer}"
+    scaled = f"scale=out_color_matrix={matrix}:out_range=tv:flags=accurate_rnd+full_chroma_int+lanczos"
+    return f"{scaled},setparams=colorspace={matrix}:{tags}:range=tv"
+
+
+# palettegen counts every colour it meets: among 64 levels a channel it is 20 times faster, as good, and bounded
+SIX_BITS = "lutrgb=" + ":".join(f"{channel}='round(val*63/255)*255/63'" for channel in "rgb")
+ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
+
+
+class Encoding(Protocol):
+    """ffmpeg's output options for frames with or without alpha, of 8 or 16 bits a channel."""
+
+    def __call__(self, alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]: ...
+
+
+def _mp4(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    quality = ["-c:v", "libx264", "-preset", "medium", "-crf", str(18 if crf is None else crf)]
+    return [
+        *["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-pix_fmt", "yuv420p", *quality],
+        *["-movflags", "+faststart"],
+    ]
+
+
+def _h265(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    if "libx265" not in ffmpeg.encoders():
+        raise UserError(
+            "This ffmpeg has no encoder for H.265; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another."
+        )
+    kind = "yuv420p" if bits == 8 else "yuv420p10le"
+    quality = ["-c:v", "libx265", "-preset", "medium", "-crf", str(20 if crf is None else crf), "-tag:v", "hvc1"]
+    filters = (ON_BLACK if alpha else "") + tagged(colours)
+    return ["-vf", filters, "-pix_fmt", kind, *quality, "-x265-params", "log-level=error", "-movflags", "+faststart"]
+
+
+def _webm(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    quality = ["-c:v", "libvpx-vp9", "-b:v", "0", "-crf", str(24 if crf is None else crf), "-row-mt", "1"]
+    speed = ["-deadline", "good", "-cpu-used", "4"]
+    return ["-vf", tagged(colours), "-pix_fmt", "yuva420p" if alpha else "yuv420p", *quality, *speed]
+
+
+def _av1(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    quality = ["-crf", str(30 if crf is None else crf)]
+    speed = {
+        "libsvtav1": ["-c:v", "libsvtav1", "-preset", "8"],
+        "libaom-av1": ["-c:v", "libaom-av1", "-b:v", "0", "-cpu-used", "6", "-row-mt", "1"],
+    }
+    encoder = next((name for name in speed if name in ffmpeg.encoders()), None)
+    if encoder is None:
+        raise UserError("This ffmpeg has no encoder for AV1; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another.")
+    kind = "yuv420p" if bits == 8 else "yuv420p10le"
+    return ["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-pix_fmt", kind, *speed[encoder], *quality]
+
+
+def lossless(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    kind = {(False, 8): "bgr0", (True, 8): "bgra", (False, 16): "gbrp16le", (True, 16): "gbrap16le"}[alpha, bits]
+    transfer = "iec61966-2-1" if colours.transfer == "bt709" else colours.transfer
+    told = f"setparams=color_primaries={colours.primaries}:color_trc={transfer}"
+    return ["-vf", told, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
+
+
+def _prores(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if alpha else "yuv444p10le", "-vendor", "apl0"]
+    return ["-vf", tagged(colours), "-c:v", "prores_ks", *kind]
+
+
+def _prores_422_hq(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    kind = ["-profile:v", "hq", "-pix_fmt", "yuv422p10le", "-vendor", "apl0"]
+    return ["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-c:v", "prores_ks", *kind]
+
+
+def _apng(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    return ["-c:v", "apng", "-pix_fmt", "rgba" if alpha else "rgb24", "-plays", str(loops), "-f", "apng"]
+
+
+def _webp(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+    kind = ["-pix_fmt", "yuva420p" if alpha else "yuv420p", "-quality", "90", "-compression_level", "3"]
+    return ["-c:v", "libwebp_anim", *kind, "-loop", str(loops), "-f", "webp"]
+
+
+@dataclass(frozen=True)
+class Container:
+    """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
+
+    The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
+    is turned into the first one, by the options `encoder`, in pairs.
+    """
+
+    name: str
+    codecs: Mapping[str, Encoding]
+    even: bool = False
+    sound: tuple[str, ...] = ()
+    encoder: tuple[str, ...] = ()
+    passes: int = 1
+
+    def encoding(self, codec: str | None) -> Encoding:
+        return self.codecs[codec or next(iter(self.codecs))]
+
+
+# The widest and highest picture that an encoder, or what holds it, takes.
+LARGEST = {
+    "h264": (16384, 16384), "h265": (8192, 8192), "vp9": (65536, 65536), "av1": (16384, 8704),
+    "prores-4444": (65534, 65534),
+    "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (FORMATS[".webp"].longest,) * 2,
+}  # fmt: skip
+
+ANIMATIONS = {
+    ".mp4": Container(
+        "MP4",
+        {"h264": _mp4, "h265": _h265},
+        even=True,
+        sound=("aac", "mp3", "ac3"),
+        encoder=("-c", "aac", "-b", "192k"),
+    ),
+    ".webm": Container(
+        "WebM",
+        {"vp9": _webm, "av1": _av1},
+        even=True,
+        sound=("opus", "vorbis"),
+        encoder=("-c", "libopus", "-b", "128k"),
+    ),
+    ".mkv": Container(
+        "FFV1", {"ffv1": lossless}, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("-c", "flac")
+    ),
+    ".mov": Container(
+        "ProRes",
+        {"prores-4444": _prores, "prores-422-hq": _prores_422_hq},
+        even=True,
+        sound=("pcm_s16le", "pcm_s24le", "aac"),
+        encoder=("-c", "pcm_s16le"),
+    ),
+    ".gif": Container("GIF", {"gif": lossless}, passes=2),  # by way of a lossless file, see `animation_writer`
+    ".apng": Container("APNG", {"apng": _apng}),
+    ".webp": Container("animated WebP", {"webp": _webp}),
+}
+
+
+def is_animation(path: str | os.PathLike[str]) -> bool:
+    """Whether the name alone asks for more than one frame; `.webp` does not, it may be a still."""
+    suffix = Path(path).suffix.lower()
+    return is_sequence(path) or (suffix in ANIMATIONS and suffix != ".webp")
+
+
+def passes(path: str | os.PathLike[str]) -> int:
+    """How many times each frame of an animation is gone through until it is written."""
+    return 1 if is_sequence(path) else ANIMATIONS[Path(path).suffix.lower()].passes
+
+
+def check_animation(
+    path: str | os.PathLike[str],
+    fps: float | Fraction = 1,
+    codec: str | None = None,
+    size: tuple[int, int] | None = None,
+) -> None:
+    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate, codec or size."""
+    if not 0 < fps <= 1000:
+        raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
+    if is_sequence(path):
+        if NUMBER.search(NUMBER.sub("", Path(path).name, count=1)):
+            raise UserError(f"Cannot write {path}: a sequence's name holds one number, as in name.%04d.png.")
+        suffix = Path(path).suffix.lower()
+        if suffix in ANIMATIONS and suffix not in FORMATS:
+            mend = f"end in one of {' '.join(FORMATS)}, or leave out the number for one {suffix}"
+            raise UserError(f"Cannot write {path}: a sequence's files are pictures; {mend}.")
+        check_picture_output(path, size=size, codec=codec)
+        return
+    suffix = Path(path).suffix.lower()
+    if suffix not in ANIMATIONS:
+        endings = " ".join(ANIMATIONS)
+        raise UserError(f"Cannot write {path}: an animation ends in one of {endings}, or is name.%04d.png.")
+    known = ANIMATIONS[suffix].codecs
+    if codec is not None and codec not in known:
+        raise UserError(f"Cannot write {path}: {suffix} holds {' or '.join(known)}, not {codec}; change --codec.")
+    if suffix == ".gif" and fps > 50:
+        raise UserError(f"Cannot write {path}: GIF shows at most 50 frames a second; lower the rate or use .apng.")
+    used = codec or next(iter(known))
+    most = LARGEST.get(used)
+    if size is not None and most is not None and (size[0] > most[0] or size[1] > most[1]):
+        raise UserError(
+            f"Cannot write {path}: the result is {size[0]} x {size[1]} pixels, and {used} holds no more than "
+            f"{most[0]} x {most[1]}; make it smaller, or write name.%04d.png."
+        )
+
+
+def unheld_of_clip(path: str | os.PathLike[str], codec: str | None, clip: Clip) -> str:
+    """What of a clip's depth and of its colours' resolution a video's format has no room for, in a sentence, or ""."""
+    container = ANIMATIONS.get(Path(path).suffix.lower())
+    if container is None or container.passes > 1 or is_sequence(path):
+        return ""
+    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0, clip.colours)
+    (bits, chroma), (room, kept) = map(_depth, (clip.pixel_format, options[options.index("-pix_fmt") + 1]))
+    losses = [f"its {bits} bits a channel become {room}"] if bits > room else []
+    losses += [f"its colours of 4:{chroma} become 4:{kept}"] if chroma > kept else []
+    return lost(clip.path, losses)
+
+
+def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, animated: bool) -> None:
+    """Raise `UserError` if a file cannot tell what a clip's colours are, or has too few bits for their range."""
+    if clip.colours.is_usual:
+        return
+    suffix = Path(path).suffix.lower()
+    container = ANIMATIONS.get(suffix) if animated and not is_sequence(path) else None
+    named = " ".join(
+        NAMES.get(name, name) for name in (clip.colours.primaries, clip.colours.transfer) if name != "bt709"
+    )
+    mend = "write .mov, .mkv, .mp4 with --codec h265, .webm with --codec av1, or name.%04d.png"
+    if container is None and suffix == ".png":
+        return
+    if container is None or suffix not in (".mp4", ".webm", ".mkv", ".mov"):
+        raise UserError(f"Cannot write {path}: it cannot tell that the colours of {clip.path} are {named}; {mend}.")
+    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0, clip.colours)
+    if clip.colours.is_high and _depth(options[options.index("-pix_fmt") + 1])[0] < 10:
+        raise UserError(f"Cannot write {path}: the colours of {clip.path} are {named}, and 8 bits too few; {mend}.")
+
+
+def _depth(pixel_format: str) -> tuple[int, str]:
+    """Bits a channel of one of ffmpeg's formats, and its chroma subsampling: the digits after the 4."""
+    deep = re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format)
+    planar = re.search(r"4([0-4])([0-4])p", pixel_format)
+    chroma = ":".join(planar.groups()) if planar else "2:0" if pixel_format.startswith("gray") else "4:4"
+    return {48: 16, 64: 16}.get(bits := int(deep[1]) if deep else 8, bits), chroma
+
+
+def check_output(
+    path: str | os.PathLike[str],
+    *,
+    animated: bool = False,
+    fps: float | Fraction = 1,
+    codec: str | None = None,
+    bits: int | None = None,
+    size: tuple[int, int] | None = None,
+) -> None:
+    """Raise `UserError` if there is no format for `path`, as an animation if `animated` or so named, else a still.
+
+    The format must have the codec, the bits a channel and room for the size, (width, height) in pixels, that are given.
+    """
+    if animated or is_animation(path):
+        check_animation(path, fps, codec, size)
+        return
+    if Path(path).suffix.lower() not in FORMATS:
+        endings = f"a picture's name must end in one of {' '.join(FORMATS)}, an animation's in {' '.join(ANIMATIONS)}"
+        raise UserError(f"Cannot write {path}: {endings}.")
+    check_picture_output(path, bits, size, codec)
+
+
+def crf_of(quality: int) -> int:
+    """The constant rate factor of a video of quality 1 to 100: 45 to 15."""
+    return round(45 - 0.3 * quality)
