@@ -17,6 +17,7 @@ from PIL import Image
 from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
 from app.work.recovery import find
+from support.commands import Run
 from support.desk import PATIENCE, Desk, needs_a_screen
 from support.editing import pattern, small_project, write_foreign_map
 
@@ -183,9 +184,8 @@ def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["nonesuch.png", "nonesuch.toml", "nonesuch.fluidwarp"])
-def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, name: str) -> None:
-    command = [sys.executable, "-m", "app", "edit", str(tmp_path / name)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, fluidwarp: Run, name: str) -> None:
+    done = fluidwarp(tmp_path, "edit", name)
     assert done.returncode == 1
     assert name in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
