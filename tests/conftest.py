@@ -18,6 +18,11 @@ from support.commands import Run
 from support.khronos import Programs
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What waits for a window comes first, so that no process is left alone with it in the end."""
+    items.sort(key=lambda item: "desk" not in getattr(item, "fixturenames", ()))
+
+
 @pytest.fixture(scope="session", autouse=True)
 def khronos_accepts_every_program() -> Iterator[None]:
     """Every program that the tests of this process compile passes the Khronos reference compiler too."""

@@ -25,18 +25,19 @@ RESTED = 2.0  # seconds in which everything that comes by itself has come, also 
 @pytest.fixture(params=[False, True], ids=["idle", "busy"])
 def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
     """A screen with the pattern in the editor, on a machine that has nothing else to do, or has."""
-    others = [subprocess.Popen(["yes"], stdout=subprocess.DEVNULL) for _ in range(2 * request.param)]
+    others: list[subprocess.Popen[bytes]] = []
     desk = Desk(tmp_path)
     try:
         write_picture(tmp_path / "pattern.png", pattern())
         desk.open(tmp_path / "pattern.png")
         still(desk)
+        others += [subprocess.Popen(["yes"], stdout=subprocess.DEVNULL) for _ in range(2 * request.param)]
         yield desk
     finally:
-        desk.close()
         for other in others:
             other.kill()
             other.wait()
+        desk.close()
 
 
 # What asks nothing of a machine at rest that it does not ask of a busy one.
