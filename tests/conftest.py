@@ -1,15 +1,26 @@
-"""Shared fixtures: a headless device, and the check that GL was left clean."""
+"""Shared fixtures: a headless device, the check that GL was left clean, and the command line in this process."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import warnings
 from collections.abc import Iterator
+from pathlib import Path
 
 import moderngl
 import pytest
 
 import solver.gl.passes
+from app import cli
 from solver.gl.device import Device
+from support.commands import Run
 from support.khronos import Programs
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What waits for a window comes first, so that no process is left alone with it in the end."""
+    items.sort(key=lambda item: "desk" not in getattr(item, "fixturenames", ()))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -30,8 +41,14 @@ def khronos_accepts_every_program() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def shared_device() -> Iterator[Device]:
-    """One headless device for the whole test process."""
-    device = Device.headless()
+    """One headless device for the whole test process.
+
+    llvmpipe draws in the process's own thread: handing each pass to others costs a third more, and the tests' processes
+    keep the cores busy anyway. What the tests start (the command line, the window, test_fences.py) has its threads.
+    """
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("LP_NUM_THREADS", "0")
+        device = Device.headless()
     yield device
     device.release()
 
@@ -42,3 +59,24 @@ def device(shared_device: Device) -> Iterator[Device]:
     assert shared_device.ctx.error == "GL_NO_ERROR"
     yield shared_device
     assert shared_device.ctx.error == "GL_NO_ERROR"
+
+
+@pytest.fixture
+def fluidwarp(device: Device, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    """`fluidwarp(folder, *words)` is the command line in that folder, without the start of a process and of GL."""
+    monkeypatch.setattr(Device, "headless", classmethod(lambda kind: device))
+    monkeypatch.setattr(device, "release", lambda: None)
+
+    def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+        status = 0
+        with pytest.MonkeyPatch.context() as place, warnings.catch_warnings():
+            place.chdir(folder)
+            place.setattr(sys, "argv", ["fluidwarp", *words])
+            warnings.simplefilter("error", RuntimeWarning)  # a process would tell it on stderr
+            try:
+                cli.main()
+            except SystemExit as ended:
+                status = int(ended.code or 0)
+        return subprocess.CompletedProcess(words, status, *capfd.readouterr())
+
+    return run

@@ -1,4 +1,4 @@
-"""The command line as its user meets it: in a process of its own, with files, and with everything that can be wrong."""
+"""The command line as its user meets it: with files, in a process of its own, and with everything that can be wrong."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from app.progress import Progress
 from app.work.export import run
 from app.work.jobs import Job, Outputs
 from solver.gl.device import Device
+from support.commands import Run
 
 ROOT = Path(__file__).parent.parent
 RECIPE = """
@@ -52,8 +53,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def fluidwarp(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run `fluidwarp words...` in `folder`."""
+def process(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """`fluidwarp words...` in `folder`, in a process of its own."""
     return subprocess.run(
         [sys.executable, "-m", "app", *words],
         cwd=folder,
@@ -73,7 +74,7 @@ def here(folder: Path) -> set[str]:
 
 def test_a_picture_twice_is_the_same_bytes(folder: Path):
     for name in ("one.png", "two.png"):
-        ran = fluidwarp(folder, "render", "a.toml", "-o", name)
+        ran = process(folder, "render", "a.toml", "-o", name)
         assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
     assert (folder / "one.png").read_bytes() == (folder / "two.png").read_bytes()
     before, after = read_picture(folder / "cat.png").pixels, read_picture(folder / "one.png").pixels
@@ -90,7 +91,7 @@ def test_both_modules_are_the_command(folder: Path, module: str):
     assert "Cannot read none.toml: there is no such file" in ran.stderr
 
 
-def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path):
+def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path, fluidwarp: Run):
     assert fluidwarp(folder, "render", "a.toml", "-o", "end.png").returncode == 0
     ran = fluidwarp(folder, "render", "a.toml", "-o", "f.%02d.png", "--stats", "s.json")
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -106,7 +107,7 @@ def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path):
     assert {"advect", "diffuse", "project", "warp map"} <= numbers[-1]["milliseconds"].keys()
 
 
-def test_options_instead_of_the_recipe(folder: Path):
+def test_options_instead_of_the_recipe(folder: Path, fluidwarp: Run):
     write_picture(folder / "dog.png", Picture(np.zeros((30, 20, 3), np.uint8)))
     words = ["--image", "dog.png", "--size", "60", "--grid", "16", "--solver", "paper", "--duration", "0.1"]
     ran = fluidwarp(folder, "render", "a.toml", "-o", "out.jpg", *words)
@@ -114,7 +115,7 @@ def test_options_instead_of_the_recipe(folder: Path):
     assert read_picture(folder / "out.jpg").pixels.shape == (60, 40, 3)
 
 
-def test_a_project_is_a_recipe(folder: Path):
+def test_a_project_is_a_recipe(folder: Path, fluidwarp: Run):
     """With its picture in it, and rendered to the same bytes."""
     save(from_recipe(folder / "a.toml"), folder / "a.fluidwarp")
     assert fluidwarp(folder, "render", "a.toml", "-o", "a.png").returncode == 0
@@ -124,21 +125,21 @@ def test_a_project_is_a_recipe(folder: Path):
     assert (folder / "a.png").read_bytes() == (folder / "b.png").read_bytes()
 
 
-def test_several_pictures(folder: Path):
+def test_several_pictures(folder: Path, fluidwarp: Run):
     write_picture(folder / "dog.png", Picture(np.zeros((30, 20, 3), np.uint8)))
     ran = fluidwarp(folder, "render", "a.toml", "cat.png", "dog.png", "-o", "{name} warped.png")
     assert (ran.returncode, ran.stderr) == (0, "")
     assert {"cat warped.png", "dog warped.png"} <= here(folder)
 
 
-def test_an_animation_that_would_begin_after_its_end_is_told(folder: Path):
+def test_an_animation_that_would_begin_after_its_end_is_told(folder: Path, fluidwarp: Run):
     ran = fluidwarp(folder, "render", "a.toml", "-o", "b.gif", "--from", "99")
     assert ran.returncode == 1
     assert re.fullmatch(r"fluidwarp: the animation ends at [\d.]+ s, and cannot begin at 99 s; .*\n", ran.stderr)
     assert here(folder) == {"a.toml", "cat.png"}
 
 
-def test_the_loss_of_a_clips_depth_is_told(folder: Path):
+def test_the_loss_of_a_clips_depth_is_told(folder: Path, fluidwarp: Run):
     from app.media.ffmpeg import executable
 
     ten = ["-f", "lavfi", "-i", "testsrc=s=64x48:r=10:d=0.2", "-pix_fmt", "yuv420p10le", "-c:v", "ffv1"]
@@ -149,7 +150,7 @@ def test_the_loss_of_a_clips_depth_is_told(folder: Path):
     assert fluidwarp(folder, "apply", "m.npy", "in.mkv", "-o", "applied.mp4").stderr == line
 
 
-def test_animation_stopped_and_turned(folder: Path):
+def test_animation_stopped_and_turned(folder: Path, fluidwarp: Run):
     (folder / "b.toml").write_text(
         RECIPE + "[stop]\ndisplacement_above = 0.03\n[time]\nreverse = true\nping_pong = true"
     )
@@ -160,7 +161,7 @@ def test_animation_stopped_and_turned(folder: Path):
     assert (folder / "b.gif").read_bytes()[:6] == b"GIF89a"
 
 
-def test_density_mode_moves_values(folder: Path):
+def test_density_mode_moves_values(folder: Path, fluidwarp: Run):
     (folder / "b.toml").write_text('mode = "density"\n' + RECIPE + "[density]\nkappa = 0.01\n")
     ran = fluidwarp(folder, "render", "b.toml", "-o", "b.png")
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -170,7 +171,7 @@ def test_density_mode_moves_values(folder: Path):
 
 
 def test_doctor(folder: Path):
-    ran = fluidwarp(folder, "doctor", DISPLAY="", WAYLAND_DISPLAY="")
+    ran = process(folder, "doctor", DISPLAY="", WAYLAND_DISPLAY="")
     assert ran.returncode == 0
     assert "OpenGL" in ran.stdout
     assert "no display" in ran.stdout
@@ -179,7 +180,7 @@ def test_doctor(folder: Path):
 
 def test_doctor_fails_where_something_vital_is_missing(folder: Path):
     nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ""}
-    ran = fluidwarp(folder, "doctor", **nothing)
+    ran = process(folder, "doctor", **nothing)
     assert ran.returncode == 1
     assert "missing" in ran.stdout
     assert "apt-get install" in ran.stdout
@@ -211,7 +212,7 @@ def test_a_mistake_of_ours_has_a_status_of_its_own(folder: Path):
 
 def test_no_egl_is_told(folder: Path):
     nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ""}
-    ran = fluidwarp(folder, "render", "a.toml", "-o", "out.png", **nothing)
+    ran = process(folder, "render", "a.toml", "-o", "out.png", **nothing)
     assert ran.returncode != 0
     assert "apt-get install" in ran.stderr
     assert len(ran.stderr.splitlines()) <= 2
@@ -328,7 +329,7 @@ FORCES = {
 }
 
 
-def test_bad_forces_name_the_force(folder: Path):
+def test_bad_forces_name_the_force(folder: Path, fluidwarp: Run):
     for text, expected in FORCES.values():
         force = f'[[force]]\nname = "x"\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\n{text}\n'
         (folder / "b.toml").write_text(f'picture = "cat.png"\nduration = 0.2\n[fluid]\ngrid = 32\n{force}')
@@ -339,7 +340,7 @@ def test_bad_forces_name_the_force(folder: Path):
         assert here(folder) == {"a.toml", "b.toml", "cat.png"}
 
 
-def test_a_force_that_never_acts_is_remarked_on(folder: Path):
+def test_a_force_that_never_acts_is_remarked_on(folder: Path, fluidwarp: Run):
     force = '[[force]]\nname = "x"\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\nat = [7]\n'
     (folder / "b.toml").write_text(f'picture = "cat.png"\nduration = 0.2\n[fluid]\ngrid = 32\n{force}')
     ran = fluidwarp(folder, "render", "b.toml", "-o", "x.png")
@@ -427,7 +428,7 @@ def test_memory_does_not_grow_with_the_frames(device: Device, tmp_path: Path):
     assert resident[39] < resident[9] + 10
 
 
-def test_what_is_lost_is_told_in_a_line(folder: Path):
+def test_what_is_lost_is_told_in_a_line(folder: Path, fluidwarp: Run):
     """By every command that reads pictures, of the picture itself and of those that the recipe names."""
     wild = Image.open(folder / "cat.png")
     wild.save(folder / "pages.tif", save_all=True, append_images=[wild, wild])
@@ -446,7 +447,7 @@ def test_what_is_lost_is_told_in_a_line(folder: Path):
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", line)
 
 
-def test_a_fold_is_told(folder: Path):
+def test_a_fold_is_told(folder: Path, fluidwarp: Run):
     values = np.zeros((48, 64, 2), np.float32)
     values[:, 32:, 0] = -0.1
     write_map(folder / "m.npy", Displacement(values))
@@ -467,7 +468,7 @@ def test_a_fold_is_told(folder: Path):
     assert ran.stderr == "fluidwarp: folds in 1 of the maps m.%04d.npy, the worst in 96 of its pixels\n"
 
 
-def test_a_map_is_turned_round(folder: Path):
+def test_a_map_is_turned_round(folder: Path, fluidwarp: Run):
     """What is looked up at x + D(x) goes from there to x, by -D(x)."""
     x = (np.arange(64) + 0.5) / 64
     values = np.zeros((48, 64, 2), np.float32)
@@ -500,14 +501,14 @@ def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(fold
 
 
 @pytest.mark.parametrize("words", [["render", "a.toml", "-o", "x.png"], ["apply", "m.npy", "cat.png", "-o", "x.png"]])
-def test_a_limit_below_one_pixel_is_refused(folder: Path, words: list[str]):
+def test_a_limit_below_one_pixel_is_refused(folder: Path, fluidwarp: Run, words: list[str]):
     for limit in ("-1", "0"):
         ran = fluidwarp(folder, *words, "--max-pixels", limit)
         assert ran.returncode == 2
         assert "--max-pixels" in ran.stderr
 
 
-def test_a_picture_too_wide_is_refused_before_it_is_warped(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_picture_too_wide_is_refused_before_it_is_warped(folder: Path, fluidwarp: Run):
     write_picture(folder / "wide.png", Picture(np.zeros((8, 16384, 3), np.uint8)))
     write_map(folder / "m.npy", Displacement(np.zeros((8, 16384, 2), np.float32)))
     ran = fluidwarp(folder, "apply", "m.npy", "wide.png", "-o", "x.webp")
@@ -515,7 +516,7 @@ def test_a_picture_too_wide_is_refused_before_it_is_warped(folder: Path, monkeyp
     assert "the result is 16384 x 8 pixels, and WebP holds no side longer than 16383" in ran.stderr
 
 
-def test_primaries_that_a_format_cannot_tell_are_told(folder: Path):
+def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: Run):
     primaries = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
     write_picture(folder / "aces.exr", Picture(np.ones((48, 64, 3), np.float32), chromaticities=primaries))
     ran = fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.tif")

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
 from app.media.animation import animation_writer
 from app.media.maps import Displacement, write_map
 from app.media.pictures import write_picture
 from app.media.project import from_recipe, save
 from app.model.picture import Picture
-from solver.gl.device import Device
 
 RECIPE = """
 version = 1
@@ -52,28 +50,6 @@ def smooth() -> np.ndarray:
     y, x = np.mgrid[0:48, 0:64]
     noise = np.random.default_rng(0).integers(0, 9, (48, 64, 3))
     return (np.stack([x * 3, y * 4, x + y], axis=-1) + noise).astype(np.uint8)
-
-
-@pytest.fixture
-def fluidwarp(
-    device: Device, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> Callable[..., tuple[int, str]]:
-    """Run a command in this process, on the shared device; gives the status and what it said."""
-    monkeypatch.setattr(Device, "headless", classmethod(lambda kind: device))
-    monkeypatch.setattr(device, "release", lambda: None)
-
-    def run(*words: object) -> tuple[int, str]:
-        monkeypatch.setattr(sys, "argv", ["fluidwarp", *map(str, words)])
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as ended:
-            status = int(ended.code or 0)
-        told = capfd.readouterr()
-        assert told.out == ""
-        return status, told.err
-
-    return run
 
 
 def picture(folder: Path, ending: str) -> Path:
@@ -132,11 +108,9 @@ def test_a_damaged_file_is_used_or_refused_in_a_sentence(
     folder: Path,
     kind: str,
     ending: str,
-    fluidwarp: Callable[..., tuple[int, str]],
-    monkeypatch: pytest.MonkeyPatch,
+    fluidwarp: Callable[..., CompletedProcess[str]],
 ):
     make, _, commands, rounds = COMMANDS[kind]
-    monkeypatch.chdir(folder)
     path = make(folder, ending)
     whole = path.read_bytes()
     random = np.random.default_rng(len(ending) + len(whole))
@@ -145,8 +119,9 @@ def test_a_damaged_file_is_used_or_refused_in_a_sentence(
     for number in range(rounds):
         path.write_bytes(damaged(whole, random, number))
         for command in commands:
-            status, said = fluidwarp(*[path.name if word == "IN" else word for word in command])
-            output = folder / command[-1]
+            ran = fluidwarp(folder, *[path.name if word == "IN" else word for word in command])
+            assert ran.stdout == ""
+            status, said, output = ran.returncode, ran.stderr, folder / command[-1]
             lines = said.splitlines()
             if status == 0:
                 assert output.stat().st_size > 0
@@ -164,7 +139,8 @@ def test_a_damaged_file_is_used_or_refused_in_a_sentence(
     # The whole file is taken, and so the refusals were not for something else.
     path.write_bytes(whole)
     for command in commands:
-        assert fluidwarp(*[path.name if word == "IN" else word for word in command])[0] == 0
+        ran = fluidwarp(folder, *[path.name if word == "IN" else word for word in command])
+        assert (ran.returncode, ran.stdout) == (0, "")
         (folder / command[-1]).unlink()
 
 

@@ -29,6 +29,7 @@ from app.media.video import read_clip
 from app.model import toml
 from app.model.picture import Picture
 from app.ui.preferences import Preferences
+from support.commands import Run
 
 ROOT = Path(__file__).parents[2]
 MOST_MEMORY = 300 * 2**20  # bytes, beside what the program has before it opens a file
@@ -472,7 +473,7 @@ def test_what_is_shown_is_one_line_that_no_terminal_obeys():
     assert re.fullmatch(r"Cannot read x+ \.\.\. x+: there is no such file; check the name\.", long)
 
 
-def test_names_reach_the_terminal_escaped_and_shortened(tmp_path: Path):
+def test_names_reach_the_terminal_escaped_and_shortened(tmp_path: Path, fluidwarp: Run):
     """In errors, in notices and in the lines of a batch."""
     name = "\x1b[31mred\nline\u202e"
     (tmp_path / "a.toml").write_text(
@@ -482,16 +483,10 @@ def test_names_reach_the_terminal_escaped_and_shortened(tmp_path: Path):
     write_picture(tmp_path / f"{name}.png", Picture(np.zeros((24, 32, 3), np.uint8)))
     write_picture(tmp_path / "cat.png", Picture(np.zeros((48, 64, 3), np.uint8)))
 
-    def fluidwarp(*words: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "app", "render", *words]
-        return subprocess.run(
-            command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
-        )
-
     escaped = r"\x1b[31mred\nline\u202e"
-    ran = fluidwarp("a.toml", "-i", "cat.png", "-o", "out.png")
+    ran = fluidwarp(tmp_path, "render", "a.toml", "-i", "cat.png", "-o", "out.png")
     assert ran.stderr == f"fluidwarp: {escaped}.png is 32 x 24 and the picture 64 x 48: scaled to fit it\n"
-    ran = fluidwarp("a.toml", "cat.png", f"{name}.gone.png", "-o", "out")
+    ran = fluidwarp(tmp_path, "render", "a.toml", "cat.png", f"{name}.gone.png", "-o", "out")
     assert ran.returncode == 1
     assert ran.stderr.splitlines() == [
         f"fluidwarp: cat.png: {escaped}.png is 32 x 24 and the picture 64 x 48: scaled to fit it".replace(
@@ -500,7 +495,7 @@ def test_names_reach_the_terminal_escaped_and_shortened(tmp_path: Path):
         f"fluidwarp: Cannot read {tmp_path}/{escaped}.gone.png: there is no such file; check the name.",
         "fluidwarp: 1 of 2 pictures failed; all others are written",
     ]
-    ran = fluidwarp("x" * 100_000, "-o", "out.png")
+    ran = fluidwarp(tmp_path, "render", "x" * 100_000, "-o", "out.png")
     assert ran.returncode == 1
     assert len(ran.stderr) < MOST_SHOWN + 50
 
@@ -514,13 +509,10 @@ TOO_LONG = [
 
 
 @pytest.mark.parametrize("words", TOO_LONG)
-def test_what_is_too_long_is_told(tmp_path: Path, words: list[str]):
+def test_what_is_too_long_is_told(tmp_path: Path, fluidwarp: Run, words: list[str]):
     write_picture(tmp_path / "cat.png", Picture(np.zeros((48, 64, 3), np.uint8)))
     (tmp_path / "a.toml").write_text("duration = 0.02\n[fluid]\ngrid = 16\n")
-    command = [sys.executable, "-m", "app", "render", "a.toml", "-i", "cat.png", *words]
-    ran = subprocess.run(
-        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
-    )
+    ran = fluidwarp(tmp_path, "render", "a.toml", "-i", "cat.png", *words)
     assert ran.returncode == 1
     assert "a mistake in fluidwarp" not in ran.stderr
     assert words[-1][:50] in ran.stderr

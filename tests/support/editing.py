@@ -155,7 +155,7 @@ class Robot:
         while not condition():
             assert time.monotonic() < deadline, [message.text for message in self.editor.messages.shown]
             self.frame()
-            time.sleep(0.01)
+            time.sleep(0.05)  # for those that are waited for
         self.frame()
 
     def warp(self) -> np.ndarray:

@@ -17,6 +17,7 @@ from PIL import Image
 from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
 from app.work.recovery import find
+from support.commands import Run
 from support.desk import PATIENCE, Desk, needs_a_screen
 from support.editing import pattern, small_project, write_foreign_map
 
@@ -183,9 +184,8 @@ def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["nonesuch.png", "nonesuch.toml", "nonesuch.fluidwarp"])
-def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, name: str) -> None:
-    command = [sys.executable, "-m", "app", "edit", str(tmp_path / name)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, fluidwarp: Run, name: str) -> None:
+    done = fluidwarp(tmp_path, "edit", name)
     assert done.returncode == 1
     assert name in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
@@ -288,16 +288,15 @@ FORMATS = 229
 
 
 @pytest.mark.parametrize(
-    ("kind", "across", "name"),
+    "exports",
     [
-        ("picture", 640, "work warped.jpg"),
-        ("picture", 790, "work warped.tif"),
-        ("animation", 790, "work warped.%04d.png"),
-        ("map", 470, "work map.exr"),
+        [("picture", 640, "work warped.jpg"), ("picture", 790, "work warped.tif"), ("map", 470, "work map.exr")],
+        [("animation", 790, "work warped.%04d.png")],
     ],
+    ids=["files", "sequence"],
 )
 def test_what_is_exported_is_what_the_command_line_makes(
-    desk: Desk, tmp_path: Path, kind: str, across: int, name: str
+    desk: Desk, tmp_path: Path, fluidwarp: Run, exports: list[tuple[str, int, str]]
 ) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
@@ -305,31 +304,39 @@ def test_what_is_exported_is_what_the_command_line_makes(
     desk.drag((400, 400), (520, 400))
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
     desk.save(work)
+    for kind, across, name in exports:
+        export(desk, kind, across)
+        compare(desk, tmp_path, fluidwarp, kind, name)
+
+
+def export(desk: Desk, kind: str, across: int) -> None:
     desk.key("ctrl+e")
     time.sleep(1.5)
     for x, y in (KINDS[kind], (across, FORMATS)):
         desk.do("mousemove", str(x), str(y), "sleep", "0.4", "click", "1", "sleep", "0.6")
     desk.key("Return")
+
+
+def compare(desk: Desk, folder: Path, fluidwarp: Run, kind: str, name: str) -> None:
+    """What the window writes, and what the command line makes of the saved work."""
     pattern_of_names = name.replace("%04d", "*")
-    desk.until(lambda: bool(list(tmp_path.glob(pattern_of_names))), "the export")
-    line = tmp_path / "line"
-    line.mkdir()
-    how = ["--map", str(line / name)] if kind == "map" else ["-o", str(line / name)]
-    command = [sys.executable, "-m", "app", "render", str(work), *how]
-    subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
+    line = folder / "line"
+    line.mkdir(exist_ok=True)
+    how = ["--map" if kind == "map" else "-o", str(line / name)]
+    assert fluidwarp(folder, "render", "work.fluidwarp", *how).returncode == 0
     made = sorted(line.glob(pattern_of_names))
-    # The files of a sequence appear one by one; the window cannot resume, and leaves no record of them.
-    desk.until(lambda: len(list(tmp_path.glob(pattern_of_names))) >= len(made), "the whole export")
-    assert [path.name for path in made] == sorted(path.name for path in tmp_path.glob(pattern_of_names))
-    assert not list(tmp_path.glob(".fluidwarp-frames-*"))
     assert (len(made) > 10) == (kind == "animation")
+    # The files of a sequence appear one by one; the window cannot resume, and leaves no record of them.
+    desk.until(lambda: len(list(folder.glob(pattern_of_names))) >= len(made), f"all of {name}")
+    assert [path.name for path in made] == sorted(path.name for path in folder.glob(pattern_of_names))
+    assert not list(folder.glob(".fluidwarp-frames-*"))
     for path in made:
         same = (
-            tmp_path / path.name
+            folder / path.name
         ).read_bytes() == path.read_bytes()  # asserted as a whole: their diff would take hours
         assert same, path.name
     if kind != "map":
-        with Image.open(tmp_path / made[-1].name) as seen:
+        with Image.open(folder / made[-1].name) as seen:
             assert seen.size == (240, 180)
             assert seen.format == {"jpg": "JPEG", "tif": "TIFF", "png": "PNG"}[name[-3:]]
             difference = np.abs(np.asarray(seen.convert("RGB"), float) - pattern().pixels).mean()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ import pytest
 
 from app.media import project as projects
 from app.media.pictures import write_picture
+from support.commands import Run
 from support.desk import Desk, needs_a_screen
 from support.editing import pattern
 
@@ -25,18 +25,19 @@ RESTED = 2.0  # seconds in which everything that comes by itself has come, also 
 @pytest.fixture(params=[False, True], ids=["idle", "busy"])
 def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
     """A screen with the pattern in the editor, on a machine that has nothing else to do, or has."""
-    others = [subprocess.Popen(["yes"], stdout=subprocess.DEVNULL) for _ in range(2 * request.param)]
+    others: list[subprocess.Popen[bytes]] = []
     desk = Desk(tmp_path)
     try:
         write_picture(tmp_path / "pattern.png", pattern())
         desk.open(tmp_path / "pattern.png")
         still(desk)
+        others += [subprocess.Popen(["yes"], stdout=subprocess.DEVNULL) for _ in range(2 * request.param)]
         yield desk
     finally:
-        desk.close()
         for other in others:
             other.kill()
             other.wait()
+        desk.close()
 
 
 # What asks nothing of a machine at rest that it does not ask of a busy one.
@@ -181,24 +182,20 @@ def test_with_little_room_everything_is_reached(tmp_path: Path) -> None:
         desk.close()
 
 
-def told(folder: Path, *words: str) -> tuple[int, str]:
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    done = subprocess.run([sys.executable, "-m", "app", *words], cwd=folder, env=env, capture_output=True, text=True)
-    return done.returncode, done.stderr
-
-
-def test_a_file_that_is_not_there_and_a_command_that_is_none_are_told_in_a_sentence(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_and_a_command_that_is_none_are_told_in_a_sentence(
+    tmp_path: Path, fluidwarp: Run
+) -> None:
     for word, status, said in (
         ("nonesuch.png", 1, "nonesuch.png does not exist"),
         ("./nonesuch", 1, "does not exist"),
         ("rendr", 2, "neither a file nor a command; the commands are edit, render"),
     ):
-        code, text = told(tmp_path, word)
-        assert code == status
-        assert said in text
-        assert len(text.strip().splitlines()) == 1
+        ran = fluidwarp(tmp_path, word)
+        assert ran.returncode == status
+        assert said in ran.stderr
+        assert len(ran.stderr.strip().splitlines()) == 1
     # A command stays one, whatever lies in the folder.
     (tmp_path / "doctor").write_text("no picture")
-    code, text = told(tmp_path, "doctor", "--nonesuch")
-    assert code == 2
-    assert "No such option" in text
+    ran = fluidwarp(tmp_path, "doctor", "--nonesuch")
+    assert ran.returncode == 2
+    assert "No such option" in ran.stderr

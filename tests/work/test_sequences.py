@@ -16,6 +16,7 @@ import pytest
 from app.media.maps import Displacement, write_map
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
+from support.commands import Run
 
 ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT = 48, 32
@@ -54,12 +55,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def fluidwarp(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "app", *words]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100)
-
-
 def made(folder: Path, start: str = "w.") -> list[str]:
     return sorted(path.name for path in folder.iterdir() if path.name.startswith(start))
 
@@ -71,7 +66,7 @@ def channels(path: Path) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", ["plate.%04d.exr", "plate.####.exr"])
-def test_each_file_is_warped_by_the_state_of_its_frame(folder: Path, name: str):
+def test_each_file_is_warped_by_the_state_of_its_frame(folder: Path, fluidwarp: Run, name: str):
     """As the same picture is, alone, by the map of that frame; with its own layers and attributes, under its number."""
     ran = fluidwarp(folder, "render", "a.toml", name, "-o", "w.%04d.exr", "--map", "m.%04d.exr")
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -90,7 +85,7 @@ def test_each_file_is_warped_by_the_state_of_its_frame(folder: Path, name: str):
     assert np.abs(channels(folder / "w.1004.exr")["R"] - plate(4)[..., 0]).max() > 0.05
 
 
-def test_a_range_has_the_same_frames_as_the_whole(folder: Path):
+def test_a_range_has_the_same_frames_as_the_whole(folder: Path, fluidwarp: Run):
     for words in (["-o", "whole.%05d.png"], ["-o", "part.#####.png", "--frames", "1002-1003"]):
         ran = fluidwarp(folder, "render", "a.toml", "plate.%04d.exr", *words, "--bits", "16")
         assert ran.returncode == 0, ran.stderr
@@ -110,7 +105,9 @@ def test_a_range_has_the_same_frames_as_the_whole(folder: Path):
     ],
 )
 @pytest.mark.parametrize("command", ["render", "apply"])
-def test_missing_frames_are_named(folder: Path, command: str, remove: tuple[int, ...], words: list[str], told: str):
+def test_missing_frames_are_named(
+    folder: Path, fluidwarp: Run, command: str, remove: tuple[int, ...], words: list[str], told: str
+):
     write_map(folder / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
     for number in remove:
         (folder / f"plate.{number}.exr").unlink()
@@ -122,7 +119,7 @@ def test_missing_frames_are_named(folder: Path, command: str, remove: tuple[int,
     assert made(folder) == []
 
 
-def test_frames_of_another_kind_are_told(folder: Path):
+def test_frames_of_another_kind_are_told(folder: Path, fluidwarp: Run):
     write_picture(folder / "plate.1003.exr", Picture(np.zeros((HEIGHT, WIDTH + 1, 3), np.float32)))
     ran = fluidwarp(folder, "render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr")
     assert ran.returncode == 1
@@ -131,7 +128,7 @@ def test_frames_of_another_kind_are_told(folder: Path):
     assert "w.1003.exr" not in made(folder)
 
 
-def test_files_are_not_replaced_by_their_own_results(folder: Path):
+def test_files_are_not_replaced_by_their_own_results(folder: Path, fluidwarp: Run):
     for name in ("plate.%04d.exr", "plate.####.exr", "plate.1002.exr"):
         ran = fluidwarp(folder, "render", "a.toml", "plate.####.exr", "-o", name)
         assert ran.returncode == 1
@@ -145,7 +142,7 @@ def inodes(folder: Path) -> dict[str, int]:
     return {name: (folder / name).stat().st_ino for name in made(folder)}
 
 
-def test_what_is_whole_is_not_made_again(folder: Path):
+def test_what_is_whole_is_not_made_again(folder: Path, fluidwarp: Run):
     """But what is cut, gone, of another source, recipe, depth or option is."""
     words = ["plate.%04d.exr", "-o", "w.%04d.exr", "--resume"]
     assert fluidwarp(folder, "render", "a.toml", *words[:-1]).returncode == 0
@@ -172,7 +169,7 @@ def test_what_is_whole_is_not_made_again(folder: Path):
     assert part.stderr == "fluidwarp: 2 of 2 frames were whole and are kept\n"
 
 
-def test_a_damaged_record_costs_no_more_than_the_work(folder: Path):
+def test_a_damaged_record_costs_no_more_than_the_work(folder: Path, fluidwarp: Run):
     words = ["render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr"]
     assert fluidwarp(folder, *words).returncode == 0
     (record,) = folder.glob(".fluidwarp-frames-*")
@@ -183,7 +180,7 @@ def test_a_damaged_record_costs_no_more_than_the_work(folder: Path):
     assert fluidwarp(folder, *words, "--resume").stderr == "fluidwarp: 4 of 4 frames were whole and are kept\n"
 
 
-def test_a_picture_there_and_back_and_its_maps_go_on(folder: Path):
+def test_a_picture_there_and_back_and_its_maps_go_on(folder: Path, fluidwarp: Run):
     """Frames that are shown twice, of one picture; and files of maps beside them, of which one is gone."""
     (folder / "a.toml").write_text(RECIPE + "[time]\nping_pong = true\n")
     write_picture(folder / "p.png", Picture((plate(1) * 255).astype(np.uint8)))
@@ -204,7 +201,7 @@ def test_a_picture_there_and_back_and_its_maps_go_on(folder: Path):
     assert len(made(folder, "m.")) == 6
 
 
-def test_a_killed_task_keeps_its_frames(folder: Path):
+def test_a_killed_task_keeps_its_frames(folder: Path, fluidwarp: Run):
     (folder / "a.toml").write_text(RECIPE.replace("duration = 0.3", "duration = 20"))
     command = [sys.executable, "-m", "app", "render", "a.toml", "plate.1001.exr", "-o", "w.%03d.png"]
     job = subprocess.Popen(command, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
@@ -232,7 +229,7 @@ def test_a_killed_task_keeps_its_frames(folder: Path):
         (["-o", "w.%04d.exr", "--stats", "s.json"], "--stats has the numbers of all frames"),
     ],
 )
-def test_what_cannot_be_resumed_is_told(folder: Path, words: list[str], told: str):
+def test_what_cannot_be_resumed_is_told(folder: Path, fluidwarp: Run, words: list[str], told: str):
     ran = fluidwarp(folder, "render", "a.toml", "plate.%04d.exr", *words, "--resume")
     assert ran.returncode == 1
     assert told in ran.stderr
@@ -241,7 +238,7 @@ def test_what_cannot_be_resumed_is_told(folder: Path, words: list[str], told: st
 # Maps ---------------------------------------------------------------------------------------------------------------
 
 
-def test_maps_and_frames_go_together_by_their_numbers(folder: Path):
+def test_maps_and_frames_go_together_by_their_numbers(folder: Path, fluidwarp: Run):
     """A shift by as many pixels as the map's number says; maps that begin elsewhere go in order."""
     for first in (0, 1000):
         for number in range(first, first + 5):
@@ -262,7 +259,7 @@ def test_maps_and_frames_go_together_by_their_numbers(folder: Path):
     assert "it lacks the frame 1002" in ran.stderr
 
 
-def test_apply_goes_on(folder: Path):
+def test_apply_goes_on(folder: Path, fluidwarp: Run):
     write_map(folder / "m.npy", Displacement(np.full((HEIGHT, WIDTH, 2), 0.05, np.float32)))
     words = ["apply", "m.npy", "plate.%04d.exr", "-o", "w.%04d.exr"]
     assert fluidwarp(folder, *words).returncode == 0
@@ -276,7 +273,7 @@ def test_apply_goes_on(folder: Path):
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_apply_takes_many(folder: Path, jobs: str):
+def test_apply_takes_many(folder: Path, fluidwarp: Run, jobs: str):
     """Into a folder, in processes, each under its own name; a sequence as one of them; what fails is told in a line."""
     write_map(folder / "m.npy", Displacement(np.full((HEIGHT, WIDTH, 2), 0.05, np.float32)))
     write_picture(folder / "p.png", Picture((plate(1) * 255).astype(np.uint8)))
@@ -291,7 +288,7 @@ def test_apply_takes_many(folder: Path, jobs: str):
 
 
 @pytest.mark.parametrize("edges", ["transparent", "clamp", "black"])
-def test_nan_in_a_map_is_outside(folder: Path, edges: str):
+def test_nan_in_a_map_is_outside(folder: Path, fluidwarp: Run, edges: str):
     """Pixel for pixel, and what is beside it is as if the map went on there."""
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
     values = np.stack([0.05 * np.sin(y / 5), 0.04 * np.cos(x / 6)], axis=-1).astype(np.float32)
@@ -318,7 +315,7 @@ def test_nan_in_a_map_is_outside(folder: Path, edges: str):
         np.testing.assert_allclose(seen["A"][away], whole["A"][away] if "A" in whole else 1, atol=1e-4)
 
 
-def test_what_is_nowhere_cannot_be_turned_round_or_flow(folder: Path):
+def test_what_is_nowhere_cannot_be_turned_round_or_flow(folder: Path, fluidwarp: Run):
     values = np.zeros((HEIGHT, WIDTH, 2), np.float32)
     values[3, 4] = np.nan
     write_map(folder / "m.npy", Displacement(values))
