@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from statistics import median_low
 
 from app.model.strokes import Stroke
+from app.ui.canvas import MOVING
 from app.ui.editor_state import EditorState
 from app.ui.exporting import Exports
 from app.ui.files import Files, fresh_recipe, settings_of
@@ -22,11 +23,12 @@ HICCUP = 0.25  # seconds of one frame that count
 AT_ONCE = 0.02  # seconds of a frame for preparing another grid
 LONGEST = 120.0  # seconds that preparing one may take: a machine at rest should rest
 WANTED = 30.0  # frames a second while painting
-# Of a frame: painting takes a tenth more than what is measured, by checkpoints, looks at the map and a longer recipe;
-# and other programs want their part.
+# Of a frame. Painting takes what is measured on a grid of `TRIALS` (31 to 35 ms of processor time, three strokes on 128
+# cells, where 32 to 34 were measured), and up to a quarter more between them, as small grids are solved by transforms
+# and others by iterations; and showing the frame and other programs want their part.
 SPARE = 0.3
 TRIALS = (256, 128)  # cells, of the grids that the machine is measured on
-TICKS = 8  # on each of them
+TICKS = 8  # on each of them, and as many frames without
 FAST = 4.0  # milliseconds; a tick that takes less may be made 60 times a second
 
 
@@ -46,10 +48,10 @@ class Speed:
 
     @classmethod
     def of(cls, fine: float, coarse: float, drawing: float) -> Speed:
-        """From what a tick takes on the two grids of `TRIALS`."""
+        """From what a frame takes with a tick on each of the two grids of `TRIALS`, and without one."""
         share = (TRIALS[1] / TRIALS[0]) ** 2
         growing = max(fine - coarse, 0.0) / (1 - share)
-        return cls(max(fine - growing, 0.0), growing, drawing)
+        return cls(max(fine - drawing - growing, 0.0), growing, drawing)
 
     def tick(self, grid: int) -> float:
         return self.fixed + self.growing * (grid / TRIALS[0]) ** 2
@@ -89,8 +91,8 @@ class Quality:
     _has_stepped: bool = field(default=False, init=False)
     _frames: int = field(default=0, init=False)
     _trial: Replay | None = field(default=None, init=False)
-    _spent: list[list[float]] = field(default_factory=list, init=False)  # ms of the ticks on each grid of `TRIALS`
-    _drawing: list[float] = field(default_factory=list, init=False)
+    # ms of frames that draw only, and of those with a tick on each grid of `TRIALS`.
+    _spent: list[list[float]] = field(default_factory=lambda: [[]], init=False)
 
     @property
     def is_on(self) -> bool:
@@ -139,32 +141,32 @@ class Quality:
         return self.state.auto_quality and self.speed is None
 
     def warm_up(self, begun: float) -> None:
-        """After the first frames, a tick a frame: compile what the first stroke needs, and measure this machine.
+        """After the first frames, one that paints each: compile what the first stroke needs, and measure this machine.
 
-        `begun`: when the frame was, on `time.perf_counter`.
+        A frame is measured as a whole, with the tick and with the map as the canvas has it drawn while things move, and
+        waits for the GPU only at its end: while that works, the interface is laid out. `begun`: when the frame was, on
+        `time.perf_counter`.
         """
         self._frames += 1
-        session = self.workspace.session
-        finish = session.device.ctx.finish
+        session, view = self.workspace.session, self.workspace.view
         if self._frames < 2 or session.is_moving:
             return
-        finish()
-        self._drawing.append((time.perf_counter() - begun) * 1e3)
-        if self._trial is None:
-            self._trial = self._new_trial(TRIALS[len(self._spent)])
-            self._spent.append([])
-        start = time.perf_counter()
-        self._trial.advance()
-        self._trial.warp.composed(self._trial.grid.size)
-        finish()
-        self._spent[-1].append((time.perf_counter() - start) * 1e3)
+        if self._trial is not None:
+            self._trial.advance()
+            shown = view.canvas.width, view.canvas.height
+            self._trial.warp.composed(tuple(max(1, round(side * view.density / MOVING)) for side in shown))
+        session.device.ctx.finish()
+        self._spent[-1].append((time.perf_counter() - begun) * 1e3)
         if len(self._spent[-1]) < TICKS:
             return
         self.release()
-        if len(self._spent) == len(TRIALS):
+        if len(self._spent) <= len(TRIALS):
+            self._trial = self._new_trial(TRIALS[len(self._spent) - 1])
+            self._spent.append([])
+        else:
             # The first ones compile.
-            fine, coarse = (median_low(ticks[2:]) for ticks in self._spent)
-            self.speed = Speed.of(fine, coarse, median_low(self._drawing[2:]))
+            drawing, fine, coarse = (median_low(frames[2:]) for frames in self._spent)
+            self.speed = Speed.of(fine, coarse, drawing)
             self.grid = self.speed.best_grid
             self._begin()
 

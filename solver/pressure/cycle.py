@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.packing import is_worth_a_transform
 from solver.pressure.graph import Graph, coarsen_links, graphs_below, has_one_piece_a_block, links_of
 from solver.pressure.level import DirectSolve, GraphLevel, GridLevel
 from solver.pressure.transform import FastDiagonalization
@@ -80,7 +81,7 @@ class Cycle:
         span = float(size[0]), float(size[1])
         level = GridLevel(device, span, aspect, 0)
         self.levels.append(level)
-        while not FastDiagonalization.is_worth(level.size):
+        while not is_worth_a_transform(level.size, is_finest=level is self.finest):
             span = span[0] / 2, span[1] / 2
             level = GridLevel(device, span, aspect, len(self.levels))
             self.levels.append(level)

@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.gl.field import Field
 
-# Products of blocks that one solve is worth; a finer grid is left to multigrid. Not measured.
-LARGEST = 65536
-
 
 class FastDiagonalization:
     """Solves A p = r on a level without solids.
@@ -41,11 +38,6 @@ class FastDiagonalization:
         scale = np.where(rates > 1e-9, -1.0 / np.maximum(rates, 1e-9), 0.0)
         self._scale = device.upload(packed(scale), "inverse rates")
         self._half, self._modes = (device.field(size, 4, f"pressure {name}") for name in ("halfway", "modes"))
-
-    @staticmethod
-    def is_worth(size: tuple[int, int]) -> bool:
-        """True if a grid of so many blocks is small enough."""
-        return size[0] * size[1] * (size[0] + size[1]) <= LARGEST
 
     def solve(self, residual: Field, pressure: Field) -> None:
         """The `pressure` that accounts for all of `residual`, both at blocks."""

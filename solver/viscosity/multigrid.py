@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.packing import PackedFaces
+from solver.packing import PackedFaces, is_worth_a_transform
 from solver.params import NoSlip
 from solver.viscosity.changed import Box, changed
 from solver.viscosity.deflation import Deflation
@@ -31,9 +31,6 @@ ALONE_LEAVES = 0.1
 
 # kappa that no cell has: the coarse levels count it all.
 UNBOUNDED = 1e30
-
-# Texels of a grid whose transform is less than the corrections around one.
-SMALL_GRID = 64
 
 
 def chebyshev_weights(least: float, largest: float, count: int) -> list[float]:
@@ -77,9 +74,8 @@ class Multigrid:
             self.levels.append(Level(device, size, len(self.levels), finest))
             size = -(-size[0] // 2), -(-size[1] // 2)
         # Between free-slip walls one viscosity is solved directly on a much finer level than any other.
-        first = 0 if math.prod(self.levels[0].texels) <= SMALL_GRID else 1
-        worth = [level for level in self.levels[first:] if SineCosineTransform.is_worth(level.texels)]
-        self._transform_level = worth[0] if worth else self.levels[-1]
+        worth = (level for level in self.levels if is_worth_a_transform(level.texels, is_finest=level is self.finest))
+        self._transform_level = next(worth, self.levels[-1])
         self._transform = SineCosineTransform(device, self._transform_level.box, self._transform_level.texels)
         self.has_transform = False
         self.set_spacing(spacing)

@@ -13,10 +13,6 @@ from solver.packing import packed
 
 Faces = tuple[Field, Field]  # of u and of v
 
-# Products of 2 x 2 blocks that one solve is worth (64 x 32 texels or 40 x 40): about a multigrid cycle; a finer grid is
-# left to multigrid.
-LARGEST = 65536
-
 
 class SineCosineTransform:
     """Solves the viscous step for one viscosity in a box with free-slip walls.
@@ -46,11 +42,6 @@ class SineCosineTransform:
             (device.field(ringed, 4, f"viscous {name} u"), device.field(ringed, 4, f"viscous {name} v"))
             for name in ("halfway", "spectrum")
         )
-
-    @staticmethod
-    def is_worth(texels: tuple[int, int]) -> bool:
-        """True if a grid of so many texels is small enough."""
-        return texels[0] * texels[1] * (texels[0] + texels[1]) <= LARGEST
 
     def solve(self, rhs: Faces, faces: Faces, stiffness: tuple[float, float]) -> None:
         """The `faces` that the step makes of `rhs`, packed faces (u, v) both.

@@ -289,27 +289,27 @@ def test_the_pressure_is_what_was_subtracted(device: Device) -> None:
 
 def test_a_warm_start_is_never_worse(device: Device) -> None:
     """Two steps with the same impulse, then a third with another multiple of it."""
-    size = (128, 96)
+    size = (256, 192)
     pressure, field = Projection(device, size), device.double_field(size, 2)
-    field.read.set(brush(size, 8.0))
+    field.read.set(brush(size, 16.0))
     pressure.project(field, 1)
     cold = pressure.divergence_norm(field.read)
     for change, most in ((1.0, 0.05), (-1.0, 1.01), (0.01, 0.011), (100.0, 101.0)):
         pressure.forget()
         for _ in range(2):
-            field.read.set(brush(size, 8.0))
+            field.read.set(brush(size, 16.0))
             pressure.project(field, 3, warm=True)
-        field.read.set(change * brush(size, 8.0))
+        field.read.set(change * brush(size, 16.0))
         pressure.project(field, 1, warm=True)
         assert pressure.divergence_norm(field.read) < most * cold
 
 
 def test_what_changes_steadily_takes_one_cycle(device: Device) -> None:
-    size = (128, 96)
+    size = (256, 192)
     pressure, field = Projection(device, size), device.double_field(size, 2)
     cycles = []
     for step in range(6):
-        field.read.set((1.0 + 0.1 * step) * brush(size, 8.0))
+        field.read.set((1.0 + 0.1 * step) * brush(size, 16.0))
         before = pressure.divergence_norm(field.read)
         cycles.append(pressure.project(field, warm=True))
         assert pressure.divergence_norm(field.read) <= 1e-3 * before

@@ -30,7 +30,7 @@ from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
-from app.ui.quality import GRIDS, Speed
+from app.ui.quality import GRIDS, TRIALS, Speed
 from app.ui.saving import SaveDialog
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
@@ -1212,6 +1212,12 @@ def test_the_grid_is_chosen_from_the_machine_measured(automatic: Robot) -> None:
     assert automatic.editor.session.recipe.fluid.grid in GRIDS
     assert names(automatic) == ["Open"]
     assert not automatic.editor.workspace.is_dirty
+
+
+def test_a_tick_is_what_it_adds_to_a_frame() -> None:
+    speed = Speed.of(fine=40.0, coarse=22.0, drawing=10.0)
+    assert speed.drawing + speed.tick(TRIALS[0]) == pytest.approx(40.0)
+    assert speed.drawing + speed.tick(TRIALS[1]) == pytest.approx(22.0)
 
 
 def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> None:
