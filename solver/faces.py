@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from solver.grid import Grid
 from solver.limits import check_finite, check_shape, check_size, check_type, real_array
 
 # A vector on MAC faces: (ny, nx, 2), or a function (x, y, t) of arrays that gives both components.
-Vector = np.ndarray | Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+Function = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+Vector = np.ndarray | Function
 
 # A force, lengths / s^2: a vector, or a field on faces with its time law integrated over the step, seconds.
 Force = Vector | tuple[Field, float]
@@ -25,14 +26,45 @@ def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.nda
         ValueError: on another shape or a value that is not finite.
     """
     if callable(vector):
-        both = vector(*grid.u_faces(), time), vector(*grid.v_faces(), time)
-        if {len(parts) for parts in both} != {2}:
-            raise ValueError(f"{what} has two components, and the function gave {len(both[0])}")
-        shape = grid.ny, grid.nx
-        array = np.stack([np.broadcast_to(parts[axis], shape) for axis, parts in enumerate(both)], axis=-1)
-    else:
-        array = vector
-    array = real_array(what, array)
+        u, v = components(what, vector, *grid.u_faces(), time)[0], components(what, vector, *grid.v_faces(), time)[1]
+        vector = np.stack([u, v], axis=-1)
+    return _finite(what, vector, grid)
+
+
+def at_centres(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.ndarray:
+    """A vector at cell centres as (ny, nx, 2) float32.
+
+    Raises:
+        ValueError: on another shape or a value that is not finite.
+    """
+    if callable(vector):
+        vector = np.stack(components(what, vector, *grid.centres(), time), axis=-1)
+    return _finite(what, vector, grid)
+
+
+def components(what: str, function: Function, x: np.ndarray, y: np.ndarray, time: float) -> tuple[np.ndarray, ...]:
+    """Both components that a function gives at places and a time, each shaped as these.
+
+    Raises:
+        ValueError: if it gives something else, or a value that is not finite.
+    """
+    check_type("a time", time)
+    parts = function(x, y, time)
+    if not isinstance(parts, Sequence | np.ndarray) or len(parts) != 2:
+        count = len(parts) if isinstance(parts, Sequence | np.ndarray) else 1
+        raise ValueError(f"{what} has two components, and the function gave {count}")
+    arrays = tuple(real_array(what, part) for part in parts)
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise ValueError(f"{what} holds a value that is not finite")
+    try:
+        return tuple(np.broadcast_to(array, x.shape) for array in arrays)
+    except ValueError:
+        shapes = " and ".join(str(array.shape) for array in arrays)
+        raise ValueError(f"{what} of shape {shapes} was given, {x.shape} is wanted") from None
+
+
+def _finite(what: str, vector: object, grid: Grid) -> np.ndarray:
+    array = real_array(what, vector)
     check_shape(what, array, (grid.ny, grid.nx, 2))
     if not np.isfinite(array).all():
         raise ValueError(f"{what} holds a value that is not finite")
@@ -57,7 +89,9 @@ def impulses(forces: Forces, grid: Grid, time: float, dt: float) -> tuple[list[t
     several = [forces] if isinstance(forces, np.ndarray) or callable(forces) else forces
     check_type("what forces the fluid", several, Iterable)
     for force in several:
-        if isinstance(force, tuple):
+        if isinstance(force, tuple | Field):
+            if not (isinstance(force, tuple) and len(force) == 2):
+                raise ValueError("a force that is a field goes with its time law, integrated over the step")
             field, impulse = force
             check_field("a force", field, grid)
             check_finite("a force's impulse", impulse)

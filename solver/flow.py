@@ -10,6 +10,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
+from solver.limits import check_type
 from solver.params import Walls
 
 
@@ -26,7 +27,13 @@ class Flow:
 
         Where both are the same cells, moved by whole ones, it is the same to the bit, and else a mean over each face,
         so that as much flows through it, without the pressure. Outside `here` all is at rest.
+
+        Raises:
+            ValueError: if it is a grid of another picture.
         """
+        check_type("where a flow goes", there, Grid)
+        if there.picture != here.picture:
+            raise ValueError(f"a flow in a picture of {here.picture} cannot go on in one of {there.picture}")
         step = np.divide(there.spacing, here.spacing)
         origin = np.subtract(there.origin, here.origin) / here.spacing
         is_moved = bool(np.allclose(step, 1.0, rtol=0.0, atol=1e-6))

@@ -239,6 +239,7 @@ class Fluid(Scheme):
         Raises:
             ValueError: if there are not as many.
         """
+        check_type("where a fluid is laid", grid, Grid)
         if grid.size != self.grid.size:
             raise ValueError(f"a fluid of {self.grid} cannot be laid on {grid}")
         self.grid = grid
@@ -256,7 +257,12 @@ class Fluid(Scheme):
         return flow.resampled(self.device, self.grid, grid, self.params.walls)
 
     def go_on_with(self, flow: Flow) -> None:
-        """Take over a flow on this grid, from `flow_on`, made free of divergence between its walls and solids."""
+        """Take over a flow on this grid, from `flow_on`, made free of divergence between its walls and solids.
+
+        Raises:
+            ValueError: if it is on another grid.
+        """
+        check_type("what flows on", flow, Flow)
         self.velocity.read.copy_from(flow.velocity)
         self._forget_last_step()
         self.project()

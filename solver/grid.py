@@ -7,7 +7,7 @@ from math import ceil
 
 import numpy as np
 
-from solver.limits import check_type
+from solver.limits import check_type, numbers
 
 SMALLEST_GRID = 8
 ROUNDING = 1e-9  # longer sides
@@ -37,12 +37,16 @@ class Grid:
     picture: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for count in (self.nx, self.ny):
-            check_type("a count of cells", count)
-        if min(self.nx, self.ny) < SMALLEST_GRID or self.nx != int(self.nx) or self.ny != int(self.ny):
-            raise ValueError(
-                f"a grid of {self.nx} x {self.ny} is none of whole cells, or below {SMALLEST_GRID} x {SMALLEST_GRID}"
-            )
+        for name in ("nx", "ny"):
+            check_type("a count of cells", count := getattr(self, name))
+            if not (count >= SMALLEST_GRID and count % 1 == 0):
+                raise ValueError(
+                    f"a grid of {self.nx} x {self.ny} is none of whole cells, or below {SMALLEST_GRID} x "
+                    f"{SMALLEST_GRID}"
+                )
+            object.__setattr__(self, name, int(count))
+        for name in ("extent", "origin", "picture"):
+            object.__setattr__(self, name, numbers(f"a grid's {name} in the picture", getattr(self, name), 2))
         if self.extent == (0.0, 0.0):
             longer = max(self.nx, self.ny)
             object.__setattr__(self, "extent", (self.nx / longer, self.ny / longer))
@@ -64,6 +68,8 @@ class Grid:
         The shorter side is rounded to whole cells, which are then a little wider or narrower than high. A picture so
         narrow that it would have fewer than 8 of them there gets more along it instead, up to `MOST_ALONG`.
         """
+        for count in (width, height, cells):
+            check_type("a count of pixels or cells", count)
         longer, shorter = max(width, height), min(width, height)
         if not min(shorter, cells) >= 1:
             raise ValueError(f"{cells} cells along a picture of {width} x {height} pixels were asked for")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from numbers import Real
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -24,8 +24,20 @@ def check_type(what: str, value: object, kind: Any = Real) -> None:
         TypeError: if it is not.
     """
     if not isinstance(value, kind):
-        wanted = "number" if kind is Real else kind.__name__
-        raise TypeError(f"{what} is {value!r}, a {wanted} is wanted")
+        wanted = " or ".join("number" if one is Real else one.__name__ for one in get_args(kind) or (kind,))
+        raise TypeError(f"{what} is {' '.join(repr(value).split()):.80}, a {wanted} is wanted")
+
+
+def numbers(what: str, values: object, count: int) -> tuple[float, ...]:
+    """So many finite numbers, none beyond `LARGEST_SPEED`, as floats.
+
+    Raises:
+        ValueError: if there are more or fewer of them, or they are of another kind.
+    """
+    array = real_array(what, values)
+    check_shape(what, array, (count,))
+    check_size(what, array)
+    return tuple(array.astype(float).tolist())
 
 
 def real_array(what: str, values: object) -> np.ndarray:
@@ -40,7 +52,47 @@ def real_array(what: str, values: object) -> np.ndarray:
         raise ValueError(f"{what} has rows of unequal length") from None
     if array.dtype.kind not in "fiub":
         raise ValueError(f"{what} is of {array.dtype}, real numbers are wanted")
-    return array
+    return array.astype(np.float32) if array.dtype == np.float16 else array
+
+
+def viscosities(values: object, shape: tuple[int, ...] = ()) -> np.ndarray:
+    """Viscosities as float32: of all cells one number, or one each if these have a shape.
+
+    Raises:
+        ValueError: on another shape, or if one is negative, not finite or beyond all measure.
+    """
+    array = real_array("a viscosity", values)
+    if array.ndim and shape:
+        check_shape("a viscosity", array, shape)
+    if not ((array >= 0) & (array <= LARGEST_VISCOSITY)).all():
+        raise ValueError(f"viscosity must be from 0 to {LARGEST_VISCOSITY:g} everywhere")
+    return np.broadcast_to(array.astype(np.float32), shape or array.shape)
+
+
+def as_mask(what: str, values: object, shape: tuple[int, ...]) -> np.ndarray:
+    """255 where something is true or not 0, else 0: uint8.
+
+    Raises:
+        ValueError: on another shape or a NaN.
+    """
+    array = np.asarray(values)
+    check_shape(what, array, shape)
+    if array.dtype.kind not in "fiub" or np.isnan(array).any():
+        raise ValueError(f"{what} must be true or false, or numbers")
+    return np.where(array, 255, 0).astype(np.uint8)
+
+
+def places(points: object) -> np.ndarray:
+    """Places (n, 2), or more axes of them, as (n, 2) float64.
+
+    Raises:
+        ValueError: on another shape, or a value that is not finite or beyond all measure.
+    """
+    array = real_array("a list of places", points)
+    if array.shape[-1:] != (2,):
+        raise ValueError(f"places of shape {array.shape} were given, (n, 2) is wanted")
+    check_size("a place", array)
+    return array.astype(np.float64).reshape(-1, 2)
 
 
 def check_step(dt: float) -> float:
@@ -64,9 +116,9 @@ def check_finite(what: str, value: float) -> None:
 
 
 def check_size(what: str, array: np.ndarray) -> None:
-    """Make sure that nothing in an array is faster than `LARGEST_SPEED`."""
+    """Make sure that everything in an array is finite, and no larger than `LARGEST_SPEED`."""
     if not (np.abs(array) <= LARGEST_SPEED).all():
-        raise ValueError(f"{what} is beyond {LARGEST_SPEED:g} longer sides per second somewhere, or not finite")
+        raise ValueError(f"{what} is beyond {LARGEST_SPEED:g} somewhere, or not finite")
 
 
 def check_shape(what: str, array: np.ndarray, shape: tuple[int, ...]) -> None:

@@ -7,16 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver.faces import Forces, Vector, impulses
+from solver.faces import Forces, Vector, at_centres, impulses
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.grid import Grid
-from solver.limits import check_shape, check_size, check_step, check_type, real_array
+from solver.limits import check_size, check_step, check_type
 from solver.params import FluidParams
 from solver.scheme import Residuals, Scheme
 from solver.warp.map import WarpMap
-from solver.warp.prescribed import Velocity
 
 
 class PaperFluid(Scheme):
@@ -122,10 +121,7 @@ class PaperFluid(Scheme):
 
     def set_velocity(self, velocity: Vector) -> None:
         """Set the velocity at cell centres from (ny, nx, 2) or a function (x, y, t)."""
-        if callable(velocity):
-            velocity = np.stack(velocity(*self.grid.centres(), self.time), axis=-1)
-        array = real_array("a velocity", velocity).astype(np.float32)
-        check_shape("a velocity", array, (self.grid.ny, self.grid.nx, 2))
+        array = at_centres("a velocity", velocity, self.grid, self.time)
         check_size("a velocity", array)
         self.velocity.read.set(array)
         self.impulse.clear()
@@ -213,11 +209,9 @@ class PaperWarpMap(WarpMap):
         self._steps += 1  # the whole map is not the accumulated one
         self._changed()
 
-    def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
+    def advance_prescribed(self, velocity: Vector, dt: float, time: float = 0.0) -> None:
         """Carry the map from `time` to `time + dt` by a function (x, y, t) or an array (ny, nx, 2), at cell centres."""
-        if not isinstance(velocity, np.ndarray):
-            velocity = np.stack(velocity(*self.grid.centres(), time + 0.5 * dt), axis=-1)
-        check_shape("a velocity", velocity, (self.grid.ny, self.grid.nx, 2))
-        field = self.device.upload(velocity.astype(np.float32), "prescribed velocity")
+        array = at_centres("a velocity", velocity, self.grid, time + 0.5 * check_step(dt))
+        field = self.device.upload(array, "prescribed velocity")
         self.advance(field, dt)
         field.release()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
+from numbers import Integral
 from typing import Any, Literal, NamedTuple
 
-from solver.limits import LARGEST_SPEED
+from solver.limits import check_type, numbers
 
 
 class NoSlip(NamedTuple):
@@ -70,10 +71,8 @@ class Walls:
     def __post_init__(self) -> None:
         if self.slip not in ("free", "none"):
             raise ValueError(f'walls of slip {self.slip!r} were asked for; it must be "free" or "none"')
-        if len(self.speed) != 4 or not all(abs(speed) <= LARGEST_SPEED for speed in self.speed):
-            raise ValueError(
-                f"walls of the speeds {self.speed} were asked for; there must be four, to {LARGEST_SPEED:g}"
-            )
+        object.__setattr__(self, "speed", numbers("the speeds of walls", self.speed, 4))
+        object.__setattr__(self, "sticky", tuple(map(bool, numbers("which walls are sticky", self.sticky, 4))))
 
 
 @dataclass(frozen=True)
@@ -96,8 +95,10 @@ class FluidParams:
     sweeps: int = 40
 
     def __post_init__(self) -> None:
+        check_type("what the walls are", self.walls, Walls)
+        check_type("a drag", self.drag)
         if not 0 <= self.drag < inf:
             raise ValueError(f"a drag of {self.drag} was asked for; it must be finite and not negative")
         for what, count in (("pressure cycles", self.pressure_cycles), ("sweeps", self.sweeps)):
-            if count is not None and not (count == int(count) and count >= 1):
+            if count is not None and not (isinstance(count, Integral) and count >= 1):
                 raise ValueError(f"{count} {what} were asked for; it must be a whole number from 1")

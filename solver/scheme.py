@@ -12,7 +12,7 @@ from solver.faces import Forces, Vector, check_field
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.limits import LARGEST_VISCOSITY, check_finite, check_shape, check_type, real_array
+from solver.limits import as_mask, check_finite, check_type, viscosities
 from solver.params import FluidParams
 from solver.state import State
 
@@ -87,6 +87,9 @@ class Scheme(ABC):
     """
 
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
+        check_type("what a fluid lives in", device, Device)
+        check_type("the cells of a fluid", grid, Grid)
+        check_type("how a step is made", params or FluidParams(), FluidParams)
         self.device = device
         self.grid = grid
         self.params = params or FluidParams()
@@ -134,12 +137,7 @@ class Scheme(ABC):
         Raises:
             ValueError: on another shape, or if a value is negative, not finite or beyond all measure.
         """
-        array = real_array("a viscosity", viscosity).astype(np.float32)
-        if array.ndim:
-            check_shape("a viscosity", array, (self.grid.ny, self.grid.nx))
-        if not ((array >= 0).all() and (array <= LARGEST_VISCOSITY).all()):
-            raise ValueError(f"viscosity must be from 0 to {LARGEST_VISCOSITY:g} everywhere")
-        self.viscosity.set(np.broadcast_to(array, (self.grid.ny, self.grid.nx)))
+        self.viscosity.set(viscosities(viscosity, (self.grid.ny, self.grid.nx)))
         self.masks_changed()
 
     def set_solid(self, solid: np.ndarray) -> None:
@@ -148,11 +146,7 @@ class Scheme(ABC):
         Raises:
             ValueError: on another shape or a NaN.
         """
-        array = np.asarray(solid)
-        check_shape("solid cells", array, (self.grid.ny, self.grid.nx))
-        if array.dtype.kind not in "fiub" or np.isnan(array).any():
-            raise ValueError("solid cells must be true or false, or numbers")
-        self.solid.set(np.where(array, 255, 0).astype(np.uint8))
+        self.solid.set(as_mask("solid cells", solid, (self.grid.ny, self.grid.nx)))
         self.masks_changed()
 
     @abstractmethod

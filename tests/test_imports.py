@@ -50,7 +50,7 @@ SOLVER = {
     "state": {"gl"},
     "faces": {"gl", "limits", "grid"},
     "scheme": {"gl", "limits", "grid", "params", "state", "faces"},
-    "flow": {"gl", "grid", "params"},
+    "flow": {"gl", "limits", "grid", "params"},
     "trace": {"gl", "grid", "params"},
     "advection": {"gl", "params", "packing"},
     "energy": {"gl", "limits", "packing"},

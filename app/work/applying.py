@@ -382,7 +382,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
         warp.set(values)
         with ForwardMap(warp) as forward:
             found = forward.read((width, height))
-    except FieldError as error:
+    except ValueError as error:
         raise UserError(f"the map cannot be turned round: {error}") from None
     finally:
         warp.release()

@@ -31,7 +31,7 @@ from solver.brush.tip import Tip
 from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
 from solver.gl.device import Device
-from solver.gl.field import Field, FieldError
+from solver.gl.field import Field
 from solver.grid import SMALLEST_GRID, Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
@@ -539,7 +539,7 @@ class Replay:
     def _begin_with(self, name: str) -> None:
         try:
             self.warp.set(self.pictures.load_map(name))
-        except FieldError as error:
+        except ValueError as error:
             raise UserError(f"{name} cannot be the map to begin with: {error}") from None
 
     def _new_density(self) -> Density:

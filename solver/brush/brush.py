@@ -11,10 +11,11 @@ import numpy as np
 from solver.brush.push import Push, Slip
 from solver.brush.tip import NEAR, Tip
 from solver.brush.twirl import Twirl
+from solver.faces import check_field
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.reduction import Reduction
-from solver.limits import check_finite
+from solver.limits import check_finite, check_type
 from solver.scheme import Scheme
 from solver.warp.map import WarpMap
 
@@ -42,6 +43,7 @@ class Brush:
         stretch too far.
         """
         check_finite("a gain", gain)
+        _check(fluid, motion, warp)
         self._look(fluid, motion, fluid.faces(), warp)
         fluid.impulse.add(lambda faces: self._draw(fluid, motion, faces, gain))
 
@@ -51,6 +53,8 @@ class Brush:
         Viscosity does not spread that any more. So it spares what is thicker than the fluid at the tip, and does less
         the more of the brush lies on what is thicker or solid. For `steer` of `Scheme.step`.
         """
+        _check(fluid, motion, warp)
+        check_field("a velocity", velocity, fluid.grid)
         self._look(fluid, motion, velocity, warp)
         obstruct, tip = self.device.pass_("brush/obstruct.frag"), motion.tip.inputs(fluid.grid)
         obstruct(self._obstruction, motion=self._motion, viscosity=fluid.viscosity, solid=fluid.solid, **tip)
@@ -59,6 +63,8 @@ class Brush:
 
     def carry(self, fluid: Scheme, push: Push, warp: WarpMap | None = None) -> None:
         """Let the local part of a push carry the picture until the fluid's next step; what is thicker, less."""
+        check_type("what is carried", push, Push)
+        _check(fluid, push, warp)
         if not push.local:
             return
         self._look(fluid, push, fluid.faces(), warp)
@@ -81,6 +87,8 @@ class Brush:
         The room comes from all of the fluid or, if the tip is near, from that around it.
         """
         check_finite("a rate", rate)
+        check_type("what expands", tip, Tip)
+        check_type("what a brush moves", fluid, Scheme)
         self._expand(fluid, tip, rate)
         if tip.near and (around := self._area(fluid, tip.wide)):
             self._expand(fluid, tip.wide, -rate * self._area(fluid, tip) / around)
@@ -162,6 +170,13 @@ class Brush:
         if key not in self._sums:
             self._sums[key] = Sum(self.device, *key)
         return self._sums[key].of(draw)
+
+
+def _check(fluid: Scheme, motion: Motion, warp: WarpMap | None) -> None:
+    check_type("what a brush moves", fluid, Scheme)
+    check_type("what a brush does", motion, Motion)
+    if warp is not None:
+        check_type("what a brush looks at", warp, WarpMap)
 
 
 class Sum:

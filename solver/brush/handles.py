@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from solver.brush.tip import FARTHEST, Point, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.limits import LARGEST_LEAD, check_step
+from solver.limits import LARGEST_LEAD, check_step, check_type, numbers
 from solver.scheme import Scheme
 from solver.state import State
 from solver.warp.inverse import ForwardMap
@@ -73,6 +73,13 @@ class Handle:
     keys: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "at", numbers("a handle's place", self.at, 2))
+        if self.to is not None:
+            object.__setattr__(self, "to", numbers("where a handle goes", self.to, 2))
+        check_type("a handle's keys", self.keys, Iterable)
+        object.__setattr__(self, "keys", tuple(numbers("a handle's key", key, 3) for key in self.keys))
+        for number in (self.radius, self.start, self.duration, self.end, self.stiffness, self.local):
+            check_type("a number of a handle", number)
         places = (*self.at, *(self.to or ()), *(side for key in self.keys for side in key[1:]))
         if not all(abs(place) <= FARTHEST for place in places):
             raise ValueError(f"a handle from {self.at} to {self.to} is off the picture by more than {FARTHEST:g} sides")
@@ -156,6 +163,8 @@ class Handles:
     """
 
     def __init__(self, fluid: Scheme, warp: WarpMap, handles: Sequence[Handle]) -> None:
+        check_type("what handles move", fluid, Scheme)
+        check_type("what handles look at", warp, WarpMap)
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
         self._one = fluid.device.field((1, 1), 1, "slip of handles")
@@ -168,6 +177,9 @@ class Handles:
 
     def replace(self, handles: Sequence[Handle]) -> None:
         """Go on with other handles; those that have begun keep their number."""
+        check_type("what is led", handles, Iterable)
+        for handle in handles:
+            check_type("a handle", handle, Handle)
         self.handles = tuple(handles)
         self._at = np.array([handle.at for handle in handles], np.float64).reshape(-1, 2)
         self._radii = np.array([handle.radius for handle in handles])
@@ -189,7 +201,8 @@ class Handles:
 
     def lead(self, dt: float, time: float) -> None:
         """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
-        check_step(dt)
+        if not check_step(dt) > 0:
+            raise ValueError("to lead a handle takes some time")
         active = [handle.start <= time + dt / 2 < handle.end for handle in self.handles]
         self._places = self._located()
         begun = np.array([handle.start <= time + dt / 2 for handle in self.handles], bool)

@@ -15,7 +15,7 @@ from solver.gl.field import Field, FieldPool
 from solver.gl.passes import Blend, Region
 from solver.gl.tiled import TILE, Kind, SavedTiles, TiledField
 from solver.grid import Grid
-from solver.limits import LARGEST_VISCOSITY, check_finite
+from solver.limits import LARGEST_VISCOSITY, as_mask, check_finite, check_type, viscosities
 from solver.scheme import Scheme
 from solver.state import State
 
@@ -40,6 +40,7 @@ class Masks:
     """
 
     def __init__(self, device: Device, canvas: Grid) -> None:
+        check_type("what masks are painted on", canvas, Grid)
         self.device = device
         self.canvas = canvas
         self._kinds = {
@@ -62,18 +63,27 @@ class Masks:
     # -- what is painted over ---------------------------------------------------------------------------------------
 
     def set_base(self, viscosity: Base) -> None:
-        """Set the viscosity that is painted over, lengths^2 / s: of all cells, (ny, nx), or a function of the grid."""
-        self._base = viscosity
+        """Set the viscosity that is painted over, lengths^2 / s: of all cells, (ny, nx), or a function of the grid.
+
+        Raises:
+            ValueError: if a value is negative, not finite or beyond all measure.
+        """
+        self._base = viscosity if callable(viscosity) else viscosities(viscosity)
         self._applied_to = None
 
     def set_frozen(self, frozen: np.ndarray | None) -> None:
-        """Set what is frozen by the recipe, (h, w) true or false on the canvas; paint on it is taken off."""
+        """Set what is frozen by the recipe, (h, w) true or false on the canvas; paint on it is taken off.
+
+        Raises:
+            ValueError: on another shape or a NaN.
+        """
+        texels = None if frozen is None else as_mask("frozen texels", frozen, (self.canvas.ny, self.canvas.nx))
         if self._frozen_before is not None:
             self._frozen_before.release()
             self._frozen_before = None
         self._clear("frozen")
-        if frozen is not None and frozen.any():
-            self._field("frozen").set(np.where(frozen, 255, 0).astype(np.uint8))
+        if texels is not None and texels.any():
+            self._field("frozen").set(texels)
             self._frozen_before = self._field("frozen").save()
         self._frozen_in = 0, 0, *self.canvas.size
         self._applied_to = None
@@ -127,12 +137,18 @@ class Masks:
         cells with something frozen in them and those within two of them: there the map, which holds what is frozen to
         the bit (`WarpMap.hold`), goes over into what flows. Were only cells solid of which half is frozen, the fluid
         would glide along the edge, and the map tear there.
+
+        Raises:
+            ValueError: for a fluid of another picture.
         """
+        check_type("what gets masks", fluid, Scheme)
         grid = fluid.grid
+        if grid.picture != self.canvas.picture:
+            raise ValueError(f"masks on a picture of {self.canvas.picture} do not fit one of {grid.picture}")
         base = self._cells.get("base viscosity", grid.size, 1)
         if self._applied_to != (fluid, grid):
             viscosity = self._base(grid) if callable(self._base) else self._base
-            base.set(np.broadcast_to(np.asarray(viscosity, np.float32), (grid.ny, grid.nx)))
+            base.set(viscosities(viscosity, (grid.ny, grid.nx)))
             fluid.viscosity.copy_from(base)
             fluid.solid.clear()
             self._changed = dict.fromkeys(self._painted, (0, 0, *self.canvas.size))

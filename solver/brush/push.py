@@ -10,7 +10,7 @@ from solver.brush.tip import Point, Tip
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.limits import check_finite, check_step
+from solver.limits import check_finite, check_step, check_type
 from solver.warp.map import WarpMap
 
 # A push slips so that what it draws out does not become thinner than the map can tell: there the map would fold.
@@ -95,6 +95,7 @@ class Push:
     local: float = 0.0
 
     def __post_init__(self) -> None:
+        check_type("what pushes", self.tip, Tip)
         if not check_step(self.dt) > 0:
             raise ValueError("a push takes some time")
         for name in ("strength", "slip", "strain_limit"):

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from solver.gl.passes import Region
 from solver.grid import Grid
+from solver.limits import check_type
 
 Point = tuple[float, float]
 
@@ -39,7 +43,12 @@ class Tip:
     near: bool = False
 
     def __post_init__(self) -> None:
+        for what, place in (("start", self.start), ("end", self.end)):
+            if not (isinstance(place, Sequence | np.ndarray) and len(place) == 2):
+                raise ValueError(f"a brush's {what} is {place!r}, a place (x, y) is wanted")
         places = (*self.start, *self.end)
+        for number in (*places, self.radius, self.hardness):
+            check_type("a number of a brush", number)
         if not all(abs(place) <= FARTHEST for place in places):
             raise ValueError(
                 f"a brush from {self.start} to {self.end} is off the picture by more than {FARTHEST:g} sides"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from solver.brush.tip import Tip
-from solver.limits import check_finite
+from solver.limits import check_finite, check_type
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class Twirl:
     rate: float
 
     def __post_init__(self) -> None:
+        check_type("what twirls", self.tip, Tip)
         check_finite("a twirl's rate", self.rate)
 
     @property

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import moderngl
 
@@ -59,9 +59,12 @@ class Context:
         ctx: a moderngl context, GL 3.3 core or later; use `headless()` where there is no window.
     """
 
+    _current: ClassVar[Context | None] = None  # whose context is
+
     def __init__(self, ctx: moderngl.Context, owns_context: bool = False) -> None:
         self.ctx = ctx
         self._owns_context = owns_context
+        Context._current = self  # as a new one is
         info = ctx.info
         self.limits = Limits(
             vendor=str(info["GL_VENDOR"]),
@@ -109,12 +112,14 @@ class Context:
     def forget_targets(self, texture: moderngl.Texture) -> None:
         """Drop the framebuffers that hold a texture, because it is being released."""
         # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
+        self.use()
         self._rest.use()
         for key in [key for key in self._targets if texture.glo in key]:
             self._targets.pop(key).release()
 
     def collect(self) -> None:
-        """Free the GL objects that Python has dropped; the context must be current, as for any drawing."""
+        """Free the GL objects that Python has dropped."""
+        self.use()
         objects = self.ctx.objects
         if objects:
             self._rest.use()
@@ -122,6 +127,18 @@ class Context:
             item = objects.popleft()
             if not isinstance(item, moderngl.InvalidObject):  # released before
                 item.release()
+
+    def use(self) -> None:
+        """Make its context the current one, if another device's was used last; to be called before any drawing.
+
+        Raises:
+            ContextError: if it was released.
+        """
+        if Context._current is not self:
+            if isinstance(self.ctx.mglo, moderngl.InvalidObject):
+                raise ContextError("the device was released")
+            self.ctx.__enter__()
+            Context._current = self
 
     # -- its life ---------------------------------------------------------------------------------------------------
 
@@ -133,8 +150,10 @@ class Context:
 
     def release(self) -> None:
         """Give the context back, if it is ours; nothing made in it can be used afterwards."""
-        if self._owns_context:
+        if self._owns_context and not isinstance(self.ctx.mglo, moderngl.InvalidObject):
+            self.use()
             self.ctx.release()
+            Context._current = None
 
     def __enter__(self) -> Self:
         return self

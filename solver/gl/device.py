@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 
 from solver.gl.context import Context
-from solver.gl.field import DoubleField, Field
+from solver.gl.field import DoubleField, Field, FieldError
 from solver.gl.passes import Pass
 
 
@@ -26,8 +26,14 @@ class Device(Context):
         return DoubleField(self, size, components, label)
 
     def upload(self, array: np.ndarray, label: str = "upload", dtype: str | None = None) -> Field:
-        """A field holding `array`, `(h, w)` or `(h, w, c)`; dtype from the array: uint8 -> f1, else f4."""
+        """A field holding `array`, `(h, w)` or `(h, w, c)`; dtype from the array: uint8 -> f1, else f4.
+
+        Raises:
+            FieldError: on another shape, or on a value that is no number or not finite.
+        """
         array = np.asarray(array)
+        if array.ndim not in (2, 3) or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
+            raise FieldError(f"{label}: an array of shape {array.shape} was given, (h, w) or (h, w, 1-4) is wanted")
         kind = dtype or ("f1" if array.dtype == np.uint8 else "f4")
         components = 1 if array.ndim == 2 else array.shape[2]
         field = Field(self, (array.shape[1], array.shape[0]), components, label, kind)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Integral
+
 import moderngl
 import numpy as np
 
@@ -26,6 +28,8 @@ class Field:
     """
 
     def __init__(self, device: Context, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
+        if np.shape(size) != (2,) or not all(isinstance(side, Integral) for side in size):
+            raise FieldError(f"{label}: a size of {size!r} was given, (width, height) in whole texels is wanted")
         width, height = size
         limit = device.limits.max_texture_size
         # A texture that is too large, or empty, is returned without an error and fails much later.
@@ -37,13 +41,26 @@ class Field:
         self.components = components
         self.label = label
         self.dtype = dtype
-        self.texture: moderngl.Texture = device.ctx.texture(self.size, components, dtype=dtype, alignment=1)
-        self.texture.repeat_x = self.texture.repeat_y = False
-        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self.texture.label = label
-        self.framebuffer: moderngl.Framebuffer = device.ctx.framebuffer([self.texture])
-        self.framebuffer.label = label
+        texture = device.ctx.texture(self.size, components, dtype=dtype, alignment=1)
+        texture.repeat_x = texture.repeat_y = False
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        framebuffer = device.ctx.framebuffer([texture])
+        texture.label = framebuffer.label = label
+        self._made: tuple[moderngl.Texture, moderngl.Framebuffer] | None = texture, framebuffer
         self.clear()
+
+    @property
+    def texture(self) -> moderngl.Texture:
+        return self._in_use()[0]
+
+    @property
+    def framebuffer(self) -> moderngl.Framebuffer:
+        return self._in_use()[1]
+
+    def _in_use(self) -> tuple[moderngl.Texture, moderngl.Framebuffer]:
+        if self._made is None:
+            raise FieldError(f"{self.label} was released")
+        return self._made
 
     @property
     def width(self) -> int:
@@ -65,6 +82,7 @@ class Field:
 
     def clear(self, *values: float) -> None:
         """Fill with `values`, by default zero."""
+        self.device.use()
         red, green, blue, alpha = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
         self.framebuffer.clear(red, green, blue, alpha)
         self.device.fences.hold()
@@ -74,15 +92,19 @@ class Field:
         """Write an array of shape (height, width) or (height, width, components), row 0 on top.
 
         Raises:
-            FieldError: on another shape, or on a value that is not finite.
+            FieldError: on another shape, or on a value that is no number or not finite.
         """
         array = np.asarray(array)
+        if array.dtype.kind not in "fiub":
+            raise FieldError(f"{self.label}: an array of {array.dtype} was given, real numbers are wanted")
         shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
         if array.shape != shape and array.shape != (*shape, 1):
             raise FieldError(f"{self.label}: an array of shape {array.shape} was given, {shape} is wanted")
-        data = array.astype(DTYPES[self.dtype], copy=False)
+        with np.errstate(over="ignore"):  # it is told below
+            data = array.astype(DTYPES[self.dtype], copy=False)
         if self.dtype in ("f2", "f4") and not np.isfinite(data).all():
             raise FieldError(f"{self.label}: the array holds a value that is not finite")
+        self.device.use()
         self.texture.write(np.ascontiguousarray(data).tobytes())
         self.drawn()
 
@@ -96,11 +118,20 @@ class Field:
         shape = (height, width) if self.components == 1 else (height, width, self.components)
         array = np.empty(shape, DTYPES[self.dtype])
         viewport = x, y, width, height
+        self.device.use()
         self.framebuffer.read_into(array, viewport, self.components, dtype=self.dtype, alignment=1)
         return array
 
     def copy_from(self, other: Field) -> None:
-        """Take over the texels of `other`, which has the same size and components."""
+        """Take over the texels of `other`, which has the same size and components.
+
+        Raises:
+            FieldError: if it has not, or is another device's.
+        """
+        kind, others = ((field.device, field.size, field.components, field.dtype) for field in (self, other))
+        if kind != others:
+            raise FieldError(f"{self} cannot take over {other}")
+        self.device.use()
         self.device.ctx.copy_framebuffer(self.framebuffer, other.framebuffer)
         self.device.fences.hold()
         # One driver (softpipe) leaves an error behind at its first copy, though that is made; who asks for errors next
@@ -112,9 +143,12 @@ class Field:
 
     def release(self) -> None:
         """Free the texture; the field can no longer be used."""
-        self.device.forget_targets(self.texture)
-        self.framebuffer.release()
-        self.texture.release()
+        if self._made is not None:
+            texture, framebuffer = self._made
+            self.device.forget_targets(texture)
+            framebuffer.release()
+            texture.release()
+            self._made = None
 
     def __repr__(self) -> str:
         return f"Field({self.label}, {self.width} x {self.height} x {self.components} {self.dtype})"

@@ -8,7 +8,7 @@ from typing import Literal
 import moderngl
 
 from solver.gl.context import Context
-from solver.gl.field import Field
+from solver.gl.field import Field, FieldError
 from solver.gl.program import ShaderError, assemble, compile_program, declared_reads
 
 GL_SAMPLERS = 0x8B5E, 0x8DD2  # sampler2D, usampler2D
@@ -29,6 +29,7 @@ class Pass:
     """
 
     def __init__(self, device: Context, shader: str, defines: dict[str, object]) -> None:
+        device.use()
         self.device = device
         self.shader = shader
         self.reads = declared_reads(shader)
@@ -71,6 +72,7 @@ class Pass:
             inputs: the shader's uniforms without their `u_`.
         """
         fields = [target] if isinstance(target, Field) else list(target)
+        self.device.use()
         self._bind(inputs)
         several = len(fields) > 1
         framebuffer = self.device.framebuffer([f.texture for f in fields]) if several else fields[0].framebuffer
@@ -109,6 +111,7 @@ class Pass:
             smooth: names of inputs that are read with linear filtering, whatever their textures say.
             inputs: the shader's uniforms without their `u_`.
         """
+        self.device.use()
         self._bind(inputs)
         units = [self._units[name] for name in smooth if name in self._units]
         for unit in units:
@@ -123,7 +126,11 @@ class Pass:
         units, numbers = self._units, self._numbers
         for name, value in inputs.items():
             if name in units:
-                texture = value.texture if isinstance(value, Field) else value
+                texture = value
+                if isinstance(value, Field):
+                    texture = value.texture
+                    if value.device is not self.device:
+                        raise FieldError(f"{value} is another device's")
                 texture.use(units[name])  # pyright: ignore[reportAttributeAccessIssue]
             elif name not in self._dropped and numbers.get(name) != value:
                 self._set(name, value)

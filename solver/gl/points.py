@@ -20,7 +20,6 @@ def draw_at(
     **inputs: Any,
 ) -> np.ndarray:
     """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, 2)."""
-    points = np.asarray(points, np.float64).reshape(-1, 2)
     rows = max(1, -(-len(points) // _ROW))
     listed = np.zeros((rows * _ROW, 2))
     listed[: len(points)] = points / domain

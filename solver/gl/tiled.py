@@ -196,6 +196,7 @@ class TiledField(Field):
             if tile is same or (same is not None and tile.field is None and same.field is None):
                 continue
             if tile.field is None:
+                self.device.use()
                 self.framebuffer.clear(*self._blank_values, viewport=region)
                 self.device.fences.hold()
             else:

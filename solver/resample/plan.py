@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from numbers import Integral
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -38,6 +39,9 @@ class Sampling:
         linear_light: mix in linear light; uint8 and uint16 are taken as sRGB, float32 as linear already.
         dither: spread the rounding to 8 bits by a fixed pattern; by default where light is mixed.
         premultiplied: the colours are multiplied by alpha already, and stay so.
+
+    Raises:
+        SamplingError: for what is none of these.
     """
 
     quality: Quality = "catmull-rom"
@@ -46,6 +50,14 @@ class Sampling:
     linear_light: bool = True
     dither: bool | None = None
     premultiplied: bool = False
+
+    def __post_init__(self) -> None:
+        for what, kinds in (("quality", get_args(Quality)), ("edges", get_args(Edges))):
+            if getattr(self, what) not in kinds:
+                raise SamplingError(f"{what} of {getattr(self, what)!r} were asked for, {', '.join(kinds)} there are")
+        several = self.samples
+        if several not in ("auto", 1) and not (isinstance(several, int) and several > 0 and several % 2 == 0):
+            raise SamplingError(f"{several!r} samples were asked for; it must be auto, 1 or an even number")
 
 
 class GivenMap:
@@ -57,17 +69,19 @@ class GivenMap:
 
     Raises:
         SamplingError: on another shape.
+        FieldError: on a value that is not finite.
     """
 
     version = 0
 
     def __init__(self, device: Device, displacement: np.ndarray) -> None:
+        displacement = np.asarray(displacement)
         if displacement.ndim != 3 or displacement.shape[2] != 2 or min(displacement.shape[:2]) < 6:
             raise SamplingError(f"a map of shape {displacement.shape} was given, (h, w, 2) from 6 x 6 is wanted")
         height, width = displacement.shape[:2]
         self.device = device
         self.extent = width / max(width, height), height / max(width, height)
-        self._field = device.upload(displacement.astype(np.float32, copy=False), "given map")
+        self._field = device.upload(displacement, "given map", "f4")
 
     def composed(self) -> Field:
         """The displacement."""
@@ -203,12 +217,17 @@ class Plan:
 
 def plan_for(warp: WarpMap | GivenMap, picture: np.ndarray, size: tuple[int, int] | None, how: Sampling) -> Plan:
     """What follows from a map, a picture and how it is to be looked up; raises `SamplingError`."""
+    if not isinstance(warp, WarpMap | GivenMap) or not isinstance(picture, np.ndarray):
+        given = f"a {type(picture).__name__} through a {type(warp).__name__}"
+        raise SamplingError(f"{given} was to be looked up; an array through a WarpMap or a GivenMap is wanted")
     if picture.dtype not in KINDS or picture.ndim not in (2, 3) or picture.size == 0:
         raise SamplingError(f"a picture of shape {picture.shape} of {picture.dtype} cannot be looked up")
     shaped = picture.reshape(*picture.shape[:2], -1)
     if shaped.shape[2] > 4:
         raise SamplingError(f"a picture of {shaped.shape[2]} channels cannot be looked up, 1 to 4 can")
     size = size or (picture.shape[1], picture.shape[0])
+    if np.shape(size) != (2,) or not all(isinstance(side, Integral) and side >= 1 for side in size):
+        raise SamplingError(f"a result of {size!r} was asked for, (width, height) in whole pixels is wanted")
     if isinstance(warp, WarpMap):
         field = warp.composed(warp.size_for((picture.shape[1], picture.shape[0]), size))
         held, slack = warp.held, 0.5 * picture.shape[1] / field.width

@@ -65,9 +65,10 @@ class Sampler:
         Raises:
             SamplingError: on a picture of another type or shape, or a map that tears a tile apart.
         """
-        width, height = size or (picture.shape[1], picture.shape[0])
+        plan = plan_for(warp, picture, size, how or Sampling())
+        width, height = plan.size
         result = np.empty((height, width, *picture.shape[2:]), picture.dtype)
-        for _ in self.bands(warp, picture, size, how, result):
+        for _ in self._bands(plan, picture, result):
             pass
         return result
 
@@ -83,7 +84,9 @@ class Sampler:
 
         `result` takes them, if given; otherwise each band is an array of its own.
         """
-        plan = plan_for(warp, picture, size, how or Sampling())
+        return self._bands(plan_for(warp, picture, size, how or Sampling()), picture, result)
+
+    def _bands(self, plan: Plan, picture: np.ndarray, result: np.ndarray | None) -> Iterator[np.ndarray]:
         width, height = plan.size
         whole = self.tiling.fits(plan.source_size) and not plan.is_repeated
         columns, rows = plan.size if whole and self.tiling.fits(plan.size) else self.tiling.tile_of(plan.size)

@@ -51,6 +51,7 @@ class Source:
 
     def load(self, plan: Plan, piece: Piece, room: tuple[int, int] | None = None) -> None:
         """Upload a piece of the picture (left, top, right, bottom) and prepare it; without `room` it is all of it."""
+        self.device.use()
         self._held = None
         self.piece = piece
         self.uploads += 1

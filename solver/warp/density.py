@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.faces import check_field
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.limits import LARGEST_VISCOSITY, check_shape, check_step
+from solver.limits import LARGEST_VISCOSITY, check_shape, check_size, check_step, check_type, real_array
 from solver.state import State
 
 DIFFUSION_SWEEPS = 20
@@ -23,27 +24,32 @@ class Density:
         source: what is added, per second, shaped as `values`.
 
     Raises:
-        ValueError: for values of another shape, or a kappa that is negative or beyond all measure.
+        ValueError: for values of another shape, not finite or beyond all measure, or such a kappa, or a negative one.
     """
 
     def __init__(
         self, device: Device, values: np.ndarray, kappa: float = 0.0, source: np.ndarray | None = None
     ) -> None:
         self.device = device
+        check_type("a diffusion", kappa)
         if not 0 <= kappa <= LARGEST_VISCOSITY:
             raise ValueError(f"a diffusion of {kappa} was asked for; it must be from 0 to {LARGEST_VISCOSITY:g}")
         self.kappa = kappa
-        if source is not None:
-            check_shape("a source of density", source, values.shape)
-        height, width, self._components = values.shape if values.ndim == 3 else (*values.shape, 1)
-        self._values = device.double_field((width, height), 4, "density")
-        self._before = device.field((width, height), 4, "density before diffusion")
-        self._source = None if source is None else device.upload(self._padded(source), "density source")
-        self.set(values)
+        self._shape = real_array("a density", values).shape
+        if not (len(self._shape) == 2 or (len(self._shape) == 3 and 1 <= self._shape[2] <= 4)):
+            raise ValueError(f"a density of shape {self._shape} was given, (h, w) or (h, w, 1-4) is wanted")
+        start = self._padded("a density", values)
+        added = None if source is None else self._padded("a source of density", source)
+        self._values = device.double_field(self._shape[1::-1], 4, "density")
+        self._before = device.field(self._shape[1::-1], 4, "density before diffusion")
+        self._source = None if added is None else device.upload(added, "density source")
+        self._values.read.set(start)
 
     def advance(self, faces: Field, grid: Grid, dt: float) -> None:
         """Move by the velocity on `faces` of the fluid's `grid` for `dt` seconds, diffuse, and add the source."""
         dt = check_step(dt)
+        check_type("the cells of a fluid", grid, Grid)
+        check_field("a velocity", faces, grid)
         with self.device.stage("density"):
             hx, hy = grid.spacing
             advect = self.device.pass_("warp/density/advect.frag")
@@ -62,13 +68,17 @@ class Density:
         return self._values.read
 
     def set(self, values: np.ndarray) -> None:
-        """Start again from (h, w) or (h, w, c)."""
-        self._values.read.set(self._padded(values))
+        """Start again from values shaped as the first.
+
+        Raises:
+            ValueError: on another shape, or a value that is not finite or beyond all measure.
+        """
+        self._values.read.set(self._padded("a density", values))
 
     def get(self) -> np.ndarray:
         """The densities now, shaped as they were given, float32."""
-        values = self._values.read.get()[..., : self._components]
-        return values[..., 0] if self._components == 1 else values
+        components = self._shape[2] if len(self._shape) == 3 else 1
+        return self._values.read.get()[..., :components].reshape(self._shape)
 
     def save(self) -> State:
         """A copy of this moment, on the GPU, which the caller releases."""
@@ -91,8 +101,9 @@ class Density:
             sweep(self._values.write, density=self._values.read, before=self._before, k=k)
             self._values.swap()
 
-    def _padded(self, values: np.ndarray) -> np.ndarray:
-        values = np.asarray(values, np.float32)
-        if values.ndim == 2:
-            values = values[..., None]
-        return np.pad(values, ((0, 0), (0, 0), (0, 4 - values.shape[2])))
+    def _padded(self, what: str, values: np.ndarray) -> np.ndarray:
+        array = real_array(what, values)
+        check_shape(what, array, self._shape)
+        check_size(what, array)
+        array = array.astype(np.float32).reshape(*self._shape[:2], -1)
+        return np.pad(array, ((0, 0), (0, 0), (0, 4 - array.shape[2])))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from solver.gl.points import draw_at
+from solver.limits import places
 from solver.warp.map import WarpMap
 
 MOST_ALONG = 1024  # texels along a side of the first guess
@@ -31,7 +32,8 @@ class ForwardMap:
         Returns:
             float32 (height, width, 2), longer sides.
         """
-        field = self._warp.device.field(size or self._warp.coarse_size, 2, "forward map, to read")
+        size = self._warp.coarse_size if size is None else size
+        field = self._warp.device.field(size, 2, "forward map, to read")
         invert = self._warp.device.pass_("warp/invert.frag")
         invert(field, **self._inputs(), origin=(0.0, 0.0), step=field.texel)
         displacement = field.get()
@@ -40,7 +42,7 @@ class ForwardMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement F at points (n, 2) of the original, in longer sides: float32 (n, 2)."""
-        return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **self._inputs())
+        return draw_at(self._warp.device, places(points), self._warp.extent, "warp/invert.frag", **self._inputs())
 
     def release(self) -> None:
         """Free the texture."""

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from solver.faces import check_field, on_faces
+from solver.faces import Vector, check_field, on_faces
+from solver.fluid import Fluid
 from solver.gl.device import Device
-from solver.gl.field import Field, FieldError
+from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.grid import Grid
-from solver.limits import check_step, check_type, real_array
-from solver.scheme import Scheme
+from solver.limits import check_size, check_step, check_type, numbers, places, real_array
 from solver.state import State
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.frozen import Frozen
-from solver.warp.prescribed import Velocity, traced
+from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
 from solver.warp.state import SUBMAPS, MapState, grid_in, values_of
 from solver.warp.submap import Level, Submap, depth, inputs_of, window_of
-
-if TYPE_CHECKING:
-    from solver.fluid import Fluid
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
 MOST_PLACES = 2**19  # at which its distortion is looked at
@@ -85,8 +81,9 @@ class WarpMap:
 
     def follow(self, fluid: Fluid, dt: float) -> None:
         """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
-        check_type("what the map is to follow", fluid, Scheme)
-        check_field("a velocity", fluid.faces(), self.grid)
+        check_type("what the map is to follow", fluid, Fluid)
+        if fluid.grid != self.grid:
+            raise ValueError(f"a map on {self.grid} cannot follow a fluid on {fluid.grid}; `move_to` takes it there")
         if tracing := fluid.begin_trace(check_step(dt)):
             self._submap.advance_tracing(tracing.target, tracing.defines, tracing.inputs)
             self._advanced()
@@ -117,7 +114,7 @@ class WarpMap:
         if self._steps >= self.remap_every or (self._steps % CHECK_EVERY == 0 and self._submap.is_steep):
             self._begin_remap()
 
-    def advance_prescribed(self, velocity: Velocity | np.ndarray, dt: float, time: float = 0.0) -> None:
+    def advance_prescribed(self, velocity: Vector, dt: float, time: float = 0.0) -> None:
         """Carry the map from `time` to `time + dt` by a velocity that is given.
 
         Args:
@@ -131,15 +128,13 @@ class WarpMap:
             ValueError: on an array of another shape, a value that is not finite, or a step that is none.
         """
         dt = check_step(dt)
-        if isinstance(velocity, np.ndarray):
+        if callable(velocity):
+            self._submap.trace.set(traced(velocity, self.grid, dt, time))
+            self.advance_traced(self._submap.trace)
+        else:
             field = self.device.upload(on_faces("a velocity", velocity, self.grid), "prescribed velocity")
             self.advance(field, dt)
             field.release()
-            return
-        check_type("a velocity", velocity, Callable)
-        check_type("a time", time)
-        self._submap.trace.set(traced(velocity, self.grid, dt, time))
-        self.advance_traced(self._submap.trace)
 
     def remap(self) -> None:
         """Let the accumulated map take in all that has moved, at once; the whole map stays what it was."""
@@ -152,6 +147,7 @@ class WarpMap:
         Raises:
             ValueError: if it is a grid of another picture.
         """
+        check_type("what the map moves to", grid, Grid)
         if grid == self.grid:
             return
         if grid.picture != self.extent:
@@ -176,6 +172,7 @@ class WarpMap:
         if frozen is None:
             self._frozen.release()
         else:
+            check_type("what is frozen", frozen, Field)
             self._frozen.hold(frozen, changed or (0, 0, *frozen.size), self._keep)
             self._is_settled &= not self._steps
         self._changed()
@@ -189,7 +186,12 @@ class WarpMap:
             center, radius: longer sides.
             hardness: the part of the radius that is fully under the brush, 0-1; the rest falls off smoothly.
             amount: 0-1, the part of the displacement that is taken away at the centre.
+
+        Raises:
+            ValueError: if a number is not finite or beyond all measure.
         """
+        numbers("a brush's centre", center, 2)
+        numbers("a brush", (radius, hardness, amount), 3)
         if not self._is_settled:
             self._begin_remap()  # or what is around the held places would not go on from them
         self._remapping.finish()
@@ -234,19 +236,19 @@ class WarpMap:
         """Take over a displacement (h, w, 2) in longer sides, of any size from 6 x 6, laid over the whole domain.
 
         Raises:
-            FieldError: on another shape, also one that is upright for a picture that is not, or a value that is not
-                finite.
+            ValueError: on another shape, also one that is upright for a picture that is not, or a value that is not
+                finite or beyond all measure.
         """
-        displacement = np.asarray(displacement)
+        displacement = real_array("a map", displacement)
         if displacement.ndim != 3 or displacement.shape[2] != 2 or min(displacement.shape[:2]) < 6:
-            raise FieldError(f"a map of shape {displacement.shape} was given, (h, w, 2) from 6 x 6 is wanted")
-        given = self.device.upload(displacement.astype(np.float32), "given map")
+            raise ValueError(f"a map of shape {displacement.shape} was given, (h, w, 2) from 6 x 6 is wanted")
+        check_size("a map", displacement)
         (rows, columns), (width, height) = displacement.shape[:2], self.extent
         if (columns - rows) * (width - height) < 0:
-            given.release()
-            raise FieldError(
+            raise ValueError(
                 f"a map of {columns} x {rows} was given for a picture of {width:.4g} x {height:.4g}: is it transposed?"
             )
+        given = self.device.upload(displacement, "given map")
         self.reset()
         resample = self.device.pass_("warp/resample.frag")
         x, y = (np.arange(columns) + 0.5) / columns * width, (np.arange(rows) + 0.5) / rows * height
@@ -314,7 +316,7 @@ class WarpMap:
         Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, so is the
         accumulated map for it.
         """
-        size = size or self.size
+        size = self.size if size is None else size
         if size == self.size and self._steps == 0 and self._remapping.is_idle and self._frozen.held is None:
             return self._accumulated.now
         key = size, exact
@@ -350,9 +352,7 @@ class WarpMap:
         Returns:
             float32 (height, width, 2), longer sides.
         """
-        if size is not None and np.shape(size) != (2,):
-            raise ValueError(f"a size of {size!r} was given, (width, height) is wanted")
-        field = self.device.field(size or self.coarse_size, 2, "warp map, to read")
+        field = self.device.field(self.coarse_size if size is None else size, 2, "warp map, to read")
         self._compose(field)
         displacement = field.get()
         field.release()
@@ -360,21 +360,13 @@ class WarpMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement at points (n, 2) of the result, in longer sides: float32 (n, 2)."""
-        points = real_array("places", points)
-        if points.shape[-1:] != (2,):
-            raise ValueError(f"places of shape {points.shape} were given, (n, 2) is wanted")
-        return draw_at(self.device, points, self.extent, "warp/compose.frag", self._defines(), **self._parts())
+        shader, defines = "warp/compose.frag", self._defines()
+        return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())
 
     def determinants(self, points: np.ndarray) -> np.ndarray:
         """det J at points (n, 2) of the result, in longer sides, by the chain rule: float32 (n,)."""
-        return draw_at(
-            self.device,
-            points,
-            self.extent,
-            "warp/distortion.frag",
-            self._held_defines() | depth(self._levels),
-            **self._parts(),
-        )[:, 1]
+        shader, defines = "warp/distortion.frag", self._held_defines() | depth(self._levels)
+        return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())[:, 1]
 
     def draw(self, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
         """Draw the displacement at (fragment + origin) step, 0-1 of the picture, to be looked at between its texels."""

@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
+from solver.faces import Function, components
 from solver.grid import Grid
 from solver.warp.submap import window_of
 
-Velocity = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 
-
-def traced(velocity: Velocity, grid: Grid, dt: float, time: float) -> np.ndarray:
+def traced(velocity: Function, grid: Grid, dt: float, time: float) -> np.ndarray:
     """How far back what arrives at the cells' centres at `time + dt` came from, in cells: (ny, nx, 2).
 
     A fourth-order Runge-Kutta step; what would come from beyond the grid's edge comes from the edge.
 
     Raises:
-        ValueError: if the velocity has not two components.
+        ValueError: if the velocity has not two components, each finite and shaped as the places.
     """
     x, y = grid.centres()
-    if (count := len(velocity(x, y, time + dt))) != 2:
-        raise ValueError(f"a velocity has two components, and the function gave {count}")
-    back_x, back_y = _runge_kutta(velocity, x, y, time + dt, -dt)
+    back_x, back_y = _runge_kutta(partial(components, "a velocity", velocity), x, y, time + dt, -dt)
     left, top, width, height = window_of(grid)
     back = np.stack([np.clip(back_x, left, left + width) - x, np.clip(back_y, top, top + height) - y], axis=-1)
     return back / grid.spacing
 
 
 def _runge_kutta(
-    velocity: Velocity, x: np.ndarray, y: np.ndarray, time: float, dt: float
+    velocity: Callable[..., tuple[np.ndarray, ...]], x: np.ndarray, y: np.ndarray, time: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where points are carried in `dt` by a velocity: the classical fourth-order step."""
     u1, v1 = velocity(x, y, time)

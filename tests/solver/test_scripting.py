@@ -12,7 +12,27 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from solver import Brush, Density, Device, Fluid, FluidParams, Grid, PaperFluid, Tip, Walls, WarpMap
+from solver import (
+    Brush,
+    Density,
+    Device,
+    Fluid,
+    FluidParams,
+    Grid,
+    Handle,
+    Handles,
+    Masks,
+    PaperFluid,
+    Tip,
+    Walls,
+    WarpMap,
+)
+from solver.brush.push import Push
+from solver.gl.context import ContextError
+from solver.gl.field import FieldError
+from solver.resample.plan import Sampling
+from solver.resample.sampler import Sampler
+from solver.warp.inverse import ForwardMap
 from support import reference
 
 SECTION = (Path(__file__).parents[2] / "README.md").read_text("utf-8").split("## Scripting")[1].split("\n## ")[0]
@@ -98,6 +118,49 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
         "brush",
     ),
     "a push in no time": (lambda fluid: Brush(fluid.device).push(fluid, Tip((0.1, 0.1), (0.2, 0.1), 0.1), 0.0), "time"),
+    "a force that is a field alone": (
+        lambda fluid: fluid.step(0.1, [fluid.device.upload(np.ones((12, 20, 2)))]),
+        "law",
+    ),
+    "a force of another shape": (lambda fluid: fluid.step(0.1, lambda x, y, t: (x[:5], y)), "shape"),
+    "a force that gives nothing": (lambda fluid: fluid.step(0.1, lambda x, y, t: cast(Any, None)), "two components"),
+    "a flow on another picture": (lambda fluid: fluid.flow_on(Grid(20, 20)), "picture"),
+    "a flow on another grid": (lambda fluid: fluid.go_on_with(fluid.flow_on(Grid(30, 18))), "take over"),
+    "a side that is not told of": (lambda fluid: Walls(sticky=cast(Any, (True,))), "sticky"),
+    "an endless number of cycles": (lambda fluid: FluidParams(pressure_cycles=cast(Any, np.inf)), "cycles"),
+    "cells of NaN": (lambda fluid: Grid(cast(Any, np.nan), 12), "whole"),
+    "a density of five": (lambda fluid: Density(fluid.device, np.ones((12, 20, 5))), "shape"),
+    "a density set to another shape": (
+        lambda fluid: Density(fluid.device, np.ones((12, 20))).set(np.ones((12, 20, 3))),
+        "shape",
+    ),
+    "a density moved by one component": (
+        lambda fluid: Density(fluid.device, np.ones((12, 20))).advance(fluid.viscosity, fluid.grid, 0.1),
+        "velocity",
+    ),
+    "a negative viscosity to paint on": (lambda fluid: Masks(fluid.device, fluid.grid).set_base(-1.0), "viscosity"),
+    "frozen texels of NaN": (
+        lambda fluid: Masks(fluid.device, fluid.grid).set_frozen(np.full((12, 20), np.nan)),
+        "frozen",
+    ),
+    "masks of another picture": (lambda fluid: Masks(fluid.device, Grid(20, 20)).apply(fluid), "picture"),
+    "a brush in three dimensions": (lambda fluid: Tip(cast(Any, (0, 0, 0)), (0.1, 0.1), 0.1), "place"),
+    "a handle in three dimensions": (lambda fluid: Handle(cast(Any, (0.3, 0.3, 0.3))), "shape"),
+    "a key without a place": (lambda fluid: Handle((0.3, 0.3), keys=cast(Any, ((1.0, 0.4),))), "shape"),
+    "handles led in no time": (
+        lambda fluid: Handles(fluid, WarpMap(fluid.device, fluid.grid), [Handle((0.3, 0.3), (0.4, 0.3))]).advance(0.0),
+        "time",
+    ),
+    "a picture at an unknown quality": (lambda fluid: Sampling(quality=cast(Any, "best")), "quality"),
+    "three samples": (lambda fluid: Sampling(samples=3), "samples"),
+    "a picture at no size": (
+        lambda fluid: Sampler(fluid.device).apply(
+            WarpMap(fluid.device, fluid.grid), np.zeros((6, 6), np.uint8), (0, 5)
+        ),
+        "size|result",
+    ),
+    "a field of a part of a texel": (lambda fluid: fluid.device.field(cast(Any, (2.5, 3))), "whole"),
+    "words on the GPU": (lambda fluid: fluid.device.upload(np.full((3, 3), "a")), "real"),
     "an endless growth": (lambda fluid: Brush(fluid.device).expand(fluid, Tip((0, 0), (0, 0), 0.1), np.inf), "rate"),
 }
 
@@ -124,6 +187,15 @@ def test_what_cannot_be_simulated_is_refused_and_nothing_has_happened(fluid: Flu
         lambda warp: warp.advance_prescribed(lambda x, y, t: (x, y), np.nan),
         lambda warp: warp.advance_prescribed(lambda x, y, t: x, 0.1),
         lambda warp: warp.advance(warp.device.upload(np.zeros((12, 20))), 0.1),
+        lambda warp: warp.follow(Fluid(warp.device, Grid(20, 12, (0.5, 0.3), (0.1, 0.1), (1.0, 0.6))), 0.1),
+        lambda warp: warp.set(np.full((12, 20, 2), 1e38)),
+        lambda warp: warp.restore_under((0.3, 0.3), 0.1, amount=np.nan),
+        lambda warp: warp.restore_under((0.3, 0.3), 0.1, hardness=np.nan),
+        lambda warp: warp.restore_under((0.3, 0.3), np.inf),
+        lambda warp: warp.determinants(np.zeros((3, 3))),
+        lambda warp: ForwardMap(warp).at(np.zeros((3, 3))),
+        lambda warp: warp.read((40.5, 24)),
+        lambda warp: warp.statistics("all"),
     ],
     ids=[
         "transposed",
@@ -134,11 +206,20 @@ def test_what_cannot_be_simulated_is_refused_and_nothing_has_happened(fluid: Flu
         "NaN step",
         "function",
         "field",
+        "fluid of a window",
+        "beyond all measure",
+        "amount of NaN",
+        "hardness of NaN",
+        "endless radius",
+        "places of determinants",
+        "places of the forward map",
+        "half a pixel",
+        "size of a word",
     ],
 )
 def test_a_map_refuses_what_does_not_fit(device: Device, act: Callable[[WarpMap], object]) -> None:
     warp = WarpMap(device, Grid(20, 12))
-    with pytest.raises(ValueError, match=r"shape|transposed|step|wanted|components"):
+    with pytest.raises(ValueError, match=r"shape|transposed|step|wanted|components|cannot follow|beyond"):
         act(warp)
     assert not warp.read().any()
     warp.release()
@@ -256,6 +337,36 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         warp.at,
         lambda wrong: warp.read(wrong or cast(Any, (3, 4, 5))),
         lambda wrong: Grid(wrong, 16),
+        lambda wrong: Grid.for_picture(wrong, 16, 64),
+        lambda wrong: Fluid(wrong, grid),
+        lambda wrong: Fluid(own.device, wrong),
+        lambda wrong: Fluid(own.device, grid, wrong or cast(Any, Walls())),
+        lambda wrong: FluidParams(wrong),
+        lambda wrong: FluidParams(drag=wrong),
+        lambda wrong: Walls(speed=wrong),
+        own.flow_on,
+        own.lay_on,
+        own.go_on_with,
+        lambda wrong: Brush(device).push(wrong, Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1),
+        lambda wrong: Brush(device).push(fluid, wrong, 0.1),
+        lambda wrong: Brush(device).lead(fluid, wrong),
+        lambda wrong: Brush(device).make_up(fluid, Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1), wrong),
+        lambda wrong: Tip((0.3, 0.3), (0.3, 0.3), wrong),
+        lambda wrong: Handle(wrong),
+        lambda wrong: Handle((0.3, 0.3), radius=wrong),
+        lambda wrong: Handles(fluid, warp, [wrong]),
+        lambda wrong: Handles(wrong, warp, []),
+        lambda wrong: Handles(fluid, wrong, []),
+        lambda wrong: Density(device, wrong),
+        lambda wrong: Density(device, np.ones((12, 16))).advance(wrong, grid, 0.1),
+        lambda wrong: Masks(device, wrong),
+        lambda wrong: Masks(device, grid).set_base(wrong),
+        lambda wrong: Masks(device, grid).apply(wrong),
+        lambda wrong: Sampler(device).apply(warp, wrong),
+        lambda wrong: Sampler(device).apply(wrong, np.zeros((6, 6), np.uint8)),
+        warp.move_to,
+        lambda wrong: warp.hold(wrong or cast(Any, still)),
+        device.upload,
     ]
     for call in calls:
         for wrong in (nothing, cast(Any, "x")):
@@ -264,3 +375,65 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
     assert np.array_equal(fluid.velocity_at_centres(), still)
     for item in (fluid, warp, own):
         item.release()
+
+
+def test_arrays_of_any_layout_are_the_same_numbers(device: Device) -> None:
+    grid, found = Grid(20, 12), []
+    array = reference.smooth_velocity(20, 12, seed=3).astype(np.float32)
+    spread = np.zeros((24, 40, 2), np.float32)
+    spread[::2, ::2] = array
+    turned = np.ascontiguousarray(array.transpose(1, 0, 2)).transpose(1, 0, 2)
+    for given in (array, array.tolist(), array.astype(">f4"), array.astype(">f8"), spread[::2, ::2], turned):
+        fluid = Fluid(device, grid)
+        fluid.set_velocity(cast(Any, given))
+        found.append(fluid.faces().get())
+        fluid.release()
+    assert found[0].any()
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+
+
+def test_devices_beside_each_other_do_not_mix(device: Device) -> None:
+    """Each draws in its own context, whichever was made or used last; a field of another one is refused."""
+
+    def stirred(where: Device) -> Fluid:
+        fluid = Fluid(where, Grid(20, 12))
+        fluid.set_velocity(reference.smooth_velocity(20, 12, seed=2))
+        return fluid
+
+    alone = stirred(device)
+    alone.step(0.1)
+    wanted = alone.u
+    with Device.headless() as other:
+        here, there = stirred(device), stirred(other)
+        for fluid in (here, there):
+            fluid.step(0.1)
+            np.testing.assert_array_equal(fluid.u, wanted)
+        force = other.upload(np.ones((12, 20, 2)))
+        with pytest.raises(FieldError, match="another device"):
+            here.step(0.1, [(force, 0.1)])
+        np.testing.assert_array_equal(here.u, wanted)
+    here.step(0.1)
+    assert np.isfinite(here.u).all()
+    with pytest.raises(ContextError, match="released"):
+        there.step(0.1)
+    here.release()
+    alone.release()
+
+
+def test_what_was_released_says_so(device: Device) -> None:
+    fluid, warp = Fluid(device, Grid(20, 12)), WarpMap(device, Grid(20, 12))
+    state = fluid.save()
+    calls: list[Callable[[], object]] = [
+        lambda: fluid.step(0.1),
+        lambda: fluid.u,
+        lambda: fluid.set_viscosity(1.0),
+        lambda: fluid.restore(state),
+        lambda: warp.follow(fluid, 0.1),
+        lambda: warp.read(),
+    ]
+    for thing in (fluid, warp, state, fluid, warp):  # again, which does nothing
+        thing.release()
+    for call in calls:
+        with pytest.raises(FieldError, match="was released"):
+            call()
