@@ -4,7 +4,8 @@
 //      links of lib/block.glsl
 // With SOURCE: u_source, the side times the wanted divergence, at cells, lengths / s, 0 in the mean over closed regions.
 // With EXPECTED: u_expected, p at blocks, lengths / s.
-// out: r at blocks, lengths / s;  squares summed over the block: R without what is expected, G of r
+// out: r at blocks, lengths / s;  squares summed over the block: R without what is expected, G of r, B of all that the
+//      former is a difference of, each face once
 // reads: 20
 #include "lib/block.glsl"
 
@@ -49,15 +50,20 @@ void main() {
     vec4 left, right, up, down;
     read_faces(left, right, up, down);
     // The weights down hold the aspect squared.
-    out_residual = f.right * right - f.left * left + (f.down * down - f.up * up) / u_aspect;
+    left *= f.left;
+    up *= f.up / u_aspect;
+    out_residual = f.right * right - left + f.down * down / u_aspect - up;
+    float terms = dot(left, left) + dot(up, up);
 #ifdef SOURCE
     vec2 texel = 1.0 / vec2(textureSize(u_source, 0)), a = (2.0 * floor(gl_FragCoord.xy) + 0.5) * texel, b = a + texel;
     vec2 inside = vec2(lessThan(b, vec2(1.0)));  // a block at the edge may have cells beyond it
-    out_residual -= vec4(texture(u_source, a).r, texture(u_source, vec2(b.x, a.y)).r,
-                         texture(u_source, vec2(a.x, b.y)).r, texture(u_source, b).r)
-                  * vec2(1.0, inside.x).xyxy * vec2(1.0, inside.y).xxyy;
+    vec4 source = vec4(texture(u_source, a).r, texture(u_source, vec2(b.x, a.y)).r,
+                       texture(u_source, vec2(a.x, b.y)).r, texture(u_source, b).r)
+                * vec2(1.0, inside.x).xyxy * vec2(1.0, inside.y).xxyy;
+    out_residual -= source;
+    terms += dot(source, source);
 #endif
-    out_squares = vec4(dot(out_residual, out_residual));
+    out_squares = vec4(vec2(dot(out_residual, out_residual)), terms, 0.0);
 #ifdef EXPECTED
     out_residual -= laplacian(u_expected, v_uv, texture(u_expected, v_uv), f);
     out_squares.y = dot(out_residual, out_residual);

@@ -14,9 +14,6 @@ if TYPE_CHECKING:
 # A bound, for no endless run: of some thousand random masks none has needed more than 11.
 MOST_ITERATIONS = 40
 
-# Of a residual, what sums in float32 still tell from nothing.
-ROUNDING = 1e-6
-
 
 class ConjugateGradients:
     """Solves A p = r on the finest level, until little enough of r is left.
@@ -60,14 +57,12 @@ class ConjugateGradients:
             squares: the sum of its squares.
             wanted: and what is wanted of it.
             sweeps: of the smoother before and after each correction.
-            iterations: so many of them, or until only rounding is left.
+            iterations: of them, at most.
 
         Returns:
             The number of iterations.
         """
         most = iterations or MOST_ITERATIONS
-        if iterations is not None:
-            wanted = ROUNDING**2 * squares
         count, rz = 0, 0.0
         while count < most and squares > wanted:
             z = direction = cycle.solve(residual.read, sweeps)

@@ -214,6 +214,29 @@ def check_source(device: Device, seed: int) -> dict[str, float]:
     return {"left": float(left / max(np.linalg.norm(wanted), 1e-30)), "cycles": cycles}
 
 
+def check_again_and_again(device: Device, seed: int) -> dict[str, float]:
+    """What is free of divergence but for rounding, or has what is asked for, stays as it is, projected ever again."""
+    rng = np.random.default_rng(seed)
+    kind = list(MASKS)[seed % len(MASKS)]
+    size = int(rng.integers(8, 40)), int(rng.integers(8, 40))
+    projection, field = Projection(device, size), device.double_field(size, 2)
+    frozen = device.upload(kind(size, rng).astype(np.uint8) * 255)
+    source = device.upload(rng.standard_normal(size[::-1]).astype(np.float32)) if rng.random() < 0.3 else None
+    if kind is not open_box:
+        projection.set_solids(frozen)
+    cycles, velocity = None if rng.random() < 0.7 else 8, random_velocity(size, rng)
+    field.read.set(velocity)
+    projection.project(field, cycles, source, warm=True)
+    first = field.read.get().astype(np.float64)
+    for _ in range(60):
+        projection.project(field, cycles, source, warm=True)
+    moved = np.linalg.norm(field.read.get() - first) / np.linalg.norm(velocity)
+    assert moved <= 1e-2, f"{kind.__name__} {size}: {moved:.2e}"
+    for item in (projection, field, frozen, *([source] if source else [])):
+        item.release()
+    return {"moved": float(moved)}
+
+
 def check_symmetry(device: Device, seed: int) -> dict[str, float]:
     """What is mirrored or transposed is projected to what is mirrored or transposed, but for what is left."""
     rng = np.random.default_rng(seed)

@@ -23,6 +23,11 @@ def test_a_source_acts_less_its_mean_over_each_region(device: Device, seed: int)
     properties.check_source(device, seed)
 
 
+@pytest.mark.parametrize("seed", range(14))
+def test_what_is_free_of_divergence_stays_as_it_is(device: Device, seed: int) -> None:
+    properties.check_again_and_again(device, seed)
+
+
 @pytest.mark.parametrize("seed", range(7))
 def test_what_is_mirrored_or_transposed_is_projected_so(device: Device, seed: int) -> None:
     properties.check_symmetry(device, seed)
