@@ -203,8 +203,14 @@ def edited(words: np.ndarray, edit: WholeEdit, canvas: Grid, pictures: NamedPict
             return _grown(words, edit.radius, canvas) if grows else last - _grown(last - words, edit.radius, canvas)
         case PictureMask():
             grey = to_grid(intensity(pictures.load(edit.picture)), canvas)
-            amount = edit.white * grey if edit.of == "thickness" else (grey >= 0.5).astype(np.float32)
-            return wanted(amount).astype(words.dtype)
+            return wanted(edit.white * grey if edit.of == "thickness" else grey).astype(words.dtype)
+
+
+def as_grey(words: np.ndarray, of: MaskName) -> np.ndarray:
+    """A mask as a `PictureMask` reads it back to the word, (h, w) uint16; of thickness, what is thinned is black."""
+    zero, unit = UNITS[of]
+    white = unit * (THICKEST if of == "thickness" else 1)
+    return np.rint(np.clip((words.astype(np.float64) - zero) / white, 0, 1) * 65535).astype(np.uint16)
 
 
 def _inside(corners: np.ndarray, canvas: Grid) -> np.ndarray:
