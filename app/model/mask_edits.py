@@ -7,12 +7,12 @@ same.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import zip_longest
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, model_validator
 
 from app.model.sampling import SOURCE, NamedPictures, PictureName, Point, Segment, Window, intensity, places, to_grid
 from app.model.schema import Model, Radius, Several
@@ -20,6 +20,8 @@ from app.model.strokes import Stroke, Tick
 from solver.grid import Grid
 
 MaskName = Literal["frozen", "thickness"]
+MASKS: dict[MaskName, str] = {"frozen": "what is frozen", "thickness": "the thickness"}
+"""What people call them."""
 MaskTool = Literal["thicken", "thin", "freeze", "thaw", "smooth"]
 THINNEST, THICKEST = -3.0, 5.0  # decades that can be painted
 UNITS = {"frozen": (0, 255), "thickness": (24576, 8192)}
@@ -150,6 +152,8 @@ class PictureMask(_Edit):
 
 WholeEdit = FillMask | InvertMask | FeatherMask | SpreadMask | PictureMask
 MaskEdit = Annotated[MaskStroke | ClearMask | WholeEdit, Field(discriminator="kind")]
+mask_edit: Callable[[dict[str, Any]], MaskEdit] = TypeAdapter(MaskEdit).validate_python
+"""The edit that a table of the recipe says."""
 
 
 def remaining(edits: Sequence[MaskEdit], done: Sequence[MaskEdit]) -> list[tuple[MaskEdit, int]] | None:

@@ -543,10 +543,10 @@ class Session:
 
     # -- edits ------------------------------------------------------------------------------------------------------
 
-    def edit_mask(self, name: str, edit: MaskEdit) -> None:
-        """Do something to a mask, in no time: where the recording ends, or the playhead was sent back to.
+    def edit_masks(self, name: str, *edits: MaskEdit) -> None:
+        """Do something to masks, in no time: where the recording ends, or the playhead was sent back to.
 
-        `edit`: whatever its tick.
+        `edits`: whatever their ticks.
 
         Raises:
             UserError: what is wrong with it on this picture.
@@ -557,10 +557,10 @@ class Session:
         if not self.coasting:
             self._send(tick)
         self.replay.checkpoint()
-        self._keep_masks(name, edit.model_copy(update={"tick": tick}))
+        self._keep_masks(name, *(edit.model_copy(update={"tick": tick}) for edit in edits))
 
-    def _keep_masks(self, name: str, edit: MaskEdit) -> None:
-        recipe = self._base.edited(mask=(*self._base.mask, edit))
+    def _keep_masks(self, name: str, *edits: MaskEdit) -> None:
+        recipe = self._base.edited(mask=(*self._base.mask, *edits))
         try:
             self.replay.use(recipe)
         except UserError:
@@ -625,7 +625,7 @@ class Session:
         self.release()
         recipe = self._base.edited(map=name)
         if name is not None:
-            self.pictures.forget_map(name)
+            self.pictures.forget(name)
             height, width = self.pictures.load_map(name).shape[:2]
             most = self.device.limits.max_texture_size
             if min(width, height) < 6 or max(width, height) > most:

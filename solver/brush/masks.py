@@ -113,6 +113,10 @@ class Masks:
         for name in self._kinds:
             self.take_off(name)
 
+    def words(self, name: str) -> np.ndarray | None:
+        """The texels of a mask as `edit` has them; None if nothing has been painted on it."""
+        return self._painted[name].get() if name in self._painted else None
+
     def edit(self, name: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
         """Make a mask anew from its texels: (h, w), uint16 of "thickness", uint8 of "frozen", in which 255 is all."""
         field = self._field(name)

@@ -139,7 +139,7 @@ def test_undo_and_redo_of_masks_are_exact(session: Session) -> None:
             paint(session, dice.choice(MASKS), place, (0.5, 0.5), hold=dice.randrange(1, 4))
             assert session.recipe.mask[-1].kind == "stroke"
         else:
-            session.edit_mask("Edit", dice.choice(EDITS))
+            session.edit_masks("Edit", dice.choice(EDITS))
         seen.append(masks(session.replay))
     assert len(session.document.history.entries) == len(seen)
     for _ in range(25):
@@ -167,7 +167,7 @@ def test_random_work_replays_to_the_byte(device: Device, tmp_path: Path, solver:
             case 3 | 4:
                 paint(session, "push", *places)
             case 5:
-                session.edit_mask("Edit", dice.choice(EDITS))
+                session.edit_masks("Edit", dice.choice(EDITS))
             case 6:
                 dice.choice((session.undo, session.redo))()
             case 7:
@@ -222,11 +222,11 @@ def test_a_mask_picture_is_loaded_and_one_that_is_not_there_is_a_sentence(sessio
     grey = np.zeros((height, width), np.uint16)
     grey[: height // 2] = 65535
     write_picture(tmp_path / "mask.png", Picture(grey[..., None]))
-    session.edit_mask("Load", PictureMask(kind="picture", tick=0, of="frozen", picture=str(tmp_path / "mask.png")))
+    session.edit_masks("Load", PictureMask(kind="picture", tick=0, of="frozen", picture=str(tmp_path / "mask.png")))
     assert np.array_equal(session.replay.masks.frozen.get() > 127, grey > 0)
     seen = masks(session.replay)
     with pytest.raises(UserError, match="nowhere"):
-        session.edit_mask("Load", PictureMask(kind="picture", tick=0, of="frozen", picture="nowhere.png"))
+        session.edit_masks("Load", PictureMask(kind="picture", tick=0, of="frozen", picture="nowhere.png"))
     assert is_same(masks(session.replay), seen)
     assert len(session.document.history.entries) == 2
     assert is_same(seen, replayed(session))
