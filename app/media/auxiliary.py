@@ -71,9 +71,10 @@ class Pictures:
                 self.notice(f"{name} folds over itself in {folded} of its pixels")
         return self._maps[name]
 
-    def forget_map(self, name: str) -> None:
-        """Read a map anew when it is wanted next: its file may be another one now."""
+    def forget(self, name: str) -> None:
+        """Read a map or a picture anew when it is wanted next: its file may be another one now."""
         self._maps.pop(name, None)
+        self._read.pop(name, None)
 
     def values(self) -> list[np.ndarray]:
         """The pixels of all that was read so far and the values of maps, the source first, the others by name."""

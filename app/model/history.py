@@ -127,7 +127,7 @@ class History:
 def _own_bytes(recipe: Recipe, before: Recipe | None) -> int:
     """Bytes that `recipe` needs beside `before`: the parts that are not the same objects, roughly."""
     size = 1024
-    for name in ("viscosity", "freeze", "force", "handle", "pin", "change", "stroke"):
+    for name in ("viscosity", "freeze", "force", "handle", "pin", "change", "mask", "stroke"):
         known = {id(part) for part in getattr(before, name)} if before is not None else set()
         parts = getattr(recipe, name)
         size += 8 * len(parts)

@@ -11,11 +11,12 @@ from app.errors import UserError
 from app.model import toml
 from app.model.forces import Force
 from app.model.handles import MOST_HANDLES, RecipeHandle, RecipePin, is_inside
+from app.model.mask_edits import MaskEdit, remaining
 from app.model.masks import FreezeLayer, ViscosityLayer
 from app.model.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
 from app.model.strokes import Change, Stroke
 
-VERSION = 3
+VERSION = 4
 MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
@@ -152,8 +153,8 @@ class Recipe(Model):
     """Everything that makes a warp; see the modules of its parts for the units.
 
     Attributes:
-        version: of this format. In version 1 strokes had no `detail`, in version 2 there were no handles; one that is
-            older becomes one of this version when it is read.
+        version: of this format. In version 1 strokes had no `detail`, in version 2 there were no handles, in version 3
+            masks were only painted in time; one that is older becomes one of this version when it is read.
         name: a title.
         picture: the source, relative to the recipe's own folder.
         map: a warp map to begin with instead of the picture as it is, in any format of `app.media.maps`.
@@ -161,10 +162,11 @@ class Recipe(Model):
         edges: what lies beyond the picture's edge.
         mode: "coordinates" warps the picture's coordinates, "density" moves its values (see `Density`).
         viscosity, freeze, force, stroke, change: applied in the order they are written in.
+        mask: what is done to the masks in no time, in this order, before all else that begins at the same tick.
         handle, pin: in force all at once.
     """
 
-    version: Literal[3] = VERSION
+    version: Literal[4] = VERSION
     name: str = ""
     picture: FileName | None = None
     map: FileName | None = None
@@ -182,6 +184,7 @@ class Recipe(Model):
     handle: Several[RecipeHandle] = ()
     pin: Several[RecipePin] = ()
     change: Several[Change] = ()
+    mask: Several[MaskEdit] = ()
     stroke: Several[Stroke] = ()
 
     @model_validator(mode="before")
@@ -204,9 +207,9 @@ class Recipe(Model):
             )
         if self.stop.handles_within is not None and not self.handle:
             raise ValueError("'stop.handles_within' waits for handles, and there is no [[handle]]")
-        ticks = [change.tick for change in self.change]
-        if any(later < earlier for earlier, later in pairwise(ticks)):
-            raise ValueError("the ticks of [[change]] must not go backwards")
+        for key, things in (("change", self.change), ("mask", self.mask)):
+            if any(later.tick < earlier.tick for earlier, later in pairwise(things)):
+                raise ValueError(f"the ticks of [[{key}]] must not go backwards")
         return self
 
     # -- text -------------------------------------------------------------------------------------------------------
@@ -250,7 +253,7 @@ class Recipe(Model):
                 continue
             tables = tomlkit.aot()
             for entry in value:
-                if key == "stroke":
+                if "samples" in entry:
                     # Of samples there are thousands, and tomlkit takes its time over each; a list's repr is TOML too.
                     samples.append(repr(entry["samples"]))
                     entry["samples"] = _SAMPLES
@@ -281,6 +284,10 @@ class Recipe(Model):
                         changed[key] = value
         return self.fluid.model_copy(update=changed) if changed else self.fluid
 
+    def masks_at(self, tick: int) -> tuple[MaskEdit, ...]:
+        """What is done to the masks at a tick, before its step."""
+        return tuple(edit for edit in self.mask if edit.tick == tick)
+
     def edited(self, **parts: Any) -> Self:
         """The recipe with some of its parts replaced by parts that are valid in themselves; shares all the others."""
         return self.model_copy(update=parts)
@@ -304,7 +311,7 @@ class Recipe(Model):
     def agrees_until(self, other: Recipe) -> float:
         """The tick before which both recipes simulate the same; infinite where they do so for ever.
 
-        Checkpoints up to and including that tick are common to both.
+        Checkpoints up to that tick are common to both; one at it, if `goes_on_from` says so.
         """
         if not self.is_set_up_as(other):
             return 0
@@ -324,13 +331,19 @@ class Recipe(Model):
                 agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (mine, theirs) if led is not None)])
         if self.pin != other.pin:
             agreed = min([agreed, *(led.first_tick(self.fluid.dt) for led in (*self.pin, *other.pin))])
-        for mine, theirs in zip_longest(self.change, other.change):
-            if mine != theirs:
+        for mine, theirs in (*zip_longest(self.change, other.change), *zip_longest(self.mask, other.mask)):
+            if mine is not theirs and mine != theirs:
                 agreed = min([agreed, *(change.tick for change in (mine, theirs) if change is not None)])
         return agreed
 
+    def goes_on_from(self, other: Recipe, tick: int) -> bool:
+        """True if a simulation of `other` that has come to a tick, with all masks there, is on the way of this one."""
+        if (agreed := self.agrees_until(other)) != tick:
+            return agreed > tick
+        return remaining(self.masks_at(tick), other.masks_at(tick)) is not None
+
     def is_set_up_as(self, other: Recipe) -> bool:
-        """True if both are the same simulation but for strokes, changes, handles and pins."""
+        """True if both are the same simulation but for strokes, edits of masks, changes, handles and pins."""
         return self._set_up() == other._set_up()
 
     def _set_up(self) -> tuple[object, ...]:

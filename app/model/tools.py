@@ -8,6 +8,7 @@ from math import hypot
 from typing import NamedTuple
 
 from app.model.handles import RecipeHandle
+from app.model.mask_edits import MaskStroke
 from app.model.strokes import Stroke
 from app.model.strokes import Tool as StrokeTool
 from app.model.windows import FLOWING
@@ -51,6 +52,7 @@ class Press:
         slack: how far the pointer may shake, in longer sides, and is not moved yet.
         at: the place in the original of what was pressed on.
         held: the handle that was taken hold of, and `rests`, where it is led.
+        timeless: what is painted on masks takes no time.
     """
 
     brush: BrushSettings
@@ -63,6 +65,7 @@ class Press:
     at: tuple[float, float] = (0.0, 0.0)
     held: RecipeHandle | None = None
     rests: tuple[float, float] | None = None
+    timeless: bool = False
 
 
 Made = Stroke | RecipeHandle
@@ -98,7 +101,7 @@ class Tool:
 
 def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke:
     brush = press.brush
-    return Stroke(
+    stroke = Stroke(
         tool=name,
         radius=brush.radius,
         hardness=brush.hardness,
@@ -108,6 +111,7 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> S
         local=brush.local if name == "push" else 0.0,
         samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )
+    return MaskStroke.model_validate({"kind": "stroke", **stroke.model_dump()}) if press.timeless else stroke
 
 
 def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callable[[Press, Touch], Gesture]:

@@ -60,9 +60,9 @@ def _table() -> list[Action]:
     for name, label, key in (
         ("clear_velocity", "Stop all motion", "x"),
         ("reset_warp", "Reset the warp", "ctrl+r"),
-        ("clear_masks", "Clear the masks", "ctrl+d"),
     ):
         add("Edit", name, label, key, lambda c, n=name, label=label: c.workspace.change(label, **{n: True}))
+    add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
     add("Edit", "remove", "Remove the handle", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "cancel", "Give up the stroke", "escape", lambda c: c.workspace.session.cancel())
 
@@ -72,6 +72,17 @@ def _table() -> list[Action]:
             label = tool.directions[1] if tool.name in ("bloat", "thicken", "freeze") else f"{tool.label}, reversed"
             keys = f"shift+{tool.key}" + (" d" if tool.name == "freeze" else "")
             add("Tools", f"tool_{tool.name}_back", label, keys, lambda c, n=tool.name: c.state.choose_tool(n, True))
+    for kind, label, key in (
+        ("invert", "Invert the mask", "ctrl+shift+i"),
+        ("fill", "Fill the mask", "ctrl+shift+f"),
+        ("clear", "Clear the mask", ""),
+        ("feather", "Feather the mask", ""),
+        ("grow", "Grow the mask", ""),
+        ("shrink", "Shrink the mask", ""),
+    ):
+        add("Masks", f"mask_{kind}", label, key, lambda c, kind=kind: c.edit_mask(kind))
+    add("Masks", "mask_load", "Load a mask ...", "", lambda c: c.files.ask_mask(c.state))
+    add("Masks", "mask_save", "Save the mask ...", "", lambda c: c.files.ask_save_mask(c.state.mask))
     add("Brush", "smaller", "Smaller", "[", lambda c: c.state.resize_brush(1 / 1.15), repeats=True)
     add("Brush", "larger", "Larger", "]", lambda c: c.state.resize_brush(1.15), repeats=True)
     add("Brush", "softer", "Softer", "{ shift+[", lambda c: c.state.harden_brush(-0.1), repeats=True)

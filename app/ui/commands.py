@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from app.model.handles import labelled
+from app.model.mask_edits import MASKS, ClearMask, mask_edit
 from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialogs, Preferring
 from app.ui.editor_state import EditorState
@@ -68,6 +69,22 @@ class Commands:
         if selected in dict(labelled(session.recipe.handle, session.recipe.pin)):
             session.let_go(selected)
         self.state.selected = ""
+
+    def clear_masks(self) -> None:
+        """Take all paint off both masks."""
+        if self.workspace.session.has_begun:
+            edits = (ClearMask(kind="clear", tick=0, of=name) for name in MASKS)
+            self.workspace.session.edit_masks("Clear the masks", *edits)
+
+    def edit_mask(self, kind: str) -> None:
+        """Do something to the mask that is chosen, and show it."""
+        state, edit = self.state, {"kind": kind, "tick": 0, "of": self.state.mask}
+        if kind in ("feather", "grow", "shrink"):
+            edit["radius"] = state.mask_reach
+        if kind == "fill":
+            edit["amount"] = 1.0 if state.mask == "frozen" else state.mask_decades
+        self.workspace.session.edit_masks(f"{kind.capitalize()} {MASKS[state.mask]}", mask_edit(edit))
+        state.show_mask()
 
     def copy_recipe(self) -> None:
         self.clipboard(self.workspace.session.recipe.text())

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from app.model.mask_edits import MaskName
 from app.model.tools import TOOL, BrushSettings, Tool
 
+MASK_OF: dict[str, MaskName] = {"freeze": "frozen", "thicken": "thickness"}
 SMALLEST, LARGEST = 0.005, 0.5  # of a brush's radius, in longer sides
 
 
@@ -46,6 +48,9 @@ class EditorState:
         over_narrow: it is open in one that has not.
         sections: which of its sections are open.
         history_seen: the entry of the history that was scrolled to last.
+        mask: the one that the inspector edits; that of the tool that was chosen last.
+        mask_reach: by how much it is feathered, grown and shrunk, longer sides.
+        mask_decades: of thickness, with which it is filled.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
@@ -62,6 +67,9 @@ class EditorState:
     over_narrow: bool = False
     sections: dict[str, bool] = field(default_factory=dict)
     history_seen: int = -1
+    mask: MaskName = "frozen"
+    mask_reach: float = 0.02
+    mask_decades: float = 2.0
     selected: str = ""
     before: bool = False
     split: float | None = None
@@ -79,6 +87,10 @@ class EditorState:
 
     def choose_tool(self, name: str, opposite: bool) -> None:
         self.tool_name = name
+        if name in MASK_OF:
+            self.mask = MASK_OF[name]
+        if self.tool.masks:
+            self.sections["masks"] = True
         if self.tool.directions:
             self.opposite[name] = opposite
 
@@ -93,6 +105,10 @@ class EditorState:
 
     def _set_brush(self, **settings: float) -> None:
         self.brush = replace(self.brush, **settings)
+
+    def show_mask(self) -> None:
+        """Let the mask that is edited be seen, with any tool."""
+        self.overlays["frozen" if self.mask == "frozen" else "viscosity"].shown = True
 
     def toggle_split(self) -> None:
         self.split = 0.5 if self.split is None else None

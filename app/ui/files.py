@@ -14,11 +14,15 @@ from app.errors import UserError
 from app.media import project as projects
 from app.media.maps import MAP_ENDINGS, holds
 from app.media.opening import PICTURE_ENDINGS, check_picture
+from app.media.pictures import write_picture
 from app.media.project import SUFFIX, Project
+from app.model.mask_edits import MASKS, UNITS, MaskName, PictureMask, as_grey
+from app.model.picture import Picture
 from app.model.presets import DEFAULT
 from app.model.recipe import FluidSettings, Recipe
 from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialogs, PictureOrMap, Unsaved
+from app.ui.editor_state import EditorState
 from app.ui.loading import Loading
 from app.ui.messages import Messages
 from app.ui.preferences import Preferences
@@ -58,6 +62,17 @@ class Files:
 
     def ask_map(self) -> None:
         self.chooser.ask_which("Start from a warp map", self.preferences.open_from, MAP_ENDINGS, self.start_from_map)
+
+    def ask_mask(self, state: EditorState) -> None:
+        def load(path: Path) -> None:
+            self.load_mask(path, state.mask)
+            state.show_mask()
+
+        self.chooser.ask_which(f"A picture of {MASKS[state.mask]}", self.preferences.open_from, PICTURE_ENDINGS, load)
+
+    def ask_save_mask(self, of: MaskName) -> None:
+        path = self.preferences.open_from / f"{self.workspace.session.project.name}-{of}.png"
+        self.chooser.ask_where("Save the mask", path, (".png",), lambda path: self.save_mask(path, of))
 
     def open(self, path: Path) -> None:
         """Open a picture, a recipe or a project, after asking about unsaved work; of a warp map, start from it.
@@ -108,6 +123,30 @@ class Files:
         self.workspace.session.start_from_map(str(path))
         self.preferences.folder = str(path.parent)
         self.messages.done(f"The picture now starts from {path.name}. Undo takes it away again.")
+
+    def load_mask(self, path: Path, of: MaskName) -> None:
+        """Let a picture's brightness be a mask; can be undone.
+
+        Raises:
+            UserError: if it cannot be read.
+        """
+        session, name = self.workspace.session, str(path.resolve())
+        session.pictures.forget(name)
+        session.edit_masks(f"Load {MASKS[of]}", PictureMask(kind="picture", tick=0, of=of, picture=name))
+        self.preferences.folder = str(path.parent)
+
+    def save_mask(self, path: Path, of: MaskName) -> None:
+        """Write a mask as a picture of 16 bits that `load_mask` reads back.
+
+        Raises:
+            UserError: if nothing is painted on it, or the file cannot be written.
+        """
+        words = self.workspace.session.replay.masks.words(of)
+        if words is None:
+            raise UserError("There is nothing on this mask to save.")
+        write_picture(path, Picture(as_grey(words, of)[..., None]))
+        thinned = of == "thickness" and words.min() < UNITS[of][0]
+        self.messages.done(f"Saved {path.name}." + (" What is thinned is not in it." if thinned else ""))
 
     def read(self, path: Path, load: Callable[[], Project], found: Found | None = None, leaves: bool = False) -> None:
         """Read a file in the background, and open it then; what was being read before is not wanted any more.

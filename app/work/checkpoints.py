@@ -56,14 +56,14 @@ class Moment:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The state before tick `tick` of a recipe; good for every recipe that has the same past up to there."""
+    """The state before the step of tick `tick` of a recipe, with what is done to masks at it in no time."""
 
     recipe: Recipe
     tick: int
     moment: Moment
 
     def is_valid_for(self, recipe: Recipe) -> bool:
-        return self.recipe.agrees_until(recipe) >= self.tick
+        return recipe.goes_on_from(self.recipe, self.tick)
 
 
 class Checkpoints:
@@ -83,12 +83,13 @@ class Checkpoints:
 
     def nearest(self, recipe: Recipe, tick: int) -> Checkpoint | None:
         """The last checkpoint at or before `tick` that is valid for `recipe`."""
-        before = sorted((kept for kept in self._kept if kept.tick <= tick), key=lambda kept: kept.tick, reverse=True)
+        before = sorted((kept for kept in self._kept if kept.tick <= tick), key=_progress, reverse=True)
         return next((kept for kept in before if kept.is_valid_for(recipe)), None)
 
     def has(self, recipe: Recipe, tick: int) -> bool:
         """True if exactly this moment is kept."""
-        return any(kept.tick == tick and kept.is_valid_for(recipe) for kept in self._kept)
+        here = (kept for kept in self._kept if kept.tick == tick)
+        return any(kept.is_valid_for(recipe) and kept.recipe.goes_on_from(recipe, tick) for kept in here)
 
     def add(self, checkpoint: Checkpoint) -> None:
         """Keep a checkpoint; those that are missed least go where there is no room, and none stays with no budget."""
@@ -106,7 +107,7 @@ class Checkpoints:
 
     def _least_missed(self, newest: Checkpoint) -> Checkpoint:
         """An undone future's oldest, or else the one with the smallest gap for its distance from the newest."""
-        stale = [kept for kept in self._kept if not newest.recipe.agrees_until(kept.recipe) >= kept.tick]
+        stale = [kept for kept in self._kept if not kept.is_valid_for(newest.recipe)]
         if stale:
             return stale[0]
         line = sorted(self._kept, key=lambda kept: kept.tick)
@@ -125,3 +126,8 @@ class Checkpoints:
                 del self._holders[texture]
                 self.nbytes -= texture.nbytes
         checkpoint.moment.release()
+
+
+def _progress(kept: Checkpoint) -> tuple[int, int]:
+    """How far it has come: its tick, and how much has been done to masks there."""
+    return kept.tick, len(kept.recipe.masks_at(kept.tick))

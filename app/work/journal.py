@@ -96,7 +96,8 @@ class Work:
     @property
     def strokes(self) -> int:
         """How many strokes there are, with those that have been undone."""
-        return max(len(entry.recipe.stroke) for entry in self.entries[self.index :])
+        recipes = [entry.recipe for entry in self.entries[self.index :]]
+        return max(len(recipe.stroke) + sum(edit.kind == "stroke" for edit in recipe.mask) for recipe in recipes)
 
     @property
     def is_unsaved(self) -> bool:

@@ -15,6 +15,7 @@ from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.forces import BuiltForce, build
 from app.model.handles import RecipeHandle, RecipePin, is_inside, labelled, objections
+from app.model.mask_edits import ClearMask, MaskStroke, edited, remaining
 from app.model.masks import FINEST, solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import channels
@@ -111,7 +112,8 @@ class Replay:
         budget: bytes of texture memory for checkpoints.
 
     Attributes:
-        tick: the steps made so far; strokes and changes at this tick come next.
+        tick: the steps made so far. What is done to masks at this tick in no time is done; strokes and changes at it
+            come next.
         grid: of the whole picture.
         window: where the flow is solved on finer cells instead, None if nowhere; `fluid.grid` are its cells.
         fluid, warp, masks, density: the simulation at this moment; `density` only in density mode.
@@ -141,6 +143,7 @@ class Replay:
             self.checkpoint()
         self._step(1.0)
         self.tick += 1
+        self._edit_masks()
 
     def seek(self, position: int | Fraction) -> None:
         """Go to a tick, or between two: there the step from the earlier one is made, with the map carried on only by
@@ -173,7 +176,7 @@ class Replay:
             tick, self.tick = self.tick, 0
             self._build()
             self.seek(tick)
-        elif recipe.agrees_until(before) < self.tick:
+        elif not recipe.goes_on_from(before, self.tick):
             # What is left behind may be wanted again: by redo.
             self._keep(before)
             tick = self.tick
@@ -182,6 +185,7 @@ class Replay:
             self.seek(tick)
         else:
             self.handles.replace(self._handles_in_picture())
+            self._edit_masks(before)
 
     def checkpoint(self) -> None:
         """Keep this moment, so that going back to it costs nothing."""
@@ -483,6 +487,26 @@ class Replay:
         start, end = (dab.x0 * width, dab.y0 * height), (dab.x1 * width, dab.y1 * height)
         return Tip(start, end, stroke.radius, stroke.hardness, near=stroke.detail > 0)
 
+    def _edit_masks(self, before: Recipe | None = None) -> None:
+        """Do what is done to the masks at this tick in no time, but for what was done of `before`."""
+        here, canvas = self.recipe.masks_at(self.tick), self.masks.canvas
+        left = remaining(here, before.masks_at(self.tick) if before is not None else ())
+        assert left is not None
+        for edit, first in left:
+            if isinstance(edit, MaskStroke):
+                for hand in range(first, edit.last_tick + 1):
+                    self._draw(edit, edit.at(hand), self.recipe.fluid.dt, 1.0)
+            elif isinstance(edit, ClearMask):
+                self.masks.take_off(edit.of)
+            else:
+                try:
+                    self.masks.edit(edit.of, lambda words, edit=edit: edited(words, edit, canvas, self.pictures))
+                except (ValueError, UserError) as error:
+                    raise UserError(f"mask[{self.recipe.mask.index(edit) + 1}]: {error}") from None
+        if left:
+            with self.device.stage("brush"):
+                self._apply_masks()
+
     # -- its state --------------------------------------------------------------------------------------------------
 
     def _build(self) -> None:
@@ -512,6 +536,7 @@ class Replay:
         self.forces = [LoadedForce.of(self.device, force) for force in built]
         self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters(recipe.fluid)  # changes come with the tick
+        self._edit_masks()
 
     def _handles_in_picture(self) -> list[Handle]:
         made, extent = [], self.grid.extent
@@ -594,11 +619,12 @@ class Replay:
     def _load(self, checkpoint: Checkpoint | None) -> None:
         if checkpoint is None:
             self._release_simulation()
-            self._build()
             self.tick = 0
+            self._build()
         else:
             self._restore(checkpoint.moment)
             self.tick = checkpoint.tick
+            self._edit_masks(checkpoint.recipe)
 
     def _keep(self, recipe: Recipe) -> None:
         if self.checkpoints.budget and not self.checkpoints.has(recipe, self.tick):

@@ -18,6 +18,7 @@ from app.media.auxiliary import Pictures
 from app.media.project import Project
 from app.model.document import Document
 from app.model.handles import ARRIVED, MOST_HANDLES, RecipeHandle, RecipePin, is_inside, labelled
+from app.model.mask_edits import MaskEdit, MaskStroke
 from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.strokes import Change, Stroke
@@ -94,6 +95,7 @@ class Session:
         self.last_place: tuple[float, float] | None = None
         self._gesture: Gesture | None = None
         # The tick that the gesture is recorded at: ahead of the simulation while strokes before it are still waiting.
+        # While a mask is painted in no time, it counts the hand's.
         self._pen = 0
         # The person has sent the playhead back, and what is done next takes the place of what comes after it.
         self._went_back = False
@@ -127,7 +129,12 @@ class Session:
         """Ticks recorded; 0 where nothing has been yet."""
         recipe = self._live if hasattr(self, "_live") else self.project.recipe
         acts = recipe.stroke or recipe.change or recipe.force or recipe.handle
-        return recipe.ticks if acts else 0
+        return recipe.ticks if acts or any(edit.tick for edit in recipe.mask) else 0
+
+    @property
+    def has_begun(self) -> bool:
+        """Something has been done."""
+        return self.end > 0 or bool(self._live.mask)
 
     @property
     def dt(self) -> float:
@@ -156,9 +163,14 @@ class Session:
         """Where the playhead is or is going."""
         if self._target is not None:
             return self._target
-        if self.is_painting:
+        if self.is_painting and not self._is_timeless:
             return self._pen
         return self.end if self.coasting else self.tick
+
+    @property
+    def _is_timeless(self) -> bool:
+        """A mask is being painted, and no time goes on."""
+        return isinstance(self.made, MaskStroke)
 
     @property
     def waiting(self) -> list[Stroke]:
@@ -181,7 +193,8 @@ class Session:
     ) -> None:
         """The pointer went down at (x, y), fractions of the picture: a gesture begins, and time with it.
 
-        Where strokes before it are not yet simulated to their ends, it is recorded behind them.
+        While time stands still, it goes on to do so for a tool that paints masks. Where strokes before it are not yet
+        simulated to their ends, it is recorded behind them.
 
         Args:
             held: what was taken hold of, by a tool that does that.
@@ -195,8 +208,10 @@ class Session:
         self._taken = None
         if tool.name == "handle" and held is None:
             press = replace(press, at=self._under(x, y))
+        stands = not self.is_moving
         self.playing = False
         self._pen = self._go_on()
+        press = replace(press, timeless=tool.masks and stands and self._pen == self.tick)
         if held is not None:
             press = replace(press, held=self._take(held.led), rests=held.target)
         self._target = None
@@ -233,6 +248,10 @@ class Session:
             return
         if isinstance(made, Stroke):
             self.last_place = path[-1]
+        if isinstance(made, MaskStroke):
+            self._keep_masks(self._label(made), made)
+            return
+        if isinstance(made, Stroke):
             last = made.last_tick
         else:
             last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
@@ -256,12 +275,15 @@ class Session:
         self.made = made
         if made is not None:
             self._live = self._with(made, self._pen + 1)
-            self.replay.use(self._live)
+            if not self._is_timeless:
+                self.replay.use(self._live)
         self.changes += 1
 
     def _with(self, made: Made, ticks: int) -> Recipe:
         """What is made now with a gesture's, and so many ticks."""
         base, duration = self._base, ticks * self.dt
+        if isinstance(made, MaskStroke):
+            return base.edited(mask=(*base.mask, made))
         if isinstance(made, Stroke):
             return base.edited(stroke=(*base.stroke, made), duration=duration)
         at = len(base.handle) if self._taken is None else self._taken
@@ -362,7 +384,9 @@ class Session:
             self._approach(start + PATIENCE)
             return
         while ticks > 0 or self.is_behind:
-            if self.is_painting and ticks > 0 and (self.made is not None or self.coasting):
+            if self._is_timeless:
+                self._paint_masks()
+            elif self.is_painting and ticks > 0 and (self.made is not None or self.coasting):
                 self._record()
             elif self.is_behind:
                 self._step()
@@ -451,12 +475,7 @@ class Session:
 
         While strokes are waiting, a gesture is recorded as it would be without them: a tick for every step.
         """
-        if self._gesture is not None:
-            assert self._touch is not None
-            if not isinstance(self.made, Stroke) or self.made.last_tick < self._pen:
-                self._touch = self._touch._replace(tick=self._pen)
-                self._hear(self._gesture.send(self._touch))
-            self._pen += 1
+        self._hold()
         ticks = self._pen if self.is_painting else self.tick + 1
         if self._live.ticks < ticks:
             self._live = self._live.edited(duration=ticks * self.dt)
@@ -465,6 +484,22 @@ class Session:
                 self.document.history.amend(self._live)
                 self._base = self._live
         self._step()
+
+    def _hold(self) -> None:
+        """A tick of the hand: the open stroke stays where the pointer is."""
+        if self._gesture is not None:
+            assert self._touch is not None
+            if not isinstance(self.made, Stroke) or self.made.last_tick < self._pen:
+                self._touch = self._touch._replace(tick=self._pen)
+                self._hear(self._gesture.send(self._touch))
+            self._pen += 1
+
+    def _paint_masks(self) -> None:
+        """A tick of the hand, in which no time goes on: what it has painted is seen."""
+        self._hold()
+        assert isinstance(self.made, MaskStroke)
+        if painted := self.made.before(self._pen):
+            self.replay.use(self._with(painted, 0))
 
     def _step(self) -> None:
         self.replay.advance()
@@ -508,6 +543,32 @@ class Session:
 
     # -- edits ------------------------------------------------------------------------------------------------------
 
+    def edit_masks(self, name: str, *edits: MaskEdit) -> None:
+        """Do something to masks, in no time: where the recording ends, or the playhead was sent back to.
+
+        `edits`: whatever their ticks.
+
+        Raises:
+            UserError: what is wrong with it on this picture.
+        """
+        self.release()
+        self.playing = False
+        tick = self._go_on()
+        if not self.coasting:
+            self._send(tick)
+        self.replay.checkpoint()
+        self._keep_masks(name, *(edit.model_copy(update={"tick": tick}) for edit in edits))
+
+    def _keep_masks(self, name: str, *edits: MaskEdit) -> None:
+        recipe = self._base.edited(mask=(*self._base.mask, *edits))
+        try:
+            self.replay.use(recipe)
+        except UserError:
+            self.replay.use(self._live)
+            raise
+        self._live = recipe
+        self.commit(name)
+
     def change(self, name: str, **settings: Any) -> None:
         """Set something from the playhead on: viscosity, drag, walls, clear_velocity, reset_warp, clear_masks."""
         self.preview_change(**settings)
@@ -521,7 +582,7 @@ class Session:
         """As `change`, without an entry in the history yet: for a slider that is being dragged."""
         self.release()
         base, lasts = self._base, settings.keys() <= {"viscosity", "drag", "walls"}
-        if not base.stroke and not base.change and self.target == 0 and lasts:
+        if not (base.stroke or base.change or base.mask) and self.target == 0 and lasts:
             self._use(base.edited(fluid=base.fluid.model_copy(update=settings)))
             return
         tick = self._go_on()
@@ -564,7 +625,7 @@ class Session:
         self.release()
         recipe = self._base.edited(map=name)
         if name is not None:
-            self.pictures.forget_map(name)
+            self.pictures.forget(name)
             height, width = self.pictures.load_map(name).shape[:2]
             most = self.device.limits.max_texture_size
             if min(width, height) < 6 or max(width, height) > most:
@@ -619,7 +680,7 @@ class Session:
 
     def begin_with(self, **fluid: Any) -> None:
         """Other settings of the fluid for work that has not begun yet: no edit, and nothing to save."""
-        if self.end:
+        if self.has_begun:
             return
         recipe = self._live.edited(fluid=self._live.fluid.model_copy(update=fluid))
         recipe = recipe.edited(duration=recipe.fluid.dt)
@@ -698,9 +759,10 @@ class Session:
             handle=tuple(handle for handle in handles if handle is not None),
             pin=tuple(pin for pin in base.pin if pin.first_tick(self.dt) < tick),
             change=tuple(change for change in base.change if change.tick < tick),
+            mask=tuple(edit for edit in base.mask if edit.tick <= tick),
             duration=max(tick, 1) * self.dt,
         )
-        parts = ("stroke", "handle", "pin", "change")
+        parts = ("stroke", "handle", "pin", "change", "mask")
         if any(getattr(cut, part) != getattr(base, part) for part in parts):
             self.notice = f"Going on from {tick * self.dt:.1f} s. What came after it is one Undo away."
         self._base = self._live = cut

@@ -120,13 +120,27 @@ class Masks:
 
     def clear(self) -> None:
         """Take all paint off."""
-        self._clear("thickness")
-        if self._frozen_before is None:
-            self._clear("frozen")
-        else:
+        for name in self._kinds:
+            self.take_off(name)
+
+    def words(self, name: str) -> np.ndarray | None:
+        """The texels of a mask as `edit` has them; None if nothing has been painted on it."""
+        return self._painted[name].get() if name in self._painted else None
+
+    def edit(self, name: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Make a mask anew from its texels: (h, w), uint16 of "thickness", uint8 of "frozen", in which 255 is all."""
+        field = self._field(name)
+        field.set(change(field.get()))
+        self._note_change(name, (0, 0, *self.canvas.size))
+
+    def take_off(self, name: str) -> None:
+        """Take all paint off one mask."""
+        if name == "frozen" and self._frozen_before is not None:
             self._field("frozen").restore(self._frozen_before)
-        self._frozen_in = 0, 0, *self.canvas.size
-        self._applied_to = None
+        else:
+            self._clear(name)
+        if name in self._painted:
+            self._note_change(name, (0, 0, *self.canvas.size))
 
     # -- what the fluid takes of them -------------------------------------------------------------------------------
 
@@ -262,9 +276,12 @@ class Masks:
         if region[2] and region[3]:
             inputs |= tip.inputs(self.canvas)
             self.device.pass_(shader)(self._field(name), blend=blend, region=region, **inputs)
-            self._changed[name] = _around(region, self._changed.get(name))
-            if name == "frozen":
-                self._frozen_in = _around(region, self._frozen_in)
+            self._note_change(name, region)
+
+    def _note_change(self, name: str, region: Region) -> None:
+        self._changed[name] = _around(region, self._changed.get(name))
+        if name == "frozen":
+            self._frozen_in = _around(region, self._frozen_in)
 
     def _region(self, tip: Tip) -> Region:
         """The texels of the canvas that a tip touches."""

@@ -101,16 +101,16 @@ def test_round_trip_loses_nothing():
 
 
 def test_defaults_are_not_written():
-    assert Recipe().text() == "version = 3\n"
+    assert Recipe().text() == "version = 4\n"
     assert Recipe.parse("") == Recipe()
 
 
 def test_what_older_versions_said_is_said_in_this_one():
     old = Recipe.parse('version = 1\npicture = "a.png"\n[[stroke]]\ntool = "push"\nsamples = [[0, 0.1, 0.2, 1.0]]\n')
     assert old.stroke[0].detail == 0
-    assert old.text().startswith("version = 3\n")
+    assert old.text().startswith("version = 4\n")
     for version in (1, 2, 3):
-        assert Recipe.parse(old.text().replace("version = 3", f"version = {version}")) == old
+        assert Recipe.parse(old.text().replace("version = 4", f"version = {version}")) == old
     fine = old.edited(stroke=(old.stroke[0].model_copy(update={"detail": 1400}),))
     assert Recipe.parse(fine.text()) == fine
     assert fine.agrees_until(old) == 0
@@ -137,9 +137,9 @@ def test_save_and_load(tmp_path: Path):
         ("fluid = 3", "'fluid' must be a table, not 3"),
         ("stroke = 3", "'stroke' must be a list, not 3"),
         ("[force]\nkind = 'vortex'", "line 1: 'force' must be a list, not a table; begin each with [[force]]"),
-        ("version = 0", "'version' must be 3, not 0"),
+        ("version = 0", "'version' must be 4, not 0"),
         ("duration = 2020-01-01", "'duration' must be a number, not 2020-01-01"),
-        ("version = 4", "of version 4, and this fluidwarp reads recipes up to version 3"),
+        ("version = 5", "of version 5, and this fluidwarp reads recipes up to version 4"),
         ("duration = 1\nduration = 2", "the same key is given twice"),
         ("duration = ", "not valid TOML"),
         ("duration = 1e6", "make dt larger"),

@@ -135,7 +135,7 @@ def test_an_overlay_is_shown_as_strongly_as_its_slider_says(robot: Robot, widget
 
 @pytest.mark.parametrize(
     ("words", "name"),
-    [("Clear the masks", "clear_masks"), ("Stop all motion", "clear_velocity"), ("Reset the warp", "reset_warp")],
+    [("Stop all motion", "clear_velocity"), ("Reset the warp", "reset_warp")],
 )
 def test_a_button_of_the_inspector_does_what_it_says(robot: Robot, widgets: Widgets, words: str, name: str) -> None:
     robot.drag((0.4, 0.5), (0.45, 0.5), steps=2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot
+from math import hypot, log10
 from pathlib import PurePath
 
 import numpy as np
@@ -11,14 +11,15 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.model.handles import ARRIVED, RecipeHandle, labelled
+from app.model.mask_edits import MASKS, THICKEST, THINNEST
 from app.model.presets import DEFAULT
-from app.ui.actions import Do
+from app.ui.actions import ACTIONS, Do
 from app.ui.clock import Clock
 from app.ui.editor_state import SMALLEST, EditorState
 from app.ui.panels import feels
 from app.ui.quality import Quality
 from app.ui.theme import packed
-from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS, Unit
+from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS, TIMES, Unit
 from app.ui.viewport import Rect
 from app.ui.widgets import Slid, Ui
 from app.ui.workspace import Workspace
@@ -27,6 +28,14 @@ from app.work.session import Session
 GRIDS = (128, 160, 192, 256, 384)
 EDGES = ("clamp", "mirror", "wrap", "transparent", "black")
 WALLS = ("free-slip", "no-slip")
+ABOUT_MASKS = {
+    "invert": "What is thickest becomes what is thinnest, what is frozen thaws and the rest freezes.",
+    "fill": "All of the picture.",
+    "clear": "Takes all paint off.",
+    "feather": "Softens edges; of what is frozen, corners.",
+    "load": "A picture: white is frozen, or thickest.",
+    "save": "A picture of 16 bits.",
+}
 
 
 def draw(ui: Ui, rect: Rect, workspace: Workspace, state: EditorState, quality: Quality, clock: Clock, do: Do) -> None:
@@ -39,7 +48,7 @@ def draw(ui: Ui, rect: Rect, workspace: Workspace, state: EditorState, quality: 
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("view", "Overlays", lambda: _view(ui, state), True),
             ("quality", "Picture and quality", lambda: _quality(ui, workspace, quality), False),
-            ("masks", "Masks and motion", lambda: _masks(ui, session, do), False),
+            ("masks", "Masks and motion", lambda: _masks(ui, workspace, state, do), False),
             ("history", "History", lambda: _history(ui, session, state), True),
             ("numbers", "Statistics", lambda: _numbers(ui, session, state, clock, do), False),
         ):
@@ -187,13 +196,36 @@ def _quality(ui: Ui, workspace: Workspace, quality: Quality) -> None:
         session.edit("Edges of the picture", edges=EDGES[number])
 
 
-def _masks(ui: Ui, session: Session, do: Do) -> None:
+def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
+    names = list(MASKS)
+    state.mask = names[ui.segmented("mask", ("Frozen", "Thickness"), names.index(state.mask), -1)]
+    if state.mask == "thickness":
+        slid = ui.slider(
+            "mask amount", "Fill with", 10**state.mask_decades, 10**THINNEST, 10**THICKEST, TIMES, 100.0,
+            logarithmic=True, title="What Fill fills with", more="So many times as thick as the fluid.",
+        )  # fmt: skip
+        state.mask_decades = round(log10(slid.value), 3)
+    slid = ui.slider(
+        "mask reach", "By", state.mask_reach, 0.001, 0.25, Unit(" px", max(workspace.canvas.size)), 0.02,
+        logarithmic=True, title="How far", more="By so much Feather, Grow and Shrink move its edges.",
+    )  # fmt: skip
+    state.mask_reach = slid.value
+    for row in (("invert", "fill", "clear"), ("feather", "grow", "shrink"), ("load", "save")):
+        width = (imgui.get_content_region_avail().x / ui.scale - 8 * (len(row) - 1)) / len(row)
+        for number, name in enumerate(row):
+            if number:
+                imgui.same_line(0, ui.px(8))
+            label = name.capitalize() + (" ..." if name in ("load", "save") else "")
+            if ui.button(f"{label}##mask", width=width, height=30):
+                do(f"mask_{name}")
+            ui.tooltip(ACTIONS[f"mask_{name}"].label, ACTIONS[f"mask_{name}"].key, ABOUT_MASKS.get(name, ""))
+    session = workspace.session
     for name, label in (
         ("clear_masks", "Clear the masks"),
         ("clear_velocity", "Stop all motion"),
         ("reset_warp", "Reset the warp"),
     ):
-        with ui.enabled(session.end > 0):
+        with ui.enabled(session.end > 0 or (name == "clear_masks" and session.has_begun)):
             if ui.button(label, width=-1, height=30):
                 do(name)
     if ui.button("Copy as recipe", width=-1, height=30):

@@ -89,12 +89,14 @@ def _track(ui: Ui, session: Session, state: EditorState, width: float) -> None:
     draw = imgui.get_window_draw_list()
     top, bottom = corner.y + ui.px(10), corner.y + ui.px(22)
     draw.add_rect_filled(ImVec2(x0, top), ImVec2(x1, bottom), packed(palette.raised), ui.px(4))
-    if not end:
-        return
 
     def across(tick: float) -> float:
-        return x0 + (x1 - x0) * min(tick / end, 1.0)
+        return x0 + (x1 - x0) * min(tick / max(end, 1), 1.0)
 
+    for x in {across(edit.tick) for edit in session.recipe.mask}:
+        draw.add_line(ImVec2(x, top - ui.px(3)), ImVec2(x, bottom + ui.px(3)), packed(MASKS), ui.px(2))
+    if not end:
+        return
     now = across(session.target)
     played = blend(palette.raised, palette.accent, 0.16)
     draw.add_rect_filled(ImVec2(x0, top), ImVec2(now, bottom), packed(played), ui.px(4))

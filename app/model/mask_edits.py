@@ -1,0 +1,260 @@
+"""What is done to the masks at a moment, in no time: strokes of a mask's brush while nothing moves, and whole edits.
+
+A mask is edited texel by texel of its canvas, on the whole numbers it is kept in, so that every machine comes to the
+same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import zip_longest
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, TypeAdapter, model_validator
+
+from app.model.sampling import SOURCE, NamedPictures, PictureName, Point, Segment, Window, intensity, places, to_grid
+from app.model.schema import Model, Radius, Several
+from app.model.strokes import Stroke, Tick
+from solver.grid import Grid
+
+MaskName = Literal["frozen", "thickness"]
+MASKS: dict[MaskName, str] = {"frozen": "what is frozen", "thickness": "the thickness"}
+"""What people call them."""
+MaskTool = Literal["thicken", "thin", "freeze", "thaw", "smooth"]
+THINNEST, THICKEST = -3.0, 5.0  # decades that can be painted
+UNITS = {"frozen": (0, 255), "thickness": (24576, 8192)}
+"""The words that masks are kept in: that of nothing, and how many more it is frozen at, or a decade thicker."""
+Decades = Annotated[float, Field(ge=THINNEST, le=THICKEST)]
+
+
+class MaskStroke(Stroke):
+    """A stroke of a mask's brush that takes no time.
+
+    Its samples' ticks are those of the hand: it paints what it would have painted in so many ticks of the fluid, all
+    at its first one.
+    """
+
+    kind: Literal["stroke"]
+    tool: MaskTool
+
+    @property
+    def tick(self) -> int:
+        """The moment it is painted at."""
+        return self.first_tick
+
+    def goes_on_after(self, other: MaskEdit) -> int | None:
+        """The hand's tick from which it goes on, if it begins with all that another edit does; else None."""
+        if not isinstance(other, MaskStroke) or self._head() != other._head():
+            return None
+        own, count = self.samples, len(other.samples)
+        is_longer = own[:count] == other.samples and (len(own) == count or own[count][0] > other.last_tick)
+        return other.last_tick + 1 if is_longer else None
+
+
+class _Edit(Model):
+    """What all edits of a whole mask share.
+
+    Attributes:
+        tick: the moment it is done at, before all else that begins at this tick.
+        of: the mask.
+    """
+
+    tick: Tick
+    of: MaskName
+
+
+class ClearMask(_Edit):
+    """Take all paint off."""
+
+    kind: Literal["clear"]
+
+
+class FillMask(_Edit):
+    """Make a mask the same everywhere, or in an area: what is in all of those that are given.
+
+    Attributes:
+        amount: decades of thickness; of what is frozen, 1 freezes and 0 thaws.
+        window: a rectangle or an ellipse.
+        outline: the corners of an area, as fractions of the picture; what it winds around an odd number of times.
+        segment: what is chosen by colour or brightness, in the picture as it was before any warp.
+    """
+
+    kind: Literal["fill"]
+    amount: Decades
+    window: Window | None = None
+    outline: Annotated[Several[Point], Field(min_length=3)] | None = None
+    segment: Segment | None = None
+
+    @model_validator(mode="after")
+    def _frozen_or_not(self) -> FillMask:
+        if self.of == "frozen" and not 0 <= self.amount <= 1:
+            raise ValueError(f"'amount' of what is frozen is from 0 to 1, not {self.amount:g}")
+        return self
+
+    def coverage(self, canvas: Grid, pictures: NamedPictures) -> np.ndarray:
+        """How much of each texel lies in the area, (h, w) in [0, 1].
+
+        Raises:
+            ValueError: if a segment chooses nothing, or everything.
+        """
+        covered = np.ones((canvas.ny, canvas.nx))
+        if self.window is not None:
+            covered *= self.window.weight(canvas)
+        if self.outline is not None:
+            covered *= _inside(places(self.outline, canvas), canvas)
+        if self.segment is not None:
+            covered *= self.segment.weight(SOURCE, canvas, pictures)
+        return covered
+
+
+class InvertMask(_Edit):
+    """Freeze what is not frozen and thaw what is; of thickness, what is thickest becomes what is thinnest."""
+
+    kind: Literal["invert"]
+
+
+class FeatherMask(_Edit):
+    """Soften a mask: three means in a row, each over squares; of what is frozen, corners become round.
+
+    Attributes:
+        radius: how far an edge becomes soft to each side, longer sides.
+    """
+
+    kind: Literal["feather"]
+    radius: Radius
+
+
+class SpreadMask(_Edit):
+    """Let each place be as the largest value within a disc is ("grow"), or the smallest ("shrink").
+
+    Attributes:
+        radius: of the disc, longer sides.
+    """
+
+    kind: Literal["grow", "shrink"]
+    radius: Radius
+
+
+class PictureMask(_Edit):
+    """A mask from a picture's brightness: what is from middle grey on is frozen; thickness goes from black to white.
+
+    Attributes:
+        picture: "source" or a file.
+        white: decades of thickness that white stands for; black is none.
+    """
+
+    kind: Literal["picture"]
+    picture: PictureName = SOURCE
+    white: Decades = THICKEST
+
+
+WholeEdit = FillMask | InvertMask | FeatherMask | SpreadMask | PictureMask
+MaskEdit = Annotated[MaskStroke | ClearMask | WholeEdit, Field(discriminator="kind")]
+mask_edit: Callable[[dict[str, Any]], MaskEdit] = TypeAdapter(MaskEdit).validate_python
+"""The edit that a table of the recipe says."""
+
+
+def remaining(edits: Sequence[MaskEdit], done: Sequence[MaskEdit]) -> list[tuple[MaskEdit, int]] | None:
+    """What of `edits` is still to be done after `done`, each with the hand's tick that it goes on from.
+
+    None if `done` is not how `edits` begins. A stroke that is still drawn begins as the finished one does.
+    """
+    left = list[tuple[MaskEdit, int]]()
+    for mine, theirs in zip_longest(edits, done):
+        if mine is None or (theirs is not None and left):
+            return None
+        if theirs is None:
+            left.append((mine, mine.tick))
+        elif mine is not theirs and mine != theirs:
+            first = mine.goes_on_after(theirs) if isinstance(mine, MaskStroke) else None
+            if first is None:
+                return None
+            left.append((mine, first))
+    return left
+
+
+def edited(words: np.ndarray, edit: WholeEdit, canvas: Grid, pictures: NamedPictures) -> np.ndarray:
+    """A mask after an edit of all of it.
+
+    Args:
+        words: the mask's texels, (h, w), uint8 of what is frozen, uint16 of thickness.
+
+    Returns:
+        as `words`.
+
+    Raises:
+        UserError, ValueError: what is wrong with the edit on these pictures.
+    """
+    zero, unit = UNITS[edit.of]
+    last = np.iinfo(words.dtype).max
+
+    def wanted(amount: np.ndarray | float) -> np.ndarray:
+        return np.clip(np.rint(zero + unit * np.asarray(amount)), 0, last)
+
+    match edit:
+        case FillMask():
+            covered = edit.coverage(canvas, pictures)
+            return np.rint(words + covered * (wanted(edit.amount) - words)).astype(words.dtype)
+        case InvertMask():
+            low, high = (0, last) if edit.of == "frozen" else (int(words.min()), int(words.max()))
+            return (low + high - words.astype(np.int32)).astype(words.dtype)
+        case FeatherMask():
+            return _softened(words, [round(edit.radius / 3 / h) for h in reversed(canvas.spacing)])
+        case SpreadMask():
+            grows = edit.kind == "grow"
+            return _grown(words, edit.radius, canvas) if grows else last - _grown(last - words, edit.radius, canvas)
+        case PictureMask():
+            grey = to_grid(intensity(pictures.load(edit.picture)), canvas)
+            return wanted(edit.white * grey if edit.of == "thickness" else grey).astype(words.dtype)
+
+
+def as_grey(words: np.ndarray, of: MaskName) -> np.ndarray:
+    """A mask as a `PictureMask` reads it back to the word, (h, w) uint16; of thickness, what is thinned is black."""
+    zero, unit = UNITS[of]
+    white = unit * (THICKEST if of == "thickness" else 1)
+    return np.rint(np.clip((words.astype(np.float64) - zero) / white, 0, 1) * 65535).astype(np.uint16)
+
+
+def _inside(corners: np.ndarray, canvas: Grid) -> np.ndarray:
+    """1 where a texel's middle lies in a polygon (n, 2), by the rule of odd and even, (h, w)."""
+    x, y = canvas.centres()
+    crossed = np.zeros((canvas.ny, canvas.nx), np.int32)
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        rows = np.flatnonzero((y[:, 0] >= min(ay, by)) & (y[:, 0] < max(ay, by)))
+        if len(rows):
+            at = ax + (y[rows, 0] - ay) * (bx - ax) / (by - ay)
+            crossed[rows] += x[rows] > at[:, None]
+    return crossed % 2
+
+
+def _softened(words: np.ndarray, reaches: Sequence[int]) -> np.ndarray:
+    """Three running means along each axis, each over `reach` texels to both sides; the border is repeated."""
+    values = words.astype(np.int64)
+    for reach in reaches:
+        count = 2 * reach + 1
+        for _ in range(3 if reach else 0):
+            sums = np.cumsum(np.pad(values, ((reach + 1, reach), (0, 0)), "edge"), axis=0)
+            values = (sums[count:] - sums[:-count] + reach) // count
+        values = values.T
+    return values.astype(words.dtype)
+
+
+def _grown(words: np.ndarray, radius: float, canvas: Grid) -> np.ndarray:
+    """The largest word within a disc, longer sides; beyond the border there is nothing."""
+    (hx, hy), (height, width), result = canvas.spacing, words.shape, words.copy()
+    margin = min(int(radius / hx), width)
+    # The largest of 1, 2, 4 ... words from each on to the right: two of them that overlap make any width.
+    runs = [np.pad(words, ((0, 0), (margin, margin)))]
+    for row in range(min(int(radius / hy), height - 1) + 1):
+        reach = min(int(math.sqrt(radius**2 - (row * hy) ** 2) / hx), margin)
+        level = (2 * reach + 1).bit_length() - 1
+        while len(runs) <= level:
+            run, ahead = runs[-1], 1 << (len(runs) - 1)
+            runs.append(np.maximum(run[:, :-ahead], run[:, ahead:]))
+        first, second = margin - reach, margin + reach + 1 - (1 << level)
+        across = np.maximum(runs[level][:, first : first + width], runs[level][:, second : second + width])
+        for target, source in ((result[row:], across[: height - row]), (result[: height - row], across[row:])):
+            np.maximum(target, source, out=target)
+    return result

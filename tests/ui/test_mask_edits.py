@@ -1,0 +1,130 @@
+"""Masks in the window: painted in no time, edited by buttons and keys, loaded and saved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.media.pictures import read_picture
+from app.model.mask_edits import FeatherMask, FillMask, SpreadMask
+from app.ui.actions import ACTIONS
+from solver.gl.device import Device
+from support.editing import Robot, small_project
+from support.widgets import Widgets
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    robot = Robot(device, small_project(tmp_path))
+    yield robot
+    robot.close()
+
+
+def frozen(robot: Robot) -> np.ndarray:
+    return robot.editor.session.replay.masks.frozen.get()
+
+
+def test_a_mask_follows_the_pointer_in_every_frame_and_takes_no_time(robot: Robot) -> None:
+    session = robot.editor.session
+    robot.key("f")
+    robot.move(*robot.at(0.3, 0.5))
+    robot.press()
+    seen = [0]
+    for step in range(6):
+        robot.move(*robot.at(0.3 + 0.03 * step, 0.5))
+        seen.append(int((frozen(robot) > 127).sum()))
+    assert all(later > earlier for earlier, later in zip(seen, seen[1:], strict=False))
+    robot.release()
+    assert (session.end, session.tick, session.is_moving) == (0, 0, False)
+    assert [entry.name for entry in session.document.history.entries] == ["Open", "Freeze"]
+    robot.key("ctrl+z")
+    assert not frozen(robot).any()
+
+
+def test_a_pointer_that_rests_goes_on_thickening(robot: Robot) -> None:
+    robot.key("v")
+    robot.move(*robot.at(0.5, 0.5))
+    robot.press()
+    thickest = []
+    for _ in range(4):
+        robot.frame()
+        thickest.append(int(robot.editor.session.replay.masks.thickness.get().max()))
+    assert thickest == sorted(set(thickest))
+    robot.release()
+    assert robot.editor.session.end == 0
+
+
+def test_a_mark_stands_on_the_timeline(robot: Robot) -> None:
+    robot.move(5, 5)
+    before = robot.pixels()[-60:]
+    robot.key("f")
+    robot.drag((0.3, 0.5), (0.4, 0.5), steps=2)
+    robot.key("p")
+    robot.move(5, 5)
+    robot.frame(count=2)
+    changed = np.argwhere((robot.pixels()[-60:] != before).any(axis=2))
+    assert 0 < np.ptp(changed[:, 1]) < 8
+    assert 8 < np.ptp(changed[:, 0]) < 30
+
+
+@pytest.mark.parametrize("kind", ["invert", "fill", "clear", "feather", "grow", "shrink"])
+def test_a_button_edits_the_mask_of_the_tool(robot: Robot, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    """With what the sliders say."""
+    robot.key("v")
+    robot.drag((0.5, 0.5), (0.55, 0.5), steps=3)
+    state = robot.editor.state
+    state.sections = {name: name == "masks" for name in ("fluid", "view", "quality", "masks", "history", "numbers")}
+    state.mask_reach, state.mask_decades = 0.07, -1.5
+    Widgets(robot, monkeypatch).click(kind.capitalize())
+    edit = robot.editor.session.recipe.mask[-1]
+    assert (edit.kind, edit.tick) == (kind, 0)
+    assert not isinstance(edit, (FeatherMask, SpreadMask)) or edit.radius == 0.07
+    assert not isinstance(edit, FillMask) or (edit.amount, edit.of) == (-1.5, "thickness")
+    assert state.overlays["viscosity"].shown
+    assert robot.editor.session.document.history.entries[-1].name == f"{kind.capitalize()} the thickness"
+
+
+def test_keys_edit_masks_too_and_clear_both(robot: Robot) -> None:
+    robot.key("f")
+    robot.drag((0.5, 0.5), (0.55, 0.5), steps=3)
+    before = frozen(robot)
+    robot.key("ctrl+shift+i")
+    assert np.array_equal(frozen(robot), 255 - before)
+    robot.key("ctrl+d")
+    assert not frozen(robot).any()
+    assert robot.editor.session.end == 0
+    robot.key("ctrl+z")
+    assert np.array_equal(frozen(robot), 255 - before)
+
+
+@pytest.mark.parametrize(("key", "of"), [("f", "frozen"), ("v", "thickness")])
+def test_a_mask_that_was_saved_is_loaded_as_it_was(robot: Robot, tmp_path: Path, key: str, of: str) -> None:
+    files, masks, state = robot.editor.files, robot.editor.session.replay.masks, robot.editor.state
+    robot.key(key)
+    assert state.mask == of
+    robot.drag((0.5, 0.5), (0.55, 0.5), steps=3)
+    before = masks.words(of)
+    files.save_mask(tmp_path / "mask.png", state.mask)
+    picture = read_picture(tmp_path / "mask.png")
+    assert (picture.bits, picture.pixels.shape[2]) == (16, 1)
+    robot.key("ctrl+d")
+    files.load_mask(tmp_path / "mask.png", state.mask)
+    assert before is not None
+    assert np.array_equal(masks.words(of), before)
+    robot.key("ctrl+z")
+    assert not np.array_equal(masks.words(of), before)
+
+
+def test_what_is_not_painted_is_not_saved(robot: Robot, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="nothing on this mask"):
+        robot.editor.files.save_mask(tmp_path / "mask.png", "frozen")
+    assert not (tmp_path / "mask.png").exists()
+
+
+def test_every_edit_of_a_mask_is_an_action() -> None:
+    names = {name for name in ACTIONS if name.startswith("mask_")}
+    assert names == {f"mask_{kind}" for kind in "invert fill clear feather grow shrink load save".split()}

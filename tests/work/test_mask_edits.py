@@ -1,0 +1,250 @@
+"""Masks that are painted and edited while nothing moves: in no time, seen as recorded, replayed to the byte."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.media import project as projects
+from app.media.auxiliary import Pictures
+from app.media.pictures import write_picture
+from app.media.project import Project
+from app.model.history import History
+from app.model.mask_edits import ClearMask, FeatherMask, FillMask, InvertMask, MaskStroke, PictureMask, SpreadMask
+from app.model.picture import Picture
+from app.model.recipe import Recipe
+from app.model.sampling import Window
+from app.model.tools import TOOL, TOOLS, BrushSettings, Press
+from app.work import journal
+from app.work.replay import THICKENING, Replay
+from app.work.session import Session
+from solver.gl.device import Device
+from support.editing import small_project
+
+MASKS = [tool.name for tool in TOOLS if tool.masks]
+EDITS = (
+    InvertMask(kind="invert", tick=0, of="frozen"),
+    InvertMask(kind="invert", tick=0, of="thickness"),
+    ClearMask(kind="clear", tick=0, of="frozen"),
+    ClearMask(kind="clear", tick=0, of="thickness"),
+    FeatherMask(kind="feather", tick=0, of="thickness", radius=0.05),
+    SpreadMask(kind="grow", tick=0, of="frozen", radius=0.03),
+    SpreadMask(kind="shrink", tick=0, of="thickness", radius=0.03),
+    FillMask(kind="fill", tick=0, of="frozen", amount=1.0, window=Window(box=(0.1, 0.1, 0.3, 0.4))),
+)
+
+
+@pytest.fixture
+def session(device: Device, tmp_path: Path) -> Iterator[Session]:
+    session = Session(device, quick_project(tmp_path, "paper"))
+    yield session
+    session.release_gpu()
+
+
+def quick_project(folder: Path, solver: str) -> Project:
+    """A fluid that comes to rest within a few ticks."""
+    project = small_project(folder, grid=24)
+    fluid = project.recipe.fluid.model_copy(update={"drag": 30.0, "solver": solver, "sweeps": 2})
+    return replace(project, recipe=project.recipe.edited(fluid=fluid))
+
+
+def paint(session: Session, tool: str, *places: tuple[float, float], back: bool = False, hold: int = 1) -> None:
+    """A stroke from place to place, `hold` ticks at each."""
+    press = Press(BrushSettings(0.12, 0.2), back, session.extent, session.dt)
+    session.press(TOOL[tool], press, *places[0])
+    for place in places:
+        session.move(*place)
+        for _ in range(hold):
+            session.advance(1)
+    session.release()
+
+
+def masks(replay: Replay) -> tuple[np.ndarray, ...]:
+    """Both masks, what the fluid has of them, and the warp."""
+    painted, fluid = replay.masks, replay.fluid
+    size = painted.canvas.size[::-1]
+    thickness, frozen = (np.broadcast_to(mask.get(), size) for mask in (painted.thickness, painted.frozen))
+    return thickness, frozen, fluid.viscosity.get(), fluid.solid.get(), replay.warp.read()
+
+
+def is_same(one: tuple[np.ndarray, ...], other: tuple[np.ndarray, ...]) -> bool:
+    return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
+def replayed(session: Session, tick: int | None = None) -> tuple[np.ndarray, ...]:
+    """What the recording, written and read again, comes to."""
+    recipe = Recipe.parse(session.recipe.text())
+    assert recipe == session.recipe
+    again = Replay(session.device, recipe, session.pictures)
+    try:
+        again.seek(session.tick if tick is None else tick)
+        return masks(again)
+    finally:
+        again.release()
+
+
+def test_painting_a_mask_at_rest_takes_no_time(session: Session) -> None:
+    paint(session, "thicken", (0.3, 0.3), (0.6, 0.4), hold=30)
+    paint(session, "freeze", (0.3, 0.7), (0.6, 0.8), hold=30)
+    assert (session.end, session.tick, session.is_moving, session.recipe.stroke) == (0, 0, False, ())
+    assert [edit.kind for edit in session.recipe.mask] == ["stroke", "stroke"]
+    assert is_same(masks(session.replay), replayed(session))
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    end = session.end
+    paint(session, "freeze", (0.8, 0.5), hold=30)
+    assert session.end == session.tick == end == session.recipe.ticks
+    assert session.recipe.mask[-1].tick == end
+    assert is_same(masks(session.replay), replayed(session))
+
+
+def test_what_is_painted_while_the_pointer_rests_is_seen_at_once_and_is_so_many_decades(session: Session) -> None:
+    """4 decades a second under the brush, of the hand's seconds."""
+    press = Press(BrushSettings(0.2, 1.0), False, session.extent, session.dt)
+    session.press(TOOL["thicken"], press, 0.5, 0.5)
+    seen = []
+    for _ in range(20):
+        session.advance(1)
+        seen.append(int(session.replay.masks.thickness.get().max()) - 24576)
+    assert np.allclose(seen, 8192 * THICKENING * session.dt * np.arange(1, 21), atol=20)
+    before = masks(session.replay)
+    session.release()
+    assert is_same(masks(session.replay), before)
+
+
+def test_with_a_moving_fluid_a_mask_is_painted_in_time(session: Session) -> None:
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    end = session.end
+    paint(session, "thicken", (0.5, 0.5), hold=10)
+    assert session.recipe.mask == ()
+    assert session.end >= end + 10
+    session.settle()
+    assert is_same(masks(session.replay), replayed(session))
+
+
+def test_undo_and_redo_of_masks_are_exact(session: Session) -> None:
+    dice, seen = random.Random(1), [masks(session.replay)]
+    for number in range(14):
+        place = dice.uniform(0.2, 0.8), dice.uniform(0.2, 0.8)
+        if number == 7:
+            paint(session, "push", place, (0.5, 0.5))
+            session.settle()
+        elif number % 3:
+            paint(session, dice.choice(MASKS), place, (0.5, 0.5), hold=dice.randrange(1, 4))
+            assert session.recipe.mask[-1].kind == "stroke"
+        else:
+            session.edit_masks("Edit", dice.choice(EDITS))
+        seen.append(masks(session.replay))
+    assert len(session.document.history.entries) == len(seen)
+    for _ in range(25):
+        index = dice.randrange(len(seen))
+        session.go_to(index)
+        session.settle()
+        assert is_same(masks(session.replay), seen[index])
+    session.replay.checkpoints.clear()
+    for index in (3, len(seen) - 1, 1):
+        session.go_to(index)
+        session.settle()
+        assert is_same(masks(session.replay), seen[index])
+
+
+@pytest.mark.parametrize(("solver", "seed"), [("paper", 1), ("paper", 3), ("paper", 5), ("mac", 2)])
+def test_random_work_replays_to_the_byte(device: Device, tmp_path: Path, solver: str, seed: int) -> None:
+    """Masks at rest, in motion and edited between pushes, undone, gone back from, given up."""
+    dice, session = random.Random(seed), Session(device, quick_project(tmp_path, solver))
+    for _ in range(14 if solver == "paper" else 7):
+        x, y = dice.uniform(0.1, 0.9), dice.uniform(0.1, 0.9)
+        places = [(x + dice.uniform(-0.04, 0.04), y + dice.uniform(-0.04, 0.04)) for _ in range(dice.randrange(1, 4))]
+        match dice.randrange(10):
+            case 0 | 1 | 2:
+                paint(session, dice.choice(MASKS), *places, back=dice.random() < 0.4, hold=dice.randrange(3))
+            case 3 | 4:
+                paint(session, "push", *places)
+            case 5:
+                session.edit_masks("Edit", dice.choice(EDITS))
+            case 6:
+                dice.choice((session.undo, session.redo))()
+            case 7:
+                session.seek(dice.randrange(session.end + 1))
+            case 8:
+                session.change("Clear", **{dice.choice(("clear_masks", "reset_warp", "clear_velocity")): True})
+            case 9:
+                session.press(TOOL["freeze"], Press(BrushSettings(), False, session.extent, session.dt), *places[0])
+                session.advance(2)
+                session.cancel()
+        if dice.random() < 0.5:
+            session.settle()
+        else:
+            session.advance(dice.randrange(4))
+    session.stop_recording()
+    session.settle()
+    seen = masks(session.replay)
+    assert is_same(seen, replayed(session))
+    middle = session.end // 2
+    session.seek(middle)
+    session.settle()
+    assert is_same(masks(session.replay), replayed(session, middle))
+    work = journal.Work(session.document.history.entries, session.document.history.index, Recipe())
+    lines = b"".join(journal.beginning(journal.Origin.of(session.project), work))
+    assert journal.read(lines)[1].recipe == session.document.recipe
+    project = projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "w.fluidwarp")
+    again = Session(device, projects.load(project.path or tmp_path))
+    again.settle()
+    assert is_same(masks(again.replay), seen)
+    for opened in (session, again):
+        opened.release_gpu()
+
+
+def test_a_journal_tells_a_mask_once(session: Session) -> None:
+    """What is written after each stroke is that stroke, and what is read is the work."""
+    origin = journal.Origin.of(session.project)
+    history = session.document.history
+    work = journal.Work(history.entries, history.index, Recipe())
+    written = b"".join(journal.beginning(origin, work))
+    for number in range(3):
+        paint(session, "freeze", (0.2 + 0.2 * number, 0.5), (0.3, 0.3), hold=5)
+        before, work = work, journal.Work(history.entries, history.index, Recipe())
+        line = journal.continuation(work, before)
+        assert line.count(b'"samples"') == 1
+        written += line
+    assert journal.read(written)[1] == replace(work, saved=journal.read(written)[1].saved)
+    assert History.restored(work.entries, 2).recipe.mask == session.recipe.mask[:2]
+
+
+def test_a_mask_picture_is_loaded_and_one_that_is_not_there_is_a_sentence(session: Session, tmp_path: Path) -> None:
+    width, height = session.replay.masks.canvas.size
+    grey = np.zeros((height, width), np.uint16)
+    grey[: height // 2] = 65535
+    write_picture(tmp_path / "mask.png", Picture(grey[..., None]))
+    session.edit_masks("Load", PictureMask(kind="picture", tick=0, of="frozen", picture=str(tmp_path / "mask.png")))
+    assert np.array_equal(session.replay.masks.frozen.get() > 127, grey > 0)
+    seen = masks(session.replay)
+    with pytest.raises(UserError, match="nowhere"):
+        session.edit_masks("Load", PictureMask(kind="picture", tick=0, of="frozen", picture="nowhere.png"))
+    assert is_same(masks(session.replay), seen)
+    assert len(session.document.history.entries) == 2
+    assert is_same(seen, replayed(session))
+
+
+def test_a_seek_between_two_ticks_leaves_the_masks_of_the_first(session: Session) -> None:
+    from fractions import Fraction
+
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    session.seek(2)
+    session.settle()
+    paint(session, "freeze", (0.5, 0.5))
+    recipe = session.recipe.edited(duration=4 * session.dt)
+    replay = Replay(session.device, recipe, Pictures(session.project.picture))
+    replay.seek(Fraction(3, 2))
+    assert not replay.masks.frozen.get().any()
+    replay.seek(2)
+    assert replay.masks.frozen.get().any()
+    assert isinstance(recipe.mask[0], MaskStroke)
+    replay.release()
