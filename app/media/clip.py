@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -50,7 +51,7 @@ def coded(colours: Colours) -> dict[bytes, bytes]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clip:
+class Clip(ABC):
     """Frames of one size and depth.
 
     fps: frames a second; None where the recipe says it. frames: about how many; None when unknown.
@@ -111,9 +112,10 @@ class Clip:
         seconds, frames = divmod(count, base)
         return f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}{mark}{frames:02d}"
 
-    def check(self, part: Part) -> None:
+    def check(self, part: Part) -> None:  # noqa: B027 - as a rule nothing is
         """Raise `UserError` if it is known beforehand that the frames of a part are not all there."""
 
+    @abstractmethod
     def pictures(
         self,
         part: Part = WHOLE,
@@ -125,8 +127,7 @@ class Clip:
 
         cancel: asked with each; true raises `Cancelled`. notice: hears of what is lost. Raises `UserError`.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def digest(self, number: int) -> str:
         """What a frame is made of: the bytes of its file. Raises `UserError` or `OSError`."""
-        raise NotImplementedError

@@ -28,7 +28,7 @@ from app.model.picture import Picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
 from app.work.along import along, widened
-from app.work.export import Kept, Report, looked_up, opaque_value, steps_for, with_alpha, write_all
+from app.work.export import Kept, Report, Target, looked_up, opaque_value, steps_for, with_alpha, write_all
 from app.work.jobs import longer_side
 from app.work.states import code
 from app.work.tasks import Piece
@@ -187,12 +187,17 @@ class _Applying:
         if picture.wide is not None:
             pixels, given = picture.wide, self.applier.widened(given, picture.margins)
             size = pixels.shape[1], pixels.shape[0]
-        found = self.applier.warped(given, pixels, size, alpha and kind.alpha, parts(size[1]))
-        look_up = partial(self.applier.looked_up, given, size, lambda rows: self.progress.check())
-        layers = along(picture.layers, look_up) if "layers" in kind.keeps else ()
+        target = Target(size, self.applier.how, parts(size[1]), alpha and kind.alpha)
+        found = self.applier.warped(given, pixels, target)
+        layers = along(picture.layers, partial(self._look_up, given, size)) if "layers" in kind.keeps else ()
         if picture.wide is None:
             return replace(picture.with_pixels(found), layers=layers)
         return picture.with_wide(found, layers)
+
+    def _look_up(self, given: Displacement, size: tuple[int, int], pixels: np.ndarray, quality: Quality) -> np.ndarray:
+        """The pixels of layers; see `along`."""
+        how = replace(self.applier.how, quality=quality, premultiplied=False)
+        return self.applier.warped(given, pixels, Target(size, how, lambda rows: self.progress.check()))
 
     def write_frames(self) -> int:
         order, outputs, clip, progress = self.order, self.outputs, self.source.clip, self.progress
@@ -257,7 +262,8 @@ class _Applying:
     def _frame(self, number: int, picture: Picture, is_own: bool) -> Frame:
         given = self._map(self._file(number))
         if not is_own:
-            return self.applier.warped(given, picture.pixels, self.size, False, lambda rows: self.progress.check())
+            target = Target(self.size, self.applier.how, lambda rows: self.progress.check())
+            return self.applier.warped(given, picture.pixels, target)
         frame = self._warped(given, picture, lambda height: lambda rows: self.progress.check(), alpha=False)
         return frame.stripped() if self.outputs.strip else frame
 
@@ -282,11 +288,14 @@ class _Applying:
 
 
 class Applier:
-    """Looks pictures up through given maps; keeps the last map on the GPU, as most stay for many frames."""
+    """Looks pictures up through given maps; keeps the last map on the GPU, as most stay for many frames.
+
+    how: the pictures are looked up.
+    """
 
     def __init__(self, device: Device, edges: Edges, premultiplied: bool = False) -> None:
         self._device = device
-        self._how = Sampling(edges=edges, premultiplied=premultiplied)
+        self.how = Sampling(edges=edges, premultiplied=premultiplied)
         self._sampler = Sampler(device)
         self._given: Displacement | None = None
         self._map: GivenMap | None = None
@@ -302,41 +311,16 @@ class Applier:
         if self._map is not None:
             self._map.release()
 
-    def warped(
-        self, given: Displacement, pixels: np.ndarray, size: tuple[int, int], alpha: bool, heard: Callable[[int], None]
-    ) -> np.ndarray:
-        """The pixels looked up through the map, in another size; for `alpha` and `heard` see `looked_up`."""
-        return self._looked_up(given, pixels, size, self._how, alpha, heard)
-
-    def looked_up(
-        self,
-        given: Displacement,
-        size: tuple[int, int],
-        heard: Callable[[int], None],
-        pixels: np.ndarray,
-        quality: Quality,
-    ) -> np.ndarray:
-        """The same of a layer's pixels, in a quality of its own."""
-        how = replace(self._how, quality=quality, premultiplied=False)
-        return self._looked_up(given, pixels, size, how, False, heard)
-
-    def _looked_up(
-        self,
-        given: Displacement,
-        pixels: np.ndarray,
-        size: tuple[int, int],
-        how: Sampling,
-        alpha: bool,
-        heard: Callable[[int], None],
-    ) -> np.ndarray:
+    def warped(self, given: Displacement, pixels: np.ndarray, target: Target) -> np.ndarray:
+        """The pixels looked up through the map. Raises `UserError` where that cannot be."""
         try:
             if given is not self._given or self._map is None:
                 self._take(given, pixels)
             assert self._map is not None
-            found = looked_up(self._sampler, self._map, pixels, size, how, alpha, heard)
+            found = looked_up(self._sampler, self._map, pixels, target)
         except (SamplingError, FieldError) as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
-        return found if self._outside is None else emptied(found, self._outside, how.edges, alpha)
+        return found if self._outside is None else emptied(found, self._outside, target.how.edges, target.alpha)
 
     def _take(self, given: Displacement, pixels: np.ndarray) -> None:
         if self._map is not None:
@@ -405,7 +389,7 @@ def filled(values: np.ndarray, outside: np.ndarray) -> np.ndarray:
 
 
 def emptied(pixels: np.ndarray, outside: np.ndarray, edges: Edges, alpha: bool) -> np.ndarray:
-    """Pixels with nothing in those whose nearest one of the map is `outside`; `alpha` as in `looked_up`."""
+    """Pixels with nothing in those whose nearest one of the map is `outside`; `alpha` as in `Target`."""
     if alpha and edges != "black":
         pixels = with_alpha(pixels)
     (height, width), (rows, columns) = pixels.shape[:2], outside.shape

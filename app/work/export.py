@@ -337,7 +337,7 @@ class _Export:
         self._position = position
 
     def _frame(self, picture: Picture, heard: Callable[[int], None] | None = None) -> np.ndarray:
-        """The pixels warped by the map as it is; for `heard` see `looked_up`."""
+        """The pixels warped by the map as it is; for `heard` see `Target`."""
         heard = heard or (lambda rows: self.progress.check())
         if self.replay.density is not None:
             frame = self._density_frame(self.replay.density.get())
@@ -349,7 +349,8 @@ class _Export:
         with self.device.stage("sample picture"):
             how = replace(self._how, premultiplied=picture.premultiplied)
             try:
-                return looked_up(self.sampler, self.replay.warp, picture.pixels, self.size, how, alpha, heard)
+                target = Target(self.size, how, heard, alpha)
+                return looked_up(self.sampler, self.replay.warp, picture.pixels, target)
             except SamplingError as error:
                 raise UserError(f"The map cannot be applied: {error}.") from None
 
@@ -395,9 +396,9 @@ class _Export:
         try:
             height, width = picture.wide.shape[:2]
             how = replace(self._how, premultiplied=picture.premultiplied)
-            alpha = not self.job.is_animation
-            wide = looked_up(self.sampler, warp, picture.wide, (width, height), how, alpha, parts(height))
-            return picture.with_wide(wide, along(picture.layers, partial(self._look_up, warp, (width, height))))
+            target = Target((width, height), how, parts(height), alpha=not self.job.is_animation)
+            wide = looked_up(self.sampler, warp, picture.wide, target)
+            return picture.with_wide(wide, along(picture.layers, partial(self._look_up, warp, target.size)))
         except SamplingError as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
         finally:
@@ -407,8 +408,8 @@ class _Export:
         self, warp: WarpMap | GivenMap, size: tuple[int, int], pixels: np.ndarray, quality: Quality
     ) -> np.ndarray:
         """The pixels of layers; see `along`."""
-        how = replace(self._how, quality=quality)
-        return looked_up(self.sampler, warp, pixels, size, how, False, lambda rows: self.progress.check())
+        target = Target(size, replace(self._how, quality=quality), lambda rows: self.progress.check())
+        return looked_up(self.sampler, warp, pixels, target)
 
     def _density_frame(self, values: np.ndarray) -> np.ndarray:
         """The densities as 8-bit colours, in the result's size."""
@@ -564,28 +565,31 @@ def displacement(
         return Displacement(values, overscan, forward)
 
 
-def looked_up(
-    sampler: Sampler,
-    warp: WarpMap | GivenMap,
-    pixels: np.ndarray,
-    size: tuple[int, int],
-    how: Sampling,
-    alpha: bool,
-    heard: Callable[[int], None],
-) -> np.ndarray:
-    """The pixels (h, w, c) looked up through a map, in bands, so that little more than the result is in memory.
+@dataclass(frozen=True)
+class Target:
+    """What pixels that are looked up become.
 
+    size: (width, height). heard: called with the number of rows in every band; may raise, as `Progress.check` does.
     alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
-    heard: called with the number of rows in every band; may raise, as `Progress.check` does.
     """
+
+    size: tuple[int, int]
+    how: Sampling
+    heard: Callable[[int], None]
+    alpha: bool = False
+
+
+def looked_up(sampler: Sampler, warp: WarpMap | GivenMap, pixels: np.ndarray, target: Target) -> np.ndarray:
+    """The pixels (h, w, c) looked up through a map, in bands, so that little more than the result is in memory."""
+    size, how = target.size, target.how
     result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)
-    if not alpha or pixels.shape[2] in (2, 4) or how.edges != "transparent":
+    if not target.alpha or pixels.shape[2] in (2, 4) or how.edges != "transparent":
         for band in sampler.bands(warp, pixels, size, how, result):
-            heard(len(band))
+            target.heard(len(band))
         return result
     top = 0
     for band in sampler.bands(warp, with_alpha(pixels), size, how):
-        heard(len(band))
+        target.heard(len(band))
         if result.shape[2] == pixels.shape[2] and (band[..., -1] < opaque_value(band)).any():
             result = with_alpha(result)
         result[top : top + len(band)] = band[..., : result.shape[2]]

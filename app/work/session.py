@@ -127,7 +127,7 @@ class Session:
     @property
     def end(self) -> int:
         """Ticks recorded; 0 where nothing has been yet."""
-        recipe = self._live if hasattr(self, "_live") else self.project.recipe
+        recipe = self._live
         acts = recipe.stroke or recipe.change or recipe.force or recipe.handle
         return recipe.ticks if acts or any(edit.tick for edit in recipe.mask) else 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -66,7 +67,7 @@ class Edits:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Piece:
+class Piece(ABC):
     """One picture of a batch, in names only, so that any process that sees the same files can do it.
 
     Attributes:
@@ -107,6 +108,7 @@ class Piece:
                 raise UserError(f"{path} cannot hold two results; give --output, --map and --stats different names")
             seen.add(real)
 
+    @abstractmethod
     def perform(self, device: Callable[[], Device], progress: Progress) -> Report:
         """Do it, with a `device` once all is read and checked.
 
@@ -114,7 +116,6 @@ class Piece:
             UserError: what is wrong with what is read or written.
             Cancelled: if `progress` says so.
         """
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

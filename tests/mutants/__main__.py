@@ -34,6 +34,12 @@ class Ran:
     seconds: float
     said: str
 
+    @property
+    def by(self) -> str:
+        """The test that noticed, and what it said."""
+        lines = [line for line in self.said.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+        return f" {lines[0][:200]}" if self.verdict == "noticed" and lines else ""
+
 
 def copy_tree(folder: Path) -> Path:
     """A copy of the tree as it is now, with what git does not ignore, compiled."""
@@ -130,7 +136,7 @@ def main() -> int:
                 verdict = "passed" if verdict == "survived" else f"FAILED ({verdict})"
             found[verdict] += 1
             what = " ".join(mutant.tests) if asked.baseline else f"{mutant.room}: {mutant.name}"
-            print(f"{SAID.get(verdict, verdict)} {what} [{ran.seconds:.0f} s]", flush=True)
+            print(f"{SAID.get(verdict, verdict)} {what} [{ran.seconds:.0f} s]{ran.by}", flush=True)
             if verdict == "broken" or verdict.startswith("FAILED"):
                 print(ran.said[-3000:], flush=True)
     print(f"{len(wanted)} in all: " + ", ".join(f"{count} {verdict}" for verdict, count in sorted(found.items())))

@@ -13,8 +13,8 @@ import pytest
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.clip import Clip
 from app.media.maps import Displacement, write_map
+from app.media.sequence import PictureSequence
 from app.media.video import read_clip
 from app.progress import Progress
 from app.work.applying import Application, MapSource
@@ -134,7 +134,8 @@ def test_a_time_code_is_kept(device: Device, tmp_path: Path, ending: str):
 )
 def test_time_codes_go_on(rate: str, first: str, number: int, then: str):
     """As SMPTE ST 12-1 counts: an hour of drop-frame code has 107892 frames."""
-    made = Clip(
-        path=Path("a.mov"), width=8, height=8, bits=8, alpha=False, pixel_format="", fps=Fraction(rate), timecode=first
-    )
+    made = PictureSequence(
+        path=Path("a.%d.png"), width=8, height=8, bits=8, alpha=False, pixel_format="", fps=Fraction(rate),
+        timecode=first, files={}, channels=3, max_pixels=64,
+    )  # fmt: skip
     assert made.timecode_at(number) == then

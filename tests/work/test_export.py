@@ -28,7 +28,7 @@ from app.model.recipe import Recipe
 from app.model.timeline import Timeline
 from app.progress import Progress
 from app.work.applying import Application, MapSource, converted, inverted
-from app.work.export import displacement, looked_up, run, shown_positions
+from app.work.export import Target, displacement, looked_up, run, shown_positions
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.threads import ahead, behind
@@ -466,7 +466,7 @@ def test_a_map_that_reaches_beyond_an_opaque_picture_gives_it_alpha(device: Devi
     values = np.zeros((30, 40, 2), np.float32)
     values[..., 0] = 0.25  # of the longer side: the right quarter comes from beyond
     given, how = GivenMap(device, values), Sampling(edges="transparent")
-    found = looked_up(Sampler(device), given, pixels, (40, 30), how, True, lambda _: None)
+    found = looked_up(Sampler(device), given, pixels, Target((40, 30), how, lambda _: None, alpha=True))
     assert found.shape == (30, 40, 4)
     assert (found[:, :29, 3] == top).all()
     assert (found[:, 31:, 3] == 0).all()
