@@ -58,11 +58,20 @@ class Advection:
         edges(targets, region=around, velocity=velocity, **terms, **walls.inputs)
         return self._blocks
 
-    def advect(self, w1: Blocks, trace: Field, decay: float, target: PackedFaces, packing: Packing) -> Advected:
+    def advect(
+        self,
+        w1: Blocks,
+        trace: Field,
+        decay: float,
+        target: PackedFaces,
+        packing: Packing,
+        weights: dict[str, Any] | None = None,
+    ) -> Advected:
         """Draw w2 into `target`: each component `decay` times what it is where its own face departs."""
-        advect = self.device.pass_("step/advect.frag", **packing.defines)
-        targets = *target.fields, self._energy
-        advect(targets, region=packing.region, blocks_u=w1.u, blocks_v=w1.v, trace=trace, decay=decay, **packing.open)
+        partial = {"PARTIAL": 1} if weights else {}
+        advect = self.device.pass_("step/advect.frag", **packing.defines, **partial)
+        targets, inputs = (*target.fields, self._energy), packing.open | (weights or {})
+        advect(targets, region=packing.region, blocks_u=w1.u, blocks_v=w1.v, trace=trace, decay=decay, **inputs)
         return Advected(target, self._energy)
 
     def release(self) -> None:

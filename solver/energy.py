@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from solver.gl.device import Device
 from solver.gl.field import Field
@@ -29,13 +30,16 @@ class EnergyBound:
         self._sum = Reduction(device, packed, 2, "sum")
         self._bounded = PackedFaces(device, packed, "bounded velocity")
 
-    def apply(self, w3: PackedFaces, before: Field, wall_speed: float = 0.0) -> PackedFaces:
+    def apply(
+        self, w3: PackedFaces, before: Field, wall_speed: float = 0.0, weights: dict[str, Any] | None = None
+    ) -> PackedFaces:
         """w3, or as much of it as has the energy `before` (|w1|^2 of each texel) and of all fluid at `wall_speed`.
 
         Raises:
             ValueError: if either is not finite, or beyond all measure.
         """
-        self.device.pass_("step/energy.frag")(self._squares, **w3.inputs(), departed=before)
+        energy = self.device.pass_("step/energy.frag", **({"PARTIAL": 1} if weights else {}))
+        energy(self._squares, **w3.inputs(), departed=before, **(weights or {}))
         after, departed = self._sum(self._squares).tolist()
         if not (departed <= self._cells * LARGEST_SPEED**2 and math.isfinite(after)):
             raise ValueError("the forces and brushes of this step are beyond all measure")

@@ -46,6 +46,8 @@ class Fluid(Scheme):
         # g: half the last pressure gradient, which the next step takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         self._trace = Trace(device, grid.size)
+        self._flux = device.field(grid.size, 2, "velocity times the open part of the faces")
+        self._is_flux_drawn = False
         self._viscosity_solver = Viscosity(device, grid.size, grid.spacing)
         self._pressure_solver = Projection(device, grid.size, grid.spacing)
         packed = self._viscosity_solver.v_star.u.size
@@ -54,7 +56,8 @@ class Fluid(Scheme):
         # What the solvers hold of the masks; None if they have to look.
         self._coefficients_of: object = None
         self._solids_of: np.ndarray | None = None
-        self._has_new_solids = True
+        self._solid: np.ndarray | None = None
+        self._has_edges = False  # cells that are closed in part
 
     # -- the paper's step -------------------------------------------------------------------------------------------
 
@@ -101,9 +104,11 @@ class Fluid(Scheme):
         """
         trace = self.trace(dt)
         self._take_up_masks(dt)
+        self._take_up_solids()
         target, packing = self._viscosity_solver.v_star, self._viscosity_solver.packing
         with self.device.stage("advect"):
-            return self._advection.advect(w1, trace, math.exp(-self.params.drag * dt), target, packing)
+            decay = math.exp(-self.params.drag * dt)
+            return self._advection.advect(w1, trace, decay, target, packing, self._pressure_solver.weights)
 
     def _diffuse(self, w2: Advected) -> PackedFaces:
         """(I - dt div mu (grad + grad^T)) w3 = w2: implicit, both components coupled: equation (V1)."""
@@ -126,7 +131,8 @@ class Fluid(Scheme):
         """
         with self.device.stage("diffuse"):
             try:
-                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.drag)))
+                weights = self._pressure_solver.weights
+                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.drag)), weights)
             except ValueError:
                 self._forget_last_step()
                 raise
@@ -149,7 +155,7 @@ class Fluid(Scheme):
                 packed=w3,
             )
             self.source.clear()
-            self._trace.forget()
+            self._velocity_changed()
         after = self._divergence_norm(wanted)
         self.residuals = replace(self.residuals, divergence_before=before, divergence_after=after)
 
@@ -160,7 +166,7 @@ class Fluid(Scheme):
         if force := self._force(forces, check_step(dt)):
             self.device.pass_("step/add_impulse.frag")(self.velocity.read, add=True, **force)
         self.impulse.clear()
-        self._trace.forget()
+        self._velocity_changed()
 
     def advect(self, dt: float) -> None:
         """Let the velocity carry itself for `dt` seconds; the result is not free of divergence."""
@@ -173,7 +179,7 @@ class Fluid(Scheme):
         self._take_up_masks(check_step(dt))
         with self.device.stage("diffuse"):
             self._viscosity_solver.diffuse(self.velocity)
-            self._trace.forget()
+            self._velocity_changed()
 
     def project(self) -> None:
         """Make the velocity free of divergence, but for what brushes ask for."""
@@ -229,7 +235,8 @@ class Fluid(Scheme):
     def masks_changed(self) -> None:
         """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
         self._coefficients_of = None
-        self._has_new_solids = True
+        self._solid = None
+        self._is_flux_drawn = False
 
     # -- on another grid of the picture ------------------------------------------------------------------------------
 
@@ -274,7 +281,13 @@ class Fluid(Scheme):
     # -- what is read out -------------------------------------------------------------------------------------------
 
     def faces(self) -> Field:
-        return self.velocity.read
+        self._look_at_solids()
+        if not self._has_edges:
+            return self.velocity.read
+        if not self._is_flux_drawn:
+            self.device.pass_("step/carry.frag")(self._flux, velocity=self.velocity.read, solid=self.solid)
+            self._is_flux_drawn = True
+        return self._flux
 
     def velocity_at_centres(self) -> np.ndarray:
         u, v = self.u, self.v
@@ -291,11 +304,11 @@ class Fluid(Scheme):
 
     def restore(self, state: State) -> None:
         super().restore(state)
-        self._trace.forget()
+        self._velocity_changed()
 
     def release(self) -> None:
         super().release()
-        for item in (self.velocity, self._carried, self._trace, self._advection, self._energy_bound):
+        for item in (self.velocity, self._carried, self._trace, self._flux, self._advection, self._energy_bound):
             item.release()
         self._viscosity_solver.release()
         self._pressure_solver.release()
@@ -329,7 +342,7 @@ class Fluid(Scheme):
     def _unpack(self, faces: PackedFaces) -> None:
         """Let packed faces be the velocity."""
         self._viscosity_solver.unpack(faces, self.velocity.read)
-        self._trace.forget()
+        self._velocity_changed()
 
     def _check_source(self) -> None:
         if self.source.is_empty:
@@ -342,7 +355,7 @@ class Fluid(Scheme):
 
     def _forget_last_step(self) -> None:
         self.impulse.clear()
-        self._trace.forget()
+        self._velocity_changed()
         self._carried.read.clear()
         self._viscosity_solver.forget()
         self._pressure_solver.forget()
@@ -357,9 +370,18 @@ class Fluid(Scheme):
 
     def _take_up_solids(self) -> None:
         """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""
-        if self._has_new_solids:
-            solid = self.solid.get()
-            if self._solids_of is None or not np.array_equal(solid, self._solids_of):
-                self._pressure_solver.set_solids(self.solid if solid.any() else None)
-                self._solids_of = solid
-            self._has_new_solids = False
+        solid = self._look_at_solids()
+        if solid is not self._solids_of and (self._solids_of is None or not np.array_equal(solid, self._solids_of)):
+            self._pressure_solver.set_solids(self.solid if solid.any() else None)
+        self._solids_of = solid
+
+    def _look_at_solids(self) -> np.ndarray:
+        """The solid cells, read back where they may be other ones."""
+        if self._solid is None:
+            self._solid = self.solid.get()
+            self._has_edges = bool(((self._solid > 0) & (self._solid < 255)).any())
+        return self._solid
+
+    def _velocity_changed(self) -> None:
+        self._trace.forget()
+        self._is_flux_drawn = False

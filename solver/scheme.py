@@ -79,7 +79,8 @@ class Scheme(ABC):
 
     Attributes:
         time: seconds that its steps have made up to now.
-        viscosity, solid: at cells, lengths^2 / s, and 1 for solid; call `masks_changed` after drawing into them.
+        viscosity, solid: at cells, lengths^2 / s, and how far each is closed, 1 for solid; call `masks_changed` after
+            drawing into them.
         impulse: what brushes have drawn on MAC faces for the next step, lengths / s.
         source: the divergence that the next projection shall leave, at cells, 1 / s: bloat, or pinch.
         local: a motion on MAC faces, lengths / s, that carries the picture until the next step and not the fluid.
@@ -180,7 +181,7 @@ class Scheme(ABC):
         faces = self.faces()
         if self.local.is_empty:
             return faces
-        carry = self.device.pass_("step/carry.frag")
+        carry = self.device.pass_("step/carry.frag", LOCAL=1)
         carry(self._carrier, velocity=faces, local=self.local.field, solid=self.solid)
         return self._carrier
 

@@ -1,4 +1,4 @@
-// Weigh: how much of each cell is under the brush, 0 where it is solid.
+// Weigh: how much of each cell is under the brush, as far as it is open.
 // u_solid: cells.
 // reads: 1
 #include "lib/brush.glsl"
@@ -8,5 +8,5 @@ in vec2 v_uv;
 layout(location = 0) out float out_weight;
 
 void main() {
-    out_weight = texture(u_solid, v_uv).r < 0.5 ? brush_weight(gl_FragCoord.xy * u_spacing) : 0.0;
+    out_weight = (1.0 - texture(u_solid, v_uv).r) * brush_weight(gl_FragCoord.xy * u_spacing);
 }

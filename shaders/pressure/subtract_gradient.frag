@@ -31,7 +31,7 @@ void main() {
 #ifdef OPEN
     vec2 open = vec2(greaterThan(cell, vec2(0.5)));
 #else
-    vec2 open = vec2(dot(texture(u_left, uv), mine), dot(texture(u_up, uv), mine));
+    vec2 open = sign(vec2(dot(texture(u_left, uv), mine), dot(texture(u_up, uv), mine)));
 #endif
     vec2 gradient = vec2(dot(texture(u_across, uv), mine), u_aspect * dot(texture(u_down, uv), mine));
 #ifdef PACKED

@@ -2,8 +2,9 @@
 // four-point cubic along each axis; packed 2 x 2 cells a texel as viscosity/operator.glsl has it, 0 on fixed faces.
 // u_blocks_u, u_blocks_v: w1 as depart.frag lays it; u_trace: backtrace of the cell centres, cells; u_decay: exp(-drag dt).
 // A face departs midway between the two cells that it parts, so inside the grid, where those do.
-// Beside w2: |w1|^2 of the faces in the texel, as if they stayed where they are.
-// reads: 58
+// Beside w2: |w1|^2 of the faces in the texel, as if they stayed where they are; with PARTIAL each times its open part,
+// u_left and u_up of lib/block.glsl.
+// reads: 58, and 60 with PARTIAL
 #include "lib/cubic.glsl"
 #ifdef UNIFORM
 #include "viscosity/box.glsl"
@@ -14,6 +15,10 @@ uniform sampler2D u_blocks_u;
 uniform sampler2D u_blocks_v;
 uniform sampler2D u_trace;
 uniform float u_decay;
+#ifdef PARTIAL
+uniform sampler2D u_left;
+uniform sampler2D u_up;
+#endif
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
 layout(location = 2) out float out_departed;
@@ -43,5 +48,10 @@ void main() {
 #undef BACK
     vec2 own = (cell * vec2(1.0, 0.5) + vec2(2.5, 1.5)) * texel;
     vec4 u = free_u * texture(u_blocks_u, own), v = free_v * texture(u_blocks_v, own);
+#ifdef PARTIAL
+    vec2 block = (own_texel() + 0.5) / vec2(textureSize(u_left, 0));
+    out_departed = dot(texture(u_left, block), u * u) + dot(texture(u_up, block), v * v);
+#else
     out_departed = dot(u, u) + dot(v, v);
+#endif
 }

@@ -1,10 +1,9 @@
-// Average what is frozen: 1 in cells of which at least u_enough is covered by it (equation B2), else 0.
+// Average what is frozen: the part of each cell that is covered by it; 0 only if nothing is, 1 only if all is.
 // u_frozen: on a canvas, frozen from 1/2.
 // reads: 64
 #include "lib/texels.glsl"
 uniform sampler2D u_frozen;
-uniform float u_enough;
-layout(location = 0) out float out_solid;
+layout(location = 0) out float out_covered;
 
 void main() {
     vec2 corner;
@@ -16,5 +15,5 @@ void main() {
             sum += part * step(0.5, texelFetch(u_frozen, block_texel(texels, corner), 0).r);
             area += part;
         }
-    out_solid = step(u_enough, sum / area);
+    out_covered = sum > 0.0 ? clamp(sum / area, 1.0 / 255.0, sum < area ? 254.0 / 255.0 : 1.0) : 0.0;
 }

@@ -9,5 +9,5 @@ void main() {
     vec2 cell = 1.0 / vec2(textureSize(u_frozen, 0));
     out_solid = 0.0;
     for (int j = -2; j <= 2; ++j)
-        for (int i = -2; i <= 2; ++i) out_solid = max(out_solid, texture(u_frozen, v_uv + vec2(i, j) * cell).r);
+        for (int i = -2; i <= 2; ++i) out_solid = max(out_solid, sign(texture(u_frozen, v_uv + vec2(i, j) * cell).r));
 }

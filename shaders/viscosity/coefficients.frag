@@ -1,5 +1,5 @@
 // Coefficients: K of the finest level and the inverse diagonal of A, as operator.glsl reads them.
-// u_viscosity: of the cells, lengths^2 / s, of which what is above u_most counts as that; u_solid: above 0 in solid ones;
+// u_viscosity: of the cells, lengths^2 / s, of which what is above u_most counts as that; u_solid: 1 in solid ones;
 // u_scale: dt / (hx hy), s / length^2.
 // mu at a node is the harmonic mean of the fluid cells that meet there. A wall node's shear is nil at free-slip walls; at
 // no-slip ones a face beyond it stands still at the node, half a cell away, which doubles K; at a convex corner the
@@ -22,7 +22,7 @@ const float LEAST = 1e-20; // so that a cell of no viscosity is still told from 
 // dt mu / (hx hy) of a cell, 0 where there is no fluid.
 float kappa(ivec2 cell) {
     ivec2 last = textureSize(u_viscosity, 0) - 1, at = clamp(cell, ivec2(0), last);
-    if (cell != at || texelFetch(u_solid, at, 0).r > 0.0) return 0.0;
+    if (cell != at || texelFetch(u_solid, at, 0).r == 1.0) return 0.0;
     return max(u_scale * min(texelFetch(u_viscosity, at, 0).r, u_most), LEAST);
 }
 

@@ -18,6 +18,7 @@ from solver.grid import Grid
 from solver.limits import LARGEST_VISCOSITY, as_mask, check_finite, check_type, viscosities
 from solver.scheme import Scheme
 from solver.state import State
+from solver.warp.frozen import REACH
 
 # Thickness is kept in 16 bits: so many steps a decade and the step that is zero leave room for 3 decades that painting
 # may thin by and 5 that it may thicken by; `lib/decades.glsl` has them too.
@@ -25,6 +26,7 @@ STEPS, ZERO, MOST = 8192, 24576, 65535
 BLANK = {"thickness": ZERO / MOST, "frozen": 0.0}
 LEAST_VISCOSITY = 1e-6  # that painting starts from where there is none
 SMOOTHED = 1 / 8  # radii over which `smooth` takes means
+FARTHEST_SOLID = 1.5  # cells from what is frozen; `close_cells.frag` looks for that as far as two cells away
 
 Base = float | np.ndarray | Callable[[Grid], np.ndarray | float]
 
@@ -147,10 +149,11 @@ class Masks:
     def apply(self, fluid: Scheme) -> None:
         """Give a fluid, on the whole picture or a window, its viscosity and solid cells; the next step takes them up.
 
-        They are averages over the cells, worked out where a mask has changed since it got them last. Solid are the
-        cells with something frozen in them and those within two of them: there the map, which holds what is frozen to
-        the bit (`WarpMap.hold`), goes over into what flows. Were only cells solid of which half is frozen, the fluid
-        would glide along the edge, and the map tear there.
+        They are worked out where a mask has changed since it got them last: viscosity by the mean over a cell, what is
+        solid by its distance from what is frozen. Solid are the cells whose middles are within half a cell of what the
+        map holds, which is what is frozen and `REACH` texels more; so not even a line of single texels lets anything
+        through. Over one more cell they are closed less and less: there the map, which holds what is frozen to the bit
+        (`WarpMap.hold`), goes over into what flows.
 
         Raises:
             ValueError: for a fluid of another picture.
@@ -183,13 +186,20 @@ class Masks:
                 **cells,
             )
         if changed := self._changed.get("frozen"):
-            frozen = self._cells.get("frozen", grid.size, 1, "f1")
+            covered = self._cells.get("covered", grid.size, 1, "f1")
             x, y, width, height = region = self._cells_over(changed, grid)
-            self.device.pass_("step/average_frozen.frag")(
-                frozen, region=region, frozen=self.frozen, enough=1e-3, **cells
+            self.device.pass_("step/average_frozen.frag")(covered, region=region, frozen=self.frozen, **cells)
+            around = (x - 2, y - 2, width + 4, height + 4)
+            close = self.device.pass_("step/close_cells.frag")
+            held = REACH * max(a / b for a, b in zip(self.canvas.spacing, grid.spacing, strict=True))
+            close(
+                fluid.solid,
+                region=around,
+                frozen=self.frozen,
+                covered=covered,
+                solid=min(0.5 + held, FARTHEST_SOLID),
+                **cells,
             )
-            widened = (x - 2, y - 2, width + 4, height + 4)
-            self.device.pass_("step/widen_solid.frag")(fluid.solid, region=widened, frozen=frozen)
         self._applied_to = fluid, grid
         self._changed.clear()
         fluid.masks_changed()

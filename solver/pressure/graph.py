@@ -15,11 +15,11 @@ from solver.components import connected_components
 OVERCORRECTION = 1.8
 
 
-def links_of(solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """1 for every left and every upper face between two fluid cells, else 0, each (ny, nx)."""
-    left, up = np.zeros(solid.shape, np.float32), np.zeros(solid.shape, np.float32)
-    left[:, 1:] = ~(solid[:, 1:] | solid[:, :-1])
-    up[1:] = ~(solid[1:] | solid[:-1])
+def links_of(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The open part of every left and every upper face, each (ny, nx): that of the cell closed more, 0-1, beside it."""
+    left, up = np.zeros(closed.shape, np.float32), np.zeros(closed.shape, np.float32)
+    left[:, 1:] = 1 - np.maximum(closed[:, 1:], closed[:, :-1])
+    up[1:] = 1 - np.maximum(closed[1:], closed[:-1])
     return left, up
 
 

@@ -55,6 +55,7 @@ class Projection:
         self._source = device.field(size, 1, "balanced source")
         self._solid: np.ndarray | None = None
         self._regions: np.ndarray | None = None
+        self._is_partial = False
         self._cycle = Cycle(device, size, self._aspect, None)
 
     def release(self) -> None:
@@ -75,7 +76,8 @@ class Projection:
 
     def set_solids(self, solid: Field | None) -> None:
         """Close every face of the solid cells (R8 at cells, 1 = solid), and of no others; None for no solids at all."""
-        self._solid = None if solid is None else solid.get() >= 128
+        self._solid = None if solid is None else solid.get() / np.float32(255)
+        self._is_partial = bool(self._solid is not None and ((self._solid > 0) & (self._solid < 1)).any())
         self._regions = None
         self._prepare()
 
@@ -97,8 +99,8 @@ class Projection:
         Args:
             velocity: MAC velocity, lengths / s; its faces at edges and solids become exactly zero.
             cycles: multigrid cycles, by default as many as leave a thousandth of the divergence.
-            source: wanted divergence at cells, 1 / s; its mean over each connected region of the fluid is taken off:
-                nothing leaves one.
+            source: wanted divergence of a cell's open part, 1 / s; its mean over each connected region of the fluid is
+                taken off: nothing leaves one.
             warm: start from the pressure that the last two let expect, unless that leaves more than half.
             carried: gradients at MAC faces, lengths / s, replaced by their mean with that of this pressure.
             packed: the velocity to be made so, as the viscous solver packs it, instead of what `velocity` holds.
@@ -127,6 +129,11 @@ class Projection:
         self._subtract_gradient(velocity, given, carried, trend=float(warm))
         return iterations
 
+    @property
+    def weights(self) -> dict[str, Any]:
+        """The open parts of left and upper faces, as `lib/block.glsl` has them, if some are open in part."""
+        return {name: self._cycle.finest.inputs[name] for name in ("left", "up")} if self._is_partial else {}
+
     def state(self) -> tuple[Field, Field]:
         """The fields that a later warm start depends on."""
         return self._last.read, self._expected.read
@@ -152,7 +159,7 @@ class Projection:
     # -- its stages -------------------------------------------------------------------------------------------------
 
     def _balance(self, source: Field) -> Field:
-        """The source, times the side of a cell, less its mean over each connected region of the fluid."""
+        """The source in the open part of each cell, times its side, less the mean over each connected region."""
         array = source.get().astype(np.float64)
         if self._solid is None:
             array -= array.mean()
@@ -160,8 +167,10 @@ class Projection:
             if self._regions is None:
                 ends = Graph.of_cells(*links_of(self._solid), 1.0).ends
                 self._regions = connected_components(np.arange(array.size), *ends.T)
-            sums, cells = np.bincount(self._regions, array.ravel()), np.bincount(self._regions)
-            array -= (sums / np.maximum(cells, 1))[self._regions].reshape(array.shape)
+            open_part = 1.0 - self._solid.astype(np.float64)
+            sums, cells = (np.bincount(self._regions, (a * open_part).ravel()) for a in (array, np.ones(array.shape)))
+            means = np.divide(sums, cells, out=np.zeros_like(sums), where=cells > 0)
+            array = open_part * (array - means[self._regions].reshape(array.shape))
         self._source.set(array * self.spacing[0])
         return self._source
 

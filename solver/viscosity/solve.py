@@ -62,7 +62,7 @@ class Viscosity:
         self._wall_speed = walls.drag
         hx, hy = self.spacing
         kappa = dt / (hx * hy)
-        is_solid, amount = solid.get() > 0, viscosity.get()
+        is_solid, amount = solid.get() == 255, viscosity.get()
         if kappa * float(amount.max()) > MOST:
             amount = np.minimum(amount, np.float32(MOST / kappa))
         fluid = amount[~is_solid] if is_solid.any() else amount

@@ -83,7 +83,7 @@ class Frozen:
         origin = window[0] / extent[0], window[1] / extent[1]
         cell = window[2] / extent[0] / target.width, window[3] / extent[1] / target.height
         average = self.device.pass_("step/average_frozen.frag")
-        average(cells, frozen=self.held, enough=1e-6, origin=origin, cell=cell)
+        average(cells, frozen=self.held, origin=origin, cell=cell)
         self.device.pass_("step/widen_solid.frag")(target, frozen=cells)
         cells.release()
 

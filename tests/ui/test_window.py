@@ -283,15 +283,15 @@ def test_keys_of_files_work_while_a_number_is_typed(desk: Desk, tmp_path: Path) 
 
 
 # Where in a window of 1280 x 800 the export dialog has its kinds, and how far down its formats.
-KINDS = {"picture": (489, 193), "animation": (639, 193), "map": (790, 193)}
-FORMATS = 229
+KINDS = {"picture": (489, 141), "animation": (639, 141), "map": (790, 141)}
+FORMATS = 177
 
 
 @pytest.mark.parametrize(
     "exports",
     [
-        [("picture", 640, "work warped.jpg"), ("picture", 790, "work warped.tif"), ("map", 470, "work map.exr")],
-        [("animation", 790, "work warped.%04d.png")],
+        [("picture", 527, "work warped.jpg"), ("picture", 753, "work warped.tif"), ("map", 470, "work map.exr")],
+        [("animation", 838, "work warped.%04d.png")],
     ],
     ids=["files", "sequence"],
 )

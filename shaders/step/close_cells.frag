@@ -1,0 +1,42 @@
+// Close cells: how far a cell is closed to the flow, by the distance d of its middle from what is frozen, in cells: 1 (solid)
+// where d <= u_solid, less and less over one cell more, then 0.
+// u_frozen: on a canvas, frozen from 1/2; u_covered: cells, the part of each that is frozen.
+// reads: 5000
+#include "lib/texels.glsl"
+uniform sampler2D u_frozen;
+uniform sampler2D u_covered;
+uniform float u_solid;
+layout(location = 0) out float out_solid;
+
+// Squared distance of the middle of a cell from a box, in cells.
+float apart(vec2 middle, vec2 low, vec2 high) {
+    vec2 far = max(max(low - middle, middle - high), 0.0);
+    return dot(far, far);
+}
+
+void main() {
+    vec2 cell = floor(gl_FragCoord.xy), middle = cell + 0.5, canvas = vec2(textureSize(u_frozen, 0));
+    ivec2 cells = textureSize(u_covered, 0);
+    float far = 1e3;
+    for (int j = -2; j <= 2; ++j)
+        for (int i = -2; i <= 2; ++i) {
+            vec2 other = cell + vec2(i, j);
+            ivec2 at = ivec2(other);
+            if (at != clamp(at, ivec2(0), cells - 1)) continue;
+            float covered = texelFetch(u_covered, at, 0).r;
+            if (covered == 0.0 || apart(middle, other, other + 1.0) >= far) continue;
+            if (covered == 1.0) {
+                far = min(far, apart(middle, other, other + 1.0));
+                continue;
+            }
+            Texels texels = texels_under(other, canvas);
+            vec2 corner, cells_a_texel = 1.0 / (u_cell * canvas);
+            for (corner.y = texels.first.y; corner.y < texels.high.y; corner.y += texels.block.y)
+                for (corner.x = texels.first.x; corner.x < texels.high.x; corner.x += texels.block.x)
+                    if (texelFetch(u_frozen, block_texel(texels, corner), 0).r >= 0.5) {
+                        vec2 low = max(corner, texels.low) - texels.low, high = min(corner + texels.block, texels.high) - texels.low;
+                        far = min(far, apart(middle, other + low * cells_a_texel, other + high * cells_a_texel));
+                    }
+        }
+    out_solid = clamp(u_solid + 1.0 - sqrt(far), 0.0, 1.0);
+}
