@@ -233,7 +233,7 @@ def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, a
         raise UserError(f"Cannot write {path}: it cannot tell that the colours of {clip.path} are {named}; {mend}.")
     options = container.encoding(codec)(clip.alpha, clip.bits, None, 0, clip.colours)
     if clip.colours.is_high and _depth(options[options.index("-pix_fmt") + 1])[0] < 10:
-        raise UserError(f"Cannot write {path}: the colours of {clip.path} are {named}, and 8 bits too few; {mend}.")
+        raise UserError(f"Cannot write {path}: the colours of {clip.path} are {named}, and 8 bits are too few; {mend}.")
 
 
 def _depth(pixel_format: str) -> tuple[int, str]:

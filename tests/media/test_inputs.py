@@ -522,5 +522,5 @@ def test_what_is_too_long_is_told(tmp_path: Path, words: list[str]):
         command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
     )
     assert ran.returncode == 1
-    assert "a mistake in fluidwarp" not in ran.stderr
+    assert "a bug in fluidwarp" not in ran.stderr
     assert words[-1][:50] in ran.stderr
