@@ -1,4 +1,4 @@
-"""The command line: `fluidwarp edit | render | apply | convert | gallery | doctor`."""
+"""The command line, `fluidwarp edit | render | apply | convert | gallery | doctor`; most of it declares options."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Optional
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
@@ -72,7 +72,7 @@ def main() -> None:
             raise
         words = str(error).strip().splitlines()
         said = f": {words[0]}" if words else ""
-        _fail(f"this is a mistake in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)
+        _fail(f"this is a bug in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)
 
 
 def _fail(message: str, status: int) -> NoReturn:
@@ -86,13 +86,15 @@ def _tell(*lines: str) -> None:
         print(f"fluidwarp: {shown(line)}", file=sys.stderr)
 
 
-Output = Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="What to write; its ending says how.")]
+Output = Annotated[
+    Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; its ending chooses the format.")
+]
 
 
 @cli.callback(invoke_without_command=True)
 def start(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Say which version this is.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
 ) -> None:
     """Without a command, opens the editor; with a picture, a recipe or a project alone, on that."""
     if version:
@@ -106,9 +108,9 @@ def start(
 
 @cli.command()
 def edit(
-    file: Annotated[Optional[Path], typer.Argument(help="A picture, a recipe or a project.", readable=False)] = None,  # noqa: UP045
+    file: Annotated[Path | None, typer.Argument(help="A picture, a recipe or a project.", readable=False)] = None,
 ) -> None:
-    """Open the editor: push the picture about with the mouse."""
+    """Open the editor and push the picture about with the mouse."""
     try:
         from app.ui.window import run
     except ImportError as error:
@@ -119,32 +121,32 @@ def edit(
 # Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
 
 MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse larger pictures, clips and maps.")]
-Bits = Annotated[Optional[int], typer.Option(help="8, 16 (half in EXR) or 32 bits a channel, not the picture's own.")]  # noqa: UP045
-Size = Annotated[Optional[int], typer.Option(help="Longer side of the result, in pixels.")]  # noqa: UP045
-Quality = Annotated[Optional[int], typer.Option(help="1-100, of JPEG, WebP and video.")]  # noqa: UP045
+Bits = Annotated[int | None, typer.Option(help="Bits a channel: 8, 16 (half in EXR) or 32; else the picture's own.")]
+Size = Annotated[int | None, typer.Option(help="Longer side of the result, in pixels.")]
+Quality = Annotated[int | None, typer.Option(help="1-100, of JPEG, WebP, AVIF and video.")]
 Frames = Annotated[
-    Optional[str],  # noqa: UP045
+    str | None,
     typer.Option(metavar="A-B", help="Only these frames of an animation, from 0 or by the numbers of its files."),
 ]
-Resume = Annotated[
-    bool, typer.Option("--resume", help="Keep the files of a sequence that are whole and made of the same.")
-]
-Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes for several pictures.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Keep the files of a sequence that would come out the same.")]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes to share several pictures.")]
 Cluster = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(metavar="ADDRESS", help="The Dask scheduler that gets several pictures, as tcp://host:8786."),
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Send several pictures to a Dask scheduler, such as tcp://host:8786."),
 ]
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
 Codec = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(help="Not the usual one: h265 in .mp4, av1 in .webm, prores-422-hq in .mov, piz, dwaa ... in .exr."),
+    str | None,
+    typer.Option(help="Another codec: h265 in .mp4, av1 in .webm, prores-422-hq in .mov; piz, dwaa ... in .exr."),
 ]
-MapKind = Annotated[Optional[str], typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]  # noqa: UP045
+MapKind = Annotated[str | None, typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]
 StGrid = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--grid", help="Where MAP's 0 and 1 lie, if it does not say: centres, corners or pixels."),
+    str | None, typer.Option("--grid", help="Where MAP's 0 and 1 lie, if it does not say: centres, corners or pixels.")
 ]
-MapOverscan = Annotated[Optional[int], typer.Option("--overscan", min=0, help="MAP's pixels beyond each side.")]  # noqa: UP045
+MapOverscan = Annotated[
+    int | None,
+    typer.Option("--overscan", min=0, help="Pixels of MAP beyond each side of the picture, if it does not say."),
+]
 
 
 @cli.command()
@@ -156,48 +158,48 @@ def render(
         ),
     ],
     pictures: Annotated[
-        Optional[list[Path]],  # noqa: UP045
+        list[Path] | None,
         typer.Argument(
             metavar="PICTURE", help="Pictures, clips or f.%04d.exr, instead of the recipe's own.", readable=False
         ),
     ] = None,
     output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--output", "-o", metavar="OUT", help="What to write; its ending says how. Default: out.png"),
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="OUT", help="File to write; its ending chooses the format. Default: out.png"
+        ),
     ] = None,
     image: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--image", "-i", help="The picture or clip to warp.", readable=False),
+        Path | None, typer.Option("--image", "-i", help="The picture or clip to warp.", readable=False)
     ] = None,
-    stats: Annotated[Optional[Path], typer.Option(help="Write numbers about every frame, as JSON.")] = None,  # noqa: UP045
+    stats: Annotated[Path | None, typer.Option(help="Write numbers about every frame, as JSON.")] = None,
     map_: Annotated[
-        Optional[Path],  # noqa: UP045
+        Path | None,
         typer.Option("--map", help="Write the last frame's warp map (.exr .tif .flo .npy); m.%04d.exr: every frame's."),
     ] = None,
     forward: Annotated[
         bool, typer.Option("--forward", help="The map tells where points of the original go, not where they come from.")
     ] = False,
     offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in the map, instead of an ST map.")] = False,
-    overscan: Annotated[int, typer.Option(min=0, help="Pixels of the map beyond each side.")] = 0,
-    map_size: Annotated[Optional[int], typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,  # noqa: UP045
+    overscan: Annotated[int, typer.Option(min=0, help="Pixels of the map beyond each side of the picture.")] = 0,
+    map_size: Annotated[int | None, typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,
     size: Size = None,
-    grid: Annotated[Optional[int], typer.Option(help="Cells along the longer side.")] = None,  # noqa: UP045
-    solver: Annotated[Optional[str], typer.Option(help="mac or paper.")] = None,  # noqa: UP045
-    duration: Annotated[Optional[float], typer.Option(help="Seconds to simulate.")] = None,  # noqa: UP045
+    grid: Annotated[int | None, typer.Option(help="Cells along the longer side.")] = None,
+    solver: Annotated[str | None, typer.Option(help="mac, or paper for the paper's own scheme.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds to simulate.")] = None,
     fps: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(help="Frames per second of a picture's animation; a clip keeps its own."),
+        float | None, typer.Option(help="Frames per second of a picture's animation; a clip keeps its own.")
     ] = None,
     quality: Quality = None,
-    start: Annotated[Optional[float], typer.Option("--from", help="First second of an animation.")] = None,  # noqa: UP045
-    end: Annotated[Optional[float], typer.Option("--to", help="Last second.")] = None,  # noqa: UP045
+    start: Annotated[float | None, typer.Option("--from", help="First second of an animation.")] = None,
+    end: Annotated[float | None, typer.Option("--to", help="Last second.")] = None,
     frames: Frames = None,
     resume: Resume = False,
     states: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option(metavar="DIR", help="Keep states of the simulation there; a later part begins with the nearest."),
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep states of the simulation there, for later parts to start from."),
     ] = None,
-    animated: Annotated[bool, typer.Option("--animated", help="OUT.webp is the animation.")] = False,
+    animated: Annotated[bool, typer.Option("--animated", help="Make OUT.webp an animation, not a still.")] = False,
     codec: Codec = None,
     bits: Bits = None,
     strip: Strip = False,
@@ -224,12 +226,14 @@ def render(
         output = Path("out.png")
     maps = MapOutput(map_, "offsets" if offsets else "st", forward, overscan, map_size) if map_ else None
     if maps is None and (forward or offsets or overscan or map_size):
-        raise UserError("--forward, --offsets, --overscan and --map-size say what --map writes; give its name too")
+        raise UserError(
+            "--forward, --offsets, --overscan and --map-size say how --map is written; give --map and a name"
+        )
     given = [*([image] if image else []), *(pictures or [])]
     outputs = Outputs(output, stats, maps, _part(frames), animated, bits, strip, codec, states, resume)
     task = Task(recipe=recipe, edits=edits, picture=given[0] if given else None, outputs=outputs, max_pixels=max_pixels)
     if not given and cluster is not None:
-        raise UserError("a cluster is for many pictures: name them after the recipe")
+        raise UserError("--cluster is for several pictures; name them after the recipe")
     _perform(task, given, jobs, cluster)
 
 
@@ -318,7 +322,7 @@ def apply(
     overscan: MapOverscan = None,
     edges: Annotated[str, typer.Option(help="transparent, black, clamp, mirror or wrap.")] = "transparent",
     size: Size = None,
-    fps: Annotated[Optional[float], typer.Option(help="Frames per second of a picture's animation.")] = None,  # noqa: UP045
+    fps: Annotated[float | None, typer.Option(help="Frames per second of a picture's animation.")] = None,
     quality: Quality = None,
     frames: Frames = None,
     resume: Resume = False,
@@ -329,7 +333,7 @@ def apply(
     jobs: Jobs = 1,
     cluster: Cluster = None,
 ) -> None:
-    """Warp pictures or clips by a map that was made before, or elsewhere; several as `render` does."""
+    """Warp pictures or clips by a map from fluidwarp or another program; several as `render` does."""
     from app.model.recipe import Recipe
     from app.work.applying import Application
     from app.work.jobs import Outputs
@@ -370,7 +374,7 @@ def convert(
     output: Output,
     offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in OUT, instead of an ST map.")] = False,
     invert: Annotated[
-        bool, typer.Option("--invert", help="Turn it round: where points go, from where they come from.")
+        bool, typer.Option("--invert", help="Invert it: where points go, from where they come from.")
     ] = False,
     kind: MapKind = None,
     grid: StGrid = None,
@@ -393,7 +397,8 @@ def gallery(
         "gallery"
     ),
     strokes: Annotated[
-        bool, typer.Option("--strokes", help="What a hand does instead: three retouching jobs and three posters.")
+        bool,
+        typer.Option("--strokes", help="Make three retouching jobs and three posters, done by brush strokes, instead."),
     ] = False,
 ) -> None:
     """Make the paper's figures again: results, animations and contact sheets."""
@@ -409,7 +414,7 @@ def gallery(
 
 @cli.command()
 def doctor() -> None:
-    """Say which OpenGL is there, whether a window can be opened, and what to install otherwise."""
+    """Check OpenGL, the window and the encoder, and say what to install."""
     from rich.console import Console
     from rich.table import Table
 

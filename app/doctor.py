@@ -65,7 +65,7 @@ def _version(name: str) -> str:
 def _headless() -> Iterator[Finding]:
     found = _ask("app.doctor")
     if "error" in found:
-        yield Finding("OpenGL without a window", found["error"], "install it, as said", vital=True)
+        yield Finding("OpenGL without a window", found["error"], "install what is named above", vital=True)
         return
     yield Finding("OpenGL without a window", f"{found['version']}, {found['renderer']} ({found['vendor']})")
     yield Finding(

@@ -1,4 +1,4 @@
-"""The paper's figures made again: for each its result, its animation, and a contact sheet as the paper sets it."""
+"""The paper's figures made again, a function each: result, animation, contact sheet, and what only they measure."""
 
 from __future__ import annotations
 

@@ -206,7 +206,7 @@ def test_a_mistake_of_ours_has_a_status_of_its_own(folder: Path):
         text=True,
     )
     assert ran.returncode == 70
-    assert ran.stderr.startswith("fluidwarp: this is a mistake in fluidwarp (ZeroDivisionError: division by zero);")
+    assert ran.stderr.startswith("fluidwarp: this is a bug in fluidwarp (ZeroDivisionError: division by zero);")
     assert len(ran.stderr.splitlines()) == 1
 
 
@@ -248,7 +248,7 @@ BAD = {
     "numbers onto the result": (["a.toml", "-o", "x.png", "--stats", "x.png"], "x.png cannot hold two results"),
     "numbers onto the recipe": (["a.toml", "--stats", "a.toml"], "a.toml would be replaced by its own result"),
     "map onto the first map": (["map.toml", "--map", "m.exr"], "m.exr would be replaced by its own result"),
-    "map without a name": (["a.toml", "-o", "x.exr", "--forward"], "say what --map writes"),
+    "map without a name": (["a.toml", "-o", "x.exr", "--forward"], "say how --map is written"),
     "too long": (["a.toml", "-o", "x" * 300 + ".png"], "the name is too long"),
     "too long to be read": (["a.toml", "-i", "x" * 300 + ".mp4", "-o", "x.png"], "File name too long"),
     "too long a recipe": (["x" * 300 + ".toml", "-o", "x.png"], "File name too long"),
@@ -433,12 +433,12 @@ def test_what_is_lost_is_told_in_a_line(folder: Path, fluidwarp: Run):
     wild = Image.open(folder / "cat.png")
     wild.save(folder / "pages.tif", save_all=True, append_images=[wild, wild])
     (folder / "b.toml").write_text(RECIPE.replace("cat.png", "pages.tif"))
-    line = "fluidwarp: pages.tif: of its 3 pages the first is taken\n"
+    line = "fluidwarp: pages.tif: of its 3 pages only the first is used\n"
     ran = fluidwarp(folder, "render", "b.toml", "-o", "x.png")
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", line)
     ran = fluidwarp(folder, "render", "a.toml", "pages.tif", "cat.png", "-o", "several")
     assert ran.returncode == 0
-    assert ran.stderr == f"fluidwarp: {folder / 'pages.tif'}: of its 3 pages the first is taken\n"
+    assert ran.stderr == f"fluidwarp: {folder / 'pages.tif'}: of its 3 pages only the first is used\n"
     mask = '[[viscosity]]\nkind = "picture"\npicture = "pages.tif"\nscale = 0.1\n'
     (folder / "c.toml").write_text(RECIPE + mask)
     assert fluidwarp(folder, "render", "c.toml", "-o", "y.png").stderr == line
@@ -461,7 +461,7 @@ def test_a_fold_is_told(folder: Path, fluidwarp: Run):
     ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy")
     assert ran.stderr == ""
     ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy", "--invert")
-    assert ran.stderr == "fluidwarp: m.npy folds over itself in 96 of its pixels, where no inverse can be right\n"
+    assert ran.stderr == "fluidwarp: m.npy folds over itself in 96 of its pixels, where it has no inverse\n"
     write_map(folder / "m.0007.npy", Displacement(values * 0))
     write_map(folder / "m.0008.npy", Displacement(values))
     ran = fluidwarp(folder, "apply", "m.%04d.npy", "cat.png", "-o", "z.%04d.png")
@@ -521,6 +521,6 @@ def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: R
     write_picture(folder / "aces.exr", Picture(np.ones((48, 64, 3), np.float32), chromaticities=primaries))
     ran = fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.tif")
     assert ran.stderr == (
-        "fluidwarp: x.tif cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709\n"
+        "fluidwarp: x.tif cannot tell the primaries (chromaticities) of the picture, and is read as BT.709\n"
     )
     assert fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.exr").stderr == ""

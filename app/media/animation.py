@@ -18,7 +18,7 @@ from app.errors import Cancelled, UserError
 from app.media import ffmpeg
 from app.media.clip import USUAL, Colours
 from app.media.depth import to_bits
-from app.media.encoders import ANIMATIONS, SIX_BITS, Container, Encoding, check_animation, lossless
+from app.media.encoders import ANIMATIONS, SIX_BITS, Container, Encoding, Stream, check_animation, lossless
 from app.media.files import cannot_write, is_sequence, numbered, replacing, temporary_beside, temporary_file
 from app.media.pictures import write_picture
 from app.media.video import sound_codecs
@@ -177,7 +177,7 @@ class _Video:
             [
                 *["-f", "rawvideo", "-pix_fmt", names[channels - 1], "-s", f"{width}x{height}", "-r", str(self.rate)],
                 *["-i", "-", *self.sound[0], "-map", "0:v:0"],
-                *self._timed(self.encoding(channels in (2, 4), bits, self.crf, self.loops, self.colours)),
+                *self._timed(self.encoding(Stream(channels in (2, 4), bits, self.crf, self.loops, self.colours))),
                 *self.sound[1],
                 f"file:{self.temporary}",
             ],
@@ -265,10 +265,10 @@ def _gif_writer(
     name = temporary_beside(temporary.with_suffix(".mkv"))
     with temporary_file(name) as spool, temporary_file(name.with_suffix(".png")) as palette:
 
-        def with_palette(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-            generate = f"{SIX_BITS},palettegen=stats_mode=full:reserve_transparent={int(alpha)}"
+        def with_palette(stream: Stream) -> list[str]:
+            generate = f"{SIX_BITS},palettegen=stats_mode=full:reserve_transparent={int(stream.alpha)}"
             first = ["-vf", generate, "-update", "1", f"file:{palette}"]
-            return [*first, "-map", "0:v:0", *lossless(alpha, bits, crf, loops, colours)]
+            return [*first, "-map", "0:v:0", *lossless(stream)]
 
         with _Video(spool, label, with_palette, rate, cancel=cancel) as video:
             yield lambda frame: video.write(to_bits(frame, 8))

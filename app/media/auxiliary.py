@@ -56,14 +56,14 @@ class Pictures:
         if name not in self._maps:
             given = read_map(self.folder / name)
             if given.forward:
-                goes = f"{name} tells where each point goes"
+                forward = f"{name} tells where each point goes"
                 raise UserError(
-                    f"{goes}; turn it round with: fluidwarp convert --invert",
-                    in_window=f"{goes}, and what is needed is where it comes from; write it the other way round.",
+                    f"{forward}; invert it with: fluidwarp convert --invert",
+                    in_window=f"{forward}, and must tell where each comes from; export it in the other direction.",
                 )
             if (nowhere := np.isnan(given.values).any(axis=2)).any():
                 raise UserError(
-                    f"Cannot use {name}: {int(nowhere.sum())} of its pixels are NaN, and a fluid is everywhere; "
+                    f"Cannot use {name}: {int(nowhere.sum())} of its pixels are NaN, and each needs a value; "
                     "fill them where the map was made."
                 )
             self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Protocol
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.clip import Clip, Colours
+from app.media.clip import USUAL, Clip, Colours
 from app.media.files import NUMBER, is_sequence
 from app.media.formats import FORMATS, check_picture_output
 from app.media.losses import lost
@@ -31,39 +30,53 @@ SIX_BITS = "lutrgb=" + ":".join(f"{channel}='round(val*63/255)*255/63'" for chan
 ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
 
 
-class Encoding(Protocol):
-    """ffmpeg's output options for frames with or without alpha, of 8 or 16 bits a channel."""
+@dataclass(frozen=True)
+class Stream:
+    """Frames for an encoder, with alpha or not, of 8 or 16 bits a channel; `crf` None is the codec's usual one."""
 
-    def __call__(self, alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]: ...
+    alpha: bool
+    bits: int
+    crf: int | None = None
+    loops: int = 0
+    colours: Colours = USUAL
+
+    @property
+    def on_black(self) -> str:
+        """The filters for a codec without alpha."""
+        return (ON_BLACK if self.alpha else "") + tagged(self.colours)
+
+    def crf_or(self, usual: int) -> list[str]:
+        return ["-crf", str(usual if self.crf is None else self.crf)]
 
 
-def _mp4(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-    quality = ["-c:v", "libx264", "-preset", "medium", "-crf", str(18 if crf is None else crf)]
-    return [
-        *["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-pix_fmt", "yuv420p", *quality],
-        *["-movflags", "+faststart"],
-    ]
+Encoding = Callable[[Stream], list[str]]
+"""ffmpeg's output options for a stream."""
 
 
-def _h265(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+def _mp4(stream: Stream) -> list[str]:
+    quality = ["-c:v", "libx264", "-preset", "medium", *stream.crf_or(18)]
+    return ["-vf", stream.on_black, "-pix_fmt", "yuv420p", *quality, "-movflags", "+faststart"]
+
+
+def _h265(stream: Stream) -> list[str]:
     if "libx265" not in ffmpeg.encoders():
         raise UserError(
             "This ffmpeg has no encoder for H.265; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another."
         )
-    kind = "yuv420p" if bits == 8 else "yuv420p10le"
-    quality = ["-c:v", "libx265", "-preset", "medium", "-crf", str(20 if crf is None else crf), "-tag:v", "hvc1"]
-    filters = (ON_BLACK if alpha else "") + tagged(colours)
-    return ["-vf", filters, "-pix_fmt", kind, *quality, "-x265-params", "log-level=error", "-movflags", "+faststart"]
+    kind = "yuv420p" if stream.bits == 8 else "yuv420p10le"
+    quality = ["-c:v", "libx265", "-preset", "medium", *stream.crf_or(20), "-tag:v", "hvc1"]
+    quiet = ["-x265-params", "log-level=error"]
+    return ["-vf", stream.on_black, "-pix_fmt", kind, *quality, *quiet, "-movflags", "+faststart"]
 
 
-def _webm(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-    quality = ["-c:v", "libvpx-vp9", "-b:v", "0", "-crf", str(24 if crf is None else crf), "-row-mt", "1"]
+def _webm(stream: Stream) -> list[str]:
+    quality = ["-c:v", "libvpx-vp9", "-b:v", "0", *stream.crf_or(24), "-row-mt", "1"]
     speed = ["-deadline", "good", "-cpu-used", "4"]
-    return ["-vf", tagged(colours), "-pix_fmt", "yuva420p" if alpha else "yuv420p", *quality, *speed]
+    return ["-vf", tagged(stream.colours), "-pix_fmt", "yuva420p" if stream.alpha else "yuv420p", *quality, *speed]
 
 
-def _av1(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-    quality = ["-crf", str(30 if crf is None else crf)]
+def _av1(stream: Stream) -> list[str]:
+    quality = stream.crf_or(30)
     speed = {
         "libsvtav1": ["-c:v", "libsvtav1", "-preset", "8"],
         "libaom-av1": ["-c:v", "libaom-av1", "-b:v", "0", "-cpu-used", "6", "-row-mt", "1"],
@@ -71,34 +84,35 @@ def _av1(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) 
     encoder = next((name for name in speed if name in ffmpeg.encoders()), None)
     if encoder is None:
         raise UserError("This ffmpeg has no encoder for AV1; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another.")
-    kind = "yuv420p" if bits == 8 else "yuv420p10le"
-    return ["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-pix_fmt", kind, *speed[encoder], *quality]
+    kind = "yuv420p" if stream.bits == 8 else "yuv420p10le"
+    return ["-vf", stream.on_black, "-pix_fmt", kind, *speed[encoder], *quality]
 
 
-def lossless(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-    kind = {(False, 8): "bgr0", (True, 8): "bgra", (False, 16): "gbrp16le", (True, 16): "gbrap16le"}[alpha, bits]
+def lossless(stream: Stream) -> list[str]:
+    kinds = {(False, 8): "bgr0", (True, 8): "bgra", (False, 16): "gbrp16le", (True, 16): "gbrap16le"}
+    kind, colours = kinds[stream.alpha, stream.bits], stream.colours
     transfer = "iec61966-2-1" if colours.transfer == "bt709" else colours.transfer
     told = f"setparams=color_primaries={colours.primaries}:color_trc={transfer}"
     return ["-vf", told, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
 
 
-def _prores(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-    kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if alpha else "yuv444p10le", "-vendor", "apl0"]
-    return ["-vf", tagged(colours), "-c:v", "prores_ks", *kind]
+def _prores(stream: Stream) -> list[str]:
+    kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if stream.alpha else "yuv444p10le", "-vendor", "apl0"]
+    return ["-vf", tagged(stream.colours), "-c:v", "prores_ks", *kind]
 
 
-def _prores_422_hq(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
+def _prores_422_hq(stream: Stream) -> list[str]:
     kind = ["-profile:v", "hq", "-pix_fmt", "yuv422p10le", "-vendor", "apl0"]
-    return ["-vf", (ON_BLACK if alpha else "") + tagged(colours), "-c:v", "prores_ks", *kind]
+    return ["-vf", stream.on_black, "-c:v", "prores_ks", *kind]
 
 
-def _apng(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-    return ["-c:v", "apng", "-pix_fmt", "rgba" if alpha else "rgb24", "-plays", str(loops), "-f", "apng"]
+def _apng(stream: Stream) -> list[str]:
+    return ["-c:v", "apng", "-pix_fmt", "rgba" if stream.alpha else "rgb24", "-plays", str(stream.loops), "-f", "apng"]
 
 
-def _webp(alpha: bool, bits: int, crf: int | None, loops: int, colours: Colours) -> list[str]:
-    kind = ["-pix_fmt", "yuva420p" if alpha else "yuv420p", "-quality", "90", "-compression_level", "3"]
-    return ["-c:v", "libwebp_anim", *kind, "-loop", str(loops), "-f", "webp"]
+def _webp(stream: Stream) -> list[str]:
+    kind = ["-pix_fmt", "yuva420p" if stream.alpha else "yuv420p", "-quality", "90", "-compression_level", "3"]
+    return ["-c:v", "libwebp_anim", *kind, "-loop", str(stream.loops), "-f", "webp"]
 
 
 @dataclass(frozen=True)
@@ -210,7 +224,7 @@ def unheld_of_clip(path: str | os.PathLike[str], codec: str | None, clip: Clip) 
     container = ANIMATIONS.get(Path(path).suffix.lower())
     if container is None or container.passes > 1 or is_sequence(path):
         return ""
-    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0, clip.colours)
+    options = container.encoding(codec)(Stream(clip.alpha, clip.bits, colours=clip.colours))
     (bits, chroma), (room, kept) = map(_depth, (clip.pixel_format, options[options.index("-pix_fmt") + 1]))
     losses = [f"its {bits} bits a channel become {room}"] if bits > room else []
     losses += [f"its colours of 4:{chroma} become 4:{kept}"] if chroma > kept else []
@@ -231,9 +245,9 @@ def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, a
         return
     if container is None or suffix not in (".mp4", ".webm", ".mkv", ".mov"):
         raise UserError(f"Cannot write {path}: it cannot tell that the colours of {clip.path} are {named}; {mend}.")
-    options = container.encoding(codec)(clip.alpha, clip.bits, None, 0, clip.colours)
+    options = container.encoding(codec)(Stream(clip.alpha, clip.bits, colours=clip.colours))
     if clip.colours.is_high and _depth(options[options.index("-pix_fmt") + 1])[0] < 10:
-        raise UserError(f"Cannot write {path}: the colours of {clip.path} are {named}, and 8 bits too few; {mend}.")
+        raise UserError(f"Cannot write {path}: the colours of {clip.path} are {named}, and 8 bits are too few; {mend}.")
 
 
 def _depth(pixel_format: str) -> tuple[int, str]:

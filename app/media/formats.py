@@ -139,11 +139,11 @@ def unheld(
     own, kind = picture.chromaticities, FORMATS.get(Path(path).suffix.lower())
     keeps, losses = kind.keeps if kind else frozenset[str](), []
     if own is not None and not np.allclose(own, REC709, atol=1e-3) and "chromaticities" not in keeps:
-        losses.append("cannot tell the primaries (chromaticities) of the picture, and is taken for BT.709")
+        losses.append("cannot tell the primaries (chromaticities) of the picture, and is read as BT.709")
     if picture.layers and not (with_layers and "layers" in keeps):
-        losses.append(f"is without the picture's {counted('channel', [layer.name for layer in picture.layers])}")
+        losses.append(f"lacks the picture's {counted('channel', [layer.name for layer in picture.layers])}")
     if picture.wide is not None and not (with_margins and "wide" in keeps):
-        losses.append(f"is without the picture's overscan ({max(picture.margins)} px beyond the display window)")
+        losses.append(f"lacks the picture's overscan ({max(picture.margins)} px beyond the display window)")
     if picture.origin != (0, 0) and "origin" not in keeps:
         losses.append(f"begins at 0, 0 and not at {picture.origin[0]}, {picture.origin[1]} as the display window")
     return f"{Path(path).name} {'; it '.join(losses)}" if losses else ""

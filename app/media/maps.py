@@ -1,4 +1,4 @@
-"""Warp maps out and in: ST maps, pixel offsets, Middlebury .flo and NumPy .npy."""
+"""Warp maps out and in, a function for each kind: ST maps, pixel offsets, Middlebury .flo and NumPy .npy."""
 
 from __future__ import annotations
 
@@ -352,7 +352,7 @@ def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
         check_size(file, width, height, max_pixels)
         if os.fstat(stream.fileno()).st_size != 12 + width * height * 8:
             raise UserError(
-                f"Cannot read {file}: {width} x {height} offsets need another length of file; get it again."
+                f"Cannot read {file}: {width} x {height} offsets do not fit the length of the file; get it again."
             )
         offsets = _in_memory(file, lambda: np.fromfile(stream, "<f4", 2 * width * height)).reshape(height, width, 2)
         return np.where((np.abs(offsets) > FLO_UNKNOWN / 10).any(axis=2, keepdims=True), np.float32(np.nan), offsets)

@@ -180,18 +180,16 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     if odd:
         named = " ".join(NAMES.get(name, name) for name in odd)
         kept = all(name in (*KEPT_PRIMARIES, *HIGH) for name in odd)
-        losses.append(
-            f"its colours are {named} and are {'mixed' if kept else 'taken'} {'as if' if kept else 'for'} BT.709"
-        )
+        losses.append(f"its colours are {named} and are {'mixed as if' if kept else 'treated as'} BT.709")
     if any(word.startswith(("top", "bottom")) for word in words):
-        losses.append("it is interlaced, and its fields are taken for whole frames")
+        losses.append("it is interlaced, and its fields are treated as whole frames")
     if rates := re.search(r", ([\d.]+) fps, ([\d.]+)(k?) tbr", video):  # on average, and of the shortest frames
         times = float(rates[2]) * (1000 if rates[3] else 1) / float(rates[1])
         if min(abs(times - 1), abs(times - 2)) > 0.02:  # 2: of fields
             losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
     count = sum("attached pic" not in line for line in re.findall(r"Stream #0.*: Video: .*", told))
     if count > 1:
-        losses.append(f"of its {count} picture tracks the first is taken")
+        losses.append(f"of its {count} video tracks only the first is used")
     if re.search(r"Stream #0.*: Subtitle: ", told):
         losses.append("its subtitles are not kept")
     return losses

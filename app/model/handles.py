@@ -161,9 +161,9 @@ def objections(
         if not is_inside(one.at):
             yield f"{label} takes hold of nothing: {_shown(one.at)} is outside the picture"
         elif not is_inside(end := _end(one)):
-            yield f"{label} is led to the picture's edge only: {_shown(end)} is outside the picture"
+            yield f"{label} goes only to the picture's edge: {_shown(end)} is outside the picture"
         elif (far := hypot(*_between(end, one.at, extent)) / one.radius) > LARGEST_LEAD:
-            yield f"{label} is led {LARGEST_LEAD:g} of the {far:.3g} radii of its way only; give it a larger radius"
+            yield f"{label} goes only {LARGEST_LEAD:g} of the {far:.3g} radii to its goal; give it a larger radius"
     inside = [(label, one) for label, one in led if is_inside(one.at)]
     for (label, one), (other_label, other) in combinations(inside, 2):
         if max(one.start, other.start) < min(one.end or inf, other.end or inf):

@@ -256,7 +256,7 @@ TOOLS = (
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
     Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),
     Tool(
-        "handle", "Handle", "g", "Drag a point where it shall go; click to pin it where it is", _lead,
+        "handle", "Handle", "g", "Drag a point to where it should go; click to pin it where it is", _lead,
         settings=("radius", "stiffness", "local"),
     ),
     Tool(

@@ -258,7 +258,7 @@ class ExportDialog(Dialog):
             self._chooser.ask_where("Export to", self.output, (self.ending,), self._chosen)
         ui.dim(str(self.output))
         if os.path.exists(self.output):
-            ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
+            ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(6)))
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
         if ui.button("Cancel", width=96):

@@ -122,7 +122,7 @@ class Files:
         path = path.resolve()
         self.workspace.session.start_from_map(str(path))
         self.preferences.folder = str(path.parent)
-        self.messages.done(f"The picture now starts from {path.name}. Undo takes it away again.")
+        self.messages.done(f"The picture now starts from {path.name}. Undo removes it.")
 
     def load_mask(self, path: Path, of: MaskName) -> None:
         """Let a picture's brightness be a mask; can be undone.
@@ -201,12 +201,10 @@ class Files:
         if loading.found is None:
             return
         if loading.found.is_as_it_was(loading.project):
-            self.messages.done(f"“{self.workspace.session.project.name}” is as it was. It has not been saved yet.")
+            self.messages.done(f"“{self.workspace.session.project.name}” is restored. It has not been saved yet.")
         else:
             name = loading.project.recipe.picture
-            self.messages.warn(
-                f"All strokes are here, but {name} is not the same picture any more as when they were made."
-            )
+            self.messages.warn(f"All strokes are restored, but {name} is not the picture that they were made on.")
 
     @staticmethod
     def _leave(loading: Loading) -> None:

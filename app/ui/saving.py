@@ -70,7 +70,7 @@ class SaveDialog(Dialog):
             self._chooser.ask_where("Save", self.path, (SUFFIX,), self._chosen)
         ui.dim(str(self.path))
         if os.path.exists(self.path) and self.path != self._own:
-            ui.text("It is there already, and will be replaced.", ui.palette.accent, 13)
+            ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(2)))
         with ui.enabled(not self.must_embed):
             self.embed = ui.check("Keep the picture inside the project", self.embed)

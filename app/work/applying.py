@@ -1,4 +1,4 @@
-"""Maps that were made before, or elsewhere: pictures and clips warped by them, and maps turned round."""
+"""Maps from elsewhere: pictures and clips warped by them, maps converted and inverted; all share how they are read."""
 
 from __future__ import annotations
 
@@ -108,10 +108,7 @@ class Application(Piece):
         maps.check_map(self.maps.path)
         writable(output)
         self.check_names([*self.maps.files().values(), *([self.picture] if self.picture else [])])
-        if outputs.resume and not is_sequence(output):
-            raise UserError(f"only the files of a sequence can be kept by --resume, and {output} is none")
-        if outputs.part != WHOLE and not self.outputs.is_animation:
-            raise UserError(f"only an animation has --frames, and {output} is a picture; write f.%04d.png or .mp4")
+        outputs.check()
 
     def perform(self, device: Callable[[], Device], progress: Progress) -> Report:
         """Do it; but for the frames of a sequence, nothing is left behind if it is cancelled or fails.
@@ -358,7 +355,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     """
     values = cropped(given).values
     if np.isnan(values).any():
-        raise UserError("the map is NaN in places, and what is nowhere cannot be turned round; fill it first")
+        raise UserError("the map is NaN in places, and cannot be inverted; fill it first")
     width, height = given.width, given.height
     grid = Grid.for_picture(width, height, min(max(width, height), MOST_CELLS))
     warp = WarpMap(device, grid, (width, height))
@@ -367,7 +364,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
         with ForwardMap(warp) as forward:
             found = forward.read((width, height))
     except ValueError as error:
-        raise UserError(f"the map cannot be turned round: {error}") from None
+        raise UserError(f"the map cannot be inverted: {error}") from None
     finally:
         warp.release()
     return Displacement(found.astype(np.float32), 0, not given.forward)
@@ -426,9 +423,7 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
         for number, file in files.items():
             given = source.read(file)
             if device and (folded := folds(cropped(given).values)):
-                notices.append(
-                    f"{file.name} folds over itself in {folded} of its pixels, where no inverse can be right"
-                )
+                notices.append(f"{file.name} folds over itself in {folded} of its pixels, where it has no inverse")
             write(inverted(device, given) if device else given, number)
             progress.advance()
     return tuple(notices)

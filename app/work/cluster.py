@@ -21,7 +21,15 @@ CONNECTING = 10  # seconds that a scheduler has to answer
 WATCHING = 5  # seconds between two looks at whether a scheduler has any worker
 SCHEMES = ("tcp", "tls", "ws", "wss", "ucx")  # what a scheduler's address may begin with
 
-_here = threading.local()
+
+class _Here(threading.local):
+    """What a thread of a Dask worker has of its own: the process that does its work, and what that says."""
+
+    worker: Worker | None = None
+    inbox: queue.SimpleQueue[tuple[Worker, Heard]]
+
+
+_here = _Here()
 
 
 def _perform_on_worker(task: Piece) -> Outcome:
@@ -40,7 +48,7 @@ def _perform_on_worker(task: Piece) -> Outcome:
         return known is None or known.state in ("cancelled", "released", "forgotten")
 
     for _ in range(ATTEMPTS):
-        if not hasattr(_here, "worker"):
+        if _here.worker is None:
             _here.inbox = queue.SimpleQueue()
             _here.worker = Worker(_here.inbox)
         _here.worker.begin(task)
@@ -67,8 +75,9 @@ def _outcome_of(inbox: queue.SimpleQueue[tuple[Worker, Heard]], forgotten: Calla
 
 
 def _end_worker() -> None:
-    _here.worker.end()
-    del _here.worker
+    if _here.worker is not None:
+        _here.worker.end()
+        _here.worker = None
 
 
 def run_on_cluster(

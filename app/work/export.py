@@ -1,4 +1,7 @@
-"""A recipe made into files: a picture, an animation, a clip warped, maps; streamed frame by frame."""
+"""A recipe made into files: a picture, an animation, a clip warped, maps; streamed frame by frame.
+
+One long class: what a job simulates, looks up and writes must go in one order.
+"""
 
 from __future__ import annotations
 

@@ -89,6 +89,15 @@ class Outputs:
         """True if more than the end is written."""
         return self.is_animation or (self.file is None and self.maps is not None and self.maps.is_sequence)
 
+    def check(self) -> None:
+        """Raise `UserError` for options that do not go with what is written."""
+        if self.resume and not any(map(is_sequence, self.files)):
+            raise UserError(f"--resume keeps the files of a sequence, such as f.%04d.png, and {self.files[0]} is none")
+        if self.resume and self.stats is not None:
+            raise UserError("--stats has the numbers of all frames, and --resume makes only the missing ones; drop one")
+        if self.part != WHOLE and not self.has_frames:
+            raise UserError(f"--frames is for an animation, and {self.file} is a picture; write f.%04d.png or .mp4")
+
     def renamed(self, name: Callable[[Path], Path]) -> Outputs:
         """The same written to other files, each as `name` says."""
         file, stats, states = (path and name(path) for path in (self.file, self.stats, self.states))
@@ -176,23 +185,13 @@ class Job:
             raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
         if self.clip is not None and self.has_frames:
             self.clip.check(outputs.part)
-        if outputs.resume:
-            self._check_resumable()
-        if outputs.part != WHOLE and not self.has_frames:
-            raise UserError(f"only an animation has --frames, and {output} is a picture; write f.%04d.png or .mp4")
+        outputs.check()
         if self.clip is not None and self.recipe.mode == "density":
             raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
         for path in outputs.files:
             writable(path)
         if outputs.states is not None and os.path.exists(outputs.states) and not os.path.isdir(outputs.states):
             raise cannot_write(outputs.states, FileExistsError(errno.EEXIST, "it is a file"))
-
-    def _check_resumable(self) -> None:
-        outputs = self.outputs
-        if not any(is_sequence(path) for path in (outputs.file, outputs.maps and outputs.maps.path) if path):
-            raise UserError(f"only the files of a sequence can be kept by --resume, and {self.target} is none")
-        if outputs.stats is not None:
-            raise UserError("--stats has the numbers of all frames, and --resume makes only those that are missing")
 
     def _check_map_size(self, maps: MapOutput) -> None:
         size = result_size(self.recipe, self.picture)

@@ -1,4 +1,7 @@
-"""Driving the solver by a recipe: the one way to a warp, for the window and for the command line."""
+"""Driving the solver by a recipe: the one way to a warp, for the window and for the command line.
+
+One long class: a step, and going back by a checkpoint, need all parts of the simulation.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """Working on a document live: gestures become strokes, time goes on while something moves, every edit is kept.
 
-Knows the solver and no window; the clock comes in from outside, as ticks.
+Knows the solver and no window; the clock comes in from outside, as ticks. One long class: gestures, time and edits
+all move the playhead.
 """
 
 from __future__ import annotations

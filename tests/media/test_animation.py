@@ -641,7 +641,7 @@ def test_what_of_a_clip_is_not_understood_is_told(tmp_path: Path):
     )
     assert "linear and" in tagged(tmp_path / "a.mkv", "format=gbrp,setparams=color_trc=linear", "-c:v", "ffv1")
     said = tagged(tmp_path / "a.mp4", "format=yuv420p,tinterlace=interleave_top", "-flags", "+ildct+ilme")
-    assert said == "a.mp4: it is interlaced, and its fields are taken for whole frames"
+    assert said == "a.mp4: it is interlaced, and its fields are treated as whole frames"
     said = tagged(tmp_path / "a.mov", "format=yuv422p10,setfield=bff", "-flags", "+ildct+ilme", "-c:v", "prores_ks")
     assert "interlaced" in said
 

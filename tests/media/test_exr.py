@@ -145,7 +145,7 @@ def test_layers_go_where_the_colours_go_and_ids_stay_ids(device: Device, tmp_pat
 
 def test_what_an_output_cannot_hold_is_told_in_a_line(device: Device, tmp_path: Path):
     source, _ = a_shot(tmp_path / "shot.exr")
-    lost = "is without the picture's channels Z, diffuse.G, diffuse.R, instance.id and 7 more"
+    lost = "lacks the picture's channels Z, diffuse.G, diffuse.R, instance.id and 7 more"
     assert rendered(device, source, tmp_path / "out.png") == (f"out.png {lost}",)
     assert rendered(device, source, tmp_path / "f.%02d.exr", codec="none") == (f"f.%02d.exr {lost}",)
     (frame,) = read_exr(tmp_path / "f.00.exr")
@@ -265,10 +265,10 @@ def test_overscan_that_has_no_place_is_told(device: Device, tmp_path: Path):
     said = run(
         device, Job(recipe, read_picture(source), tmp_path, Outputs(tmp_path / "o.exr", codec="none")), Progress()
     ).notices
-    assert said == ("o.exr is without the picture's overscan (6 px beyond the display window)",)
+    assert said == ("o.exr lacks the picture's overscan (6 px beyond the display window)",)
     (found,) = read_exr(tmp_path / "o.exr")
     assert found.window("dataWindow") == found.window("displayWindow") == (10, 20, 121, 99)
     assert found.channels["Z"].shape == (80, 112)
     (said,) = rendered(device, source, tmp_path / "o.png")
-    assert "without the picture's channel Z; it is without the picture's overscan" in said
+    assert "lacks the picture's channel Z; it lacks the picture's overscan" in said
     assert said.endswith("; it begins at 0, 0 and not at 10, 20 as the display window")

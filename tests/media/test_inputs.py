@@ -514,5 +514,5 @@ def test_what_is_too_long_is_told(tmp_path: Path, fluidwarp: Run, words: list[st
     (tmp_path / "a.toml").write_text("duration = 0.02\n[fluid]\ngrid = 16\n")
     ran = fluidwarp(tmp_path, "render", "a.toml", "-i", "cat.png", *words)
     assert ran.returncode == 1
-    assert "a mistake in fluidwarp" not in ran.stderr
+    assert "a bug in fluidwarp" not in ran.stderr
     assert words[-1][:50] in ran.stderr

@@ -441,7 +441,7 @@ def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     encoded = imagecodecs.avif_encode(smooth(3), level=100, primaries=9, transfer=16, matrix=0)
     (tmp_path / "a.avif").write_bytes(encoded)
     assert read_picture(tmp_path / "a.avif").note == (
-        "a.avif: its colours are BT.2020 PQ (nclx) and are taken for sRGB"
+        "a.avif: its colours are BT.2020 PQ (nclx) and are treated as sRGB"
     )
     write_picture(tmp_path / "a.avif", Picture(smooth(3)))
     assert read_picture(tmp_path / "a.avif").note == ""
@@ -455,7 +455,7 @@ def test_further_frames_and_pages_are_told(tmp_path: Path, ending: str):
     pictures[0].save(path, kind, save_all=True, append_images=pictures[1:])
     what = {".tif": "pages", ".jpg": "pictures"}.get(ending, "frames")
     read = read_picture(path)
-    assert read.note == f"a{ending}: of its 3 {what} the first is taken"
+    assert read.note == f"a{ending}: of its 3 {what} only the first is used"
     assert np.abs(read.pixels.astype(int) - np.asarray(Image.open(path).convert("RGB"))).mean() < 1
     pictures[0].save(path)
     assert read_picture(path).note == ""
@@ -473,7 +473,7 @@ def test_what_of_a_tiff_is_lost_is_told(tmp_path: Path):
     tifffile.imwrite(
         path, np.dstack([noise(4, np.uint8), noise(2, np.uint8)]), photometric="rgb", planarconfig="contig"
     )
-    assert read_picture(path).note == "a.tif: of its 6 samples a pixel the first 4 are taken"
+    assert read_picture(path).note == "a.tif: of its 6 samples a pixel only the first 4 are used"
     Image.frombytes("CMYK", (32, 32), bytes(32 * 32 * 4)).save(path)
     assert read_picture(path).note == "a.tif: its inks (CMYK) become RGB"
     with tifffile.TiffWriter(path) as writer:  # a smaller version of the same picture is no page of its own

@@ -1342,7 +1342,7 @@ def test_what_of_a_file_is_lost_is_told_when_it_is_opened_and_not_again(robot: R
     page.save(tmp_path / "pages.tif", save_all=True, append_images=[page])
     robot.editor.files.open(tmp_path / "pages.tif")
     robot.until(lambda: not robot.editor.files.is_loading)
-    line = "pages.tif: of its 2 pages the first is taken"
+    line = "pages.tif: of its 2 pages only the first is used"
     assert [message.text for message in robot.editor.messages.shown] == [line]
     robot.editor.messages.shown.clear()
     robot.editor.exports.start(export_dialog(robot, tmp_path).job())

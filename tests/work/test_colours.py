@@ -85,8 +85,8 @@ def test_colours_are_kept(
 @pytest.mark.parametrize(
     ("colours", "name", "codec", "told"),
     [
-        (PQ, "b.mp4", None, "BT.2020 PQ, and 8 bits too few; write .mov"),
-        (HLG, "b.webm", None, "BT.2020 HLG, and 8 bits too few"),
+        (PQ, "b.mp4", None, "BT.2020 PQ, and 8 bits are too few; write .mov"),
+        (HLG, "b.webm", None, "BT.2020 HLG, and 8 bits are too few"),
         (PQ, "b.gif", None, r"it cannot tell that the colours of .*a\.mov are BT.2020 PQ; write .mov"),
         (WIDE, "b.%02d.tif", None, "it cannot tell that the colours .* are BT.2020; write"),
     ],

@@ -424,7 +424,7 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
     sequence = MapOutput(tmp_path / "m.%02d.exr")
     with pytest.raises(UserError, match=r"numbers the maps of an animation and .*out\.png is a picture"):
         render(device, WHIRL, picture, tmp_path / "out.png", maps=sequence)
-    with pytest.raises(UserError, match="only an animation has --frames"):
+    with pytest.raises(UserError, match="--frames is for an animation"):
         render(device, WHIRL, picture, tmp_path / "out.png", part=(1, 2))
     with pytest.raises(UserError, match=r"clip\.mkv is a clip"):
         render(device, 'mode = "density"\n' + WHIRL, clip, tmp_path / "out.mp4")

@@ -186,7 +186,7 @@ def test_what_cannot_be_met_is_objected_to():
     recipe = Recipe.model_validate(frozen({"handle": handles}))
     assert list(objections(recipe.handle, recipe.pin, EXTENT)) == [
         "handle[1] takes hold of nothing: (1.2, 0.5) is outside the picture",
-        "handle[2] is led to the picture's edge only: (0.2, -0.5) is outside the picture",
+        "handle[2] goes only to the picture's edge: (0.2, -0.5) is outside the picture",
         "handle[3] and handle[4] cross each other's way",
         "handle[5] and handle[6] hold the same place and are led apart",
         "handle[7] and handle[8] are led 5.65 times as far apart as they lie",

@@ -130,7 +130,7 @@ def test_pages_of_a_tiff_become_a_sequence(device: Device, tmp_path: Path, dtype
 
 def test_a_still_takes_the_first_and_says_so(device: Device, tmp_path: Path):
     notices = applied(device, tmp_path, animated(tmp_path / "a.gif"), "b.png")
-    assert notices == ("a.gif: of its 5 frames the first is taken",)
+    assert notices == ("a.gif: of its 5 frames only the first is used",)
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "b.png")), shown(tmp_path / "a.gif")[0][0][..., :3])
 
 

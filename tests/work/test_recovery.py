@@ -663,7 +663,9 @@ def test_another_picture_of_the_same_name_is_told_in_the_window(starter: Starter
     write_picture(tmp_path / "pattern.png", Picture(np.zeros((180, 240, 3), np.uint8)))
     answer(robot, "Restore")
     (message,) = robot.editor.messages.shown
-    assert message.text.startswith("All strokes are here, but pattern.png is not the same picture any more")
+    assert message.text.startswith(
+        "All strokes are restored, but pattern.png is not the picture that they were made on"
+    )
 
 
 def test_trouble_with_the_journal_is_told_once_and_painting_goes_on(

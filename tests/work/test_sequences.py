@@ -225,7 +225,7 @@ def test_a_killed_task_keeps_its_frames(folder: Path, fluidwarp: Run):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["-o", "w.mp4"], "only the files of a sequence can be kept by --resume, and w.mp4 is none"),
+        (["-o", "w.mp4"], "--resume keeps the files of a sequence, such as f.%04d.png, and w.mp4 is none"),
         (["-o", "w.%04d.exr", "--stats", "s.json"], "--stats has the numbers of all frames"),
     ],
 )
@@ -320,7 +320,7 @@ def test_what_is_nowhere_cannot_be_turned_round_or_flow(folder: Path, fluidwarp:
     values[3, 4] = np.nan
     write_map(folder / "m.npy", Displacement(values))
     ran = fluidwarp(folder, "convert", "m.npy", "-o", "n.npy", "--invert")
-    assert (ran.returncode, "cannot be turned round" in ran.stderr) == (1, True)
+    assert (ran.returncode, "cannot be inverted" in ran.stderr) == (1, True)
     (folder / "b.toml").write_text('map = "m.npy"\n' + RECIPE)
     ran = fluidwarp(folder, "render", "b.toml", "plate.1001.exr", "-o", "w.png")
     assert (ran.returncode, "1 of its pixels are NaN" in ran.stderr) == (1, True)

@@ -20,7 +20,7 @@ def read(file: Path, max_pixels: int) -> Picture:
     with pillow.opened("AVIF", file, max_pixels) as image:
         codes = re.search(rb"colrnclx(....)", start_of(file), re.DOTALL)
         colours = unusual_colours(*struct.unpack(">HH", codes[1])) if codes else ""
-        losses = [f"its colours are {colours} (nclx) and are taken for sRGB"] if colours else []
+        losses = [f"its colours are {colours} (nclx) and are treated as sRGB"] if colours else []
         pixels = None
         if (deep := _bits(file)) > 8:
             import imagecodecs

@@ -57,7 +57,7 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
     with suppress(Exception):  # those after the first may be damaged
         if (count := getattr(image, "n_frames", 1)) > 1:
             frames = "pictures" if image.format in ("JPEG", "MPO") else "frames"
-            losses.append(f"of its {count} {frames} the first is taken")
+            losses.append(f"of its {count} {frames} only the first is used")
     return Picture(
         upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
         icc=icc,

@@ -72,7 +72,7 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
     if pixels.shape[2] > 4:  # further samples are masks and spot colours
         taken = 4 if page.extrasamples else 3
-        losses.append(f"of its {pixels.shape[2]} samples a pixel the first {taken} are taken")
+        losses.append(f"of its {pixels.shape[2]} samples a pixel only the first {taken} are used")
         pixels = pixels[..., :taken]
 
     premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
@@ -107,7 +107,7 @@ def _losses(tiff: Any) -> list[str]:
     with suppress(Exception):  # pages after the first may be damaged
         pages = sum(not page.subfiletype & 5 for page in tiff.pages)  # neither smaller versions nor masks
         if pages > 1:
-            losses.append(f"of its {pages} pages the first is taken")
+            losses.append(f"of its {pages} pages only the first is used")
     if (kind := tiff.pages.first.dtype) is not None and kind.itemsize > (2 if kind.kind == "u" else 4):
         losses.append(f"its {8 * kind.itemsize} bits become {16 if kind.kind == 'u' else 32}")
     return losses

@@ -35,7 +35,7 @@ def draw(
         _zoom(ui, workspace, do)
     if state.tool_name == "handle" and not session.recipe.leads and canvas.width > ui.px(HINT):
         with ui.floating("how", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
-            ui.text("  Drag a point where it shall go. Click to pin one where it is.  ", size=14)
+            ui.text("  Drag a point to where it should go. Click to pin one where it is.  ", size=14)
     elif preferences.hint and canvas.width > ui.px(HINT):
         _hint(ui, canvas, preferences)
     if state.statistics:

@@ -76,7 +76,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     label, recipe = state.selected, session.recipe
     if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
         ui.wrapped(
-            "Drag a point of the picture where it shall go; a click pins one. Click one to select it.",
+            "Drag a point of the picture to where it should go, or click to pin it. Click one to select it.",
             ui.palette.dim,
             13,
         )
@@ -86,7 +86,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         ui.dim(_whereabouts(workspace, label))
         slid = ui.slider(
             "held radius", "Reach", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
-            title="How far it reaches", more="It is led two of that at most.",
+            title="How far it reaches", more="It goes at most twice as far.",
         )  # fmt: skip
         _set_held(session, label, f"Reach of a {led.kind}", slid, radius=slid.value)
         slid = ui.slider(
@@ -104,7 +104,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             do("remove")
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
     away = sum(held.is_away(session.extent) for held in session.held)
-    ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all" + (f", {away} not where led" if away else ""))
+    ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all" + (f", {away} not there yet" if away else ""))
 
 
 def _whereabouts(workspace: Workspace, label: str) -> str:

@@ -53,7 +53,7 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         with ui.enabled(some):
             slid = ui.slider(
                 "amount", "Amount", part, 0, 1, PERCENT, 1.0, width=across, title="Amount of the warp",
-                more="Goes back along the way the picture came, so that nothing folds on the way.",
+                more="Goes back along the path of the warp, so that nothing folds on the way.",
             )  # fmt: skip
         if slid.changed and some:
             session.seek(round(slid.value * session.end))
