@@ -20,7 +20,7 @@ from support.khronos import Programs
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What waits for a window comes first, so that no process is left alone with it in the end."""
-    items.sort(key=lambda item: "desk" not in getattr(item, "fixturenames", ()))
+    items.sort(key=lambda item: not hasattr(getattr(item, "module", None), "Desk"))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -190,7 +190,7 @@ def folds(values: np.ndarray) -> int:
     for rows in _strips(values):
         # central differences, which want a row more on each side
         low, high = max(0, rows.start - 1), min(height, rows.stop + 1)
-        down, along = np.gradient(values[low:high] * np.float64(longest), axis=(0, 1))
+        down, along = np.gradient(longest * values[low:high].astype(np.float64), axis=(0, 1))
         inner = slice(rows.start - low, min(height, rows.stop) - low)
         down, along = down[inner], along[inner]
         count += int(((1 + along[..., 0]) * (1 + down[..., 1]) <= along[..., 1] * down[..., 0]).sum())
