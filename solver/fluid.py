@@ -43,7 +43,7 @@ class Fluid(Scheme):
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
         super().__init__(device, grid, params)
         self.velocity = device.double_field(grid.size, 2, "velocity")
-        # g: half the last pressure gradient, which the next step takes off where the fluid departs.
+        # g: half of what pressure did in the last step, which the next one takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         self._trace = Trace(device, grid.size)
         self._viscosity_solver = Viscosity(device, grid.size, grid.spacing)
@@ -53,7 +53,6 @@ class Fluid(Scheme):
         self._energy_bound = EnergyBound(device, grid.nx * grid.ny, packed)
         # What the solvers hold of the masks; None if they have to look.
         self._coefficients_of: object = None
-        self._solids_of: np.ndarray | None = None
         self._has_new_solids = True
 
     # -- the paper's step -------------------------------------------------------------------------------------------
@@ -83,7 +82,7 @@ class Fluid(Scheme):
     def _add_force(self, forces: Forces, dt: float) -> Blocks:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn: equation (S2).
 
-        g is half the last pressure gradient; the projection takes off the other half where the fluid arrives. So
+        g is half of what pressure did in the last step; the projection takes off the rest where the fluid arrives. So
         pressure acts along the path by the trapezoidal rule, which is of second order in time.
         """
         self._check_source()
@@ -126,7 +125,7 @@ class Fluid(Scheme):
         """
         with self.device.stage("diffuse"):
             try:
-                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.drag)))
+                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.driving_speed)))
             except ValueError:
                 self._forget_last_step()
                 raise
@@ -356,10 +355,8 @@ class Fluid(Scheme):
             self._coefficients_of = key
 
     def _take_up_solids(self) -> None:
-        """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""
+        """Hand the solid cells to the projection, which looks whether they are others: most paint only thickens."""
         if self._has_new_solids:
-            solid = self.solid.get()
-            if self._solids_of is None or not np.array_equal(solid, self._solids_of):
-                self._pressure_solver.set_solids(self.solid if solid.any() else None)
-                self._solids_of = solid
+            solid = self.solid.get() >= 128
+            self._pressure_solver.set_solids(solid if solid.any() else None)
             self._has_new_solids = False

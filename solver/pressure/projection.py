@@ -23,11 +23,11 @@ WANTED_LEFT = 1e-3
 
 
 class Projection:
-    """The projection u <- u - grad p with lap p = div u - s (P1 to P3), and no flow through edges and solid cells.
+    """The projection u <- u - grad q with lap q = div u - s (P1 to P3), and no flow through edges and solid cells.
 
-    What is kept on the GPU is p over the side of a cell along x, in lengths / s. Conjugate gradients solve for what the
-    pressure differs from the one expected, the last two's trend: of a flow that changes little one iteration is enough,
-    and float32 sets no floor to the divergence.
+    What is kept on the GPU is p, q over the side of a cell along x, in lengths / s. Conjugate gradients solve for what
+    the pressure differs from the one expected, the last two's trend: of a flow that changes little one iteration is
+    enough, and float32 sets no floor to the divergence.
 
     Args:
         device: the device.
@@ -67,11 +67,11 @@ class Projection:
             self._aspect = spacing[0] / spacing[1]
             self._prepare()
 
-    def set_solids(self, solid: Field | None) -> None:
-        """Close every face of the solid cells (R8 at cells, 1 = solid), and of no others; None for no solids at all."""
-        self._solid = None if solid is None else solid.get() >= 128
-        self._regions = None
-        self._prepare()
+    def set_solids(self, solid: np.ndarray | None) -> None:
+        """Close every face of the solid cells, (ny, nx) true there, and of no others; None for no solids at all."""
+        if not np.array_equal(np.asarray(solid), np.asarray(self._solid)):
+            self._solid, self._regions = solid, None
+            self._prepare()
 
     def _prepare(self) -> None:
         self._cycle.release()
@@ -132,7 +132,7 @@ class Projection:
 
     @property
     def pressure(self) -> np.ndarray:
-        """The last pressure, (ny, nx) float32, lengths^2 / s: it includes the time step.
+        """The last q, (ny, nx) float32, lengths^2 / s: it includes the time step.
 
         After a warm start what that step changed is a little smoother than what was subtracted; see `gradient.frag`.
         """
