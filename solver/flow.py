@@ -16,7 +16,7 @@ from solver.params import Walls
 
 @dataclass(frozen=True)
 class Flow:
-    """A flow on the faces of a grid: time, velocity, and half the last pressure gradient where that is known."""
+    """A flow on the faces of a grid: time, velocity, and g of (S2) where that is known."""
 
     time: float
     velocity: Field

@@ -43,7 +43,7 @@ class Fluid(Scheme):
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
         super().__init__(device, grid, params)
         self.velocity = device.double_field(grid.size, 2, "velocity")
-        # g: half the last pressure gradient, which the next step takes off where the fluid departs.
+        # g: half of what pressure did in the last step, which the next one takes off where the fluid departs.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         self._trace = Trace(device, grid.size)
         self._flux = device.field(grid.size, 2, "velocity times the open part of the faces")
@@ -86,7 +86,7 @@ class Fluid(Scheme):
     def _add_force(self, forces: Forces, dt: float) -> Blocks:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn: equation (S2).
 
-        g is half the last pressure gradient; the projection takes off the other half where the fluid arrives. So
+        g is half of what pressure did in the last step; the projection takes off the rest where the fluid arrives. So
         pressure acts along the path by the trapezoidal rule, which is of second order in time.
         """
         self._check_source()
@@ -132,7 +132,7 @@ class Fluid(Scheme):
         with self.device.stage("diffuse"):
             try:
                 weights = self._pressure_solver.weights
-                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.drag)), weights)
+                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.driving_speed)), weights)
             except ValueError:
                 self._forget_last_step()
                 raise
@@ -372,7 +372,7 @@ class Fluid(Scheme):
         """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""
         solid = self._look_at_solids()
         if solid is not self._solids_of and (self._solids_of is None or not np.array_equal(solid, self._solids_of)):
-            self._pressure_solver.set_solids(self.solid if solid.any() else None)
+            self._pressure_solver.set_solids(solid / np.float32(255) if solid.any() else None)
         self._solids_of = solid
 
     def _look_at_solids(self) -> np.ndarray:

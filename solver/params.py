@@ -52,7 +52,7 @@ class Walls:
         return NoSlip(left, right, top, bottom, everywhere)
 
     @property
-    def drag(self) -> tuple[float, ...]:
+    def driving_speed(self) -> tuple[float, ...]:
         """The speeds of the walls that it sticks to, 0 for the others."""
         return tuple(speed if sticks else 0.0 for speed, sticks in zip(self.speed, self.no_slip, strict=False))
 

@@ -195,7 +195,10 @@ class Scheme(ABC):
 
     @abstractmethod
     def pressure(self) -> np.ndarray:
-        """The last projection's q, (ny, nx) float32, lengths^2 / s: pressure times dt."""
+        """The last projection's q, (ny, nx) float32, lengths^2 / s: what of pressure times dt acts there.
+
+        All of it in the paper's scheme and in a first step of `Fluid`, half of it in the later ones: see (S2).
+        """
 
     @property
     def u(self) -> np.ndarray:

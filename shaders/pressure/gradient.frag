@@ -15,8 +15,8 @@ uniform sampler2D u_change;
 uniform sampler2D u_before;
 uniform float u_trend;
 
-// Parts of A p that are added to the change: at 1/8 nothing is left of a checkerboard. A trend of which nothing came in
-// would never fade.
+// Parts of A p that are added to the change: 1/8 would take away all of a checkerboard. What is kept loses half of it; what
+// makes the trend nearly all, but not all, as one that is in the expected pressure already would then never fade.
 const float KEPT = 0.0625, TREND = 0.12;
 
 in vec2 v_uv;

@@ -2,7 +2,7 @@
 // of any cubic: texel (i + 2, k + 1) holds 2 x 2 faces, of columns i and i + 1, rows 2k and 2k + 1. It reaches as far beyond
 // the walls as the cubic does, with images of the faces inside. Only where no face is on a wall or beyond one; with EDGES
 // anywhere.
-// u_velocity (w0), with CARRIED u_carried (g, half the last pressure gradient): MAC faces, lengths / s. With FORCE: u_force,
+// u_velocity (w0), with CARRIED u_carried (g, half of what pressure did last): MAC faces, lengths / s. With FORCE: u_force,
 // MAC faces, lengths / s^2, and u_impulse, the force's time law integrated over the tick, seconds.
 // reads: 12
 #ifdef EDGES

@@ -1,5 +1,5 @@
 // Advance: S'(x) = (x_d - x) + S(x_d), the submap's displacement carried one step by the fluid (characteristic mapping
-// method, equation S4 of solver/README.md; paper section 4.1, eq. (5) without diffusion); x + S'(x) stays in the picture.
+// method, equation S4 of solver/README.md; paper section 4.1, eq. (5) without diffusion); x + S'(x) stays in the grid.
 // u_displacement (S): cell centres, longer sides; u_spacing: sides of a cell, longer sides; u_trace: x_d - x, cells.
 // With INNER the grid is a window, and over the last FADING cells before a side that is not the picture's edge (1 in
 // u_inner: left, right, top, bottom) it is carried less and less, so that there is no step in the map at the side.

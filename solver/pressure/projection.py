@@ -29,11 +29,11 @@ ROUNDING = 2.5 * float(np.finfo(np.float32).eps) ** 2
 
 
 class Projection:
-    """The projection u <- u - grad p with lap p = div u - s (P1 to P3), and no flow through edges and solid cells.
+    """The projection u <- u - grad q with lap q = div u - s (P1 to P3), and no flow through edges and solid cells.
 
-    What is kept on the GPU is p over the side of a cell along x, in lengths / s. Conjugate gradients solve for what the
-    pressure differs from the one expected, the last two's trend: of a flow that changes little one iteration is enough,
-    and float32 sets no floor to the divergence.
+    What is kept on the GPU is p, q over the side of a cell along x, in lengths / s. Conjugate gradients solve for what
+    the pressure differs from the one expected, the last two's trend: of a flow that changes little one iteration is
+    enough, and float32 sets no floor to the divergence.
 
     Args:
         device: the device.
@@ -74,9 +74,9 @@ class Projection:
             self._aspect = spacing[0] / spacing[1]
             self._prepare()
 
-    def set_solids(self, solid: Field | None) -> None:
-        """Close every face of the solid cells (R8 at cells, 1 = solid), and of no others; None for no solids at all."""
-        self._solid = None if solid is None else solid.get() / np.float32(255)
+    def set_solids(self, solid: np.ndarray | None) -> None:
+        """Close the faces of solid cells, (ny, nx), by the part of each that is solid, 0-1; None for no solids at all."""
+        self._solid = None if solid is None else np.asarray(solid, np.float32)
         self._is_partial = bool(self._solid is not None and ((self._solid > 0) & (self._solid < 1)).any())
         self._regions = None
         self._prepare()
@@ -145,7 +145,7 @@ class Projection:
 
     @property
     def pressure(self) -> np.ndarray:
-        """The last pressure, (ny, nx) float32, lengths^2 / s: it includes the time step.
+        """The last q, (ny, nx) float32, lengths^2 / s: it includes the time step.
 
         After a warm start what that step changed is a little smoother than what was subtracted; see `gradient.frag`.
         """

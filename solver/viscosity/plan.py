@@ -44,8 +44,8 @@ class Plan:
     """How a viscous step is solved; see `plan_for`.
 
     Attributes:
-        method: "smooth": v* is smoothed, by Chebyshev's weights; "direct": the grid is so small that its inverse is at
-            hand; "cg": by conjugate gradients, each iteration with one multigrid cycle.
+        method: "smooth": v* is smoothed, by Chebyshev's weights; "direct": the grid is so small that its transform or
+            inverse is at hand; "cg": by conjugate gradients, each iteration with one multigrid cycle.
         sweeps: smoothing sweeps; of conjugate gradients, before and after the coarser levels, or of one viscosity only
             after them.
         tolerance: of the conjugate gradients.

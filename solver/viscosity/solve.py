@@ -59,7 +59,7 @@ class Viscosity:
 
     def set_coefficients(self, viscosity: Field, solid: Field, dt: float, walls: Walls) -> None:
         """Take up another viscosity (cells, lengths^2 / s), solid cells (1 = solid), time step (s) or walls."""
-        self._wall_speed = walls.drag
+        self._wall_speed = walls.driving_speed
         hx, hy = self.spacing
         kappa = dt / (hx * hy)
         is_solid, amount = solid.get() == 255, viscosity.get()

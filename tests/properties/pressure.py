@@ -150,9 +150,8 @@ def leave(device: Device, size: Size, kind: Callable[..., np.ndarray], rng: np.r
     solid, spacing = kind(size, rng), random_spacing(size, rng)
     aspect, faces = spacing[0] / spacing[1], open_faces(solid)
     projection, field = Projection(device, size, spacing), device.double_field(size, 2)
-    frozen = device.upload(solid.astype(np.uint8) * 255)
     if kind is not open_box:
-        projection.set_solids(frozen)
+        projection.set_solids(solid)
     velocity, change = random_velocity(size, rng), 0.05 * random_velocity(size, rng)
     worst, most = 0.0, 0
     for step in range(3):
@@ -167,7 +166,7 @@ def leave(device: Device, size: Size, kind: Callable[..., np.ndarray], rng: np.r
         assert left <= 1e-3 * before, f"{kind.__name__} {size}: {left / before:.2e} left"
         worst = max(worst, float(left / before) if before else 0.0)
     assert most <= MASKS[kind], f"{kind.__name__} {size}: {most} cycles"
-    for item in (projection, field, frozen):
+    for item in (projection, field):
         item.release()
     return {"left": worst, f"cycles of {kind.__name__}": most}
 
@@ -202,14 +201,14 @@ def check_source(device: Device, seed: int) -> dict[str, float]:
     mean = np.bincount(region.ravel(), asked.ravel()) / np.maximum(np.bincount(region.ravel()), 1)
     wanted = np.where(solid, 0.0, asked - mean[region]) / max(size)
     projection, field = Projection(device, size), device.double_field(size, 2)
-    source, frozen = device.upload(asked), device.upload(solid.astype(np.uint8) * 255)
-    projection.set_solids(frozen)
+    source = device.upload(asked)
+    projection.set_solids(solid)
     cycles = projection.project(field, source=source)
     left = np.linalg.norm(divergence(field.read.get(), 1.0) - wanted)
     # A region of one cell wants exactly nothing; what float32 makes of its mean is left aside.
     assert left <= 1e-3 * np.linalg.norm(wanted) + 1e-6 / max(size)
     assert cycles <= 25
-    for item in (projection, field, source, frozen):
+    for item in (projection, field, source):
         item.release()
     return {"left": float(left / max(np.linalg.norm(wanted), 1e-30)), "cycles": cycles}
 
@@ -220,7 +219,7 @@ def check_again_and_again(device: Device, seed: int) -> dict[str, float]:
     kind = list(MASKS)[seed % len(MASKS)]
     size = int(rng.integers(8, 40)), int(rng.integers(8, 40))
     projection, field = Projection(device, size), device.double_field(size, 2)
-    frozen = device.upload(kind(size, rng).astype(np.uint8) * 255)
+    frozen = kind(size, rng)
     source = device.upload(rng.standard_normal(size[::-1]).astype(np.float32)) if rng.random() < 0.3 else None
     if kind is not open_box:
         projection.set_solids(frozen)
@@ -232,7 +231,7 @@ def check_again_and_again(device: Device, seed: int) -> dict[str, float]:
         projection.project(field, cycles, source, warm=True)
     moved = np.linalg.norm(field.read.get() - first) / np.linalg.norm(velocity)
     assert moved <= 1e-2, f"{kind.__name__} {size}: {moved:.2e}"
-    for item in (projection, field, frozen, *([source] if source else [])):
+    for item in (projection, field, *([source] if source else [])):
         item.release()
     return {"moved": float(moved)}
 
@@ -247,12 +246,11 @@ def check_symmetry(device: Device, seed: int) -> dict[str, float]:
 
     def project(solid: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         projection, field = Projection(device, solid.shape[::-1]), device.double_field(solid.shape[::-1], 2)
-        frozen = device.upload(solid.astype(np.uint8) * 255)
-        projection.set_solids(frozen if solid.any() else None)
+        projection.set_solids(solid if solid.any() else None)
         field.read.set(velocity)
         projection.project(field, 20)
         result = field.read.get()
-        for item in (projection, field, frozen):
+        for item in (projection, field):
             item.release()
         return result
 

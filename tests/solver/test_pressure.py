@@ -111,13 +111,12 @@ def project(
     """The velocity after a projection on the GPU from a cold start."""
     size = solid.shape[1], solid.shape[0]
     pressure, field = Projection(device, size, (aspect / max(size), 1 / max(size))), device.double_field(size, 2)
-    frozen = device.upload(solid.astype(np.uint8) * 255) if solid.any() else None
     wanted = None if source is None else device.upload(source)
-    pressure.set_solids(frozen)
+    pressure.set_solids(solid if solid.any() else None)
     field.read.set(velocity)
     pressure.project(field, cycles, wanted)
     result = field.read.get()
-    for item in (pressure, field, frozen, wanted):
+    for item in (pressure, field, wanted):
         if item is not None:
             item.release()
     return result
@@ -179,8 +178,7 @@ SIZES_TO_REACH = [(512, 512), (333, 217), (512, 100), (257, 255)]
 def worst_left_over(device: Device, grid: Grid, solid: np.ndarray, seeds: range) -> float:
     """What the projection leaves of the divergence after the cycles it takes itself, relative."""
     pressure, field = Projection(device, grid.size), device.double_field(grid.size, 2)
-    frozen = device.upload(solid.astype(np.uint8) * 255)
-    pressure.set_solids(frozen if solid.any() else None)
+    pressure.set_solids(solid if solid.any() else None)
     left = []
     for seed in seeds:
         velocity = brushes(grid, seed)
@@ -188,7 +186,7 @@ def worst_left_over(device: Device, grid: Grid, solid: np.ndarray, seeds: range)
         pressure.project(field)
         before = np.linalg.norm(divergence(closed(velocity, solid)))
         left.append(float(np.linalg.norm(divergence(field.read.get())) / before))
-    for item in (pressure, field, frozen):
+    for item in (pressure, field):
         item.release()
     return max(left)
 
@@ -215,8 +213,7 @@ def test_faces_worked_out_are_the_faces_stored(device: Device) -> None:
     size = (333, 217)
     velocity, pressure = device.double_field(size, 2), Projection(device, size)
     results = []
-    nowhere = device.field(size, 1, "nowhere solid", "f1")
-    for solid in (None, nowhere):
+    for solid in (None, np.zeros(size[::-1], bool)):
         pressure.set_solids(solid)
         velocity.read.set(brushes(Grid(*size), 1))
         pressure.project(velocity, 12)
