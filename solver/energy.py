@@ -6,7 +6,7 @@ import math
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.reduction import Reduction
+from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.limits import LARGEST_SPEED
 from solver.packing import PackedFaces
 
@@ -25,8 +25,9 @@ class EnergyBound:
     def __init__(self, device: Device, cells: int, packed: tuple[int, int]) -> None:
         self.device = device
         self._cells = cells
-        self._squares = device.field(packed, 2, "energies")
-        self._sum = Reduction(device, packed, 2, "sum")
+        blocks = blocks_of(packed)
+        self._squares = device.field(blocks, 2, "energies")
+        self._sum = Reduction(device, blocks, 2, "sum")
         self._bounded = PackedFaces(device, packed, "bounded velocity")
 
     def apply(self, w3: PackedFaces, before: Field, wall_speed: float = 0.0) -> PackedFaces:
@@ -35,7 +36,7 @@ class EnergyBound:
         Raises:
             ValueError: if either is not finite, or beyond all measure.
         """
-        self.device.pass_("step/energy.frag")(self._squares, **w3.inputs(), departed=before)
+        self.device.pass_("step/energy.frag")(self._squares, **w3.inputs(), departed=before, side=SIDE)
         after, departed = self._sum(self._squares).tolist()
         if not (departed <= self._cells * LARGEST_SPEED**2 and math.isfinite(after)):
             raise ValueError("the forces and brushes of this step are beyond all measure")
