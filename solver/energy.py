@@ -7,7 +7,7 @@ from typing import Any
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.reduction import Reduction
+from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.limits import LARGEST_SPEED
 from solver.packing import PackedFaces
 
@@ -26,8 +26,9 @@ class EnergyBound:
     def __init__(self, device: Device, cells: int, packed: tuple[int, int]) -> None:
         self.device = device
         self._cells = cells
-        self._squares = device.field(packed, 2, "energies")
-        self._sum = Reduction(device, packed, 2, "sum")
+        blocks = blocks_of(packed)
+        self._squares = device.field(blocks, 2, "energies")
+        self._sum = Reduction(device, blocks, 2, "sum")
         self._bounded = PackedFaces(device, packed, "bounded velocity")
 
     def apply(
@@ -39,7 +40,7 @@ class EnergyBound:
             ValueError: if either is not finite, or beyond all measure.
         """
         energy = self.device.pass_("step/energy.frag", **({"PARTIAL": 1} if weights else {}))
-        energy(self._squares, **w3.inputs(), departed=before, **(weights or {}))
+        energy(self._squares, **w3.inputs(), departed=before, side=SIDE, **(weights or {}))
         after, departed = self._sum(self._squares).tolist()
         if not (departed <= self._cells * LARGEST_SPEED**2 and math.isfinite(after)):
             raise ValueError("the forces and brushes of this step are beyond all measure")

@@ -1,15 +1,28 @@
-// Steepness: |grad D|^2 at every corner that four cells share, by the differences of their means.
-// u_displacement (D): cell centres, longer sides; u_spacing: distances of the centres, longer sides.
-// reads: 4
+// Steepness: the largest |grad D|^2 at the corners, each shared by four cells, of a block, by differences of their means.
+// u_displacement (D): cell centres, longer sides; u_spacing: distances of the centres, longer sides; u_side: corners along
+// a block.
+// reads: 144
 uniform sampler2D u_displacement;
 uniform vec2 u_spacing;
+uniform float u_side;
 layout(location = 0) out float out_steepness;
 
 void main() {
-    vec2 texel = 1.0 / vec2(textureSize(u_displacement, 0)), a = gl_FragCoord.xy * texel, b = a + texel;
-    vec2 upper_left = texture(u_displacement, a).rg, upper_right = texture(u_displacement, vec2(b.x, a.y)).rg;
-    vec2 lower_left = texture(u_displacement, vec2(a.x, b.y)).rg, lower_right = texture(u_displacement, b).rg;
-    vec2 across = upper_right + lower_right - upper_left - lower_left, down = lower_left + lower_right - upper_left - upper_right;
-    vec4 slope = 0.5 * vec4(across, down) / u_spacing.xxyy;
-    out_steepness = dot(slope, slope);
+    vec2 size = vec2(textureSize(u_displacement, 0)), texel = 1.0 / size;
+    vec2 first = u_side * floor(gl_FragCoord.xy) + 0.5, end = min(first + u_side, size - 1.0);
+    out_steepness = 0.0;
+    for (float y = first.y; y < end.y; ++y) {
+        vec2 upper_left = texture(u_displacement, vec2(first.x, y) * texel).rg;
+        vec2 lower_left = texture(u_displacement, vec2(first.x, y + 1.0) * texel).rg;
+        for (float x = first.x; x < end.x; ++x) {
+            vec2 upper_right = texture(u_displacement, vec2(x + 1.0, y) * texel).rg;
+            vec2 lower_right = texture(u_displacement, vec2(x + 1.0, y + 1.0) * texel).rg;
+            vec2 across = upper_right + lower_right - upper_left - lower_left;
+            vec2 down = lower_left + lower_right - upper_left - upper_right;
+            vec4 slope = 0.5 * vec4(across, down) / u_spacing.xxyy;
+            out_steepness = max(out_steepness, dot(slope, slope));
+            upper_left = upper_right;
+            lower_left = lower_right;
+        }
+    }
 }

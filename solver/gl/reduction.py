@@ -9,8 +9,13 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 
-_SIDE = 8  # texels along the blocks that become one
+SIDE = 8  # texels along the blocks that become one
 _READABLE = 40  # texels across that are cheaper to read back than to shrink again
+
+
+def blocks_of(size: tuple[int, int]) -> tuple[int, int]:
+    """How many blocks there are across and down."""
+    return -(-size[0] // SIDE), -(-size[1] // SIDE)
 
 
 class Reduction:
@@ -28,13 +33,13 @@ class Reduction:
         self._shrink = device.pass_("gl/shrink.frag", **({"SUM": 1} if kind == "sum" else {}))
         self._levels: list[Field] = []
         while max(size) > _READABLE:
-            size = -(-size[0] // _SIDE), -(-size[1] // _SIDE)
+            size = blocks_of(size)
             self._levels.append(device.field(size, components, f"{kind} {size[0]} x {size[1]}"))
 
     def __call__(self, field: Field) -> np.ndarray:
         """One number a component, float64; waits for the GPU."""
         for level in self._levels:
-            self._shrink(level, field=field, side=_SIDE)
+            self._shrink(level, field=field, side=SIDE)
             field = level
         values = field.get().reshape(-1, field.components)
         return values.max(axis=0).astype(np.float64) if self._kind == "max" else values.sum(axis=0, dtype=np.float64)

@@ -38,8 +38,8 @@ class ConjugateGradients:
         self._sum = Reduction(device, ringed, 4, "sum")
         # Of the guess, with the strains on the far walls, which lie in the ring.
         self._guess_products = device.field(ringed, 4, "viscous products of the guess")
-        self._change_product = device.field(ringed, 1, "viscous product of the change")
-        self._change_sum = Reduction(device, ringed, 1, "sum")
+        self._more_products = device.field(ringed, 2, "viscous products of the change and of the residual")
+        self._sum_of_more = Reduction(device, ringed, 2, "sum")
         self.iterations = 0
 
     def solve(
@@ -50,19 +50,20 @@ class ConjugateGradients:
         precondition: Callable[[PackedFaces], PackedFaces],
         tolerance: float,
         most: int,
+        cycle_leaves: float = inf,
     ) -> PackedFaces:
         """The solution, from about the best first guess in the plane of `v_star` and the last step's `change`.
 
         `change` becomes what this step has made of `v_star`. Ends when less than the part `tolerance`^2 of the energy
         is left, or after so many iterations at most. What is left is the rest of the geometric series of what
-        iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r.
+        iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r;
+        if it is known to leave no more than the part `cycle_leaves` of the energy, the first may be the last without
+        A z and its products: what the guess v* + d lacks is r . A^-1 r, no more than r . r, as A is no less than 1.
         """
         before: dict[str, Any] = {"parts": (1.0, 1.0), **v_star.inputs(), **change.read.inputs("change_")}
         self._guess(before, rhs)
-        bv, bd, vav, vad, dad = (
-            *self._sum(self._guess_products).tolist(),
-            float(self._change_sum(self._change_product)[0]),
-        )
+        bv, bd, vav, vad = self._sum(self._guess_products).tolist()
+        dad, rr = self._sum_of_more(self._more_products).tolist()
         self.iterations = 0
         if rhs is v_star and not vav:  # at rest
             for field in change.read.fields:
@@ -75,6 +76,9 @@ class ConjugateGradients:
             self._guess(before, rhs)
         else:
             found -= lost
+            if cycle_leaves * rr <= tolerance**2 * found:
+                self.iterations = 1
+                return self._finish(change, before, precondition(self._r.read), 1.0)
         curvature, gained_before = 0.0, inf
         while True:
             is_first = not self.iterations
@@ -97,7 +101,7 @@ class ConjugateGradients:
         """The residual of a v* + c d, (a, c) its `parts`, and the products that tell the best ones."""
         x, y, width, height = self.level.region
         draw = self.device.pass_("viscosity/guess_residual.frag", **self.level.defines)
-        targets = *self._r.read.fields, self._guess_products, self._change_product
+        targets = *self._r.read.fields, self._guess_products, self._more_products
         draw(targets, region=(x, y, width + 1, height + 1), **guess, **rhs.inputs("rhs_"), **self.level.operator)
 
     def _apply_operator(self, z: PackedFaces, first: bool) -> tuple[float, float, float]:
@@ -142,7 +146,7 @@ class ConjugateGradients:
         """Free the textures."""
         for item in (self._x, self._r, self._p, self._ap, self._az):
             item.release()
-        for item in (self._products, self._sum, self._guess_products, self._change_product, self._change_sum):
+        for item in (self._products, self._sum, self._guess_products, self._more_products, self._sum_of_more):
             item.release()
 
 

@@ -67,11 +67,10 @@ class Viscosity:
             amount = np.minimum(amount, np.float32(MOST / kappa))
         fluid = amount[~is_solid] if is_solid.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
-        self.plan = plan_for(
-            kappa * least, kappa * largest, self.size[0] * self.size[1], is_sharp(kappa * amount, is_solid)
-        )
+        is_one, cells = least == largest and not is_solid.any(), self.size[0] * self.size[1]
+        self.plan = plan_for(kappa * least, kappa * largest, cells, is_one, is_sharp(kappa * amount, is_solid))
         self.deflation.set_stiff(None)
-        if least == largest and not is_solid.any():
+        if is_one:
             self.multigrid.set_uniform(least, dt, walls.no_slip)
         else:
             self.multigrid.set_coefficients(viscosity, solid, amount, is_solid, dt, walls.no_slip)
@@ -101,7 +100,8 @@ class Viscosity:
         v_star, rhs, finest = self.v_star, self._right_hand_side(), self.multigrid.finest
         if self.plan.method == "cg":
             plan, solve = self.plan, self.conjugate_gradients.solve
-            return solve(v_star, self._change, rhs, self._precondition, plan.tolerance, plan.iterations)
+            wanted = plan.tolerance, plan.iterations, plan.cycle_leaves
+            return solve(v_star, self._change, rhs, self._precondition, *wanted)
         if self.plan.method == "direct":
             self.multigrid.direct_solve(rhs)
         else:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
-from solver.gl.reduction import Reduction
+from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.grid import Grid
 
 STEEPEST = 1.0  # largest |grad S| that the cubic carries well
@@ -29,9 +29,9 @@ class Submap(DoubleField):
         self.device = device
         self.grid = grid
         self.trace = device.field(grid.size, 2, "submap, trace")
-        corners = grid.nx - 1, grid.ny - 1
-        self._steepness = device.field(corners, 1, "submap, steepness")
-        self._find_steepest = Reduction(device, corners, 1, "max")
+        blocks = blocks_of((grid.nx - 1, grid.ny - 1))
+        self._steepness = device.field(blocks, 1, "submap, steepness")
+        self._find_steepest = Reduction(device, blocks, 1, "max")
 
     def advance(self, trace: Field) -> None:
         """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
@@ -58,7 +58,7 @@ class Submap(DoubleField):
     def is_steep(self) -> bool:
         """True if it is bent too far for its interpolation; waits for the GPU."""
         find = self.device.pass_("warp/steepness.frag")
-        find(self._steepness, displacement=self.read, spacing=self.grid.spacing)
+        find(self._steepness, displacement=self.read, spacing=self.grid.spacing, side=SIDE)
         return self._find_steepest(self._steepness)[0] > STEEPEST**2
 
     def release(self) -> None:
