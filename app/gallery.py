@@ -316,9 +316,10 @@ def _at_pixels(cells: np.ndarray, picture: np.ndarray) -> np.ndarray:
     return cells[rows.astype(int)[:, None], columns.astype(int)]
 
 
-def _near(pixels: np.ndarray, force: GradientForce, around: float = 0.08) -> np.ndarray:
+def _near(pixels: np.ndarray, force: GradientForce) -> np.ndarray:
     """The part of a picture about the window a force acts in."""
     assert force.within is not None
+    around = 0.08
     left, top, right, bottom = force.within.box
     height, width = pixels.shape[:2]
     rows = slice(int((top - around) * height), int((bottom + around) * height))

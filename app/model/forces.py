@@ -122,7 +122,8 @@ class PointForce(_Push):
         push = self.strength * _unit(self.direction)
 
         def stream(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-            # Its curl is u(0) = push, and for the Gaussian `numerics.md` section 6.
+            # Its curl is the push F at the centre; with a Gaussian g of deviation s, it is
+            # g ((1 - r^2 / s^2) F + x (F . x) / s^2).
             weight = _profile(np.hypot(x, y), self.radius, self.falloff)
             return weight * (push[0] * y - push[1] * x)
 

@@ -34,9 +34,9 @@ class History:
         self._index = 0
 
     @classmethod
-    def restored(cls, entries: Sequence[Entry], index: int, budget: int = DEFAULT_BUDGET) -> History:
+    def restored(cls, entries: Sequence[Entry], index: int) -> History:
         """The history that had these entries; `index` is the present."""
-        history = cls(entries[0].recipe, budget=budget)
+        history = cls(entries[0].recipe)
         history._entries = list(entries)
         history.go_to(index)
         return history

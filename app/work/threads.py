@@ -15,13 +15,13 @@ _END = object()
 
 
 @contextmanager
-def behind(write: Callable[[T], None], depth: int = DEPTH) -> Iterator[Callable[[T], None]]:
-    """Yield a function that hands an item to `write` in another thread, and waits once `depth` items lie there.
+def behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
+    """Yield a function that hands an item to `write` in another thread, and waits once `DEPTH` items lie there.
 
     What `write` raises is raised by the next call, or when the block ends; all has been written once it has ended well.
     What is handed over must not be changed afterwards.
     """
-    waiting: queue.Queue[object] = queue.Queue(depth)
+    waiting: queue.Queue[object] = queue.Queue(DEPTH)
     failed: list[BaseException] = []
     stopped = threading.Event()
 
@@ -54,12 +54,12 @@ def behind(write: Callable[[T], None], depth: int = DEPTH) -> Iterator[Callable[
 
 
 @contextmanager
-def ahead(items: Iterator[T], depth: int = DEPTH) -> Iterator[Iterator[T]]:
-    """Yield an iterator over `items`, which are made in another thread, `depth` of them in advance.
+def ahead(items: Iterator[T]) -> Iterator[Iterator[T]]:
+    """Yield an iterator over `items`, which are made in another thread, `DEPTH` of them in advance.
 
     When the block ends before the items do, `items` is closed if it is a generator.
     """
-    reader = _Ahead(items, depth)
+    reader = _Ahead(items)
     try:
         yield reader
     finally:
@@ -67,9 +67,9 @@ def ahead(items: Iterator[T], depth: int = DEPTH) -> Iterator[Iterator[T]]:
 
 
 class _Ahead(Generic[T]):
-    def __init__(self, items: Iterator[T], depth: int) -> None:
+    def __init__(self, items: Iterator[T]) -> None:
         self._items = items
-        self._ready: queue.Queue[object] = queue.Queue(depth)
+        self._ready: queue.Queue[object] = queue.Queue(DEPTH)
         self._stopped = threading.Event()
         self._failed: BaseException | None = None
         self._thread = threading.Thread(target=self._work, name="reader", daemon=True)
