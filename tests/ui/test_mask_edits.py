@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ def test_a_mask_follows_the_pointer_in_every_frame_and_takes_no_time(robot: Robo
     for step in range(6):
         robot.move(*robot.at(0.3 + 0.03 * step, 0.5))
         seen.append(int((frozen(robot) > 127).sum()))
-    assert all(later > earlier for earlier, later in zip(seen, seen[1:], strict=False))
+    assert all(later > earlier for earlier, later in pairwise(seen))
     robot.release()
     assert (session.end, session.tick, session.is_moving) == (0, 0, False)
     assert [entry.name for entry in session.document.history.entries] == ["Open", "Freeze"]
@@ -126,5 +127,5 @@ def test_what_is_not_painted_is_not_saved(robot: Robot, tmp_path: Path) -> None:
 
 
 def test_every_edit_of_a_mask_is_an_action() -> None:
-    names = {name for name in ACTIONS if name.startswith("mask_")}
-    assert names == {f"mask_{kind}" for kind in "invert fill clear feather grow shrink load save".split()}
+    kinds = {name.removeprefix("mask_") for name in ACTIONS if name.startswith("mask_")}
+    assert kinds == {"invert", "fill", "clear", "feather", "grow", "shrink", "load", "save"}
