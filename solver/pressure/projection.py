@@ -75,7 +75,7 @@ class Projection:
             self._prepare()
 
     def set_solids(self, solid: np.ndarray | None) -> None:
-        """Close the faces of solid cells, (ny, nx), by the part of each that is solid, 0-1; None for no solids at all."""
+        """Close the faces of solid cells, (ny, nx), by the part of each that is solid, 0-1; None for no solids."""
         self._solid = None if solid is None else np.asarray(solid, np.float32)
         self._is_partial = bool(self._solid is not None and ((self._solid > 0) & (self._solid < 1)).any())
         self._regions = None

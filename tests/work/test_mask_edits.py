@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -232,9 +233,33 @@ def test_a_mask_picture_is_loaded_and_one_that_is_not_there_is_a_sentence(sessio
     assert is_same(seen, replayed(session))
 
 
-def test_a_seek_between_two_ticks_leaves_the_masks_of_the_first(session: Session) -> None:
-    from fractions import Fraction
+def test_going_back_keeps_the_masks_that_are_seen_there(session: Session) -> None:
+    """What was painted at that moment is, what came after it is not, and both are one undo away."""
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    middle, end = session.end // 2, session.end
+    session.seek(middle)
+    session.settle()
+    paint(session, "freeze", (0.2, 0.5))
+    paint(session, "push", (0.6, 0.5), (0.7, 0.5))
+    session.settle()
+    paint(session, "freeze", (0.8, 0.5))
+    after = masks(session.replay)
+    session.seek(middle)
+    session.settle()
+    here = masks(session.replay)
+    paint(session, "thicken", (0.5, 0.2))
+    assert [edit.tick for edit in session.recipe.mask] == [middle, middle]
+    assert session.end == middle < end
+    assert np.array_equal(session.replay.masks.frozen.get(), here[1])
+    assert here[1].any()
+    assert is_same(masks(session.replay), replayed(session))
+    session.undo()
+    session.settle()
+    assert is_same(masks(session.replay), after)
 
+
+def test_a_seek_between_two_ticks_leaves_the_masks_of_the_first(session: Session) -> None:
     paint(session, "push", (0.4, 0.5), (0.5, 0.5))
     session.settle()
     session.seek(2)
