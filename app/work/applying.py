@@ -32,7 +32,7 @@ from app.work.export import Kept, Report, Target, looked_up, opaque_value, steps
 from app.work.jobs import longer_side
 from app.work.states import code
 from app.work.tasks import Piece
-from app.work.threads import ahead
+from app.work.threads import prefetch
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
@@ -227,7 +227,7 @@ class _Applying:
             pictures: Iterator[tuple[int, Picture]]
             if clip:
                 frames = clip.pictures(outputs.part, kept, progress.cancel, self.notices.append)
-                pictures = stack.enter_context(ahead(frames))
+                pictures = stack.enter_context(prefetch(frames))
             else:
                 numbers = [number for number in self._files if first <= number and (last is None or number <= last)]
                 pictures = ((number, self.source.picture) for number in numbers if not kept(number))

@@ -39,7 +39,7 @@ from app.work.checkpoints import DEFAULT_BUDGET
 from app.work.jobs import Job, MapOutput, longer_side, result_size
 from app.work.replay import Replay
 from app.work.states import StoredStates, code
-from app.work.threads import ahead, behind
+from app.work.threads import prefetch, write_behind
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
@@ -231,7 +231,7 @@ class _Export:
             kept = Kept(records.values() if self.outputs.resume else [])
             if clip is not None:
                 pictures = clip.pictures(self.outputs.part, kept, self.progress.cancel, self.pictures.notice)
-                source = stack.enter_context(ahead(pictures))
+                source = stack.enter_context(prefetch(pictures))
                 # Once the fluid has come to its end, the clip goes on with the last warp.
                 at = ((number, shown[min(moment(number), len(shown) - 1)], one) for number, one in source)
                 frames = self._frames(at, take_map)
@@ -494,8 +494,8 @@ class Kept:
 
 
 def in_order(write: NumberedWriter[T]) -> AbstractContextManager[Callable[[tuple[int, T]], None]]:
-    """`write`, in a thread of its own; see `behind`."""
-    return behind(lambda item: write(item[1], item[0]))
+    """`write`, in a thread of its own; see `write_behind`."""
+    return write_behind(lambda item: write(item[1], item[0]))
 
 
 def write_all(

@@ -15,7 +15,7 @@ _END = object()
 
 
 @contextmanager
-def behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
+def write_behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
     """Yield a function that hands an item to `write` in another thread, and waits once `DEPTH` items lie there.
 
     What `write` raises is raised by the next call, or when the block ends; all has been written once it has ended well.
@@ -54,7 +54,7 @@ def behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
 
 
 @contextmanager
-def ahead(items: Iterator[T]) -> Iterator[Iterator[T]]:
+def prefetch(items: Iterator[T]) -> Iterator[Iterator[T]]:
     """Yield an iterator over `items`, which are made in another thread, `DEPTH` of them in advance.
 
     When the block ends before the items do, `items` is closed if it is a generator.

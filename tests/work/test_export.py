@@ -31,7 +31,7 @@ from app.work.applying import Application, MapSource, converted, inverted
 from app.work.export import Target, displacement, looked_up, run, shown_positions
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
-from app.work.threads import ahead, behind
+from app.work.threads import prefetch, write_behind
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
@@ -501,11 +501,11 @@ def test_what_is_opaque_stays_so(device: Device, tmp_path: Path):
 
 def test_what_is_handed_over_arrives_in_order():
     came: list[int] = []
-    with behind(came.append) as put:
+    with write_behind(came.append) as put:
         for number in range(100):
             put(number)
     assert came == list(range(100))
-    with ahead(iter(range(100))) as items:
+    with prefetch(iter(range(100))) as items:
         assert list(items) == list(range(100))
 
 
@@ -518,9 +518,9 @@ def test_what_goes_wrong_at_one_end_is_heard_at_the_other():
         yield 1
         raise UserError("the clip ends here")
 
-    with pytest.raises(Cancelled), behind(refuse) as put:
+    with pytest.raises(Cancelled), write_behind(refuse) as put:
         all(put(number) is None for number in range(1000))
-    with pytest.raises(UserError, match="ends here"), ahead(broken()) as items:
+    with pytest.raises(UserError, match="ends here"), prefetch(broken()) as items:
         list(items)
     closed: list[bool] = []
 
@@ -531,7 +531,7 @@ def test_what_goes_wrong_at_one_end_is_heard_at_the_other():
         finally:
             closed.append(True)
 
-    with ahead(endless()) as items:
+    with prefetch(endless()) as items:
         next(items)
     assert closed == [True]
 
