@@ -110,9 +110,10 @@ def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path, fluidwarp: Ru
 def test_options_instead_of_the_recipe(folder: Path, fluidwarp: Run):
     write_picture(folder / "dog.png", Picture(np.zeros((30, 20, 3), np.uint8)))
     words = ["--image", "dog.png", "--size", "60", "--grid", "16", "--solver", "paper", "--duration", "0.1"]
-    ran = fluidwarp(folder, "render", "a.toml", "-o", "out.jpg", *words)
+    ran = fluidwarp(folder, "render", "a.toml", "-o", "out.jpg", *words, "--map", "m.tif", "--offsets")
     assert (ran.returncode, ran.stderr) == (0, "")
     assert read_picture(folder / "out.jpg").pixels.shape == (60, 40, 3)
+    assert np.array_equal(read_map(folder / "m.tif").values, read_map(folder / "m.tif", kind="offsets").values)
 
 
 def test_a_project_is_a_recipe(folder: Path, fluidwarp: Run):

@@ -55,6 +55,17 @@ def test_the_parts_of_a_sheet() -> None:
     assert sheet.shape == (gallery.PANEL + 4 * gallery.MARGIN, 4 * gallery.PANEL + 3 * gallery.MARGIN, 3)
 
 
+def test_a_sheet_is_as_high_as_its_panels(studio: Studio) -> None:
+    studio.sheet("one", "title", [("a", np.zeros((20, 30, 3), np.uint8))], 40)
+    assert read_picture(studio.folder / "one-sheet.png").height == 40 + 4 * gallery.MARGIN
+
+
+def test_what_is_played_ends_as_the_still(studio: Studio) -> None:
+    recipe = load("figure-5")
+    short = {"duration": recipe.fluid.dt, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
+    assert np.array_equal(studio.play("figure-5", **short).result, studio.still(recipe.edited(**short)))
+
+
 @pytest.mark.parametrize("name", sorted({*gallery.RECIPES, *gallery.GUIDE}))
 def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str) -> None:
     from app.model.forces import build

@@ -556,6 +556,9 @@ def test_narrow_pixels_of_a_turned_picture_are_turned_too(tmp_path: Path, ending
     assert read_picture(path).dpi == pytest.approx((150, 300), abs=0.1)
     image.save(path, dpi=(300, 150))
     assert read_picture(path).dpi == pytest.approx((300, 150), abs=0.1)
+    if ending == "tif":
+        image.save(path, tiffinfo={296: 3, 282: 100.0, 283: 50.0})  # a centimetre
+        assert read_picture(path).dpi == pytest.approx((254, 127), abs=0.1)
 
 
 def test_16_bit_png_and_exr_keep_their_metadata(tmp_path: Path):

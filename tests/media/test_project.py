@@ -94,6 +94,16 @@ def test_a_newer_project_says_so(made: Project, tmp_path: Path) -> None:
         projects.load(path)
 
 
+@pytest.mark.parametrize("told", ["fluidwarp notes 1", "other project 1"])
+def test_what_does_not_say_that_it_is_a_project_is_none(made: Project, tmp_path: Path, told: str) -> None:
+    path = tmp_path / "work.fluidwarp"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("format.txt", told)
+        archive.writestr("recipe.toml", 'picture = "photo.png"')
+    with pytest.raises(UserError, match=r"work\.fluidwarp is no fluidwarp project"):
+        projects.load(path)
+
+
 @pytest.mark.parametrize("part", [0, 3, 100, 0.5, 0.99])
 def test_a_project_cut_short_says_so(made: Project, tmp_path: Path, part: float) -> None:
     path = tmp_path / "work.fluidwarp"

@@ -142,6 +142,7 @@ VALUES = {
     "floor(-1.5)": -2, "ceil(-1.5)": -1, "atan2(1, -1)": 0.75 * math.pi, "abs(-3)": 3, "min(3, 1, 2)": 1,
     "max(3, 5, 2)": 5, "step(-0.1) + step(0) + step(2)": 2, "pulse(1, 1, 2) + 2*pulse(2, 1, 2) + 4*pulse(0, 1, 2)": 1,
     "smoothstep(1, 3, 1.5)": 0.15625, "smoothstep(1, 3, 4)": 1, "7.5 % 2": 1.5, "2**-1": 0.5, "7 / 2 - 1 * 2 + 3": 4.5,
+    "(0 == 1) + 2*(1 == 1) + 4*(1 != 1) + 8*(0 != 1) + 16*(1 == 0)": 10,
 }  # fmt: skip
 
 
@@ -159,8 +160,9 @@ def test_feedback_sees_the_state() -> None:
     law = timed(feedback=lambda state: seen.append(state) or 2.0).law
     assert law.impulse(0, 0.5, "state") == 1.0
     assert seen == ["state"]
-    with pytest.raises(UserError, match="feedback function returned nan"):
-        timed(feedback=lambda state: math.nan).law.impulse(0, 1)
+    for value in (math.nan, math.inf, -math.inf):
+        with pytest.raises(UserError, match=f"feedback function returned {value}"):
+            timed(feedback=lambda state, value=value: value).law.impulse(0, 1)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from scipy import fft, ndimage
 
 from solver.brush.brush import Brush, Tip
-from solver.brush.push import FIRM_CARRIED, LOOSEST_CARRIED, Push, Slip
+from solver.brush.push import FIRM_CARRIED, LOOSEST_CARRIED, Push, Slip, gain_compensation, slip_factor
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -210,6 +210,32 @@ def test_a_local_push_from_beyond_the_edge_moves_nothing_against_it(device: Devi
     carrier, _ = pushed(device, Push(Tip((-0.1, 0.3), (-0.05, 0.32), radius=0.25), 1 / 60, local=1.0))
     assert carrier.min() == 0
     assert carrier.max() > 0.1
+
+
+@pytest.mark.parametrize(("radii", "part"), [(0.0, 1.0), (0.7, 1.0), (1.2, 0.3 + 0.7 / 1.5), (1e4, 0.3)])
+def test_a_stroke_holds_fast_for_seven_tenths_of_a_radius_and_slips_to_three_tenths(radii: float, part: float) -> None:
+    assert slip_factor(radii) == pytest.approx(part, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("drag", "viscosity", "gain"), [(0, 0, 1), (3, 0, np.exp(0.03)), (0, 0.5, 1 + 12 * 0.5), (1e3, 1e3, 20)]
+)
+def test_a_brush_makes_up_for_what_drag_and_viscosity_take_in_a_tick(
+    drag: float, viscosity: float, gain: float
+) -> None:
+    assert gain_compensation(radius=0.1, dt=0.01, drag=drag, viscosity=viscosity) == pytest.approx(gain, rel=1e-6)
+
+
+def test_what_a_brush_has_drawn_acts_in_one_step(device: Device) -> None:
+    fluid, brush = Fluid(device, Grid(32, 32)), Brush(device)
+    brush.push(fluid, Tip((0.45, 0.5), (0.5, 0.5), radius=0.3), 1 / 60)
+    fluid.step(1e-3)
+    speed = fluid.motion().largest_speed
+    assert speed > 1
+    fluid.step(1e-3)
+    assert fluid.motion().largest_speed == pytest.approx(speed, rel=0.1)
+    for thing in (fluid, brush):
+        thing.release()
 
 
 @pytest.mark.parametrize("radii", [0.3, 1.0, 3.0])

@@ -17,6 +17,7 @@ from app.model.strokes import Change
 from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, ExportDialog
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences
+from app.ui.widgets import Ui
 from solver.gl.device import Device
 from support.editing import Robot, export_dialog, small_project
 from support.widgets import Widgets
@@ -205,6 +206,23 @@ def dialog(robot: Robot) -> ExportDialog:
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     return dialog
+
+
+def test_the_button_of_the_bar_exports(robot: Robot, widgets: Widgets) -> None:
+    widgets.click("Export")
+    assert isinstance(robot.editor.dialogs.shown[-1], ExportDialog)
+
+
+def test_a_file_that_will_be_replaced_is_told(
+    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words, text = [], Ui.text
+    monkeypatch.setattr(Ui, "text", lambda ui, said, *how, **more: words.append(said) or text(ui, said, *how, **more))
+    for is_there in (False, True):
+        words.clear()
+        robot.frame()
+        assert ("It is there already, and will be replaced." in words) is is_there
+        dialog.job().target.write_bytes(b"")
 
 
 def test_an_exported_picture_is_what_is_asked_for(

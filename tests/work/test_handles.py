@@ -76,6 +76,13 @@ def test_what_is_local_moves_nothing_beside_it(device: Device):
         thing.release()
 
 
+@pytest.mark.parametrize(("time", "part"), [(0.9, 0), (1.0, 0), (1.1, 0.15625), (1.2, 0.5), (1.4, 1), (2.0, 1)])
+def test_a_handle_begins_and_ends_its_way_at_rest(time: float, part: float):
+    """By a smoothstep."""
+    handle = Handle((0.4, 0.5), (0.5, 0.5), RADIUS, start=1.0, duration=0.4)
+    assert handle.passed(time) == pytest.approx(part, abs=1e-9)
+
+
 def test_a_handle_takes_hold_of_what_has_been_moved_to_elsewhere(device: Device):
     later = led_to([0.4, 0.5], [0.5, 0.6], start=0.5, duration=0.2)
     replay = replay_of(device, handle=[led_to([0.3, 0.4], [0.4, 0.5], end=0.45), later | {"at": [0.3, 0.4]}])
