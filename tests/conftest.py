@@ -43,8 +43,8 @@ def khronos_accepts_every_program() -> Iterator[None]:
 def shared_device() -> Iterator[Device]:
     """One headless device for the whole test process.
 
-    llvmpipe draws in the process's own thread: handing each pass to others costs a third more, and the tests' processes
-    keep the cores busy anyway. What the tests start (the command line, the window, test_fences.py) has its threads.
+    llvmpipe draws in the process's own thread: handing small passes to others costs up to a third more, and the tests'
+    processes keep the cores busy anyway. What they start (the command line, the window, test_fences.py) has threads.
     """
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("LP_NUM_THREADS", "0")
