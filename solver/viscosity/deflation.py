@@ -212,7 +212,7 @@ class Deflation:
         part = stiff[top : top + 2 * rows, left : left + 2 * columns]
         part = framed(part, (0, 2 * rows - part.shape[0]), (0, 2 * columns - part.shape[1]))
         level = self.level.coefficients(region)
-        parts = find_parts(part, level.open_u, level.open_v, self.side)
+        parts = find_parts(part, level.xx[0, 0], level.open_u, level.open_v, self.side)
         if not parts.count:
             return
         self._space = CoarseSpace(parts, level, self._threshold, (left, top))

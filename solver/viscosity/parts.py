@@ -10,6 +10,8 @@ from solver.components import connected_components
 from solver.packing import framed
 
 BROAD = 5  # cells across a core, at least
+# Cells side by side whose stiffness differs by more belong to two parts: the softer one strains, however stiff it is.
+EDGE = 30.0
 
 
 @dataclass(frozen=True)
@@ -33,25 +35,30 @@ class Parts:
         return len(self.tile) - 1
 
 
-def find_parts(stiff: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: int) -> Parts:
-    """The cores and runs of the `stiff` cells, (rows, columns), in tiles of `side` cells.
+def find_parts(stiff: np.ndarray, stiffness: np.ndarray, open_u: np.ndarray, open_v: np.ndarray, side: int) -> Parts:
+    """The cores and runs of the `stiff` cells, (rows, columns), by the `stiffness` of all, in tiles of `side` cells.
 
     Where these are a part of the grid, no cell on its edge is stiff but at a wall.
     """
     inside = _opened(stiff)
-    core = _numbered(inside, side)
+    core = _numbered(inside, stiffness, side)
     cores = int(core.max(initial=0))
     # What is few, the parts' faces, is worked on in lists: a mask of bytes costs little, an array of numbers much.
     # The first column of u and the first row of v are walls, so that a cell lies behind each open face.
     touch_u = open_u & (inside | framed(inside, (0, 0), (1, 0))[:, :-1])
     touch_v = open_v & (inside | framed(inside, (1, 0), (0, 0))[:-1])
     of_u, of_v = np.zeros(stiff.shape, np.int32), np.zeros(stiff.shape, np.int32)
+    amount = np.where(inside, stiffness, 0.0).ravel()
     for of_face, touch, back in ((of_u, touch_u, 1), (of_v, touch_v, stiff.shape[1])):
         at = np.flatnonzero(touch)
-        of_face.ravel()[at] = np.maximum(core.ravel()[at], core.ravel()[at - back])
+        # Of two cores the stiffer one's; of two as stiff, as at the edges of tiles, the last one's.
+        here, there = ((amount[cells], core.ravel()[cells]) for cells in (at, at - back))
+        is_here = (here[0] > there[0]) | ((here[0] == there[0]) & (here[1] > there[1]))
+        of_face.ravel()[at] = np.where(is_here, here[1], there[1])
     free = stiff & ~inside
-    on_u, runs_u = _runs(free, open_u & ~touch_u, side)
-    on_v, runs_v = _runs(np.ascontiguousarray(free.T), np.ascontiguousarray((open_v & ~touch_v).T), side)
+    on_u, runs_u = _runs(free, stiffness, open_u & ~touch_u, side)
+    across = (np.ascontiguousarray(of.T) for of in (free, stiffness, open_v & ~touch_v))
+    on_v, runs_v = _runs(*across, side=side)
     runs_of_u, runs_of_v = int(runs_u.max(initial=0)), int(runs_v.max(initial=0))
     of_u[on_u] = cores + runs_u
     of_v.T[on_v] = cores + runs_of_u + runs_v
@@ -71,10 +78,11 @@ def _opened(stiff: np.ndarray) -> np.ndarray:
     return stiff
 
 
-def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
+def _numbered(inside: np.ndarray, stiffness: np.ndarray, side: int) -> np.ndarray:
     """The pieces of a mask within tiles, numbered from 1 on, 0 outside.
 
-    Two cells side by side belong together if a node that both touch has all four cells inside; else they are a hinge.
+    Two cells side by side belong together if neither is much softer, and a node that both touch has all four cells
+    inside; else they are a hinge.
     """
     count = int(np.count_nonzero(inside))
     number: np.ndarray = np.zeros(inside.shape, int)
@@ -82,18 +90,25 @@ def _numbered(inside: np.ndarray, side: int) -> np.ndarray:
     around = framed(inside, (1, 1), (1, 1))
     whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
     links = []
-    for turned, nodes in ((number, whole), (number.T, whole.T)):
+    for turned, nodes, amount in ((number, whole, stiffness), (number.T, whole.T, stiffness.T)):
         together = (nodes[:-1, 1:-1] | nodes[1:, 1:-1]) & (np.arange(1, turned.shape[1]) % side != 0)
-        links.append((turned[:, :-1][together], turned[:, 1:][together]))
+        ends = amount[:, :-1][together], amount[:, 1:][together]
+        alike = np.maximum(*ends) <= EDGE * np.minimum(*ends)
+        links.append((turned[:, :-1][together][alike], turned[:, 1:][together][alike]))
     one, other = (np.concatenate(ends) for ends in zip(*links, strict=True))
     root = connected_components(np.arange(count), one, other)
     number[inside] = np.cumsum(root == np.arange(count))[root]
     return number
 
 
-def _runs(free: np.ndarray, faces: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which faces lie along the rows of `free` cells, and of these their run, from 1 on; a tile's edge ends a run."""
+def _runs(free: np.ndarray, stiffness: np.ndarray, faces: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which faces lie along the rows of `free` cells, and of these their run, from 1 on.
+
+    A tile's edge ends a run, and so does a cell much softer than the one before or behind it.
+    """
     touching = faces & (free | framed(free, (0, 0), (1, 0))[:, :-1])
+    around = framed(stiffness, (0, 0), (1, 1))
+    firm = free & (EDGE * stiffness >= np.maximum(around[:, 2:], around[:, :-2]))
     on = np.zeros_like(touching)
-    on[:, 1:] = touching[:, 1:] & touching[:, :-1] & free[:, :-1] & (np.arange(1, free.shape[1]) % side != 0)
+    on[:, 1:] = touching[:, 1:] & touching[:, :-1] & firm[:, :-1] & (np.arange(1, free.shape[1]) % side != 0)
     return touching, np.cumsum(~on[touching])

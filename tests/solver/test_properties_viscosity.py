@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from properties import viscosity
 from solver.fluid import Fluid
@@ -44,6 +45,29 @@ def test_every_class_of_mask(device: Device, kind: str, contrast: float, softest
     found, iterations = case.solved(device)
     assert viscosity.error(found, case.exact()) < viscosity.ERROR[contrast]
     assert iterations <= viscosity.ITERATIONS[softest]
+
+
+@pytest.mark.parametrize(("seed", "softest"), [(0, 1.0), (0, 30.0), (3, 1.0)])
+def test_stiffer_parts_in_stiff_ones(device: Device, seed: int, softest: float) -> None:
+    """One in another, each 300 times as stiff as what is around it: they took 11 to 20 iterations as one part."""
+    rng = np.random.default_rng(seed)
+    field = ndimage.gaussian_filter(rng.standard_normal((96, 96)), rng.uniform(2, 8))
+    field /= field.std()
+    amount = softest * 1e5 ** (0.5 * (field > -0.3) + 0.5 * (field > 0.6))
+    case = viscosity.Case(amount.astype(np.float32), viscosity.eddies(rng, 96, 96), Walls(), np.zeros((96, 96), bool))
+    found, iterations = case.solved(device)
+    assert viscosity.error(found, case.exact()) < viscosity.ERROR[1e5]
+    assert iterations <= viscosity.ITERATIONS[softest]
+
+
+@pytest.mark.parametrize("softest", [1.0, 30.0])
+def test_noise_from_cell_to_cell(device: Device, softest: float) -> None:
+    rng = np.random.default_rng(0)
+    amount = softest * 1e5 ** rng.random((40, 48))
+    case = viscosity.Case(amount.astype(np.float32), viscosity.eddies(rng, 48, 40), Walls(), np.zeros((40, 48), bool))
+    found, iterations = case.solved(device)
+    assert viscosity.error(found, case.exact()) < viscosity.ERROR[1e5]
+    assert iterations <= 10
 
 
 @pytest.mark.parametrize("size", [(8, 4096), (1023, 8), (9, 17)])
