@@ -294,8 +294,8 @@ def _portrait(studio: Studio, name: str, what: str) -> Numbers:
         ],
     )
     # The window is what the recipe with the freeze leaves free: where the dark window is darker than middle grey.
-    cells = solid(frozen.recipe.freeze, frozen.grid, pictures)
-    outside = _at_pixels(cells, thick.source)
+    height, width = thick.source.shape[:2]
+    outside = solid(frozen.recipe.freeze, Grid.for_picture(width, height, max(width, height)), pictures)
     moved, moved_frozen = (np.linalg.norm(one.displacement, axis=-1) * COMPARED for one in (thick, frozen))
     changed = (frozen.result != frozen.source).any(axis=-1)
     return {
@@ -308,12 +308,6 @@ def _portrait(studio: Studio, name: str, what: str) -> Numbers:
         "det J": _range(thick),
         "frozen: det J": _range(frozen),
     }
-
-
-def _at_pixels(cells: np.ndarray, picture: np.ndarray) -> np.ndarray:
-    """What is given of the cells, for each pixel that of the cell its centre lies in."""
-    rows, columns = ((np.arange(n) + 0.5) * m / n for n, m in zip(picture.shape, cells.shape, strict=False))
-    return cells[rows.astype(int)[:, None], columns.astype(int)]
 
 
 def _near(pixels: np.ndarray, force: GradientForce) -> np.ndarray:

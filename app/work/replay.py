@@ -30,7 +30,7 @@ from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from solver.brush.brush import Brush, Motion
 from solver.brush.handles import Handle, Handles
 from solver.brush.masks import Masks
-from solver.brush.push import Push, gain_compensation, slip_factor, strain_limit
+from solver.brush.push import Push, coasting, gain_compensation, slip_factor, strain_limit
 from solver.brush.tip import Tip
 from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
@@ -424,8 +424,8 @@ class Replay:
         match stroke.tool:
             case "push":
                 far, fluid = stroke.travelled(self.tick, self.grid.extent) / stroke.radius, self.settings
-                limit = strain_limit(whole, dt, far, fluid.drag, fluid.viscosity)
-                self._lead(Push(whole, dt, pressed, slip_factor(far), limit, stroke.local))
+                on = coasting(whole, dt, fluid.drag, fluid.viscosity)
+                self._lead(Push(whole, dt, pressed, slip_factor(far, on), strain_limit(far, on), stroke.local))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])

@@ -4,7 +4,7 @@
 // With INNER the grid is a window, and over the last FADING cells before a side that is not the picture's edge (1 in
 // u_inner: left, right, top, bottom) it is carried less and less, so that there is no step in the map at the side.
 // With TRACE the trace is not given but drawn beside it, for the fluid's next step: inputs of step/trace.frag.
-// reads: 13, and 23 with TRACE
+// reads: 13, and 23 with TRACE, 47 in two halves
 #include "lib/displacement.glsl"
 #ifdef TRACE
 #include "lib/mac.glsl"

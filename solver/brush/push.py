@@ -25,9 +25,12 @@ FIRM_CARRIED, LOOSEST_CARRIED = 0.5, 0.5
 #    the strain limit begins to slip, and where it gives nothing.
 SLIPPING, HELD_OFF = 4.0, 5.25
 # The strain limit: its part at the beginning of a stroke; the radii of the path in which as much is added; and how much
-# less for every radius that the fluid will go on without the brush, after the first. Found, as all of these, by making
-# the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
+# less for every radius that the fluid will coast, go on without the brush, after the first. Found, as all of these, by
+# making the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
 BEGINNING, GAINING, COASTING = 0.68, 6.0, 3.0
+# A push gives no more speed than lets the fluid coast so many radii, beyond which the strain limit would leave nothing
+# of it, where what nothing slows down counts as coming to rest in so many seconds.
+FARTHEST_COASTING, LONGEST_COASTING = 1.5, 1.0
 
 # 4. By energy: it gives nothing to a fluid that has, under the brush, so many times the energy of the brush's own flow.
 #    One stroke does not come there by itself, with any feel; stirred for a minute without drag, a fluid then moves at
@@ -48,23 +51,29 @@ FINE = 8
 AROUND = 2 * (FINE + 1) + 1
 
 
-def slip_factor(travelled: float) -> float:
+def coasting(tip: Tip, dt: float, drag: float, viscosity: float) -> float:
+    """Radii that the fluid goes on at the tip's speed without the brush."""
+    speed = math.hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1]) / dt
+    slowing = drag + SQUARED_WAVENUMBER * viscosity / tip.radius**2
+    return speed / max(slowing, 1 / LONGEST_COASTING) / tip.radius
+
+
+def slip_factor(travelled: float, coasting: float = 0.0) -> float:
     """The part of its speed that a push gives, `travelled` radii after its stroke began: the first law."""
-    return LOOSEST + (1 - LOOSEST) / (1 + 2 * max(travelled - FIRM, 0.0) ** 2)
+    by_path = LOOSEST + (1 - LOOSEST) / (1 + 2 * max(travelled - FIRM, 0.0) ** 2)
+    return by_path * FARTHEST_COASTING / max(coasting, FARTHEST_COASTING)
 
 
-def strain_limit(tip: Tip, dt: float, travelled: float, drag: float, viscosity: float) -> float:
+def strain_limit(travelled: float, coasting: float) -> float:
     """The part of the most strain at which a push slips, `travelled` radii after its stroke began: the third law.
 
     All that a stroke strains by itself it may; one that begins where the picture is strained already slips soon. So
     does one in a fluid that will go on by itself for about the brush's radius, because then there is no brush to slip.
     Nothing depends on the grid: a recipe gives the same warp on any.
     """
-    speed = math.hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1]) / dt
-    slowing = max(drag + SQUARED_WAVENUMBER * viscosity / tip.radius**2, 1e-6)
-    coasting = speed / slowing / tip.radius
-    begin = BEGINNING / (1 + coasting / 2)
-    return min(begin + travelled / GAINING, 1.0) / (1 + coasting / 4 + COASTING * max(coasting - 1, 0.0))
+    far = min(coasting, FARTHEST_COASTING)
+    begin = BEGINNING / (1 + far / 2)
+    return min(begin + travelled / GAINING, 1.0) / (1 + far / 4 + COASTING * max(far - 1, 0.0))
 
 
 def gain_compensation(radius: float, dt: float, drag: float, viscosity: float) -> float:

@@ -68,6 +68,33 @@ def test_a_curve_blows_at_half_a_side_a_second(device: Device) -> None:
         assert replay.fluid.velocity_at_centres()[24, 28:36, 0] == pytest.approx(0.5, rel=0.02)
 
 
+def test_a_push_of_a_radius_a_tick_folds_nothing(device: Device) -> None:
+    """Along such a way the velocity changes so much that one step of the midpoint rule would press the map to lines."""
+    push = {"tool": "push", "radius": 0.045, "samples": ((0, 0.78, 0.107, 1.0), (12, 0.883, 0.762, 1.0))}
+    fluid = {"grid": 96, "viscosity": 0.0065, "drag": 0.0}
+    recipe = Recipe.model_validate({"fluid": fluid, "stroke": (push,)})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((620, 900, 3), np.uint8))))
+    for tick in (2, 12, 30):
+        replay.seek(tick)
+        assert replay.warp.statistics().det_min > 0.3
+    replay.release()
+
+
+@pytest.mark.parametrize(("radius", "far", "ticks"), [(0.06, 0.2, 30), (0.12, 0.3, 20), (0.09, 0.15, 6)])
+def test_a_push_moves_a_fluid_that_nothing_slows_down(device: Device, radius: float, far: float, ticks: int) -> None:
+    """Slow or a flick, it takes the picture along, and neither it nor the next half a second folds it."""
+    samples = (0, 0.5 - far / 2, 0.5, 1.0), (ticks, 0.5 + far / 2, 0.5, 1.0)
+    push = {"tool": "push", "radius": radius, "samples": samples}
+    fluid = {"grid": 96, "viscosity": 0.0, "drag": 0.0}
+    recipe = Recipe.model_validate({"fluid": fluid, "stroke": (push,)})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((384, 512, 3), np.uint8))))
+    replay.seek(ticks + 30)
+    found = replay.warp.statistics()
+    assert found.displacement_max > 0.5 * radius
+    assert found.folds == 0
+    replay.release()
+
+
 @pytest.mark.parametrize(("tool", "rate"), [("thicken", 4.0), ("thin", -4.0)])
 @pytest.mark.parametrize("pressures", [(1.0,), (0.5,), (1.0, 1.0, 1.0)], ids=str)
 def test_thicken_paints_four_decades_a_second(
