@@ -132,6 +132,7 @@ class Files:
         """
         session, name = self.workspace.session, str(path.resolve())
         session.pictures.forget(name)
+        session.pictures.load(name)
         session.edit_masks(f"Load {MASKS[of]}", PictureMask(kind="picture", tick=0, of=of, picture=name))
         self.preferences.folder = str(path.parent)
 

@@ -248,14 +248,12 @@ class Session:
                 self._show(self.document.recipe)
             return
         if isinstance(made, Stroke):
-            self.last_place = path[-1]
+            self.last_place, last = path[-1], made.last_tick
+        else:
+            last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
         if isinstance(made, MaskStroke):
             self._keep_masks(self._label(made), made)
             return
-        if isinstance(made, Stroke):
-            last = made.last_tick
-        else:
-            last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
         self._live = self._with(made, max(self._pen, last + 1))
         self.replay.use(self._live)
         self.commit(self._label(made))

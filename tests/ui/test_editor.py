@@ -17,6 +17,7 @@ from app.media import project as projects
 from app.media.maps import Displacement, read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import Project
+from app.model.mask_edits import MaskStroke
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.tools import TOOLS
@@ -178,7 +179,8 @@ def test_thicken_and_thin_act_in_the_very_next_frame(robot: Robot, key: str, rat
     robot.frame(count=8)
     robot.release()
     ratio = robot.editor.session.replay.fluid.viscosity.get() / 0.03
-    stroke = robot.editor.session.recipe.stroke[0]
+    stroke = robot.editor.session.recipe.mask[0]
+    assert isinstance(stroke, MaskStroke)
     seconds = (stroke.last_tick + 1 - stroke.first_tick) / 30
     assert np.log10(ratio[ratio.shape[0] // 2, ratio.shape[1] // 2]) == pytest.approx(rate * seconds, rel=0.05)
 

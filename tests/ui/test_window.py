@@ -16,6 +16,7 @@ from PIL import Image
 
 from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
+from app.model.mask_edits import MaskStroke
 from app.work.recovery import find
 from support.commands import Run
 from support.desk import PATIENCE, Desk, needs_a_screen
@@ -48,7 +49,9 @@ def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
 
     desk.save(work)
     saved = projects.load(work)
-    assert [stroke.tool for stroke in saved.recipe.stroke] == ["push", "freeze"]
+    # What is frozen was painted in time, or in none, if the fluid was at rest by then.
+    painted = [edit for edit in saved.recipe.mask if isinstance(edit, MaskStroke)]
+    assert [stroke.tool for stroke in (*saved.recipe.stroke, *painted)] == ["push", "freeze"]
     assert np.array_equal(saved.picture.pixels, pattern().pixels)
 
     exported = tmp_path / "work warped.png"
