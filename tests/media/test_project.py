@@ -90,7 +90,8 @@ def test_a_newer_project_says_so(made: Project, tmp_path: Path) -> None:
     path = tmp_path / "work.fluidwarp"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("format.txt", f"fluidwarp project {projects.VERSION + 1}\n")
-    with pytest.raises(UserError, match="newer"):
+        archive.writestr("recipe.toml", 'picture = "photo.png"')
+    with pytest.raises(UserError, match="was written by a newer fluidwarp"):
         projects.load(path)
 
 

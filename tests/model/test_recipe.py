@@ -287,6 +287,17 @@ def test_a_stroke_is_passed_piece_by_piece():
     assert stroke.at(5) == ()
 
 
+def test_what_is_cut_off_at_a_tick_is_what_was_passed_before_it():
+    stroke = push((2, 0.0, 0.0, 1.0), (4, 0.2, 0.2, 1.0), (6, 0.3, 0.2, 0.0))
+    for tick in (3, 4, 5, 6):
+        cut = stroke.before(tick)
+        assert cut is not None
+        assert cut.last_tick == tick - 1
+        assert [cut.at(k) for k in range(tick)] == [stroke.at(k) for k in range(tick)]
+    assert stroke.before(2) is None
+    assert stroke.before(7) is stroke
+
+
 def test_sampling_more_often_is_the_same_path():
     coarse = push((0, 0.0, 0.0, 1.0), (4, 0.4, 0.8, 1.0))
     fine = push(*((i, 0.1 * i, 0.2 * i, 1.0) for i in range(5)))

@@ -22,6 +22,7 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.tools import TOOLS
 from app.progress import Progress
+from app.ui import workspace
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
 from app.ui.canvas import shown_pixels
@@ -441,6 +442,32 @@ def test_opening_pictures_can_be_undone(robot: Robot, tmp_path: Path) -> None:
     for size in sizes[1:]:
         robot.key("ctrl+shift+z")
         assert robot.editor.canvas.size == size
+
+
+def test_a_key_that_is_held_steps_on(robot: Robot) -> None:
+    robot.drag((0.4, 0.5), (0.5, 0.5))
+    robot.rest()
+    session = robot.editor.session
+    session.seek(0)
+    robot.rest()
+    for key, tick in ((".", 3), (",", 0)):
+        for number in range(3):
+            robot.frame(Key(key, True, Mods(), number > 0))
+        robot.frame(Key(key, False, Mods()))
+        assert session.target == tick
+
+
+def test_pictures_opened_before_take_no_more_than_their_budget(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one before always stays."""
+    monkeypatch.setattr(workspace, "OPENED_BUDGET", 1000)
+    for number in range(3):
+        write_picture(tmp_path / f"{number}.png", pattern(40 + number, 30))
+        robot.drop(tmp_path / f"{number}.png")
+    robot.key("ctrl+z")
+    assert robot.editor.canvas.size == (41, 30)
+    assert not robot.editor.workspace.can_undo
 
 
 # Files --------------------------------------------------------------------------------------------------------------

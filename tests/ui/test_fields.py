@@ -240,6 +240,8 @@ def test_an_exported_picture_is_what_is_asked_for(
     job = dialog.job()
     assert (job.target.suffix, job.recipe.output.quality, job.recipe.output.size) == (".jpg", 35, 120)
     assert job.recipe.fluid.grid == 2 * grid
+    robot.editor.session.seek(3)
+    assert dialog.job().recipe.ticks == 3
 
 
 def test_an_exported_animation_is_what_is_asked_for(

@@ -456,6 +456,7 @@ def test_a_part_begins_with_the_nearest_stored_state(folder: Path, work: str, mo
     assert [outcome for _, outcome in taken] == [Outcome(str(folder / "p0.png"))] * 4
     assert [steps for steps, _ in taken] == [2, 3, 2, 3]  # together the ticks of the whole
     assert contents(folder / "parts") == contents(folder / "whole")
+    assert {3, 6, 9} <= {int(path.name.split("-")[1][:7]) for path in kept.iterdir()}
     # Out of order, and again when all is there.
     again = [part(folder, "again", first, first + 3, states=kept)[0] for first in (12, 4, 0, 8)]
     assert again == [3, 3, 2, 2]

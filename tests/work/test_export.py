@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from itertools import pairwise
@@ -259,6 +260,15 @@ def test_a_video_has_the_quality_of_its_recipe(device: Device, picture: Path, tm
     for quality, crf in ((50, 30), (90, 18)):
         render(device, recipe.format(quality), picture, tmp_path / "a.mp4")
         assert f"crf={crf}.0".encode() in (tmp_path / "a.mp4").read_bytes()
+
+
+def test_frames_are_kept_where_that_is_asked_for_only(device: Device, picture: Path, tmp_path: Path):
+    for number in (1, 2):
+        write_map(tmp_path / f"m.{number}.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    order = applied(tmp_path / "m.%d.npy", picture, tmp_path / "f.%d.png")
+    for resume, made in ((False, 2), (False, 2), (True, 0)):
+        order = replace(order, outputs=replace(order.outputs, resume=resume))
+        assert order.perform(lambda: device, Progress()).frames == made
 
 
 def test_a_map_for_every_frame(device: Device, picture: Path, tmp_path: Path):

@@ -76,6 +76,22 @@ def test_what_is_local_moves_nothing_beside_it(device: Device):
         thing.release()
 
 
+def test_the_stiffer_of_two_handles_prevails(device: Device):
+    grid = Grid(32, 32)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid)
+    fluid.set_viscosity(0.03)
+    ways = ((0.4, 1.0), (0.6, 0.1))
+    handles = Handles(
+        fluid, warp, [Handle((0.5, 0.5), (x, 0.5), RADIUS, duration=0.2, stiffness=stiffness) for x, stiffness in ways]
+    )
+    for _ in range(15):
+        handles.advance(1 / 60)
+    stiff, soft = handles.away
+    assert stiff < 0.5 * soft
+    for thing in (handles, warp, fluid):
+        thing.release()
+
+
 @pytest.mark.parametrize(("time", "part"), [(0.9, 0), (1.0, 0), (1.1, 0.15625), (1.2, 0.5), (1.4, 1), (2.0, 1)])
 def test_a_handle_begins_and_ends_its_way_at_rest(time: float, part: float):
     """By a smoothstep."""
