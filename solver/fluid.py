@@ -289,6 +289,10 @@ class Fluid(Scheme):
             self._is_flux_drawn = True
         return self._flux
 
+    @property
+    def has_solids(self) -> bool:
+        return bool(self._look_at_solids().any())
+
     def velocity_at_centres(self) -> np.ndarray:
         u, v = self.u, self.v
         return 0.5 * np.stack([u[:, :-1] + u[:, 1:], v[:-1] + v[1:]], axis=-1)

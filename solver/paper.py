@@ -148,6 +148,10 @@ class PaperFluid(Scheme):
         add(self._carrier, add=True, force=self.local.field, impulse=1.0)
         return self._carrier
 
+    @property
+    def has_solids(self) -> bool:
+        return bool(self.solid.get().any())
+
     def velocity_at_centres(self) -> np.ndarray:
         return self.velocity.read.get()
 

@@ -185,6 +185,11 @@ class Scheme(ABC):
         carry(self._carrier, velocity=faces, local=self.local.field, solid=self.solid)
         return self._carrier
 
+    @property
+    @abstractmethod
+    def has_solids(self) -> bool:
+        """True if some cell is closed, if only in part; waits for the GPU where one was drawn."""
+
     @abstractmethod
     def velocity_at_centres(self) -> np.ndarray:
         """Velocity at cell centres, (ny, nx, 2) float32."""

@@ -68,9 +68,11 @@ class Brush:
         if not push.local:
             return
         self._look(fluid, push, fluid.faces(), warp)
-        carry, region = self.device.pass_("brush/carry.frag"), push.tip.region(fluid.grid)
+        solids: dict[str, Any] = {"solid": fluid.solid} if fluid.has_solids else {}
+        carry = self.device.pass_("brush/carry.frag", **({"SOLIDS": 1} if solids else {}))
+        region = push.tip.region(fluid.grid)
         inputs = push.tip.inputs(fluid.grid) | {"brush_velocity": push.local_velocity, "viscosity": fluid.viscosity}
-        inputs |= {"motion": self._motion, "slip": self._slip.factor}
+        inputs |= {"motion": self._motion, "slip": self._slip.factor, **solids}
         fluid.local.add(lambda motion: carry(motion, add=True, region=region, **inputs))
 
     def push(self, fluid: Scheme, tip: Tip, dt: float, strength: float = 1.0) -> None:

@@ -80,6 +80,23 @@ def test_a_push_of_a_radius_a_tick_folds_nothing(device: Device) -> None:
     replay.release()
 
 
+@pytest.mark.parametrize("slant", [0.0, 0.1])
+def test_a_local_push_into_something_frozen_presses_what_it_brings_together_smoothly(
+    device: Device, slant: float
+) -> None:
+    """From both sides, and slanting, against a bar: nothing folds."""
+    bar = {"tool": "freeze", "radius": 0.03, "samples": ((0, 0.5 - slant, 0.25, 1.0), (2, 0.5 + slant, 0.75, 1.0))}
+    towards, along = ((3, 0.3, 0.4, 1.0), (20, 0.5, 0.55, 1.0)), ((24, 0.6, 0.35, 1.0), (40, 0.5, 0.6, 1.0))
+    pushes = tuple({"tool": "push", "local": 1.0, "radius": 0.08, "samples": way} for way in (towards, along))
+    fluid = {"grid": 96, "viscosity": 0.3, "drag": 0.0}
+    recipe = Recipe.model_validate({"fluid": fluid, "stroke": (bar, *pushes)})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((620, 900, 3), np.uint8))))
+    for tick in (22, 42):
+        replay.seek(tick)
+        assert replay.warp.statistics().folds == 0
+    replay.release()
+
+
 @pytest.mark.parametrize(("radius", "far", "ticks"), [(0.06, 0.2, 30), (0.12, 0.3, 20), (0.09, 0.15, 6)])
 def test_a_push_moves_a_fluid_that_nothing_slows_down(device: Device, radius: float, far: float, ticks: int) -> None:
     """Slow or a flick, it takes the picture along, and neither it nor the next half a second folds it."""
