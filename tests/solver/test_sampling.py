@@ -214,6 +214,15 @@ def test_soft_alpha_is_mixed_as_light_that_it_weighs(device: Device, kind: str, 
     np.testing.assert_allclose(found[:, 2:-2], wanted[:, 2:-2], atol=1.1 / top if kind == "8" else 1e-4)
 
 
+def test_what_is_even_keeps_its_code_wherever_it_lies(device: Device) -> None:
+    picture = np.repeat(np.arange(256, dtype=np.uint8), 24 * 3).reshape(256, 24, 3)
+    given = GivenMap(device, np.broadcast_to((0.3 / 256, 0.0), (256, 24, 2)))
+    sampler = Sampler(device)
+    np.testing.assert_array_equal(sampler.apply(given, picture, how=Sampling(edges="clamp", dither=False)), picture)
+    for thing in (given, sampler):
+        thing.release()
+
+
 def test_half_black_half_white_is_half_the_light(device: Device) -> None:
     picture = np.zeros((32, 32), np.uint8)
     picture[:, 1::2] = 255

@@ -214,8 +214,9 @@ def test_the_button_of_the_bar_exports(robot: Robot, widgets: Widgets) -> None:
 
 
 def test_a_file_that_will_be_replaced_is_told(
-    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
+    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    dialog.folder = tmp_path
     words, text = [], Ui.text
     monkeypatch.setattr(Ui, "text", lambda ui, said, *how, **more: words.append(said) or text(ui, said, *how, **more))
     for is_there in (False, True):

@@ -268,7 +268,9 @@ def test_frames_are_kept_where_that_is_asked_for_only(device: Device, picture: P
     order = applied(tmp_path / "m.%d.npy", picture, tmp_path / "f.%d.png")
     for resume, made in ((False, 2), (False, 2), (True, 0)):
         order = replace(order, outputs=replace(order.outputs, resume=resume))
-        assert order.perform(lambda: device, Progress()).frames == made
+        progress = Progress()
+        assert order.perform(lambda: device, progress).frames == made
+        assert progress.done == progress.total == made
 
 
 def test_a_map_for_every_frame(device: Device, picture: Path, tmp_path: Path):
