@@ -277,7 +277,7 @@ class Replay:
         for (label, _), far, (x, y) in zip(self.led, self.handles.away, self.handles.places, strict=True):
             if not far <= within:
                 (nx, ny), (hx, hy) = self.grid.size, self.grid.spacing
-                frozen = solid[min(int(y / hy), ny - 1), min(int(x / hx), nx - 1)] > 0
+                frozen = solid[min(int(y / hy), ny - 1), min(int(x / hx), nx - 1)] == 255
                 why = ": what it holds is frozen" if frozen else ""
                 pixels = far * max(self.pictures.source.width, self.pictures.source.height)
                 yield f"{label} is {far:.3g} longer sides ({pixels:.3g} pixels) away from where it is led{why}"
