@@ -75,11 +75,12 @@ def test_bilinear_is_opencv_s_on_photographs(device: Device, warped):
 
 
 def bend(places: np.ndarray) -> np.ndarray:
-    """By how much, in pixels, each pixel's FINER x FINER places are off a straight line, along x or along y."""
-    block = places.reshape(places.shape[0] // FINER, FINER, places.shape[1] // FINER, FINER)
-    down = block[:, 3] - block[:, 2] - block[:, 1] + block[:, 0]
-    along = block[..., 3] - block[..., 2] - block[..., 1] + block[..., 0]
-    return np.maximum(np.abs(down).max(axis=2), np.abs(along).max(axis=1))
+    """By how much, in pixels, the way between FINER x FINER places changes in each pixel or at its border."""
+    found = np.zeros_like(places)
+    found[1:-1] = np.abs(np.diff(places, 2, axis=0))
+    found[:, 1:-1] = np.maximum(found[:, 1:-1], np.abs(np.diff(places, 2, axis=1)))
+    height, width = (side // FINER for side in places.shape)
+    return found.reshape(height, FINER, width, FINER).max(axis=(1, 3))
 
 
 @pytest.mark.parametrize("name", PHOTOGRAPHS)
@@ -104,11 +105,12 @@ def test_opencv_comes_to_our_render_by_our_map(device: Device, tmp_path: Path, n
     within = inside(x, y, FINER).reshape(soft.shape[0], FINER, soft.shape[1], FINER).all(axis=(1, 3))
     assert within.mean() > 0.7
     # Ours is straight within a pixel. A map bent sharper than that, as beside frozen ground, is a case of its own.
-    straight = within & (np.maximum(bend(x), bend(y)) < 0.1)
+    straight = within & (np.maximum(bend(x), bend(y)) < 0.05)
     assert straight.sum() > 0.99 * within.sum()
     difference = np.abs(ours - theirs)
     assert difference[straight].max() <= 2
-    assert difference[within].max() <= 7
+    # The map has a step beside the rocket's frozen ground, 0.4 pixels high: 7.5 there.
+    assert difference[within].max() <= 8
 
 
 def test_ffmpeg_comes_to_our_render_by_our_map(device: Device, warped, tmp_path: Path):

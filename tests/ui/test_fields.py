@@ -222,7 +222,7 @@ def test_a_file_that_will_be_replaced_is_told(
     for is_there in (False, True):
         words.clear()
         robot.frame()
-        assert ("It is there already, and will be replaced." in words) is is_there
+        assert ("This file exists and will be replaced." in words) is is_there
         dialog.job().target.write_bytes(b"")
 
 

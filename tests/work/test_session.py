@@ -99,7 +99,7 @@ def test_the_fluid_comes_to_rest_and_stays_so(session: Session) -> None:
 
 def test_a_stroke_goes_on_beyond_the_edges_by_half_a_picture(session: Session) -> None:
     paint(session, "freeze", (0.9, 0.1), (3.0, -2.0), ticks=1)
-    assert session.recipe.stroke[-1].samples[-1][1:3] == (1.5, -0.5)
+    assert session.recipe.mask[-1].samples[-1][1:3] == (1.5, -0.5)
 
 
 def test_a_slider_that_is_dragged_is_one_edit(session: Session) -> None:

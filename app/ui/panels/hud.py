@@ -91,7 +91,7 @@ def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:
 
 def _statistics(ui: Ui, canvas: Rect, session: Session, numbers: Numbers, clock: Clock) -> None:
     stats = numbers.take(session)
-    with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85, clicked=False):
+    with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85):
         spent = clock.milliseconds
         ui.text(f"Frame  {spent.get('frame', 0):.1f} ms", size=13)
         for name in ("simulate", "canvas", "panels", "interface"):
