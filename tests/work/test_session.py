@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from app.media import project as projects
+from app.model.mask_edits import MaskStroke
 from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.model.strokes import Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
@@ -99,7 +100,9 @@ def test_the_fluid_comes_to_rest_and_stays_so(session: Session) -> None:
 
 def test_a_stroke_goes_on_beyond_the_edges_by_half_a_picture(session: Session) -> None:
     paint(session, "freeze", (0.9, 0.1), (3.0, -2.0), ticks=1)
-    assert session.recipe.mask[-1].samples[-1][1:3] == (1.5, -0.5)
+    painted = session.recipe.mask[-1]
+    assert isinstance(painted, MaskStroke)
+    assert painted.samples[-1][1:3] == (1.5, -0.5)
 
 
 def test_a_slider_that_is_dragged_is_one_edit(session: Session) -> None:
