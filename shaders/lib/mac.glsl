@@ -32,20 +32,28 @@ vec2 mac_centre(sampler2D velocity, vec2 p) {
 
 // Where the fluid at position p (in cells) was one step ago: second-order (midpoint) backtrace, kept in the grid; in two
 // halves where the velocity changes by much along the way, or quick pushes, of a brush's radius a step, fold what they pass.
-// `here` is the velocity at p; `cells_a_speed` is dt / spacing. 8 reads, and 24 more in two halves.
+// `here` is the velocity at p; `cells_a_speed` is dt / spacing. 8 reads, and 24 more in two halves: one look at the velocity
+// each time round, since a rasteriser that draws several fragments at once runs both sides of an `if`, but leaves a loop
+// when all of them have.
 const float BENT = 0.5; // cells a step that it changes by: from there on more and more, from twice as much on wholly
 
 vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
     vec2 edge = vec2(textureSize(velocity, 0));
-    vec2 middle = mac_velocity(velocity, clamp(p - 0.5 * cells_a_speed * here, vec2(0.0), edge));
-    vec2 once = clamp(p - cells_a_speed * middle, vec2(0.0), edge);
-    float bent = smoothstep(BENT, 2.0 * BENT, length(cells_a_speed * (middle - here)));
-    if (bent == 0.0) return once;
-    vec2 by_half = 0.5 * cells_a_speed;
-    p = clamp(p - by_half * mac_velocity(velocity, clamp(p - 0.5 * by_half * here, vec2(0.0), edge)), vec2(0.0), edge);
-    here = mac_velocity(velocity, p);
-    p = clamp(p - by_half * mac_velocity(velocity, clamp(p - 0.5 * by_half * here, vec2(0.0), edge)), vec2(0.0), edge);
-    return mix(once, p, bent);
+    vec2 begun = p, at = clamp(p - 0.5 * cells_a_speed * here, vec2(0.0), edge), once;
+    float bent = 0.0;
+    for (int look = 0; look < 4; ++look) { // in the middle of the whole; of the first half, where it ends, of the second
+        vec2 found = mac_velocity(velocity, at);
+        if (look == 0) {
+            once = clamp(p - cells_a_speed * found, vec2(0.0), edge);
+            bent = smoothstep(BENT, 2.0 * BENT, length(cells_a_speed * (found - here)));
+            if (bent == 0.0) break;
+            found = here;
+        }
+        bool ends = look % 2 == 1;
+        at = clamp(begun - (ends ? 0.5 : 0.25) * cells_a_speed * found, vec2(0.0), edge);
+        if (ends) begun = at;
+    }
+    return mix(once, at, bent);
 }
 
 // The same from the centre of the cell at p, as how far it is: x_d - x, in cells. 11 reads, and 24 more in two halves.
