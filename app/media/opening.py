@@ -114,7 +114,7 @@ class Opened:
 
 def shipped_recipes() -> dict[str, Path]:
     """The recipes that come with fluidwarp, by name."""
-    folder = Path(str(resources.files("assets"))) / "recipes"
+    folder = Path(str(resources.files("assets"))).resolve() / "recipes"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 

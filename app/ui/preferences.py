@@ -11,6 +11,7 @@ from typing import Any
 
 from app.errors import UserError
 from app.media.inputs import read_input
+from app.media.opening import shipped_recipes
 
 MOST_RECENT = 10
 MOST_BYTES = 2**20  # of the file
@@ -79,7 +80,8 @@ class Preferences:
         """Take note of a file that was opened or saved."""
         name = str(path.resolve())
         self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
-        self.folder = str(path.resolve().parent)
+        if path.resolve() not in shipped_recipes().values():  # or what is saved next would go into the program's folder
+            self.folder = str(path.resolve().parent)
         self.save()
 
     def exported(self, path: Path, kind: str) -> None:

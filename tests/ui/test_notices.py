@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from app.media.opening import shipped_recipes
 from app.ui.browser import Browser
 from app.ui.messages import MOST, Messages
 from app.ui.preferences import MOST_RECENT, Preferences
@@ -27,6 +28,15 @@ def test_files_of_late_are_newest_first_and_each_once(tmp_path: Path) -> None:
         preferences.opened(tmp_path / name)
     newest = [str(number) for number in reversed(range(MOST_RECENT - 2))]
     assert [Path(name).name for name in preferences.recent] == ["a", *newest, "b"]
+
+
+def test_nothing_is_saved_among_the_shipped_recipes(tmp_path: Path) -> None:
+    """One of them was opened: what is saved next goes to where the person was before."""
+    preferences = Preferences(None)
+    preferences.opened(tmp_path / "own.png")
+    for path in shipped_recipes().values():
+        preferences.opened(path)
+    assert (preferences.open_from, preferences.recent[0]) == (tmp_path, str(path))
 
 
 def test_folders_are_listed_before_files(tmp_path: Path) -> None:
