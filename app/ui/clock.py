@@ -9,6 +9,7 @@ from contextlib import contextmanager
 SLOWEST = 0.1  # seconds of one frame that count: after a pause, time does not leap
 FRAMES = 4  # until sizes have come to rest that follow from one another: of a window that fits what is in it
 HOVERING = 0.7  # seconds; longer than the pointer has to rest on anything before something happens
+TWICE = 0.5  # seconds between the clicks of a double click at most, as most systems have it
 PACE = 0.05  # seconds between frames that only wait for that
 
 

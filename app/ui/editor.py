@@ -153,6 +153,7 @@ class Editor:
         begun = time.perf_counter()
         self.clock.elapse(dt)
         self.messages.elapse(dt)
+        self.pointer.elapse(dt)
         with self.clock.measure("frame"):
             self._lay_out((size[0] / density, size[1] / density), density, scale)
             self._handle(events)

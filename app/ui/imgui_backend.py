@@ -39,6 +39,8 @@ class ImGuiBackend:
         io.config_nav_cursor_visible_auto = True
         # At rest nothing is drawn, and a cursor that blinks might rest while it is not to be seen.
         io.config_input_text_cursor_blink = False
+        self._down: set[imgui.Key] = set()
+        self._mods = Mods()
         self.fonts = theme.load_fonts()
         imgui.backends.opengl3_init("#version 330")
 
@@ -90,12 +92,20 @@ class ImGuiBackend:
                 self._feed_mods(io, mods)
                 if key in _KEYS:
                     io.add_key_event(_KEYS[key], down)
+                    (self._down.add if down else self._down.discard)(_KEYS[key])
             case Text(text):
                 io.add_input_characters_utf8(text)
             case Focus(focused):
                 io.add_focus_event(focused)
 
     def _feed_mods(self, io: imgui.IO, mods: Mods) -> None:
+        if mods != self._mods:
+            # A key counts with the modifiers that it was pressed with. imgui would take those at the end of a frame, in
+            # which Ctrl may have been let go of, or pressed for the next chord; it lets no key change twice in one.
+            for key in self._down:
+                io.add_key_event(key, False)
+            self._down.clear()
+            self._mods = mods
         io.add_key_event(imgui.Key.mod_ctrl, mods.ctrl)
         io.add_key_event(imgui.Key.mod_shift, mods.shift)
         io.add_key_event(imgui.Key.mod_alt, mods.alt)

@@ -8,6 +8,7 @@ from math import exp, hypot
 
 from app.model.handles import RecipeHandle, labelled
 from app.model.tools import Press
+from app.ui.clock import TWICE
 from app.ui.dialogs import Dialogs
 from app.ui.editor_state import LARGEST, SMALLEST, EditorState
 from app.ui.events import LEFT, MIDDLE, RIGHT, Button, Event, Key, Mods, Move, Wheel
@@ -19,6 +20,7 @@ from app.work.session import Held
 SPLIT_REACH = 8.0  # points from the split's line at which it is taken hold of
 GRIP = 11.0  # points from a handle's middle, likewise
 SHAKE = 3.0  # points that the pointer may move and is not dragged yet
+NEAR = 6.0  # points between the clicks of a double click at most
 
 
 @dataclass
@@ -50,6 +52,8 @@ class PointerController:
     _start: tuple[float, float] = field(default=(0.0, 0.0), init=False)
     _moved: bool = field(default=False, init=False)
     _pressed: Held | None = field(default=None, init=False)
+    _elsewhere: tuple[float, float] = field(default=(-1e6, -1e6), init=False)  # the last press off the canvas
+    _since: float = field(default=0.0, init=False)  # seconds since then
 
     @property
     def is_over_canvas(self) -> bool:
@@ -60,6 +64,12 @@ class PointerController:
     def _could_begin(self) -> bool:
         is_free = not self.dialogs.shown and not self.ui.is_covered(self.x, self.y)
         return is_free and self.workspace.view.canvas.contains(self.x, self.y)
+
+    @property
+    def _is_second_click(self) -> bool:
+        """The first one of a double click was on something that has gone since: a message, a dialog, a menu."""
+        x, y = self._elsewhere
+        return self._since <= TWICE and hypot(x - self.x, y - self.y) <= NEAR
 
     @property
     def shows_ring(self) -> bool:
@@ -95,6 +105,10 @@ class PointerController:
         """The tool works in its other direction, by the switch or by Alt."""
         return self.state.is_opposite != self.mods.alt
 
+    def elapse(self, dt: float) -> None:
+        """Let `dt` seconds go by."""
+        self._since += dt
+
     def handle(self, event: Event) -> None:
         """Take part in an event, if it is about the canvas."""
         match event:
@@ -102,7 +116,9 @@ class PointerController:
                 self._move(x, y, pressure, mods)
             case Button(button, True, mods):
                 self.mods = mods
-                if self.drag is None and self._could_begin:
+                if self.drag is None and not self._could_begin:
+                    self._elsewhere, self._since = (self.x, self.y), 0.0
+                elif self.drag is None and not self._is_second_click:
                     self._press(button)
             case Button(button, False, mods):
                 self.mods = mods

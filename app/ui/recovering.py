@@ -10,6 +10,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.ui.clock import TWICE
 from app.ui.dialogs import Dialog, Dialogs
 from app.ui.journals import Journals
 from app.ui.messages import Messages
@@ -96,6 +97,7 @@ class Offer(Dialog):
         super().__init__("Restore your work?")
         self._recovery = recovery
         self._doubted: Found | None = None  # its Discard has been pressed once
+        self._doubted_at = 0.0  # imgui's seconds
 
     def body(self, ui: Ui) -> bool:
         offered = self._recovery.offered
@@ -119,8 +121,9 @@ class Offer(Dialog):
             self._recovery.restore(restored)
             return False
         if discarded is not None and discarded is not self._doubted:
-            self._doubted = discarded
-        elif discarded is not None:
+            self._doubted, self._doubted_at = discarded, imgui.get_time()
+        elif discarded is not None and imgui.get_time() - self._doubted_at > TWICE:
+            # A double click has not read the question.
             self._recovery.discard(discarded)
         if imgui.is_key_pressed(imgui.Key.escape) or later:
             self._recovery.later()

@@ -16,7 +16,7 @@ from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER
 from app.model.tools import TOOL, TOOLS, Press
 from app.ui.clock import HOVERING
-from app.ui.events import LEFT, Button, Key, Mods, Move, Wheel
+from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog
 from app.ui.files import load_any
 from app.ui.panels.hud import BEHIND
@@ -233,6 +233,34 @@ def test_the_wheel_goes_through_the_history(robot: Robot) -> None:
     assert robot.editor.view.zoom is None
 
 
+CTRL = Mods(ctrl=True)
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        [[Key("", True, CTRL)], [Key("a", True, CTRL), Key("", False), Key("a", False)]],
+        [[Key("", True, CTRL), Key("a", True, CTRL), Key("", False), Key("a", False)]],
+        [[Key("", True, CTRL)], [Key("a", True, CTRL)], [Key("", False)], [Key("a", False)]],
+    ],
+    ids=["two frames", "one frame", "four frames"],
+)
+def test_a_chord_in_a_field_counts_with_the_modifier_that_it_was_pressed_with(
+    robot: Robot, frames: list[list[Event]]
+) -> None:
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 325)
+    robot.key("end")
+    for events in frames:
+        robot.frame(*events)
+    robot.type("new")
+    robot.frame(count=4)
+    assert dialog.name == "new"
+
+
 # Over the picture ---------------------------------------------------------------------------------------------------
 
 
@@ -256,6 +284,30 @@ def test_closing_a_message_does_not_paint(robot: Robot) -> None:
     assert is_untouched(robot)
     robot.frame(count=2)
     assert robot.editor.pointer.shows_ring
+
+
+@pytest.mark.parametrize("what", ["message", "dialog"])
+def test_a_double_click_on_what_goes_with_its_first_click_does_not_paint(robot: Robot, what: str) -> None:
+    if what == "message":
+        robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
+        robot.frame(count=3)
+        rect = robot.editor.ui.covers[-1]
+        x, y = rect.right - 14 - 11, rect.y + 10 + 9
+    else:
+        robot.key("ctrl+,")
+        robot.frame(count=3)
+        rect = robot.editor.dialogs.shown[-1].rect
+        x, y = rect.right - 60, rect.bottom - 36
+    robot.click(x, y)
+    robot.frame(count=2)
+    assert not robot.editor.messages.shown
+    assert not robot.editor.dialogs.shown
+    robot.click(x, y)
+    assert is_untouched(robot)
+    # Who waits a moment means the picture.
+    robot.frame(dt=1.0)
+    robot.click(x, y)
+    assert not is_untouched(robot)
 
 
 def test_the_ring_is_not_drawn_around_a_pointer_on_a_message(robot: Robot) -> None:

@@ -620,6 +620,10 @@ def test_work_that_is_put_off_is_offered_again_until_it_is_discarded(
     answer(robot, "Discard")
     assert offer_of(robot)  # is still there, and asks once more
     answer(robot, "Discard")
+    assert offer_of(robot)  # a double click is no answer to that
+    assert files_in(root) != []
+    robot.frame(dt=1.0)
+    answer(robot, "Discard")
     robot.frame()
     assert robot.editor.dialogs.shown == []
     starter.kill()
