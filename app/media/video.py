@@ -43,7 +43,7 @@ class Video(Clip):
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
     frames: by its duration. bits: 8, or 16 for what has more than 8.
-    file_size, inode: of the file when it was looked into.
+    file_size, inode, written: of the file when it was looked into; the last in nanoseconds.
     """
 
     fps: Fraction
@@ -51,6 +51,7 @@ class Video(Clip):
     filters: str
     file_size: int
     inode: tuple[int, int]
+    written: int
 
     def pictures(
         self,
@@ -116,10 +117,10 @@ class Video(Clip):
             now = self.path.stat()
         except OSError:
             return
-        if (now.st_dev, now.st_ino) == self.inode and now.st_size != self.file_size:
+        if (now.st_dev, now.st_ino) == self.inode and (now.st_size, now.st_mtime_ns) != (self.file_size, self.written):
+            sizes = f", from {self.file_size} to {now.st_size} bytes" if now.st_size != self.file_size else ""
             raise UserError(
-                f"Cannot read {self.path}: it changed while it was read, from {self.file_size} to {now.st_size} bytes; "
-                "start again when it is written whole.",
+                f"Cannot read {self.path}: it changed while it was read{sizes}; start again when it is written whole.",
                 CHANGED,
             )
 
@@ -166,6 +167,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         timecode=found[1] if (found := TIMECODE.search(told)) else None,
         file_size=seen.st_size,
         inode=(seen.st_dev, seen.st_ino),
+        written=seen.st_mtime_ns,
     )
 
 

@@ -746,6 +746,18 @@ def test_a_clip_that_is_cut_while_it_is_read_is_a_failure_of_its_own(tmp_path: P
     assert raised.value.status == 65
 
 
+def test_a_clip_that_is_written_anew_in_its_place_has_changed(tmp_path: Path):
+    """It may be as long as before by the time all is read."""
+    path = generate(tmp_path / "a.mkv", NOISE, "-c:v", "mjpeg", "-q:v", "2")
+    data = path.read_bytes()
+    reading = read_clip(path).read_frames()
+    next(reading)
+    path.write_bytes(data[: len(data) // 2] + bytes(len(data) - len(data) // 2))
+    with pytest.raises(UserError, match=r"a\.mkv: it changed while it was read; start again") as raised:
+        list(reading)
+    assert raised.value.status == 65
+
+
 def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
     """By what ffmpeg complains of, or else by the length that the file tells."""
     said: list[str] = []
