@@ -682,6 +682,18 @@ def test_every_sound_track_is_carried_over(tmp_path: Path, ending: str, codecs: 
         assert np.argmax(np.abs(np.fft.rfft(heard))) * 8000 / len(heard) == pytest.approx(tone, abs=4)
 
 
+def test_what_else_a_clip_holds_is_told(tmp_path: Path):
+    told = tmp_path / "told.txt"
+    told.write_text(";FFMETADATA1\ntitle=A day\nartist=Me\n[CHAPTER]\nTIMEBASE=1/1\nSTART=0\nEND=1\ntitle=Morning\n")
+    further = ["-i", str(told), "-map_metadata", "1", "-attach", str(told), "-metadata:s:t", "mimetype=text/plain"]
+    path = generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", *further)
+    assert (
+        read_clip(path).note
+        == "a.mkv: its chapters are not kept; its attachments are not kept; its tags title, ARTIST are not kept"
+    )
+    assert read_clip(generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=1")).note == ""
+
+
 def test_a_rate_that_varies_is_told(tmp_path: Path):
     slower = "setpts='if(lt(N,10),N/25,10/25+(N-10)/10)/TB'"
     path = generate(
