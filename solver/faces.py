@@ -66,9 +66,11 @@ def components(what: str, function: Function, x: np.ndarray, y: np.ndarray, time
 def _finite(what: str, vector: object, grid: Grid) -> np.ndarray:
     array = real_array(what, vector)
     check_shape(what, array, (grid.ny, grid.nx, 2))
+    with np.errstate(over="ignore"):  # what float32 cannot hold is infinite in it
+        array = array.astype(np.float32)
     if not np.isfinite(array).all():
         raise ValueError(f"{what} holds a value that is not finite")
-    return array.astype(np.float32)
+    return array
 
 
 def check_field(what: str, field: Field, grid: Grid) -> None:

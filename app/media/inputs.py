@@ -76,12 +76,14 @@ def _too_large(path: str | os.PathLike[str], kind: str, most: int) -> UserError:
     return UserError(f"Cannot read {path}: it has more than {size}, the most that a {kind} may have; get it again.")
 
 
-def check_size(file: Path, width: int, height: int, max_pixels: int) -> None:
-    """Raise `UserError` for more than `max_pixels`, telling how to raise the limit."""
-    if width * height > max_pixels:
-        size = f"Cannot read {file}: {width} x {height} pixels are more than the limit of {max_pixels}"
+def check_size(file: Path, width: int, height: int, max_pixels: int, channels: int = 1) -> None:
+    """Raise `UserError` for more than `max_pixels`, or more values than these have in RGBA, telling how to raise it."""
+    needed = max(width * height, -(-width * height * channels // 4))
+    if needed > max_pixels:
+        each = f" of {channels} channels" if needed > width * height else ""
+        size = f"Cannot read {file}: {width} x {height} pixels{each} are more than the limit of {max_pixels}"
         raise UserError(
-            f"{size}; if you trust the file, raise it with --max-pixels {width * height}.",
+            f"{size}; if you trust the file, raise it with --max-pixels {needed}.",
             in_window=f"{size}; make it smaller first.",
         )
 

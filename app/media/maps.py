@@ -300,25 +300,29 @@ def read_map(
 ) -> Displacement:
     """Read a map, also one made elsewhere.
 
-    kind, grid, overscan: what an EXR or TIFF holds; None believes its metadata, and takes it for an ST map on pixel
-    centres when there is none. What is NaN, unknown in a .flo, or not in an EXR's data window is NaN in x and y.
+    kind, grid: what an EXR or TIFF holds; None believes its metadata, and takes it for an ST map on pixel centres when
+    there is none. overscan: None believes the metadata, and is 0 when there is none.
+    What is NaN, unknown in a .flo, or not in an EXR's data window is NaN in x and y.
     Raises `UserError` for what is no map, damaged, infinite, or NaN everywhere.
     """
     check_map(path)
     suffix = Path(path).suffix.lower()
     if suffix in (".flo", ".npy"):
-        offsets = _read_flo(Path(path), max_pixels) if suffix == ".flo" else _read_npy(Path(path), max_pixels)
-        offsets = _known(path, offsets)
-        if suffix == ".npy":
-            return Displacement(offsets)
-        return from_offsets(offsets, up=False)
-    values, told, edge = _read_exr(Path(path), max_pixels) if suffix == ".exr" else _read_tiff(Path(path), max_pixels)
+        values = _read_flo(Path(path), max_pixels) if suffix == ".flo" else _read_npy(Path(path), max_pixels)
+        told, edge = {}, 0
+    else:
+        read = _read_exr if suffix == ".exr" else _read_tiff
+        values, told, edge = read(Path(path), max_pixels)
     values = _known(path, values)
     edge = edge if overscan is None else overscan
     if edge < 0 or 2 * edge >= min(values.shape[:2]):
         height, width = values.shape[:2]
         named = f"an overscan of {edge}" if overscan is None else f"--overscan {edge}"
         raise UserError(f"Cannot read {path}: {named} leaves nothing of its {width} x {height} pixels.")
+    if suffix == ".npy":
+        return Displacement(values, edge)
+    if suffix == ".flo":
+        return from_offsets(values, up=False, overscan=edge)
     if (kind or told.get("map", "st")) == "offsets":
         read = from_offsets(values, up=True, overscan=edge)
     else:

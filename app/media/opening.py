@@ -18,7 +18,7 @@ from app.media.pictures import read_picture
 from app.media.project import Project, is_project, load
 from app.media.recipes import read_recipe
 from app.media.sequence import read_sequence
-from app.media.video import Video, read_clip
+from app.media.video import read_clip
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from solver.grid import MOST_ALONG, SMALLEST_GRID
@@ -35,25 +35,22 @@ class Source:
     picture: Picture
     clip: Clip | None = None
 
-    def taken(self, animated: bool) -> Source:
-        """What of it becomes an animation, or a still: of a file of pictures no more than the first."""
-        if self.clip is None or isinstance(self.clip, Video):
-            return self
-        return Source(replace(self.picture, note=self.clip.note), self.clip) if animated else Source(self.picture)
 
-
-def open_source(path: Path, max_pixels: int = MAX_PIXELS) -> Source:
+def open_source(path: Path, max_pixels: int = MAX_PIXELS, animated: bool = True) -> Source:
     """The picture or, by its ending, the clip in a file; or the clip whose frames are the files `name.%04d.png`.
+
+    animated: whether an animation is made; if not, no more than the first of a file's or a sequence's pictures is read.
 
     Raises:
         UserError: if it cannot be read.
     """
     if is_sequence(path) and not os.path.lexists(path):
-        clip, first = read_sequence(path, max_pixels)
-        return Source(first, clip)
+        clip, picture = read_sequence(path, max_pixels)
+        return Source(picture, clip if animated else None)
     if path.suffix.lower() not in CLIP_ENDINGS:
         picture = read_picture(path, max_pixels)
-        return Source(picture, read_pages(path, picture, max_pixels))
+        clip = read_pages(path, picture, max_pixels) if animated else None
+        return Source(picture if clip is None else replace(picture, note=clip.note), clip)
     clip = read_clip(path, max_pixels)
     with closing(clip.read_frames()) as frames:
         first = next(frames, None)
@@ -99,15 +96,15 @@ class Opened:
             raise UserError(f"{self.label} names no picture; give one with --image, or a key 'picture' in it")
         return self.folder / self.recipe.picture
 
-    def source(self, other: Path | None = None, max_pixels: int = MAX_PIXELS) -> Source:
-        """The picture or clip `other`, or else the recipe's own.
+    def source(self, other: Path | None = None, max_pixels: int = MAX_PIXELS, animated: bool = True) -> Source:
+        """The picture or clip `other`, or else the recipe's own; see `open_source`.
 
         Raises:
             UserError: if there is none, or it cannot be read.
         """
         file = self.source_file(other)
         if file is not None:
-            return open_source(file, max_pixels)
+            return open_source(file, max_pixels, animated)
         assert self.project is not None
         return Source(self.project.picture)
 

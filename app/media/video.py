@@ -19,7 +19,7 @@ from app.errors import UserError
 from app.media import ffmpeg
 from app.media.clip import HIGH, WHOLE, Clip, Colours, Part
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
-from app.media.losses import lost
+from app.media.losses import lost, not_kept
 from app.media.record import digest_of_file
 from app.model.picture import Picture
 from app.progress import never
@@ -35,6 +35,11 @@ NAMES = {
 }  # fmt: skip
 
 KEPT_PRIMARIES = ("bt2020", "smpte432", "smpte431")
+UNKEPT = {
+    "subtitles": r"Stream #0.*: Subtitle: ", "chapters": r"Chapter #0", "attachments": r"Stream #0.*: Attachment: ",
+}  # fmt: skip
+# What every file has of its own, and the time code, which is kept.
+OWN_TAGS = {"major_brand", "minor_version", "compatible_brands", "encoder", "creation_time", "timecode"}
 TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULTILINE | re.IGNORECASE)
 
 
@@ -43,7 +48,7 @@ class Video(Clip):
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
     frames: by its duration. bits: 8, or 16 for what has more than 8.
-    file_size, inode: of the file when it was looked into.
+    file_size, inode, written: of the file when it was looked into; the last in nanoseconds.
     """
 
     fps: Fraction
@@ -51,6 +56,7 @@ class Video(Clip):
     filters: str
     file_size: int
     inode: tuple[int, int]
+    written: int
 
     def pictures(
         self,
@@ -116,10 +122,10 @@ class Video(Clip):
             now = self.path.stat()
         except OSError:
             return
-        if (now.st_dev, now.st_ino) == self.inode and now.st_size != self.file_size:
+        if (now.st_dev, now.st_ino) == self.inode and (now.st_size, now.st_mtime_ns) != (self.file_size, self.written):
+            sizes = f", from {self.file_size} to {now.st_size} bytes" if now.st_size != self.file_size else ""
             raise UserError(
-                f"Cannot read {self.path}: it changed while it was read, from {self.file_size} to {now.st_size} bytes; "
-                "start again when it is written whole.",
+                f"Cannot read {self.path}: it changed while it was read{sizes}; start again when it is written whole.",
                 CHANGED,
             )
 
@@ -166,6 +172,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         timecode=found[1] if (found := TIMECODE.search(told)) else None,
         file_size=seen.st_size,
         inode=(seen.st_dev, seen.st_ino),
+        written=seen.st_mtime_ns,
     )
 
 
@@ -190,8 +197,10 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     count = sum("attached pic" not in line for line in re.findall(r"Stream #0.*: Video: .*", told))
     if count > 1:
         losses.append(f"of its {count} video tracks only the first is used")
-    if re.search(r"Stream #0.*: Subtitle: ", told):
-        losses.append("its subtitles are not kept")
+    losses += [f"its {name} are not kept" for name, sign in UNKEPT.items() if re.search(sign, told)]
+    head = told.partition("Input #0")[2].partition("Duration: ")[0]
+    if tags := [tag for tag in re.findall(r"^    (\S+)\s*: ", head, re.MULTILINE) if tag.lower() not in OWN_TAGS]:
+        losses.append(not_kept("tag", tags))
     return losses
 
 

@@ -119,7 +119,7 @@ class Application(Piece):
         self.check()
         assert self.picture is not None
         progress.enter("reading")
-        source = open_source(self.picture, self.max_pixels).taken(self.outputs.is_animation)
+        source = open_source(self.picture, self.max_pixels, self.outputs.is_animation)
         check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
         if source.clip is not None:
             check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)

@@ -152,7 +152,7 @@ class Task(Piece):
         own = found.recipe if self.picture is None else found.recipe.edited(picture=None)
         read = [Path(found.label), *(found.folder / name for name in picture_names(own))]
         self.check_names(read if file is None else [*read, file])
-        source = found.source(self.picture, self.max_pixels).taken(self.outputs.has_frames)
+        source = found.source(self.picture, self.max_pixels, self.outputs.has_frames)
         return Job(self.edits.applied(found.recipe), source.picture, found.folder, self.outputs, source.clip)
 
 

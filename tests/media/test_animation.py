@@ -682,6 +682,18 @@ def test_every_sound_track_is_carried_over(tmp_path: Path, ending: str, codecs: 
         assert np.argmax(np.abs(np.fft.rfft(heard))) * 8000 / len(heard) == pytest.approx(tone, abs=4)
 
 
+def test_what_else_a_clip_holds_is_told(tmp_path: Path):
+    told = tmp_path / "told.txt"
+    told.write_text(";FFMETADATA1\ntitle=A day\nartist=Me\n[CHAPTER]\nTIMEBASE=1/1\nSTART=0\nEND=1\ntitle=Morning\n")
+    further = ["-i", str(told), "-map_metadata", "1", "-attach", str(told), "-metadata:s:t", "mimetype=text/plain"]
+    path = generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", *further)
+    assert (
+        read_clip(path).note
+        == "a.mkv: its chapters are not kept; its attachments are not kept; its tags title, ARTIST are not kept"
+    )
+    assert read_clip(generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=1")).note == ""
+
+
 def test_a_rate_that_varies_is_told(tmp_path: Path):
     slower = "setpts='if(lt(N,10),N/25,10/25+(N-10)/10)/TB'"
     path = generate(
@@ -742,6 +754,18 @@ def test_a_clip_that_is_cut_while_it_is_read_is_a_failure_of_its_own(tmp_path: P
     next(reading)
     os.truncate(path, size // 2)
     with pytest.raises(UserError, match=f"a{ending}: it changed while it was read, from {size} to") as raised:
+        list(reading)
+    assert raised.value.status == 65
+
+
+def test_a_clip_that_is_written_anew_in_its_place_has_changed(tmp_path: Path):
+    """It may be as long as before by the time all is read."""
+    path = generate(tmp_path / "a.mkv", NOISE, "-c:v", "mjpeg", "-q:v", "2")
+    data = path.read_bytes()
+    reading = read_clip(path).read_frames()
+    next(reading)
+    path.write_bytes(data[: len(data) // 2] + bytes(len(data) - len(data) // 2))
+    with pytest.raises(UserError, match=r"a\.mkv: it changed while it was read; start again") as raised:
         list(reading)
     assert raised.value.status == 65
 

@@ -272,3 +272,14 @@ def test_overscan_that_has_no_place_is_told(device: Device, tmp_path: Path):
     (said,) = rendered(device, source, tmp_path / "o.png")
     assert "lacks the picture's channel Z; it lacks the picture's overscan" in said
     assert said.endswith("; it begins at 0, 0 and not at 10, 20 as the display window")
+
+
+def test_data_beside_the_display_window_are_told(tmp_path: Path):
+    """Nothing of them is shown, and so far away they are no overscan."""
+    there = np.array([200, 0], np.int32), np.array([199 + WIDTH, HEIGHT - 1], np.int32)
+    shown = np.zeros(2, np.int32), np.array([99, 79], np.int32)
+    header = {"dataWindow": there, "displayWindow": shown}
+    OpenEXR.File(header, {name: noise(0, np.float32) for name in "RGB"}).write(str(tmp_path / "far.exr"))
+    picture = read_picture(tmp_path / "far.exr")
+    assert not picture.pixels.any()
+    assert picture.note == "far.exr: pixels that all lie outside of its display window are not kept"

@@ -16,12 +16,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
+import tifffile
+from PIL import Image
 
 from app.errors import MOST_SHOWN, UserError, shown
 from app.media import inputs
 from app.media.inputs import open_input, read_input
 from app.media.maps import holds, read_map
+from app.media.opening import open_source
 from app.media.pictures import read_picture, write_picture
 from app.media.project import is_project, load
 from app.media.recipes import read_recipe
@@ -516,3 +520,75 @@ def test_what_is_too_long_is_told(tmp_path: Path, fluidwarp: Run, words: list[st
     assert ran.returncode == 1
     assert "a bug in fluidwarp" not in ran.stderr
     assert words[-1][:50] in ran.stderr
+
+
+def circular_tiff() -> bytes:
+    """A TIFF of one page that names itself as the next."""
+    packed = io.BytesIO()
+    tifffile.imwrite(packed, np.zeros((16, 16, 3), np.uint8), metadata=None)
+    data = bytearray(packed.getvalue())
+    (start,) = struct.unpack_from("<I", data, 4)
+    (entries,) = struct.unpack_from("<H", data, start)
+    struct.pack_into("<I", data, start + 2 + 12 * entries, start)
+    return bytes(data)
+
+
+ENDLESS = {"comments.ppm": lambda: b"P6 " + b"# " * 60 + b"x", "circle.tif": circular_tiff}
+
+
+@pytest.mark.parametrize("name", ENDLESS)
+def test_a_small_picture_does_not_take_for_ever(tmp_path: Path, name: str):
+    """A comment that can be taken for many, and pages in a circle: both had no end, nor heeded Ctrl+C."""
+    (tmp_path / name).write_bytes(ENDLESS[name]())
+    ran = subprocess.run(
+        [sys.executable, "-c", READING, str(tmp_path / name)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout == {"comments.ppm": "damaged\n", "circle.tif": "1 page\n"}[name]
+
+
+READING = """
+import sys
+from pathlib import Path
+from app.errors import UserError
+from app.media.opening import open_source
+try:
+    source = open_source(Path(sys.argv[1]))
+    print("1 page" if source.clip is None and not source.picture.note else "several pages")
+except UserError as error:
+    print("damaged" if "is truncated or damaged" in str(error) else error)
+"""
+
+
+def many_channels(path: Path) -> None:
+    if path.suffix == ".exr":
+        plane = np.zeros((40, 30), np.float16)
+        parts = [OpenEXR.Part({"name": f"{part}"}, {f"{part}.{name}": plane for name in "RGBA"}) for part in range(6)]
+        OpenEXR.File(parts).write(str(path))
+    else:
+        tifffile.imwrite(path, np.zeros((40, 30, 24), np.uint8), photometric="rgb", metadata=None)
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif"])
+def test_the_limit_of_pixels_is_one_of_their_values_too(tmp_path: Path, ending: str):
+    """What is empty packs to a thousandth, however many channels it has."""
+    path = tmp_path / f"a{ending}"
+    many_channels(path)
+    with pytest.raises(UserError, match=r"30 x 40 pixels of 24 channels are more.*--max-pixels 7200\."):
+        read_picture(path, 7199)
+    assert read_picture(path, 7200).width == 30
+
+
+def test_a_still_takes_no_more_of_an_animation_than_its_first_frame(tmp_path: Path):
+    """Frames after the first may be many and damaged."""
+    frames = [Image.fromarray(np.full((64, 64), 40 * number, np.uint8)) for number in range(5)]
+    frames[0].save(tmp_path / "a.gif", save_all=True, append_images=frames[1:])
+    data = (tmp_path / "a.gif").read_bytes()
+    (tmp_path / "a.gif").write_bytes(data[: len(data) - 60])
+    assert open_source(tmp_path / "a.gif", animated=False).picture.width == 64
+    with pytest.raises(UserError, match="truncated or damaged"):
+        open_source(tmp_path / "a.gif")

@@ -453,3 +453,15 @@ def test_what_is_no_exr_at_all_is_left_to_the_reader_of_pictures(tmp_path: Path)
     assert holds(tmp_path / "a.exr") == "picture"
     assert holds(tmp_path / "nonesuch.tif") == "picture"
     assert holds(tmp_path / "a.flo") == holds(tmp_path / "a.npy") == "map"
+
+
+@pytest.mark.parametrize("ending", [".flo", ".npy"])
+def test_overscan_can_be_told_of_a_map_that_does_not(tmp_path: Path, ending: str):
+    inner = Displacement((np.random.default_rng(0).standard_normal((6, 9, 2)) / 9).astype(np.float32), 2)
+    whole = Displacement(inner.values * np.float32(5 / 9), 0)  # in the longer sides of all of it
+    write_map(tmp_path / f"a{ending}", whole if ending == ".flo" else Displacement(inner.values))
+    read = read_map(tmp_path / f"a{ending}", overscan=2)
+    assert (read.width, read.height, read.overscan) == (5, 2, 2)
+    np.testing.assert_allclose(read.values, inner.values, rtol=1e-6)
+    with pytest.raises(UserError, match="--overscan 1000000 leaves nothing of its 9 x 6 pixels"):
+        read_map(tmp_path / f"a{ending}", overscan=1_000_000)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
@@ -437,3 +438,14 @@ def test_what_was_released_says_so(device: Device) -> None:
     for call in calls:
         with pytest.raises(FieldError, match="was released"):
             call()
+
+
+def test_what_float32_cannot_hold_is_refused_in_a_sentence(device: Device):
+    """And not by NumPy's warning about it."""
+    grid = Grid(24, 16)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(ValueError, match="velocity holds a value that is not finite"):
+            Fluid(device, grid).set_velocity(np.full((16, 24, 2), 1e39))
+        with pytest.raises(ValueError, match="not finite"):
+            Fluid(device, grid).step(0.1, lambda x, y, t: (0 * x + 1e39, y))

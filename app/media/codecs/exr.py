@@ -62,10 +62,7 @@ def read_channels(file: Path, max_pixels: int = MAX_PIXELS) -> tuple[dict[str, n
 
     head_of(file)
     with decoding(file, "OpenEXR"), quiet():
-        header = OpenEXR.File(str(file), header_only=True).header()
-        for window in ("dataWindow", "displayWindow"):
-            (left, top), (right, bottom) = header[window]
-            check_size(file, int(right) - int(left) + 1, int(bottom) - int(top) + 1, max_pixels)
+        header = _headers(file, max_pixels)[0]
         exr = OpenEXR.File(str(file), separate_channels=True)
         # a file that ends early is announced on stdout, not raised: it just has no part
         channels = exr.channels() if exr.parts else {}
@@ -89,6 +86,8 @@ def read(file: Path, max_pixels: int) -> Picture:
         text for part in parts for key, text in part.texts.items() if re.fullmatch("cryptomatte/.*/name", key)
     )
     layers = []
+    if any(part.is_unseen for part in parts):
+        losses.append("pixels that all lie outside of its display window are not kept")
     for number, part in enumerate(parts):
         further = [name for name in part.channels if number != index or name not in colours]
         if part.is_flat:
@@ -146,11 +145,17 @@ class _Part:
         place_window(self.channels[name], (left - first_x + margins[0], top - first_y + margins[1]), plane)
         return plane
 
+    @property
+    def is_unseen(self) -> bool:
+        """Whether none of its data are in the display window."""
+        (left, top, right, bottom), (first_x, first_y, last_x, last_y) = self.windows
+        return left > last_x or top > last_y or right < first_x or bottom < first_y
+
     def margins(self) -> Window:
         """How far its data reach beyond the display window, if they are in it at all."""
-        (left, top, right, bottom), (first_x, first_y, last_x, last_y) = self.windows
-        if left > last_x or top > last_y or right < first_x or bottom < first_y:
+        if self.is_unseen:
             return 0, 0, 0, 0
+        (left, top, right, bottom), (first_x, first_y, last_x, last_y) = self.windows
         return max(0, first_x - left), max(0, first_y - top), max(0, right - last_x), max(0, bottom - last_y)
 
     def header(self, whole: bool) -> dict[str, Any]:
@@ -166,11 +171,7 @@ def _parts(file: Path, max_pixels: int) -> list[_Part]:
     import OpenEXR
 
     with quiet():
-        headers = [part.header for part in OpenEXR.File(str(file), header_only=True).parts]
-        for header in headers:
-            for window in ("dataWindow", "displayWindow"):
-                left, top, right, bottom = _corners(header[window])
-                check_size(file, right - left + 1, bottom - top + 1, max_pixels)
+        headers = _headers(file, max_pixels)
         # a file that ends early is announced on stdout, not raised: it just has no part
         read = OpenEXR.File(str(file), separate_channels=True).parts
     if not read or not all(part.channels for part in read):
@@ -201,6 +202,19 @@ def _parts(file: Path, max_pixels: int) -> list[_Part]:
     return parts
 
 
+def _headers(file: Path, max_pixels: int) -> list[Any]:
+    """The header of each part. Raises `UserError` for more than may be unpacked."""
+    import OpenEXR
+
+    headers = [part.header for part in OpenEXR.File(str(file), header_only=True).parts]
+    channels = sum(len(header["channels"]) for header in headers)
+    for header in headers:
+        for window in ("dataWindow", "displayWindow"):
+            left, top, right, bottom = _corners(header[window])
+            check_size(file, right - left + 1, bottom - top + 1, max_pixels, channels)
+    return headers
+
+
 def _corners(window: Any) -> Window:
     (left, top), (right, bottom) = window
     return int(left), int(top), int(right), int(bottom)
@@ -210,7 +224,8 @@ def _margins(parts: Sequence[_Part], max_pixels: int) -> tuple[Window, list[str]
     """How far the data of any part reach beyond the display window, and in words if that is too much to be kept."""
     left, top, right, bottom = (max(sides) for sides in zip(*(part.margins() for part in parts), strict=True))
     first_x, first_y, last_x, last_y = parts[0].windows[1]
-    if (left + last_x - first_x + 1 + right) * (top + last_y - first_y + 1 + bottom) > max_pixels:
+    pixels = (left + last_x - first_x + 1 + right) * (top + last_y - first_y + 1 + bottom)
+    if pixels * max(4, sum(len(part.channels) for part in parts)) > 4 * max_pixels:
         far = max(left, top, right, bottom)
         return (0, 0, 0, 0), [f"its overscan ({far} px beyond the display window) is not kept"]
     return (left, top, right, bottom), []

@@ -7,7 +7,7 @@ import math
 import os
 import re
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -35,8 +35,17 @@ def pages_of(file: Path) -> list[int]:
 
     tifffile.logger().setLevel(logging.CRITICAL)
     with tifffile.TiffFile(file) as tiff:
-        pages: Any = tiff.pages
-        return [place for place, page in enumerate(pages) if not page.subfiletype & 5]
+        return [place for place, page in enumerate(_pages(tiff)) if not page.subfiletype & 5]
+
+
+def _pages(tiff: Any) -> Iterator[Any]:
+    """A TIFF's pages, each once: tifffile follows them without end where one names an earlier one as the next."""
+    seen: set[int] = set()
+    for page in tiff.pages:
+        if page.offset in seen:
+            return
+        seen.add(page.offset)
+        yield page
 
 
 def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
@@ -47,7 +56,7 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
     with tifffile.TiffFile(file) as tiff:
         page: Any = tiff.pages[place or 0]
-        check_size(file, page.imagewidth, page.imagelength, max_pixels)
+        check_size(file, page.imagewidth, page.imagelength, max_pixels, page.samplesperpixel)
         tags = {tag.code: tag.value for tag in page.tags}
         samples = [axis for axis in page.axes if axis in "YXS"]
         if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
@@ -105,7 +114,7 @@ def _losses(tiff: Any) -> list[str]:
     """What of a TIFF is not in its first page, and what is cut of its samples."""
     losses = []
     with suppress(Exception):  # pages after the first may be damaged
-        pages = sum(not page.subfiletype & 5 for page in tiff.pages)  # neither smaller versions nor masks
+        pages = sum(not page.subfiletype & 5 for page in _pages(tiff))  # neither smaller versions nor masks
         if pages > 1:
             losses.append(f"of its {pages} pages only the first is used")
     if (kind := tiff.pages.first.dtype) is not None and kind.itemsize > (2 if kind.kind == "u" else 4):
