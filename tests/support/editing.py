@@ -86,16 +86,13 @@ class Robot:
 
     def see(self) -> None:
         """Draw all of each frame, from one that is drawn now on."""
-        self._release_target()
+        before = self.target
         self.target = self._framebuffer(self.size)
         self.frame()
+        _release(before)
 
     def _framebuffer(self, size: tuple[int, int]) -> moderngl.Framebuffer:
         return self.device.ctx.framebuffer([self.device.ctx.texture(size, 4)])
-
-    def _release_target(self) -> None:
-        self.target.color_attachments[0].release()
-        self.target.release()
 
     def pixels(self) -> np.ndarray:
         """What is seen, (h, w, 3) uint8, top row first."""
@@ -181,7 +178,12 @@ class Robot:
 
     def close(self) -> None:
         self.editor.release()
-        self._release_target()
+        _release(self.target)
+
+
+def _release(framebuffer: moderngl.Framebuffer) -> None:
+    framebuffer.color_attachments[0].release()
+    framebuffer.release()
 
 
 def export_dialog(robot: Robot, folder: Path) -> ExportDialog:
