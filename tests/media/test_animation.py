@@ -12,13 +12,14 @@ import time
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
 from app.errors import Cancelled, UserError
-from app.media import animation, encoders, ffmpeg, files, video
+from app.media import animation, encoders, ffmpeg, files
 from app.media.animation import animation_writer, frame_order, reordered
 from app.media.clip import USUAL, Colours
 from app.media.depth import to_bits
@@ -719,15 +720,16 @@ def test_depth_and_colours_of_a_clip_that_a_format_has_no_room_for_are_told(
 
 def test_a_clip_that_grows_while_it_is_looked_into_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = generate(tmp_path / "a.avi", "testsrc=s=64x48:r=10:d=1", "-c:v", "mjpeg")
-    look = video._banner
+    run = subprocess.run
 
-    def slow_look(file: Path) -> str:
-        told = look(file)
-        with file.open("ab") as stream:
-            stream.write(bytes(99))
+    def slow_run(command: list[str], **options: Any) -> subprocess.CompletedProcess[Any]:
+        told = run(command, **options)
+        if f"file:{path}" in command:
+            with path.open("ab") as stream:
+                stream.write(bytes(99))
         return told
 
-    monkeypatch.setattr(video, "_banner", slow_look)
+    monkeypatch.setattr(subprocess, "run", slow_run)
     with pytest.raises(UserError, match="it changed while it was read"):
         list(read_clip(path).read_frames())
 

@@ -171,7 +171,8 @@ def test_the_first_stroke_does_not_fold(session: Session) -> None:
     assert statistics.folds == 0
 
 
-@pytest.mark.parametrize("hardness", [0.0, 0.5, 1.0], ids=["soft", "half hard", "hard"])
+# A soft one is the first of those that are made again and again, below.
+@pytest.mark.parametrize("hardness", [0.5, 1.0], ids=["half hard", "hard"])
 @pytest.mark.parametrize("radius", [0.1, 0.15])
 @pytest.mark.parametrize("feel", FEELS, ids=lambda feel: feel.name)
 def test_a_moderate_push_does_not_fold(session: Session, feel: Feel, radius: float, hardness: float) -> None:
@@ -460,7 +461,7 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     dice = random.Random(seed)
 
     def gesture() -> None:
-        strokes, went_back = session.recipe.stroke, session._went_back
+        strokes, went_back = session.recipe.stroke, session.went_back
         press = Press(BrushSettings(0.12, 0.2), dice.random() < 0.2, session.extent, session.dt)
         session.press(TOOL[dice.choice(PAINTING).name], press, dice.random(), dice.random(), 1.0, dice.random() < 0.1)
         for _ in range(dice.randrange(5)):
