@@ -382,6 +382,10 @@ def test_only_sending_the_playhead_back_cuts_what_comes_after_it(session: Sessio
     assert first.last_tick == 1
     assert second.first_tick == 2
     assert session.notice is not None
+    # Nor is it one to do so once more.
+    session.pause()
+    strike(session, 3)
+    assert [stroke.samples[-1][1] for stroke in session.recipe.stroke[1:]] == [0.7, 0.7]
 
 
 def test_going_on_from_within_a_stroke_with_few_samples_changes_nothing_that_was_there(session: Session) -> None:
