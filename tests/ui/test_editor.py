@@ -1254,6 +1254,18 @@ def test_the_grid_is_chosen_from_the_machine_measured(automatic: Robot) -> None:
     assert not automatic.editor.workspace.is_dirty
 
 
+@pytest.mark.parametrize(("fixed", "rate"), [(3.9, 60), (4.1, 30)])
+def test_a_machine_that_needs_less_than_four_milliseconds_makes_60_ticks_a_second(
+    automatic: Robot, fixed: float, rate: int
+) -> None:
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    quality = automatic.editor.quality
+    quality.speed, quality.grid = Speed(fixed=fixed, growing=0.0, drawing=5.0), 96
+    quality.turn_on()
+    assert automatic.editor.session.recipe.fluid.dt == pytest.approx(1 / rate)
+    assert automatic.editor.session.recipe.fluid.grid == 96
+
+
 def test_a_tick_is_what_it_adds_to_a_frame() -> None:
     speed = Speed.of(fine=40.0, coarse=22.0, drawing=10.0)
     assert speed.drawing + speed.tick(TRIALS[0]) == pytest.approx(40.0)
