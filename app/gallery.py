@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -85,48 +86,55 @@ class Studio:
         """Play the recipe `name`, changed by `parts`, and write its result and animation."""
         recipe = load(name).edited(**parts)
         source = source_of(recipe)
-        pictures = Pictures(Picture(source), recipes_folder())
-        replay = Replay(self.device, recipe, pictures, budget=0)
         ticks = {round(time / recipe.fluid.dt): time for time in stills}
         kept: dict[float, np.ndarray] = {}
         frame = source
         label = save_as or name
-        try:
-            with animation_writer(self.folder / f"{label}.mp4", FPS, cancel=self.progress.cancel) as write:
-                write(frame)
-                for tick in range(1, recipe.ticks + 1):
-                    replay.advance()
-                    frame = self._frame(replay, source)
-                    write(frame)
-                    if tick in ticks:
-                        kept[ticks[tick]] = frame
-                    self.progress.advance()
+
+        def show(replay: Replay) -> None:
+            nonlocal frame
+            frame = self._frame(replay, source)
+            write(frame)
+            if replay.tick in ticks:
+                kept[ticks[replay.tick]] = frame
+
+        with animation_writer(self.folder / f"{label}.mp4", FPS, cancel=self.progress.cancel) as write:
+            write(frame)
+            with self.played(recipe, source, show) as replay:
                 for _ in range(LINGER):
                     write(frame)
-            write_picture(self.folder / f"{label}.png", Picture(frame))
-            return Played(
-                recipe=recipe,
-                grid=replay.grid,
-                source=source,
-                result=frame,
-                stills=kept,
-                field=force_field(recipe, replay.grid, pictures),
-                viscosity=replay.fluid.viscosity.get(),
-                displacement=displacement(replay, (source.shape[1], source.shape[0])).values,
-                statistics=replay.warp.statistics(),
-            )
-        finally:
-            replay.release()
+                found = Played(
+                    recipe=recipe,
+                    grid=replay.grid,
+                    source=source,
+                    result=frame,
+                    stills=kept,
+                    field=force_field(recipe, replay.grid, Pictures(Picture(source), recipes_folder())),
+                    viscosity=replay.fluid.viscosity.get(),
+                    displacement=displacement(replay, (source.shape[1], source.shape[0])).values,
+                    statistics=replay.warp.statistics(),
+                )
+        write_picture(self.folder / f"{label}.png", Picture(frame))
+        return found
 
     def still(self, recipe: Recipe) -> np.ndarray:
         """The result of a recipe of the gallery, (h, w, 3) uint8; nothing is written."""
         source = source_of(recipe)
+        with self.played(recipe, source) as replay:
+            return self._frame(replay, source)
+
+    @contextmanager
+    def played(
+        self, recipe: Recipe, source: np.ndarray, show: Callable[[Replay], None] = lambda replay: None
+    ) -> Iterator[Replay]:
+        """Yield a replay of a recipe on a picture, (h, w, 3) uint8, at its end; `show` sees it after every tick."""
         replay = Replay(self.device, recipe, Pictures(Picture(source), recipes_folder()), budget=0)
         try:
             for _ in range(recipe.ticks):
                 replay.advance()
+                show(replay)
                 self.progress.advance()
-            return self._frame(replay, source)
+            yield replay
         finally:
             replay.release()
 

@@ -8,15 +8,13 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from app.gallery import Numbers, Studio, load, recipes_folder, source_of
-from app.media.auxiliary import Pictures
+from app.gallery import Numbers, Studio, load, source_of
 from app.media.files import make_folder
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.progress import Progress
-from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.resample.plan import Sampling
 
@@ -128,22 +126,13 @@ def _played(
     """The result of a recipe on a picture, (h, w, 3) uint8 of `size`; how far each pixel of it is looked up from
     itself, in pixels (h, w); and what is measured on the whole map.
     """
-    replay = Replay(studio.device, recipe, Pictures(Picture(source), recipes_folder()), budget=0)
-    try:
-        for _ in range(recipe.ticks):
-            replay.advance()
-            studio.progress.advance()
+    with studio.played(recipe, source) as replay:
         result = studio.sampler.apply(replay.warp, source, size, Sampling(edges=recipe.edges))
         found = replay.warp.statistics()
         moved = np.linalg.norm(replay.warp.read(size), axis=-1) * max(size)
-        return (
-            result,
-            moved,
-            {
-                "px, most": f"{found.displacement_max * max(size):.1f}",
-                "det J": f"{found.det_min:.2f} to {found.det_max:.2f}",
-                "folds": f"{found.folds} of {found.places} places",
-            },
-        )
-    finally:
-        replay.release()
+    numbers = {
+        "px, most": f"{found.displacement_max * max(size):.1f}",
+        "det J": f"{found.det_min:.2f} to {found.det_max:.2f}",
+        "folds": f"{found.folds} of {found.places} places",
+    }
+    return result, moved, numbers

@@ -124,6 +124,14 @@ def test_signals_are_given_back():
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_a_second_ctrl_c_interrupts_at_once():
+    with interruptible() as cancel:
+        signal.raise_signal(signal.SIGINT)
+        assert cancel()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
 def test_other_threads_may_use_it():
     counted: list[int] = []
 

@@ -48,8 +48,7 @@ def animation_writer(
     fps: float | Fraction = 30,
     *,
     codec: str | None = None,
-    crf: int | None = None,
-    quality: int = 95,
+    quality: int | None = None,
     bits: int | None = None,
     loops: int = 0,
     sound: str | os.PathLike[str] | None = None,
@@ -69,10 +68,11 @@ def animation_writer(
 
     path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on, each of
         which appears as soon as it is written, and stays.
-    codec: one of the container's; None is its first. crf: constant rate factor of H.264 (18), VP9 (24) or AV1 (30).
+    codec: one of the container's; None is its first.
+    quality: 1-100 of a video with losses or of a sequence's pictures; None is what is usual for the codec.
     loops: GIF, APNG, WebP; 0 is for ever. durations: of the frames, in steps of 1 / fps; None is 1 for each.
     colours, timecode: what a video is told to have, the latter of its first frame.
-    quality, bits: of a sequence's pictures; see `write_picture`.
+    bits: of a sequence's pictures; see `write_picture`.
     sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
     like: the picture whose profile and metadata the pictures of a sequence get; whether its alpha is premultiplied, so
         that of the frames is.
@@ -87,7 +87,7 @@ def animation_writer(
 
         def write_one(file: Path, frame: Frame) -> None:
             picture = frame if isinstance(frame, Picture) else template.with_pixels(frame)
-            write_picture(file, picture, bits=bits, quality=quality, codec=codec)
+            write_picture(file, picture, bits=bits, codec=codec, **({} if quality is None else {"quality": quality}))
 
         with sequence_writer(path, write_one, first, cancel, written, resumed) as write:
             yield write
@@ -114,7 +114,7 @@ def animation_writer(
             container.encoding(codec),
             rate,
             container.even,
-            crf,
+            quality,
             loops,
             (given, options),
             cancel,
@@ -136,7 +136,7 @@ class _Video:
     encoding: Encoding
     rate: Fraction
     even: bool = False
-    crf: int | None = None
+    quality: int | None = None
     loops: int = 0
     sound: tuple[Sequence[str], Sequence[str]] = (), ()
     cancel: Callable[[], bool] = never
@@ -177,7 +177,7 @@ class _Video:
             [
                 *["-f", "rawvideo", "-pix_fmt", names[channels - 1], "-s", f"{width}x{height}", "-r", str(self.rate)],
                 *["-i", "-", *self.sound[0], "-map", "0:v:0"],
-                *self._timed(self.encoding(Stream(channels in (2, 4), bits, self.crf, self.loops, self.colours))),
+                *self._timed(self.encoding(Stream(channels in (2, 4), bits, self.quality, self.loops, self.colours))),
                 *self.sound[1],
                 f"file:{self.temporary}",
             ],

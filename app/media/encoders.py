@@ -32,11 +32,11 @@ ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
 
 @dataclass(frozen=True)
 class Stream:
-    """Frames for an encoder, with alpha or not, of 8 or 16 bits a channel; `crf` None is the codec's usual one."""
+    """Frames for an encoder, with alpha or not, of 8 or 16 bits a channel; `quality` None is the codec's usual one."""
 
     alpha: bool
     bits: int
-    crf: int | None = None
+    quality: int | None = None
     loops: int = 0
     colours: Colours = USUAL
 
@@ -46,7 +46,8 @@ class Stream:
         return (ON_BLACK if self.alpha else "") + tagged(self.colours)
 
     def crf_or(self, usual: int) -> list[str]:
-        return ["-crf", str(usual if self.crf is None else self.crf)]
+        """The constant rate factor, the usual one where no quality is asked for."""
+        return ["-crf", str(usual if self.quality is None else crf_of(self.quality))]
 
 
 Encoding = Callable[[Stream], list[str]]

@@ -169,7 +169,7 @@ class CurveForce(_Push):
         return self
 
     def _bare(self, grid: Grid) -> np.ndarray:
-        at, tangents, lengths = _along(places(self.points, grid), self.spline, self.radius / 8)
+        at, tangents, lengths = pieces_of(places(self.points, grid), self.spline, self.radius / 8)
         if self.direction == "tangent":
             pushes = tangents
         elif self.direction == "normal":
@@ -443,7 +443,7 @@ def _on_faces(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return faces
 
 
-def _along(points: np.ndarray, spline: bool, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pieces_of(points: np.ndarray, spline: bool, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The middles of short pieces of the curve, at most `spacing` long, their unit tangents and their lengths."""
     line = [points[0]]
     for k, (a, b) in enumerate(pairwise(points)):

@@ -16,7 +16,7 @@ from app.errors import UserError
 from app.media import maps
 from app.media.animation import Frame, animation_writer
 from app.media.clip import USUAL, WHOLE
-from app.media.encoders import check_colours, check_output, crf_of, passes, unheld_of_clip
+from app.media.encoders import check_colours, check_output, passes, unheld_of_clip
 from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, writable
 from app.media.formats import picture_format, unheld
 from app.media.inputs import MAX_PIXELS
@@ -235,7 +235,6 @@ class _Applying:
                 self.output,
                 rate,
                 codec=outputs.codec,
-                crf=crf_of(order.quality),
                 quality=order.quality,
                 bits=outputs.bits,
                 sound=clip.path if clip and clip.sound else None,

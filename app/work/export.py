@@ -23,7 +23,7 @@ from app.errors import UserError
 from app.media.animation import Frame, FrameWriter, NumberedWriter, animation_writer, frame_order, reordered
 from app.media.auxiliary import Pictures
 from app.media.clip import USUAL
-from app.media.encoders import crf_of, passes, unheld_of_clip
+from app.media.encoders import passes, unheld_of_clip
 from app.media.files import is_sequence, replacing
 from app.media.formats import picture_format, unheld
 from app.media.maps import Displacement, map_writer, write_map
@@ -288,7 +288,6 @@ class _Export:
             file,
             job.rate,
             codec=self.outputs.codec,
-            crf=crf_of(output.quality),
             quality=output.quality,
             bits=self.outputs.bits,
             sound=job.clip.path if job.clip and job.clip.sound else None,

@@ -9,13 +9,13 @@ from pathlib import Path
 if sys.platform == "win32":
     import msvcrt
 
-    def _try_lock(handle: int) -> None:
+    def try_lock(handle: int) -> None:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
 
 else:
     import fcntl
 
-    def _try_lock(handle: int) -> None:
+    def try_lock(handle: int) -> None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
@@ -34,7 +34,7 @@ class Lock:
         """
         handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)  # closed in every process that this one starts
         try:
-            _try_lock(handle)
+            try_lock(handle)
             held = cls(handle)
             # Who held it before may have removed it meanwhile: then it is no longer what others look at.
             if os.path.samestat(os.fstat(handle), os.stat(path)):

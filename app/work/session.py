@@ -442,6 +442,11 @@ class Session:
         elif self.end:
             self._record()
 
+    @property
+    def went_back(self) -> bool:
+        """The playhead was sent back, and what is done next begins there."""
+        return self._went_back
+
     def seek(self, tick: int) -> None:
         """Send the playhead to a tick of the recording; it arrives over the next frames."""
         self.release()

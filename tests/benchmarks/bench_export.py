@@ -43,7 +43,7 @@ ENDINGS = (".mp4", ".mov", ".%04d.png", ".webm", ".gif")
 
 def encode(path: Path, frames: Iterable[np.ndarray]) -> None:
     """Feed frames that are there already to the writer the export uses, with the export's settings."""
-    with animation_writer(path, Fraction(RATE), crf=18, quality=90) as write:
+    with animation_writer(path, Fraction(RATE), quality=90) as write:
         for frame in frames:
             write(frame)
 

@@ -22,7 +22,6 @@ import tifffile
 from PIL import Image
 
 from app.errors import MOST_SHOWN, UserError, shown
-from app.media import inputs
 from app.media.inputs import open_input, read_input
 from app.media.maps import holds, read_map
 from app.media.opening import open_source
@@ -435,15 +434,14 @@ def test_files_are_of_a_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_pipe_that_takes_a_files_place_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = tmp_path / "a"
     path.touch()
-    check = inputs._check
+    opened = os.open
 
-    def swap(name: Path, *others: object) -> None:
-        check(name, *others)  # type: ignore[arg-type]
-        if path.is_file():
-            path.unlink()
-            os.mkfifo(path)
+    def swap(name: str | Path, flags: int, *others: int) -> int:
+        path.unlink()
+        os.mkfifo(path)
+        return opened(name, flags, *others)
 
-    monkeypatch.setattr(inputs, "_check", swap)
+    monkeypatch.setattr(os, "open", swap)
     with pytest.raises(UserError, match="a pipe or a device"):
         open_input(path)
 

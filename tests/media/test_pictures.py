@@ -648,7 +648,7 @@ def test_bombs_are_refused_until_the_limit_is_raised(tmp_path: Path, ending: str
 def test_an_enormous_claim_is_refused_before_decoding(tmp_path: Path):
     path = tmp_path / "bomb.png"
     header = b"IHDR" + struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
-    path.write_bytes(PngImagePlugin._MAGIC + struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header)))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header)))
     with path.open("ab") as stream:
         PngImagePlugin.putchunk(stream, b"IDAT", b"")
     with pytest.raises(UserError, match=r"60000 x 60000 pixels are more than the limit"):

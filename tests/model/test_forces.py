@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
-from app.model.forces import Force, build
+from app.model.forces import Force, build, pieces_of
 from app.model.picture import Picture
 from app.model.schema import frozen
 from solver.grid import Grid
@@ -173,14 +173,12 @@ def test_a_straight_curve_has_its_strength_on_it(
 
 
 def test_a_spline_passes_through_its_points_and_a_corner_has_no_seam(pictures: Pictures) -> None:
-    from app.model.forces import _along
-
     corner = np.array([[0.2, 0.2], [0.5, 0.8], [0.8, 0.2]])
-    at, tangents, lengths = _along(corner, True, 0.01)
+    at, tangents, lengths = pieces_of(corner, True, 0.01)
     assert min(np.hypot(*(at - corner[1]).T)) < 0.01
     assert np.abs(np.diff(tangents, axis=0)).max() < 0.2
     assert lengths.max() < 0.015
-    _, _, straight = _along(corner, False, 0.01)
+    _, _, straight = pieces_of(corner, False, 0.01)
     assert straight.sum() == pytest.approx(2 * math.hypot(0.3, 0.6))
     faces = force(kind="curve", points=corner.tolist(), radius=0.1).faces(Grid(200, 200), pictures)
     assert np.abs(np.diff(faces, axis=0)).max() < 0.15
@@ -188,10 +186,8 @@ def test_a_spline_passes_through_its_points_and_a_corner_has_no_seam(pictures: P
 
 def test_a_spline_is_that_of_catmull_and_rom() -> None:
     """Of evenly spaced points of a parabola: in its inner pieces, the parabola itself."""
-    from app.model.forces import _along
-
     x = np.arange(5.0)
-    at, tangents, lengths = _along(np.stack([x, x * x / 4], axis=-1), True, 0.05)
+    at, tangents, lengths = pieces_of(np.stack([x, x * x / 4], axis=-1), True, 0.05)
     inner = (at[:, 0] > 1) & (at[:, 0] < 3)
     assert inner.sum() > 50
     assert at[inner, 1] == pytest.approx(at[inner, 0] ** 2 / 4, abs=1e-3)
@@ -210,10 +206,11 @@ def test_a_field_is_read_from_a_picture(dtype: Any, zero: int, pictures: Picture
     pixels = np.full((128, 192, 3), zero, dtype)
     pixels[40:80, 60:120, :2] = [2 * zero - 1, 1]
     field_picture(pictures.folder / "field.png", pixels)
-    up, down = (
-        at_centres(force(kind="field", picture="field.png", green=green, strength=3).faces(WIDE, pictures))
-        for green in ("up", "down")
+    up, down, plain = (
+        at_centres(force(kind="field", picture="field.png", strength=3, **keys).faces(WIDE, pictures))
+        for keys in ({"green": "up"}, {"green": "down"}, {})
     )
+    assert np.array_equal(plain, down)
     assert down[30, 45] == pytest.approx([3, -3], rel=1e-4)
     assert up[30, 45] == pytest.approx([3, 3], rel=1e-4)
     assert not down[:18].any(), "the middle value is exactly zero"

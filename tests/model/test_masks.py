@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from pydantic import TypeAdapter, ValidationError
+from scipy.special import ndtr
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
@@ -132,7 +133,11 @@ def test_levels_blur_and_stretch(pictures: Pictures) -> None:
     sharp = viscosity([layer(kind="picture", picture="half.png", scale=1)], 0, GRID, pictures)
     soft = viscosity([layer(kind="picture", picture="half.png", scale=1, blur=0.1)], 0, GRID, pictures)
     assert set(np.unique(sharp)) == {0, 1}
-    assert 0.1 < soft[24, 30] < 0.5 < soft[24, 34] < 0.9
+    edge = np.broadcast_to(ndtr((GRID.centres()[0] - 0.5) / 0.05), soft.shape)  # of a Gauss as wide as half the radius
+    assert soft == pytest.approx(edge, abs=0.01)
+    dull = Pictures(grey(0.25 + 0.5 * (np.arange(256) >= 128) * np.ones((192, 1))))
+    both = viscosity([layer(kind="picture", scale=1, stretch=True, invert=True, blur=0.1)], 0, GRID, dull)
+    assert both == pytest.approx(1 - edge, abs=0.01), "stretched before it is blurred, once"
     dim = Pictures(grey(0.4 + 0.2 * ramp().pixels[..., 0] / 255))
     wide = viscosity([layer(kind="picture", scale=1, stretch=True)], 0, GRID, dim)
     assert (wide.min(), wide.max()) == (0, 1)

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 from app.errors import UserError
 from app.media.opening import shipped_recipes
@@ -309,6 +310,8 @@ def test_sampling_more_often_is_the_same_path():
 def test_a_curve_acts_at_once_when_it_is_released():
     curve = push((0, 0.0, 0.0, 1.0), (3, 0.5, 0.0, 1.0), (6, 1.0, 0.0, 1.0), tool="curve")
     assert [len(curve.at(tick)) for tick in range(8)] == [0, 0, 0, 0, 0, 0, 2, 0]
+    with pytest.raises(ValidationError, match="a curve needs at least two samples"):
+        push((0, 0.5, 0.5, 1.0), tool="curve")
 
 
 def test_recipes_agree_until_they_differ():

@@ -105,3 +105,13 @@ def test_a_curve_is_one_stroke_in_one_tick() -> None:
     assert backward is not None
     assert backward.samples == stroke.samples[::-1]
     assert play("curve", Touch(0, 0.5, 0.5)) is None
+
+
+def test_a_curve_takes_up_points_by_their_distance_on_the_picture() -> None:
+    """More than 0.004 of the longer side: 0.005 of the width is, of the height of this picture it is 0.00375."""
+    across = play("curve", *(Touch(k, 0.2 + 0.005 * k, 0.5) for k in range(8)))
+    down = play("curve", *(Touch(k, 0.5, 0.2 + 0.005 * k) for k in range(8)))
+    assert across is not None
+    assert down is not None
+    assert [round((x - 0.2) / 0.005) for _, x, _, _ in across.samples] == [*range(8)]
+    assert [round((y - 0.2) / 0.005) for _, _, y, _ in down.samples] == [0, 2, 4, 6]

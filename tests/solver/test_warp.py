@@ -282,6 +282,26 @@ def test_restoring_makes_the_identity_under_the_brush_without_folds(device: Devi
     assert not warp.read().any()
 
 
+def test_restoring_around_what_was_frozen_in_motion_makes_the_identity_too(device: Device) -> None:
+    """All of the map goes where the brush is full, six cells beside the frozen; nothing of it there, nor by a step."""
+    grid = Grid(64, 48)
+    warp = WarpMap(device, grid)
+    warp.set(smooth(np.random.default_rng(6), grid.size, 0.03))
+    warp.advance_prescribed(vortex, 0.05)
+    x, y = grid.centres()
+    warp.hold(device.upload((np.hypot(x - 0.5, y - 0.4) < 0.1).astype(np.uint8) * 255))
+    turn, r = np.linspace(0, 2 * np.pi, 16, endpoint=False)[:, None], np.linspace(0.05, 0.25, 401)
+    rays = np.stack([0.5 + r * np.cos(turn), 0.4 + r * np.sin(turn)], axis=-1)
+    before = warp.at(rays.reshape(-1, 2)).reshape(rays.shape)
+    warp.restore_under((0.5, 0.4), 0.3, hardness=0.9, amount=1.0)
+    after = warp.at(rays.reshape(-1, 2)).reshape(rays.shape)
+    assert np.abs(before).max() > 0.05
+    np.testing.assert_array_equal(after[:, r < 0.08], before[:, r < 0.08])
+    assert np.abs(after[:, r > 0.2]).max() < 1e-6
+    assert np.linalg.norm(np.diff(after, axis=1), axis=-1).max() < 0.005
+    warp.release()
+
+
 def test_forward_map_follows_the_particles(device: Device) -> None:
     """Half a turn of the vortex: points of the original are found where particles have gone, and back."""
     grid = Grid(64, 64)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,6 +19,8 @@ import pytest
 
 NEEDED = ("Xvfb", "xdotool")
 PATIENCE = 90.0
+SLICE = 0.01  # seconds after which an editor that is held up is looked at
+SHADERS = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 
 needs_a_screen = pytest.mark.skipif(
     sys.platform != "linux" or (not all(map(shutil.which, NEEDED)) and "CI" not in os.environ),
@@ -41,6 +46,8 @@ class Desk:
             "XDG_STATE_HOME": str(folder / "state"),
             "HOME": str(folder),
             "PATH": os.environ["PATH"],
+            # Under another home Mesa would compile every shader anew, which is most of what a window costs.
+            "MESA_SHADER_CACHE_DIR": os.environ.get("MESA_SHADER_CACHE_DIR") or str(SHADERS),
         }
         self.env.pop("WAYLAND_DISPLAY", None)
         self.editor: subprocess.Popen[str] | None = None
@@ -56,9 +63,14 @@ class Desk:
             stderr=subprocess.STDOUT,
             text=True,
         )
-        self.until(lambda: bool(self._find()), "a window")
+        self.until(lambda: self.is_shown, "a window")
         self.window = self._find()[0]
         self.until(lambda: self.title() == f"{file.stem} - fluidwarp", "the file to be open")
+
+    @property
+    def is_shown(self) -> bool:
+        """A window is to be seen, and not minimised."""
+        return bool(self._find())
 
     def _find(self) -> list[str]:
         return self.do("search", "--onlyvisible", "--name", "fluidwarp").split()
@@ -79,12 +91,12 @@ class Desk:
         return subprocess.run(["xdotool", *words], env=self.env, capture_output=True, text=True).stdout
 
     def drag(self, *points: tuple[int, int]) -> None:
-        self.do("mousemove", *map(str, points[0]), "sleep", "0.1", "mousedown", "1", "sleep", "0.1")
+        words = ["mousemove", *map(str, points[0]), "sleep", "0.1", "mousedown", "1", "sleep", "0.1"]
         for start, end in pairwise(points):
             for step in range(1, 11):
                 x, y = (round(a + (b - a) * step / 10) for a, b in zip(start, end, strict=True))
-                self.do("mousemove", str(x), str(y), "sleep", "0.03")
-        self.do("sleep", "0.1", "mouseup", "1", "sleep", "0.2")
+                words += ["mousemove", str(x), str(y), "sleep", "0.03"]
+        self.do(*words, "sleep", "0.1", "mouseup", "1", "sleep", "0.2")
 
     def key(self, chord: str) -> None:
         self.do("key", "--delay", "60", chord)
@@ -129,6 +141,30 @@ class Desk:
 
         self.insist(do, path.exists, "the project to be saved")
         self.until(lambda: self.title() == f"{path.stem} - fluidwarp", "the title to say so")
+
+    @contextmanager
+    def busy(self) -> Iterator[None]:
+        """While the block runs the editor gets a third of a processor, as on a machine that has much else to do."""
+        assert self.editor is not None
+        editor, ended = self.editor, threading.Event()
+        clock = ~editor.pid << 3 | 2  # of its processor time, as clock_getcpuclockid(3) makes it
+
+        def hold_up() -> None:
+            left, since, spent = SLICE, time.monotonic(), time.clock_gettime(clock)
+            while not ended.wait(SLICE) and editor.poll() is None:
+                now, used = time.monotonic(), time.clock_gettime(clock)
+                left = min(left + (now - since) / 3 - (used - spent), SLICE)
+                since, spent = now, used
+                editor.send_signal(signal.SIGCONT if left > 0 else signal.SIGSTOP)
+            editor.send_signal(signal.SIGCONT)
+
+        others = threading.Thread(target=hold_up)
+        others.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            others.join()
 
     def until_gone(self) -> None:
         """Wait until the editor has ended by itself, and well."""

@@ -57,6 +57,7 @@ def names(robot: Robot) -> list[str]:
 
 
 def test_push_carries_the_picture_along(robot: Robot) -> None:
+    robot.see()
     before = robot.canvas()
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
@@ -78,6 +79,7 @@ def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
     ground = np.array([67, 55, 37])
     for number in range(12):
         robot.drag((0.3 + 0.03 * number, 0.4), (0.35 + 0.03 * number, 0.45))
+    robot.see()
     for chords in ((), ("ctrl+z",) * 10, ("ctrl+shift+z",) * 10):
         for chord in chords:
             robot.key(chord)
@@ -168,6 +170,7 @@ def test_tools_that_work_while_held(robot: Robot, key: str, tool: str) -> None:
 
 @pytest.mark.parametrize(("key", "rate"), [("v", 4.0), ("shift+v", -4.0)])
 def test_thicken_and_thin_act_in_the_very_next_frame(robot: Robot, key: str, rate: float) -> None:
+    robot.see()
     robot.key(key)
     robot.frame(count=2)
     robot.move(*robot.at(0.5, 0.5))
@@ -264,6 +267,7 @@ def test_honey_comes_to_rest_by_itself_and_putty_stops_with_the_brush(robot: Rob
 
 
 def test_before_and_split(robot: Robot) -> None:
+    robot.see()
     clean = robot.canvas()
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
@@ -290,6 +294,7 @@ def test_overlays_show_something(robot: Robot, key: str) -> None:
     robot.key("p")
     robot.drag((0.4, 0.3), (0.55, 0.3))
     robot.editor.session.pause()
+    robot.see()
     robot.move(900, 20)
     robot.frame(count=2)
     without = robot.canvas().astype(int)
@@ -553,6 +558,7 @@ def test_the_recipe_can_be_copied(robot: Robot) -> None:
     [("f1", Shortcuts), ("ctrl+,", Preferring), ("ctrl+e", ExportDialog), ("ctrl+o", Browser), ("ctrl+s", SaveDialog)],
 )
 def test_dialogs_open_and_close(robot: Robot, key: str, dialog: type) -> None:
+    robot.see()
     plain = robot.pixels().astype(int)
     robot.key(key)
     robot.frame(count=3)
@@ -617,6 +623,7 @@ def test_a_file_that_has_been_read_waits_for_the_answer_to_a_dialog(robot: Robot
 
 
 def test_a_message_that_comes_or_goes_by_itself_is_drawn_until_it_fits(robot: Robot) -> None:
+    robot.see()
     messages = robot.editor.messages
     messages.warn("A long one that takes two lines or even three of them in the panel that it stands in, and stays.")
     robot.frame(count=10)
@@ -752,6 +759,7 @@ def test_without_a_system_s_file_dialog_there_is_ours(
 def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
     device: Device, robot: Robot, tmp_path: Path, name: str
 ) -> None:
+    robot.see()
     clean = robot.canvas()
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
@@ -957,6 +965,7 @@ def test_the_strip_chooses_tools(robot: Robot, tool: str) -> None:
 
 
 def test_the_theme_and_the_scale(robot: Robot) -> None:
+    robot.see()
     dark = robot.pixels().mean()
     robot.key("ctrl+l")
     robot.frame()
@@ -1034,6 +1043,7 @@ def test_leaving_asks_about_an_export_that_is_running(robot: Robot, tmp_path: Pa
 
 
 def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
+    robot.see()
     write_picture(tmp_path / "other.png", pattern(100, 60))
     files, goes_on = robot.editor.files, Event()
 
@@ -1116,6 +1126,7 @@ def test_the_forces_of_a_recipe_are_shown(robot: Robot, tmp_path: Path) -> None:
     robot.drop(tmp_path / "rotor.toml")
     robot.editor.session.seek(0)
     robot.rest()
+    robot.see()
     robot.move(900, 20)
     robot.frame(count=2)
     without = robot.canvas().astype(int)
@@ -1241,6 +1252,18 @@ def test_the_grid_is_chosen_from_the_machine_measured(automatic: Robot) -> None:
     assert automatic.editor.session.recipe.fluid.grid in GRIDS
     assert names(automatic) == ["Open"]
     assert not automatic.editor.workspace.is_dirty
+
+
+@pytest.mark.parametrize(("fixed", "rate"), [(3.9, 60), (4.1, 30)])
+def test_a_machine_that_needs_less_than_four_milliseconds_makes_60_ticks_a_second(
+    automatic: Robot, fixed: float, rate: int
+) -> None:
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    quality = automatic.editor.quality
+    quality.speed, quality.grid = Speed(fixed=fixed, growing=0.0, drawing=5.0), 96
+    quality.turn_on()
+    assert automatic.editor.session.recipe.fluid.dt == pytest.approx(1 / rate)
+    assert automatic.editor.session.recipe.fluid.grid == 96
 
 
 def test_a_tick_is_what_it_adds_to_a_frame() -> None:

@@ -168,6 +168,7 @@ def test_an_entry_of_the_history_is_the_one_that_is_pressed(robot: Robot) -> Non
 @pytest.mark.parametrize("part", [0.0, 0.25, 1.0])
 def test_the_track_is_as_long_as_the_recording(robot: Robot, part: float) -> None:
     """Its ends lie 7 points within, where the playhead is drawn; white and bright as nothing else there."""
+    robot.see()
     session, rect = robot.editor.session, robot.editor.layout.timebar
     robot.drag((0.4, 0.5), (0.41, 0.5), steps=2)
     robot.rest()

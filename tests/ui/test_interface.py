@@ -66,6 +66,7 @@ def type_into(robot: Robot, x: float, y: float, text: str) -> None:
 
 
 def test_a_tooltip_comes_to_a_pointer_that_rests(robot: Robot) -> None:
+    robot.see()
     live(robot, 5)
     robot.frame(Move(24, 130))
     before = robot.pixels().astype(int)
@@ -109,6 +110,7 @@ def test_the_rest_before_a_stroke_does_not_count_to_it(robot: Robot) -> None:
 
 @pytest.mark.parametrize("scale", [1.25, 2.0])
 def test_a_dialog_of_another_size_comes_to_rest(robot: Robot, scale: float) -> None:
+    robot.see()
     robot.key("ctrl+,")
     live(robot, 3)
     robot.editor.preferences.scale = scale
@@ -223,6 +225,7 @@ def test_the_wheel_goes_through_the_history(robot: Robot) -> None:
     for number in range(12):
         robot.drag((0.3 + 0.03 * number, 0.4), (0.35 + 0.03 * number, 0.45), steps=2)
     robot.rest()
+    robot.see()
     robot.frame(Move(1140, 640))
     live(robot, 3)
     before = robot.pixels().astype(int)
@@ -311,6 +314,7 @@ def test_a_double_click_on_what_goes_with_its_first_click_does_not_paint(robot: 
 
 
 def test_the_ring_is_not_drawn_around_a_pointer_on_a_message(robot: Robot) -> None:
+    robot.see()
     robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
     robot.frame(count=6)
     plain, rect = robot.pixels(), robot.editor.ui.covers[-1]
@@ -525,6 +529,7 @@ def test_what_cannot_be_opened_asks_nothing_about_unsaved_work(robot: Robot, tmp
 
 @pytest.mark.parametrize("grid", [48, 96, 160, 1024])
 def test_the_grid_of_the_work_is_chosen_in_the_inspector(robot: Robot, grid: int) -> None:
+    robot.see()
     session = robot.editor.session
     robot.editor.state.sections |= {"quality": True, "view": False, "fluid": False}
     robot.frame(count=3)

@@ -41,6 +41,7 @@ def brightness_by_radius(robot: Robot, x: float, y: float) -> np.ndarray:
 )
 def test_the_ring_is_as_large_as_the_brush(robot: Robot, tool: str, radius: float, hardness: float) -> None:
     """Faint where the brush ends, bright where it is half as strong; of what freezes, both in one."""
+    robot.see()
     robot.key(tool)
     robot.editor.state.brush = replace(robot.editor.state.brush, radius=radius, hardness=hardness)
     x, y = (round(place) + 0.5 for place in robot.at(0.5, 0.5))
@@ -60,6 +61,7 @@ def test_under_a_transparent_picture_lie_squares_of_the_themes_tones(device: Dev
     write_picture(tmp_path / "clear.png", Picture(np.zeros((120, 160, 4), np.uint8)))
     robot = Robot(device, load_any(tmp_path / "clear.png"))
     try:
+        robot.see()
         for theme in (PALETTES["dark"], PALETTES["light"]):
             robot.move(5, 5)
             robot.frame(count=2)
@@ -81,6 +83,7 @@ def test_what_is_opaque_beside_what_is_transparent_shows_no_squares(device: Devi
     write_picture(tmp_path / "half.png", Picture(pixels))
     robot = Robot(device, load_any(tmp_path / "half.png"))
     try:
+        robot.see()
         robot.move(5, 5)
         robot.frame(count=2)
         x, y = (round(place) for place in robot.at(0.7, 0.5))
@@ -90,6 +93,7 @@ def test_what_is_opaque_beside_what_is_transparent_shows_no_squares(device: Devi
 
 
 def test_the_other_direction_has_a_minus_in_the_ring(robot: Robot) -> None:
+    robot.see()
     x, y = (round(place) + 0.5 for place in robot.at(0.5, 0.5))
     robot.move(x, y)
     plain = robot.pixels().astype(int)
@@ -104,6 +108,7 @@ def test_the_other_direction_has_a_minus_in_the_ring(robot: Robot) -> None:
 
 def test_the_split_shows_what_was_on_its_left(robot: Robot) -> None:
     """ "Before" is the longer word: the box on its ground reaches farther than that of "After"."""
+    robot.see()
     robot.key("y")
     robot.move(5, 5)
     robot.frame(count=2)

@@ -60,6 +60,7 @@ def test_a_pointer_that_rests_goes_on_thickening(robot: Robot) -> None:
 
 
 def test_a_mark_stands_on_the_timeline(robot: Robot) -> None:
+    robot.see()
     robot.move(5, 5)
     before = robot.pixels()[-60:]
     robot.key("f")

@@ -22,6 +22,19 @@ def test_the_newest_messages_stay_and_none_stands_twice() -> None:
     assert len(heard) == MOST + 3
 
 
+def test_the_next_message_that_goes_is_the_oldest() -> None:
+    messages = Messages(lambda: None)
+    messages.warn("stays")
+    assert messages.next_in is None
+    messages.say("first")
+    messages.elapse(2.0)
+    messages.say("second")
+    assert messages.next_in == 3.0, "of the five seconds that each is shown"
+    messages.elapse(3.0)
+    assert [message.text for message in messages.shown] == ["stays", "second"]
+    assert messages.next_in == 2.0
+
+
 def test_files_of_late_are_newest_first_and_each_once(tmp_path: Path) -> None:
     preferences = Preferences()
     for name in ("a", "b", "a", *map(str, range(MOST_RECENT - 2)), "a"):

@@ -117,7 +117,8 @@ def test_looks_as_it_should_on_a_fine_screen(robot: Robot, state: Callable[[Robo
 def compare(robot: Robot, state: Callable[[Robot], None], name: str, folder: Path) -> None:
     """Make the state, and see that it looks like the golden picture of that name."""
     state(robot)
-    robot.frame(count=2)
+    robot.see()
+    robot.frame()
     seen = robot.pixels()
     path = GOLDEN / name
     if os.environ.get("FLUIDWARP_GOLDEN") == "write":

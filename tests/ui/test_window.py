@@ -170,7 +170,7 @@ def test_a_minimised_window_with_unsaved_work_comes_back_to_ask(desk: Desk, tmp_
     desk.drag((400, 400), (520, 400))
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
     close_minimised(desk)
-    desk.until(lambda: bool(desk._find()), "the window")
+    desk.until(lambda: desk.is_shown, "the window")
     assert desk.editor is not None
     assert desk.editor.poll() is None
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -25,18 +26,14 @@ RESTED = 2.0  # seconds in which everything that comes by itself has come, also 
 @pytest.fixture(params=[False, True], ids=["idle", "busy"])
 def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
     """A screen with the pattern in the editor, on a machine that has nothing else to do, or has."""
-    others: list[subprocess.Popen[bytes]] = []
     desk = Desk(tmp_path)
     try:
         write_picture(tmp_path / "pattern.png", pattern())
         desk.open(tmp_path / "pattern.png")
         still(desk)
-        others += [subprocess.Popen(["yes"], stdout=subprocess.DEVNULL) for _ in range(2 * request.param)]
-        yield desk
+        with desk.busy() if request.param else nullcontext():
+            yield desk
     finally:
-        for other in others:
-            other.kill()
-            other.wait()
         desk.close()
 
 

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +135,14 @@ def test_numbers_of_two_pictures_in_one_file_are_refused(tmp_path: Path):
             order("coffee", None, Outputs(tmp_path, stats=tmp_path / "{name}.json")),
             [Path("a.png"), Path("a.jpg")],
         )
+
+
+def test_an_error_is_told_in_the_words_of_the_command_line_and_of_the_window(folder: Path):
+    task = replace(order(folder / "a.toml", folder / "p0.png", Outputs(folder / "w.png")), max_pixels=3071)
+    told = perform(task, Progress())
+    start = f"Cannot read {folder / 'p0.png'}: 64 x 48 pixels are more than the limit of 3071;"
+    assert told.error == f"{start} if you trust the file, raise it with --max-pixels 3072."
+    assert told.in_window == f"{start} make it smaller first."
 
 
 # One after the other, and in processes ------------------------------------------------------------------------------

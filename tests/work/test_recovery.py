@@ -459,7 +459,7 @@ def test_on_a_disk_without_locks_nothing_is_left(desk: Desk, monkeypatch: pytest
     def refuse(handle: int) -> None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
-    monkeypatch.setattr(locks, "_try_lock", refuse)
+    monkeypatch.setattr(locks, "try_lock", refuse)
     desk.push(2)
     desk.write()
     assert desk.journal.trouble is not None

@@ -240,12 +240,12 @@ def test_what_cannot_be_resumed_is_told(folder: Path, fluidwarp: Run, words: lis
 
 def test_maps_and_frames_go_together_by_their_numbers(folder: Path, fluidwarp: Run):
     """A shift by as many pixels as the map's number says; maps that begin elsewhere go in order."""
-    for first in (0, 1000):
+    for first in (7, 1000):
         for number in range(first, first + 5):
             shift = np.zeros((HEIGHT, WIDTH, 2), np.float32)
             shift[..., 0] = (number - first) / WIDTH
             write_map(folder / f"m{first}.{number}.npy", Displacement(shift))
-    for maps, shifts in (("m1000.%d.npy", (1, 2, 3, 4)), ("m0.%d.npy", (0, 1, 2, 3))):
+    for maps, shifts in (("m1000.%d.npy", (1, 2, 3, 4)), ("m7.%d.npy", (0, 1, 2, 3))):
         ran = fluidwarp(folder, "apply", maps, "plate.####.exr", "-o", "w.####.exr", "--edges", "clamp")
         assert (ran.returncode, ran.stderr) == (0, "")
         for number, shift in zip(range(1001, 1005), shifts, strict=True):

@@ -171,7 +171,8 @@ def test_the_first_stroke_does_not_fold(session: Session) -> None:
     assert statistics.folds == 0
 
 
-@pytest.mark.parametrize("hardness", [0.0, 0.5, 1.0], ids=["soft", "half hard", "hard"])
+# A soft one is the first of those that are made again and again, below.
+@pytest.mark.parametrize("hardness", [0.5, 1.0], ids=["half hard", "hard"])
 @pytest.mark.parametrize("radius", [0.1, 0.15])
 @pytest.mark.parametrize("feel", FEELS, ids=lambda feel: feel.name)
 def test_a_moderate_push_does_not_fold(session: Session, feel: Feel, radius: float, hardness: float) -> None:
@@ -381,6 +382,10 @@ def test_only_sending_the_playhead_back_cuts_what_comes_after_it(session: Sessio
     assert first.last_tick == 1
     assert second.first_tick == 2
     assert session.notice is not None
+    # Nor is it one to do so once more.
+    session.pause()
+    strike(session, 3)
+    assert [stroke.samples[-1][1] for stroke in session.recipe.stroke[1:]] == [0.7, 0.7]
 
 
 def test_going_on_from_within_a_stroke_with_few_samples_changes_nothing_that_was_there(session: Session) -> None:
@@ -460,7 +465,7 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     dice = random.Random(seed)
 
     def gesture() -> None:
-        strokes, went_back = session.recipe.stroke, session._went_back
+        strokes, went_back = session.recipe.stroke, session.went_back
         press = Press(BrushSettings(0.12, 0.2), dice.random() < 0.2, session.extent, session.dt)
         session.press(TOOL[dice.choice(PAINTING).name], press, dice.random(), dice.random(), 1.0, dice.random() < 0.1)
         for _ in range(dice.randrange(5)):
