@@ -327,7 +327,7 @@ def fit(
     ] = None,
     evaluations: Annotated[
         int, typer.Option(min=1, max=100_000, help="Replays on a coarse grid that may be made.")
-    ] = 64,
+    ] = 32,
     time_limit: Annotated[
         float | None, typer.Option(min=0, help="Seconds after which the best so far is taken.")
     ] = None,

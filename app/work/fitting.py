@@ -18,7 +18,7 @@ from app.work.replay import Replay
 from solver.components import connected_components
 from solver.gl.device import Device
 
-EVALUATIONS = 64  # replays on the coarse grid
+EVALUATIONS = 32  # replays on the coarse grid
 A_FINE_ONE = 8  # of them for each on the recipe's own
 COARSE_GRID, COARSE_PICTURE, COARSE_DT = 64, 512, 1 / 30
 ALONE = 12  # pairs up to which each handle has values of its own: with more, all have the same
