@@ -1,4 +1,4 @@
-"""The command line, `fluidwarp edit | render | apply | convert | gallery | doctor`; most of it declares options."""
+"""The command line, `fluidwarp edit | render | fit | apply | ...`; most of it declares options."""
 
 from __future__ import annotations
 
@@ -302,6 +302,59 @@ def _about(label: str, said: str) -> str:
     if said.startswith((f"Cannot read {label}", label)):
         return said
     return f"{label}: {said.removeprefix(f'{Path(label).name}: ')}"
+
+
+@cli.command()
+def fit(
+    recipe: Annotated[
+        str, typer.Argument(metavar="RECIPE", help="A recipe (.toml), or the name of one that comes with fluidwarp.")
+    ],
+    pairs: Annotated[
+        list[Path],
+        typer.Option(
+            metavar="FILE",
+            help="Where points are and where they should be: a CSV of x0,y0,x1,y1 in pixels, a .tps of two specimens, "
+            "or two .pts or .tps, by --pairs twice.",
+            readable=False,
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="The recipe to write.")],
+    arrived: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write where the points arrive: .csv, .pts or .tps.")
+    ] = None,
+    image: Annotated[
+        Path | None, typer.Option("--image", "-i", help="The picture, instead of the recipe's own.", readable=False)
+    ] = None,
+    evaluations: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Replays on a coarse grid that may be made.")
+    ] = 32,
+    time_limit: Annotated[
+        float | None, typer.Option(min=0, help="Seconds after which the best so far is taken.")
+    ] = None,
+    max_pixels: MaxPixels = 400_000_000,
+) -> None:
+    """Find handles that bring points to where they should be with the least work and without a fold.
+
+    Ctrl+C takes the best so far. FITTED.toml is an ordinary recipe: fluidwarp render FITTED.toml
+    """
+    from time import monotonic
+
+    from app.progress import on_terminal
+    from app.work.fit_job import FitJob
+    from solver.gl.device import Device
+
+    job = FitJob(recipe, tuple(pairs), output, arrived, image, evaluations, max_pixels)
+    job.check()
+    until = None if time_limit is None else monotonic() + time_limit
+    with on_terminal(output.name, None, at_once=None) as progress, Device.headless() as device:
+        asked = progress.cancel
+        progress.cancel = lambda: asked() or (until is not None and monotonic() >= until)
+        found = job.perform(device, progress)
+    _tell(*found.notices, f"{output.name}: {found.told}")
+    if asked():
+        _fail("stopped; the best so far is written", INTERRUPTED)
+    if found.stopped:
+        _tell(f"--time-limit {time_limit:g} has passed; the best so far is written")
 
 
 @cli.command()

@@ -262,6 +262,36 @@ def guide_viscosity(studio: Studio) -> Numbers:
     return {}
 
 
+def handles_smile(studio: Studio) -> Numbers:
+    """A smile by handles, beside the thin-plate spline of the same points."""
+    played = studio.play("handles-smile")
+    height, width = played.source.shape[:2]
+    mine, theirs = played.displacement.astype(np.float64), spline_of(played.recipe, (width, height))
+    other = studio.sampler.apply(
+        GivenMap(studio.device, theirs.astype(np.float32)), played.source, how=Sampling(edges=played.recipe.edges)
+    )
+    ours, splines = (stretch_and_det(displacement) for displacement in (mine, theirs))
+    studio.sheet(
+        "handles-smile",
+        "A smile by handles, and by a thin-plate spline",
+        [
+            ("a  source; handles and pins", led(played.source, played.recipe)),
+            ("b  handles", marked(played.result, ours[1])),
+            ("c  thin-plate spline; folds in red", marked(other, splines[1])),
+        ],
+    )
+    return {
+        key: value
+        for name, (stretch, det) in (("handles", ours), ("spline", splines))
+        for key, value in {
+            f"{name}: stretch, mean": f"{stretch.mean():.3f}",
+            f"{name}: 99th percentile": f"{np.percentile(stretch, 99):.2f}",
+            f"{name}: least det": f"{det.min():.2f}",
+            f"{name}: folds": f"{(det <= 0).sum()}",
+        }.items()
+    }
+
+
 FIGURES: dict[str, Callable[[Studio], Numbers]] = {
     "figure-1": figure_1,
     "figure-3": figure_3,
@@ -270,8 +300,19 @@ FIGURES: dict[str, Callable[[Studio], Numbers]] = {
     "figure-6": figure_6,
     "guide-forces": guide_forces,
     "guide-viscosity": guide_viscosity,
+    "handles-smile": handles_smile,
 }
-RECIPES = ("figure-1", "figure-1", "figure-3", "figure-4", "figure-5", "figure-5-freeze", "figure-6", "figure-6-freeze")
+RECIPES = (
+    "figure-1",
+    "figure-1",
+    "figure-3",
+    "figure-4",
+    "figure-5",
+    "figure-5-freeze",
+    "figure-6",
+    "figure-6-freeze",
+    "handles-smile",
+)
 GUIDE = ("guide-forces", "guide-viscosity")
 
 
@@ -399,6 +440,27 @@ def _mirrored(index: np.ndarray, n: int) -> np.ndarray:
     return n - 1 - np.abs(n - 1 - np.abs(index))
 
 
+def spline_of(recipe: Recipe, size: tuple[int, int]) -> np.ndarray:
+    """The displacement (h, w, 2) of the thin-plate spline that looks up the handles' points where they go, and pins."""
+    from scipy.interpolate import RBFInterpolator
+
+    extent = np.array(size) / max(size)
+    ends = np.array([*(each.goal or each.at for each in recipe.handle), *(each.at for each in recipe.pin)]) * extent
+    starts = np.array([each.at for each in (*recipe.handle, *recipe.pin)]) * extent
+    fitted = RBFInterpolator(ends, starts - ends, kernel="thin_plate_spline")
+    x, y = ((np.arange(n) + 0.5) / max(size) for n in size)
+    return fitted(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(size[1], size[0], 2)
+
+
+def stretch_and_det(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """At each pixel the larger of stretch and its inverse, and det J, by differences of pixels."""
+    h = 1 / max(displacement.shape[:2])
+    slopes = [np.gradient(displacement, h, axis=axis) for axis in (1, 0)]
+    jacobian = np.stack(slopes, axis=-1) + np.eye(2)
+    stretch = np.linalg.svd(jacobian, compute_uv=False)
+    return np.maximum(stretch[..., 0], 1 / np.maximum(stretch[..., 1], 1e-3)), np.linalg.det(jacobian)
+
+
 # What is shown ------------------------------------------------------------------------------------------------------
 
 
@@ -433,6 +495,26 @@ def arrows(background: np.ndarray, field: np.ndarray, across: int = 34, pale: fl
                 way = field[cell] / size[cell]
                 _arrow(pen, np.array([x, y]) * finer, way, step * finer * (0.35 + 0.85 * part**0.5))
     return np.asarray(image.resize((width, height), Image.Resampling.BOX))
+
+
+def led(pixels: np.ndarray, recipe: Recipe) -> np.ndarray:
+    """A picture with the ways of a recipe's handles, and its pins as rings."""
+    height, width = pixels.shape[:2]
+    image, finer = Image.fromarray(pixels), 3
+    image = image.resize((width * finer, height * finer), Image.Resampling.BICUBIC)
+    pen, size = ImageDraw.Draw(image), np.array([width, height]) * finer
+    for handle in recipe.handle:
+        start, end = np.array(handle.at) * size, np.array(handle.goal or handle.at) * size
+        far = max(float(np.hypot(*(end - start))), 1e-9)
+        _arrow(pen, (start + end) / 2, (end - start) / far, far)
+    for pin in recipe.pin:
+        pen.circle([*(np.array(pin.at) * size)], 4 * finer, outline=FORCE, width=2 * finer)
+    return np.asarray(image.resize((width, height), Image.Resampling.BOX))
+
+
+def marked(pixels: np.ndarray, det: np.ndarray) -> np.ndarray:
+    """A picture with the pixels where its map folds in red."""
+    return np.where((det <= 0)[..., None], np.array(FORCE, np.uint8), pixels)
 
 
 def _arrow(pen: ImageDraw.ImageDraw, middle: np.ndarray, way: np.ndarray, length: float) -> None:

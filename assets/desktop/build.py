@@ -19,7 +19,6 @@ PACKAGES = ("app", "solver", "shaders", "assets", "glfw", "imgui_bundle", "image
 UNUSED = (
     "matplotlib",
     "cv2",
-    "scipy",
     "distributed",
     "dask",
     "tkinter",

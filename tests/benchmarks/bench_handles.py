@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +29,7 @@ def main() -> None:
     with Device.headless() as device:
         for count in arguments.handles:
             failed, rows, folded = [], [], [0, 0]
-            for seed in range(arguments.first, arguments.first + arguments.seeds):
+            for seed in interruptible(range(arguments.first, arguments.first + arguments.seeds)):
                 points, targets, pins = arrangement(seed, count)
                 found = led(device, points, targets, pins, seed=seed)
                 other = spline(points, targets, pins)
@@ -39,9 +41,7 @@ def main() -> None:
                     failed.append(seed)
                     print(f"  {count} handles, seed {seed}: {found.told}", flush=True)
             worst = np.array(rows)
-            print(
-                f"{count} handles, {arguments.seeds} seeds: {arguments.seeds - len(failed)} within bounds, not {failed}"
-            )
+            print(f"{count} handles, {len(rows)} seeds: {len(rows) - len(failed)} within bounds, not {failed}")
             print(
                 f"  worst error {worst[:, 0].max():.4f} px, drift {worst[:, 1].max():.4f} px/s, "
                 f"pins {worst[:, 2].max():.4f} px, least det J {worst[:, 3].min():.3f}"
@@ -50,8 +50,20 @@ def main() -> None:
                 mean, percentile, least = worst[:, first : first + 3].T
                 print(
                     f"  {name}: {folds} folded; distortion mean {mean.mean():.3f}, 99th percentile "
-                    f"{percentile.mean():.2f} (worst {percentile.max():.2f}), least det J {least.min():.3f}"
+                    f"{percentile.mean():.2f} (worst {percentile.max():.2f}), least det J {least.min():.3f}",
+                    flush=True,
                 )
+
+
+def interruptible(seeds: range) -> Iterator[int]:
+    """The seeds until Ctrl+C: what has been made by then is told."""
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: asked.append(number))
+    for seed in seeds:
+        yield seed
+        if asked:
+            break
+    signal.signal(signal.SIGINT, before)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,84 @@
+"""Pairs of points in files of other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.media.landmarks import read_pairs, write_pairs
+
+SIZE = 200, 100
+PAIRS = np.array([[[0.25, 0.5], [0.3, 0.4]], [[0.1, 0.9], [0.1, 0.85]], [[1 / 3, 2 / 3], [0.4, 0.7]]])
+
+CSV = "x0,y0,x1,y1\n50,50,60,40\n# a remark\n20;90;20;85\n\n66.66666667\t66.66666667\t80\t70\n"
+FROM_PTS = "version: 1\nn_points: 3\n{\n50.5 50.5\n20.5 90.5\n67.16666667 67.16666667\n}\n"
+TO_PTS = "version: 1\r\nn_points:  3\r\n{\r\n60.5 40.5\r\n20.5 85.5\r\n80.5 70.5\r\n}\r\n"
+# As tpsDig2 writes it, y from below; the last landmark of each is on a curve.
+TPS = (
+    "LM=2\n50.00000 50.00000\n20.00000 10.00000\nCURVES=1\nPOINTS=1\n66.66666667 33.33333333\nIMAGE=a.jpg\nID=0\n"
+    "LM=2\n60.00000 60.00000\n20.00000 15.00000\nCURVES=1\nPOINTS=1\n80 30\nIMAGE=b.jpg\nID=1\nSCALE=0.004\n"
+)
+
+
+def test_the_same_pairs_are_read_from_every_format(tmp_path: Path) -> None:
+    names = {"pairs.csv": CSV, "from.pts": FROM_PTS, "to.pts": TO_PTS, "both.TPS": TPS}
+    for name, text in names.items():
+        (tmp_path / name).write_bytes(text.encode())
+    for given in (["pairs.csv"], ["from.pts", "to.pts"], ["both.TPS"]):
+        found = read_pairs([tmp_path / name for name in given], SIZE)
+        np.testing.assert_allclose(found, PAIRS, atol=1e-10, err_msg=str(given))
+
+
+@pytest.mark.parametrize("name", ["out.csv", "out.tps"])
+def test_pairs_come_back_as_they_were_written(tmp_path: Path, name: str) -> None:
+    write_pairs(tmp_path / name, PAIRS, SIZE)
+    np.testing.assert_allclose(read_pairs([tmp_path / name], SIZE), PAIRS, atol=1e-9)
+
+
+def test_a_pts_file_gets_where_the_points_should_be(tmp_path: Path) -> None:
+    write_pairs(tmp_path / "to.pts", PAIRS, SIZE)
+    words = (tmp_path / "to.pts").read_text().split()
+    assert words[:5] == ["version:", "1", "n_points:", "3", "{"]
+    assert words[5:] == ["60.5", "40.5", "20.5", "85.5", "80.5", "70.5", "}"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "1,2,3,4\n1,2,3\n", "line 2: expected x0,y0,x1,y1, and not '1,2,3'"),
+        ("a.csv", "1,2,3,4\n1,2,3,x\n", "line 2: expected"),
+        ("a.csv", "x0,y0,x1,y1\nx0,y0,x1,y1\n", "line 2: expected"),
+        ("a.csv", "1,2,nan,4\n", "line 1: no pixel lies at"),
+        ("a.csv", "1,2,1e9,4\n", "line 1: no pixel lies at"),
+        ("a.csv", "x0,y0,x1,y1\n", "has no pairs"),
+        ("a.pts", "version: 1\nn_points: 1\n{\n1 2\n}\n", "has one set of landmarks; pairs need two"),
+        ("a.pts", "version: 1\nn_points: 2\n{\n1 2\n}\n", "line 5: n_points says 2, and there are 1"),
+        ("a.pts", "n_points: 1\n{\n1 2 3\n}\n", "line 3: expected x y"),
+        ("a.pts", "n_points: 1\n{\n1 2\n", "ends in the middle"),
+        ("a.pts", "version: 1\n", "no { before its points"),
+        ("a.pts", "hello\n", "line 1: expected version"),
+        ("a.tps", "LM=1\n1 2\n", "has one set"),
+        ("a.tps", "LM=1\n1 2\nLM=2\n1 2\n3 4\n", "1 landmarks cannot be paired with 2"),
+        ("a.tps", "LM=2\n1 2\n", "line 1: 1 more points are announced"),
+        ("a.tps", "LM3=2\n1 2 3\n", "line 1: these landmarks are in space"),
+        ("a.tps", "LM=many\n", "line 1: expected how many points"),
+        ("a.tps", "POINTS=1\n1 2\n", "line 1: points before the first LM="),
+        ("a.tps", "ID=1\n1 2\n", "line 2: expected a key"),
+        ("a.txt", "1,2,3,4\n", "end with .csv, .pts, .tps"),
+    ],
+)
+def test_what_is_no_file_of_pairs_is_told_by_its_line(tmp_path: Path, name: str, text: str, said: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UserError) as raised:
+        read_pairs([tmp_path / name], SIZE)
+    assert said in str(raised.value)
+    assert str(tmp_path / name) in str(raised.value)
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(b"\xff\xfe1\0,\0")
+    with pytest.raises(UserError, match="not text"):
+        read_pairs([tmp_path / "a.csv"], SIZE)

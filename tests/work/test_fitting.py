@@ -1,0 +1,147 @@
+"""Fitted recipes bring points to where they should be: found again by replaying what was written, on its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import Cancelled, UserError
+from app.media.auxiliary import Pictures
+from app.media.landmarks import read_pairs, write_pairs
+from app.media.pictures import write_picture
+from app.media.recipes import read_recipe
+from app.model.picture import Picture
+from app.model.recipe import Recipe
+from app.progress import Progress
+from app.work.fitting import LEAST_DET, Fitted, fitted
+from app.work.replay import Replay
+from solver.gl.device import Device
+from solver.warp.inverse import ForwardMap
+from support.commands import Run
+from support.leading import distortion
+
+PICTURE = Picture(np.zeros((48, 64, 3), np.uint8))
+EXTENT = np.array([1.0, 0.75])
+RECIPE = "duration = 0.4\n[fluid]\ngrid = 32\ndt = 0.04\nviscosity = 0.03\n[[pin]]\nat = [0.8, 0.8]\nradius = 0.2\n"
+PAIRS = np.array([[[0.3, 0.4], [0.36, 0.43]], [[0.6, 0.5], [0.6, 0.44]]])
+WALL = '[[freeze]]\nkind = "path"\npoints = [[0.5, 0.0], [0.5, 1.0]]\nhardness = 1.0\n'
+
+
+def fit(device: Device, pairs: np.ndarray, evaluations: int = 8, recipe: str = RECIPE, **hearing: object) -> Fitted:
+    progress = Progress(**hearing)  # pyright: ignore[reportArgumentType]
+    return fitted(device, Recipe.parse(recipe), PICTURE, Path(), pairs, progress, evaluations)
+
+
+def arrived(device: Device, recipe: Recipe, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Where points (fractions) of the original are after a recipe; its displacement and folds at 512 x 512 places."""
+    replay = Replay(device, recipe, Pictures(PICTURE), budget=0)
+    replay.seek(recipe.ticks)
+    with ForwardMap(replay.warp) as forward:
+        found = points + forward.at(points * EXTENT) / EXTENT
+    shown, folds = replay.warp.read((512, 512)), replay.warp.statistics((512, 512)).folds
+    replay.release()
+    return found, shown, folds
+
+
+def test_the_written_recipe_brings_the_points_there_with_less_work_and_no_fold(device: Device):
+    once, found = (fit(device, PAIRS, evaluations) for evaluations in (1, 15))
+    recipe = Recipe.parse(found.trial.recipe.text())
+    places, displacement, folds = arrived(device, recipe, PAIRS[:, 0])
+    assert np.hypot(*((places - PAIRS[:, 1]) * EXTENT).T).max() * 64 < 0.1
+    np.testing.assert_allclose(found.pairs[:, 1], places, atol=0.02 / 64)
+    assert found.errors.max() < 0.1
+    assert folds == 0
+    assert distortion(displacement).least > 0
+    assert found.trial.det > LEAST_DET
+    assert found.trial.work < once.trial.work
+    assert recipe.pin == Recipe.parse(RECIPE).pin
+    assert not found.notices
+
+
+def test_the_same_is_found_again_also_from_what_was_fitted(device: Device):
+    one = fit(device, PAIRS, 4).trial.recipe
+    assert fit(device, PAIRS, 4).trial.recipe.text() == one.text()
+    again = fit(device, PAIRS[:1], 1, one.text()).trial.recipe
+    assert [handle.name for handle in again.handle] == ["pair 1"]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "more", "said"),
+    [
+        ([[[1.2, 0.5], [0.5, 0.5]], [[0.3, 0.3], [0.4, 0.3]]], "", "pair 1 is left out: its point is outside"),
+        ([[[0.3, 0.3], [0.4, 0.3]], [[0.7, 0.5], [1.2, 0.5]]], "", "pair 2 goes only to the picture's edge"),
+        ([[[0.4, 0.5], [0.5, 0.5]], [[0.4, 0.5], [0.3, 0.5]]], "", '"pair 2" hold the same place and are led apart'),
+        ([[[0.3, 0.5], [0.6, 0.5]], [[0.6, 0.5], [0.3, 0.5]]], "", '"pair 2" cross each other\'s way'),
+        ([[[0.5, 0.5], [0.7, 0.5]], [[0.2, 0.5], [0.3, 0.5]]], WALL, "pair 1 cannot be met: its point is frozen"),
+        ([[[0.3, 0.5], [0.5, 0.5]]], WALL, "pair 1 cannot be met: its place is frozen"),
+        ([[[0.2, 0.5], [0.8, 0.5]]], WALL, "pair 1 cannot be met: what is frozen parts its point from its place"),
+    ],
+    ids=["point outside", "place outside", "coincident", "crossing", "frozen", "into what is frozen", "beyond a wall"],
+)
+def test_what_cannot_be_met_is_told_by_number_and_nothing_folds(
+    pairs: list[list[list[float]]], more: str, said: str, device: Device
+):
+    found = fit(device, np.array(pairs), 1, RECIPE + more)
+    assert any(said in notice for notice in found.notices), found.notices
+    assert any("pixels from where it should be" in notice for notice in found.notices) or "left out" in said
+    _, displacement, folds = arrived(device, found.trial.recipe, np.zeros((1, 2)))
+    assert np.isfinite(displacement).all()
+    assert folds == found.trial.folds == 0
+
+
+def test_pairs_that_nobody_can_lead_are_refused(device: Device):
+    with pytest.raises(UserError, match="no pair has its point in the picture"):
+        fit(device, PAIRS + 2)
+    with pytest.raises(UserError, match=r"70 pairs beside the recipe's 1 handles and pins; at most 64"):
+        fit(device, np.repeat(PAIRS[:1], 70, axis=0))
+
+
+def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device):
+    heard: list[int] = []
+    found = fit(device, PAIRS, 40, report=lambda done, total: heard.append(done), cancel=lambda: max(heard) >= 3)
+    assert found.stopped
+    assert max(heard) == 3
+    assert found.trial.recipe.fluid.grid == 32
+    assert found.trial.recipe.fluid.dt == 0.04
+    with pytest.raises(Cancelled):
+        fit(device, PAIRS, cancel=lambda: True)
+
+
+def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp: Run, tmp_path: Path):
+    write_picture(tmp_path / "a.png", PICTURE)
+    (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE)
+    write_pairs(tmp_path / "p.csv", PAIRS, (64, 48))
+    (tmp_path / "out").mkdir()
+    words = ["fit", "r.toml", "--pairs", "p.csv", "-o", "out/f.toml", "--arrived", "out/a.tps", "--evaluations", "3"]
+    done = fluidwarp(tmp_path, *words)
+    assert done.returncode == 0, done.stderr
+    assert "f.toml: 2 pairs, mean error" in done.stderr
+    recipe = read_recipe(tmp_path / "out" / "f.toml")
+    assert recipe.picture == "../a.png"
+    there = read_pairs([tmp_path / "out" / "a.tps"], (64, 48))
+    np.testing.assert_allclose(there, PAIRS, atol=0.1 / 64)
+    assert fluidwarp(tmp_path, "render", "out/f.toml", "-o", "out/f.png").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--pairs", "p.csv", "-o", "f.png"], "f.png: a fitted recipe is a file that ends with .toml"),
+        (["--pairs", "p.csv", "-o", "p.csv"], "ends with .toml"),
+        (["--pairs", "none.csv", "-o", "f.toml"], "there is no such file"),
+        (["--pairs", "bad.csv", "-o", "f.toml"], "bad.csv, line 2: expected x0,y0,x1,y1"),
+        (["--pairs", "p.csv", "-o", "f.toml", "--arrived", "f.txt"], "end with .csv, .pts, .tps"),
+        (["--pairs", "p.csv", "-o", "f.toml", "--time-limit", "0"], "cancelled; nothing half-written is left"),
+    ],
+)
+def test_what_cannot_be_fitted_ends_in_a_sentence(fluidwarp: Run, tmp_path: Path, words: list[str], said: str):
+    write_picture(tmp_path / "a.png", PICTURE)
+    (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE)
+    (tmp_path / "p.csv").write_text("10,10,12,12\n")
+    (tmp_path / "bad.csv").write_text("10,10,12,12\n10,10,12\n")
+    done = fluidwarp(tmp_path, "fit", "r.toml", *words)
+    assert done.returncode not in (0, 70)
+    assert said in done.stderr
+    assert not (tmp_path / "f.toml").exists()
