@@ -123,6 +123,12 @@ def _between(m: int, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first, np.minimum(first + 1, m - 1), at - first
 
 
+def pixel_at(place: Point, pixels: np.ndarray) -> tuple[int, int]:
+    """The row and the column of the pixel at a place of a picture (h, w, ...)."""
+    height, width = pixels.shape[:2]
+    return min(int(place[1] * height), height - 1), min(int(place[0] * width), width - 1)
+
+
 def connected(chosen: np.ndarray, place: tuple[int, int]) -> np.ndarray:
     """What of the pixels chosen, (h, w) bool, is connected by their sides with the one at a place (row, column).
 
@@ -320,8 +326,7 @@ class Segment(Model):
         pixels = self._alike(picture, pictures)
         if self.at is None:
             return pixels
-        column, row = (min(int(part * side), side - 1) for part, side in zip(self.at, pixels.shape[::-1], strict=True))
-        return connected(pixels, (row, column))
+        return connected(pixels, pixel_at(self.at, pixels))
 
     def _alike(self, picture: str, pictures: NamedPictures) -> np.ndarray:
         if self.mask is not None:

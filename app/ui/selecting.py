@@ -12,7 +12,7 @@ import numpy as np
 from app.errors import UserError
 from app.model.areas import Area, Part
 from app.model.mask_edits import FillMask
-from app.model.sampling import SOURCE, Point, Segment, Window, channels, intensity, to_grid
+from app.model.sampling import SOURCE, Point, Segment, Window, channels, intensity, pixel_at, to_grid
 from app.ui.editor_state import SELECT_BY, EditorState
 from app.ui.events import Mods
 from app.ui.messages import Messages
@@ -73,7 +73,7 @@ class Selecting:
             replay = self.workspace.session.replay
             moved = replay.warp.at(np.multiply([path[0]], replay.grid.extent))[0] / replay.grid.extent
             self._picked = _within(path[0][0] + float(moved[0]), path[0][1] + float(moved[1]))
-            self.pick_again()
+            self._pick()
         elif by == "lasso":
             self._add(Area(outline=tuple(path)) if len(path) > 2 else None)
         elif (box := _box(path)) is None:
@@ -83,14 +83,21 @@ class Selecting:
         else:
             self._add(Area(window=Window.model_validate({"box": box, "shape": by})))
 
-    def pick_again(self) -> None:
-        """Select what is like the place that was clicked on last, with the tolerance as it is now."""
-        if self._picked is None:
+    def set_tolerance(self, tolerance: float, connected: bool) -> None:
+        """Select what is so unlike the place that was clicked on last, and only what is connected or all."""
+        self.state.tolerance, self.state.connected = tolerance, connected
+        try:
+            self._pick()
+        except UserError as error:
+            self.messages.warn(error.in_window)
+
+    def _pick(self) -> None:
+        if self._picked is None or self.state.select_by not in ("colour", "brightness"):
             return
         state, place, pictures = self.state, self._picked, self.workspace.session.replay.small_pictures
         like: dict[str, Any] = {"at": place if state.connected else None}
         picture = pictures.load(SOURCE)
-        column, row = int(place[0] * (picture.width - 1e-9)), int(place[1] * (picture.height - 1e-9))
+        row, column = pixel_at(place, picture.pixels)
         here = picture.with_pixels(picture.pixels[row : row + 1, column : column + 1])
         if state.select_by == "colour":
             colour = np.rint(channels(here)[0][0, 0] * 255).astype(int)

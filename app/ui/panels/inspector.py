@@ -104,8 +104,7 @@ def _selection(ui: Ui, session: Session, state: EditorState, selecting: Selectin
         )  # fmt: skip
         connected = ui.check("Only what is connected", state.connected)
         if slid.changed or connected != state.connected:
-            state.tolerance, state.connected = slid.value, connected
-            selecting.pick_again()
+            selecting.set_tolerance(slid.value, connected)
     ui.wrapped(f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, Esc gives up.", ui.palette.dim, 13)
     _which_mask(ui, state)
     words = ("Freeze", "Thaw") if state.mask == "frozen" else ("Fill", "Clear")
