@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import zip_longest
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeGuard
 
 import numpy as np
 from pydantic import Field, TypeAdapter, model_validator
 
-from app.model.sampling import SOURCE, NamedPictures, PictureName, Point, Segment, Window, intensity, places, to_grid
+from app.model.areas import Area, Part, Seen, as_it_was
+from app.model.sampling import FINEST, SOURCE, NamedPictures, PictureName, SmallPictures, intensity, strips, to_grid
 from app.model.schema import Model, Radius, Several
 from app.model.strokes import Stroke, Tick
 from solver.grid import Grid
@@ -71,21 +72,17 @@ class ClearMask(_Edit):
     kind: Literal["clear"]
 
 
-class FillMask(_Edit):
-    """Make a mask the same everywhere, or in an area: what is in all of those that are given.
+class FillMask(_Edit, Area):
+    """Make a mask the same everywhere, or in an area.
 
     Attributes:
         amount: decades of thickness; of what is frozen, 1 freezes and 0 thaws.
-        window: a rectangle or an ellipse.
-        outline: the corners of an area, as fractions of the picture; what it winds around an odd number of times.
-        segment: what is chosen by colour or brightness, in the picture as it was before any warp.
+        then: what is added to the area and taken from it, in this order.
     """
 
     kind: Literal["fill"]
     amount: Decades
-    window: Window | None = None
-    outline: Annotated[Several[Point], Field(min_length=3)] | None = None
-    segment: Segment | None = None
+    then: Several[Part] = ()
 
     @model_validator(mode="after")
     def _frozen_or_not(self) -> FillMask:
@@ -93,19 +90,11 @@ class FillMask(_Edit):
             raise ValueError(f"'amount' of what is frozen is from 0 to 1, not {self.amount:g}")
         return self
 
-    def coverage(self, canvas: Grid, pictures: NamedPictures) -> np.ndarray:
-        """How much of each texel lies in the area, (h, w) in [0, 1].
-
-        Raises:
-            ValueError: if a segment chooses nothing, or everything.
-        """
-        covered = np.ones((canvas.ny, canvas.nx))
-        if self.window is not None:
-            covered *= self.window.weight(canvas)
-        if self.outline is not None:
-            covered *= _inside(places(self.outline, canvas), canvas)
-        if self.segment is not None:
-            covered *= self.segment.weight(SOURCE, canvas, pictures)
+    def coverage(self, grid: Grid, pictures: NamedPictures, seen: Seen = as_it_was) -> np.ndarray:
+        covered = super().coverage(grid, pictures, seen)
+        for part in self.then:
+            share = part.coverage(grid, pictures, seen)
+            covered = np.maximum(covered, share) if part.combine == "add" else np.minimum(covered, 1 - share)
         return covered
 
 
@@ -141,13 +130,15 @@ class PictureMask(_Edit):
     """A mask from a picture's brightness: what is from middle grey on is frozen; thickness goes from black to white.
 
     Attributes:
-        picture: "source" or a file.
+        picture: "source", as it is seen at this moment, or a file.
         white: decades of thickness that white stands for; black is none.
+        invert: white is black and black is white.
     """
 
     kind: Literal["picture"]
     picture: PictureName = SOURCE
     white: Decades = THICKEST
+    invert: bool = False
 
 
 WholeEdit = FillMask | InvertMask | FeatherMask | SpreadMask | PictureMask
@@ -175,11 +166,32 @@ def remaining(edits: Sequence[MaskEdit], done: Sequence[MaskEdit]) -> list[tuple
     return left
 
 
-def edited(words: np.ndarray, edit: WholeEdit, canvas: Grid, pictures: NamedPictures) -> np.ndarray:
+def with_edit(edits: tuple[MaskEdit, ...], edit: MaskEdit) -> tuple[MaskEdit, ...]:
+    """The edits and one more; the picture's own brightness takes the place of the same before it, below strokes."""
+    last = next((k for k in reversed(range(len(edits))) if not isinstance(edits[k], MaskStroke)), None)
+    if last is None or not is_brightness(edit) or not is_brightness(edits[last], edit):
+        return *edits, edit
+    return *edits[:last], edit, *edits[last + 1 :]
+
+
+def is_brightness(edit: MaskEdit, like: MaskEdit | None = None) -> TypeGuard[PictureMask]:
+    """True if an edit takes the picture's own brightness, and if another is given, for its mask at its moment."""
+    if not isinstance(edit, PictureMask) or edit.picture != SOURCE:
+        return False
+    return like is None or (isinstance(like, PictureMask) and (like.of, like.tick) == (edit.of, edit.tick))
+
+
+def edited(
+    words: np.ndarray, edit: WholeEdit, canvas: Grid, pictures: SmallPictures, seen: Seen = as_it_was
+) -> np.ndarray:
     """A mask after an edit of all of it.
+
+    On a canvas above `FINEST` along its longer side, areas and the picture's own brightness are worked out on one of
+    that size, and interpolated.
 
     Args:
         words: the mask's texels, (h, w), uint8 of what is frozen, uint16 of thickness.
+        seen: takes values of the picture to where it shows them at this moment.
 
     Returns:
         as `words`.
@@ -189,14 +201,17 @@ def edited(words: np.ndarray, edit: WholeEdit, canvas: Grid, pictures: NamedPict
     """
     zero, unit = UNITS[edit.of]
     last = np.iinfo(words.dtype).max
+    grid = canvas if max(canvas.size) <= FINEST else Grid.for_picture(canvas.nx, canvas.ny, FINEST)
 
     def wanted(amount: np.ndarray | float) -> np.ndarray:
         return np.clip(np.rint(zero + unit * np.asarray(amount)), 0, last)
 
     match edit:
         case FillMask():
-            covered = edit.coverage(canvas, pictures)
-            return np.rint(words + covered * (wanted(edit.amount) - words)).astype(words.dtype)
+            covered, filled = edit.coverage(grid, pictures, seen), words.copy()
+            for rows, share in strips(covered, canvas):
+                filled[rows] = np.rint(words[rows] + share * (wanted(edit.amount) - words[rows]))
+            return filled
         case InvertMask():
             low, high = (0, last) if edit.of == "frozen" else (int(words.min()), int(words.max()))
             return (low + high - words.astype(np.int32)).astype(words.dtype)
@@ -206,8 +221,13 @@ def edited(words: np.ndarray, edit: WholeEdit, canvas: Grid, pictures: NamedPict
             grows = edit.kind == "grow"
             return _grown(words, edit.radius, canvas) if grows else last - _grown(last - words, edit.radius, canvas)
         case PictureMask():
-            grey = to_grid(intensity(pictures.load(edit.picture)), canvas)
-            return wanted(edit.white * grey if edit.of == "thickness" else grey).astype(words.dtype)
+            own, made = edit.picture == SOURCE, np.full_like(words, zero)
+            on = grid if own else canvas
+            grey = to_grid(intensity((pictures if own else pictures.full).load(edit.picture)), on)
+            grey = seen(grey, on) if own else grey
+            for rows, part in strips(1 - grey if edit.invert else grey, canvas):
+                made[rows] = wanted(edit.white * part if edit.of == "thickness" else part)
+            return made
 
 
 def as_grey(words: np.ndarray, of: MaskName) -> np.ndarray:
@@ -215,18 +235,6 @@ def as_grey(words: np.ndarray, of: MaskName) -> np.ndarray:
     zero, unit = UNITS[of]
     white = unit * (THICKEST if of == "thickness" else 1)
     return np.rint(np.clip((words.astype(np.float64) - zero) / white, 0, 1) * 65535).astype(np.uint16)
-
-
-def _inside(corners: np.ndarray, canvas: Grid) -> np.ndarray:
-    """1 where a texel's middle lies in a polygon (n, 2), by the rule of odd and even, (h, w)."""
-    x, y = canvas.centres()
-    crossed = np.zeros((canvas.ny, canvas.nx), np.int32)
-    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        rows = np.flatnonzero((y[:, 0] >= min(ay, by)) & (y[:, 0] < max(ay, by)))
-        if len(rows):
-            at = ax + (y[rows, 0] - ay) * (bx - ax) / (by - ay)
-            crossed[rows] += x[rows] > at[:, None]
-    return crossed % 2
 
 
 def _softened(words: np.ndarray, reaches: Sequence[int]) -> np.ndarray:

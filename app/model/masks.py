@@ -22,6 +22,7 @@ from pydantic import Field, model_validator
 
 from app.errors import UserError
 from app.model.sampling import (
+    FINEST,
     SOURCE,
     NamedPictures,
     PictureName,
@@ -40,7 +41,6 @@ from app.model.schema import Fraction01, Model, Radius, Several, label_of
 from solver.grid import Grid
 
 MOST_VISCOUS = 1e6
-FINEST = 2048  # texels along the longer side, at most, that what is frozen is worked out on
 FINE = 1024  # cells along the longer side, at least, that a picture is quantised on
 Viscosity = Annotated[float, Field(ge=0, le=MOST_VISCOUS)]
 

@@ -356,6 +356,10 @@ def _inline(value: Any) -> Any:
     """A table within a table of a list, as `{ ... }` on its own line: headers of headers are hard to read."""
     import tomlkit
 
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        tables = tomlkit.array()
+        tables.extend(_inline(part) for part in value)
+        return tables
     if not isinstance(value, dict):
         return value
     table = tomlkit.inline_table()

@@ -5,8 +5,9 @@ Everything is averaged over the cells (never point-sampled), so that grids of 25
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, Protocol, Self
 
 import numpy as np
@@ -14,8 +15,10 @@ from pydantic import Field, model_validator
 
 from app.model.picture import Picture, linear_to_srgb
 from app.model.schema import FileName, Fraction01, Model, Place
+from solver.components import connected_components
 from solver.grid import Grid
 
+FINEST = 2048  # pixels along the longer side, at most, that masks are worked out on
 SOURCE = "source"
 """The name by which a recipe calls the picture that is warped, where it could name an auxiliary one."""
 
@@ -36,6 +39,36 @@ class NamedPictures(Protocol):
     def notice(self, text: str) -> None:
         """Note something the user should hear of, once."""
         ...
+
+
+class SmallPictures:
+    """The pictures of `full`, but those of more than `FINEST` pixels along a side made smaller, once."""
+
+    def __init__(self, full: NamedPictures) -> None:
+        self.full = full
+        self.notice = full.notice
+        self._made: dict[str, tuple[Picture, Picture]] = {}
+
+    def load(self, name: str) -> Picture:
+        """The picture called `name`, in the means of squares of pixels where it is large. Raises UserError."""
+        picture = self.full.load(name)
+        if name not in self._made or self._made[name][0] is not picture:
+            self._made[name] = picture, _shrunk(picture, math.ceil(max(picture.width, picture.height) / FINEST))
+        return self._made[name][1]
+
+
+def _shrunk(picture: Picture, side: int) -> Picture:
+    """A picture in the means of squares of `side` pixels; what is left at the right and below is left out."""
+    if side == 1:
+        return picture
+    pixels, height, width = picture.pixels, picture.height // side, picture.width // side
+    floats = picture.linear
+    sums = np.zeros((height, width, pixels.shape[2]), np.float32 if floats else np.uint32)
+    for row in range(side):
+        for column in range(side):
+            sums += pixels[row::side, column::side][:height, :width]
+    means = sums / np.float32(side**2) if floats else (sums + side**2 // 2) // side**2
+    return picture.with_pixels(means.astype(pixels.dtype))
 
 
 # Pictures as numbers ------------------------------------------------------------------------------------------------
@@ -68,15 +101,59 @@ def to_grid(values: np.ndarray, grid: Grid) -> np.ndarray:
     return _resized(_resized(values, grid.nx, 1), grid.ny, 0).astype(np.float32)
 
 
+def strips(values: np.ndarray, grid: Grid, rows: int = 64) -> Iterator[tuple[slice, np.ndarray]]:
+    """The rows of a grid a few at a time, each time with `values` (h, w) of no more cells interpolated to them.
+
+    Rows in which all of them are 0 are left out.
+    """
+    above, below, down = _between(len(values), grid.ny)
+    left, right, across = _between(values.shape[1], grid.nx)
+    for top in range(0, grid.ny, rows):
+        here = slice(top, min(top + rows, grid.ny))
+        part = down[here, None]
+        tall = values[above[here]] * (1 - part) + values[below[here]] * part
+        if tall.any():
+            yield here, tall[:, left] * (1 - across) + tall[:, right] * across
+
+
+def _between(m: int, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For each of `n` cells between which two of `m` its middle lies, and what part it has of the second."""
+    at = np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1)
+    first = np.minimum(at.astype(int), max(m - 2, 0))
+    return first, np.minimum(first + 1, m - 1), at - first
+
+
+def pixel_at(place: Point, pixels: np.ndarray) -> tuple[int, int]:
+    """The row and the column of the pixel at a place of a picture (h, w, ...)."""
+    height, width = pixels.shape[:2]
+    return min(int(place[1] * height), height - 1), min(int(place[0] * width), width - 1)
+
+
+def connected(chosen: np.ndarray, place: tuple[int, int]) -> np.ndarray:
+    """What of the pixels chosen, (h, w) bool, is connected by their sides with the one at a place (row, column).
+
+    Raises:
+        ValueError: if that is not chosen.
+    """
+    if not chosen[place]:
+        raise ValueError("what lies 'at' the place is not chosen itself")
+    # The runs of each row are vertices, and those that touch in two rows are connected.
+    run = np.cumsum(chosen & ~np.pad(chosen, ((0, 0), (1, 0)))[:, :-1]).reshape(chosen.shape)
+    both = chosen[:-1] & chosen[1:]
+    upper, lower = run[:-1][both], run[1:][both]
+    new = np.diff(upper, prepend=-1).astype(bool) | np.diff(lower, prepend=-1).astype(bool)
+    label = connected_components(np.arange(run[-1, -1] + 1), upper[new], lower[new])
+    return chosen & (label[run] == label[run[place]])
+
+
 def _resized(values: np.ndarray, n: int, axis: int) -> np.ndarray:
     """Values resampled to `n` along an axis: exact means over the new cells, or interpolated if there are more."""
     values = np.moveaxis(values, axis, 0)
     m = len(values)
     if n >= m:
-        at = np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1)
-        k = np.minimum(at.astype(int), max(m - 2, 0))
-        part = (at - k).reshape(-1, *(1,) * (values.ndim - 1))
-        resized = values[k] * (1 - part) + values[np.minimum(k + 1, m - 1)] * part
+        first, second, part = _between(m, n)
+        part = part.reshape(-1, *(1,) * (values.ndim - 1))
+        resized = values[first] * (1 - part) + values[second] * part
     else:
         # The integral up to each of the new edges, which may lie within a pixel.
         integral = np.cumsum(values, axis=0, dtype=np.float64)
@@ -189,6 +266,7 @@ class Segment(Model):
         above, below: intensity, 0-1; both together are a band.
         color: "#rrggbb"; pixels within `tolerance` of it, as the distance in RGB, each of 0-1.
         mask: a picture file, chosen where it is brighter than middle grey.
+        at: only what is connected with this place, as fractions of the picture.
         window: nothing outside it is chosen.
     """
 
@@ -197,6 +275,7 @@ class Segment(Model):
     color: str | None = None
     tolerance: Annotated[float, Field(gt=0, le=2)] = 0.15
     mask: PictureName | None = None
+    at: tuple[Fraction01, Fraction01] | None = None
     window: Window | None = None
 
     @model_validator(mode="after")
@@ -220,21 +299,36 @@ class Segment(Model):
         return self
 
     def weight(self, picture: str, grid: Grid, pictures: NamedPictures) -> np.ndarray:
+        """As `chosen`, of what has an edge.
+
+        Raises:
+            ValueError: if it chooses nothing or everything.
+        """
+        chosen = self.chosen(picture, grid, pictures)
+        if chosen.min() > 0.5:
+            raise ValueError("the segmentation chooses the whole picture, so that it has no edge")
+        return chosen
+
+    def chosen(self, picture: str, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         """How much of each cell (ny, nx) is chosen, in [0, 1].
 
         Raises:
-            ValueError: if it chooses nothing or everything, so that it has no edge.
+            ValueError: if it chooses nothing.
         """
         chosen = to_grid(self._pixels(picture, pictures).astype(np.float32), grid).astype(np.float64)
         if self.window:
             chosen = chosen * self.window.weight(grid)
         if chosen.max() < 0.5:
             raise ValueError("the segmentation is empty; nothing in the picture is chosen by it")
-        if chosen.min() > 0.5:
-            raise ValueError("the segmentation chooses the whole picture, so that it has no edge")
         return chosen
 
     def _pixels(self, picture: str, pictures: NamedPictures) -> np.ndarray:
+        pixels = self._alike(picture, pictures)
+        if self.at is None:
+            return pixels
+        return connected(pixels, pixel_at(self.at, pixels))
+
+    def _alike(self, picture: str, pictures: NamedPictures) -> np.ndarray:
         if self.mask is not None:
             return intensity(pictures.load(self.mask)) > 0.5
         if self.color is not None:

@@ -268,6 +268,7 @@ TOOLS = (
         masks=True,
     ),
     Tool("smooth", "Smooth mask", "s", "Soften the edges of what you have painted", painting("smooth"), masks=True),
+    Tool("select", "Select", "m", "Select an area, then fill it into a mask"),
     Tool("restore", "Restore", "r", "Hold to bring the picture back as it was", painting("restore")),
     Tool("pan", "Pan", "h", "Drag to move the view (or hold Space with any tool)"),
     Tool("zoom", "Zoom", "z", "Click to zoom in, with Alt to zoom out; drag left or right"),

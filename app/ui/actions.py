@@ -64,7 +64,7 @@ def _table() -> list[Action]:
         add("Edit", name, label, key, lambda c, n=name, label=label: c.workspace.change(label, **{n: True}))
     add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
     add("Edit", "remove", "Remove the handle", "delete backspace", lambda c: c.remove_selected())
-    add("Edit", "cancel", "Give up the stroke", "escape", lambda c: c.workspace.session.cancel())
+    add("Edit", "cancel", "Give up the stroke or selection", "escape", lambda c: c.cancel())
 
     for tool in TOOLS:
         add("Tools", f"tool_{tool.name}", tool.label, tool.key, lambda c, n=tool.name: c.state.choose_tool(n, False))
@@ -72,6 +72,9 @@ def _table() -> list[Action]:
             label = tool.directions[1] if tool.name in ("bloat", "thicken", "freeze") else f"{tool.label}, reversed"
             keys = f"shift+{tool.key}" + (" d" if tool.name == "freeze" else "")
             add("Tools", f"tool_{tool.name}_back", label, keys, lambda c, n=tool.name: c.state.choose_tool(n, True))
+    add("Tools", "select_next", "Select by something else", "shift+m", lambda c: c.state.select_next())
+    add("Masks", "select_fill", "Fill the selection", "enter", lambda c: c.selecting.fill(off=False))
+    add("Masks", "select_clear", "Take it off the mask", "shift+enter", lambda c: c.selecting.fill(off=True))
     for kind, label, key in (
         ("invert", "Invert the mask", "ctrl+shift+i"),
         ("fill", "Fill the mask", "ctrl+shift+f"),

@@ -57,6 +57,8 @@ class Canvas:
         # The warp as it was last seen at rest, shown while it is made again on another grid.
         self._kept: Field | None = None
         self._kept_at = -1
+        self._selected: Field | None = None
+        self._selected_area: np.ndarray | None = None
         self._force_fields: tuple[Field, Field] | None = None
         self._forces_of: object = None
 
@@ -126,8 +128,9 @@ class Canvas:
         self._texture.release()
         self._still.release()
         self._fields.release()
-        if self._kept is not None:
-            self._kept.release()
+        for field in (self._kept, self._selected):
+            if field is not None:
+                field.release()
         self._release_forces()
 
     def _release_forces(self) -> None:
@@ -184,6 +187,16 @@ class Canvas:
             self._drawn = drawn
         return field, shown
 
+    def _selection(self, area: np.ndarray) -> Field:
+        """What is selected, uploaded where it is another."""
+        if area is not self._selected_area:
+            if self._selected is not None:
+                self._selected.release()
+            self._selected, self._selected_area = self.device.upload(area, "selection", "f1"), area
+            self._selected.texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        assert self._selected is not None
+        return self._selected
+
     def _filter(self, viewport: Viewport) -> None:
         zoom = viewport.scale * viewport.density / self._shrunk
         small = moderngl.LINEAR_MIPMAP_NEAREST if zoom < 0.75 else moderngl.LINEAR
@@ -195,18 +208,20 @@ class Canvas:
         if state.before:
             return
         replay, shown = session.replay, state.overlays
-        painting = state.tool.masks
         if shown["grid"].shown:
             defines["GRID"] = 1
             inputs |= {"grid": GRID_LINES, "grid_opacity": shown["grid"].opacity, "pixel": scale}
-        if shown["viscosity"].shown or (painting and state.tool_name in ("thicken", "smooth")):
+        if shown["viscosity"].shown or state.edits_mask("thickness", "thicken", "smooth"):
             defines["VISCOSITY"] = 1
             base = max(session.replay.settings.viscosity, 1e-6)
             inputs |= {"viscosity": replay.masks.base_viscosity, "thickness": replay.masks.thickness, "base": base}
             inputs["viscosity_opacity"] = shown["viscosity"].opacity
-        if shown["frozen"].shown or (painting and state.tool_name in ("freeze", "smooth")):
+        if shown["frozen"].shown or state.edits_mask("frozen", "freeze", "smooth"):
             defines["FROZEN"] = 1
             inputs |= {"frozen": replay.masks.frozen, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
+        if state.tool_name == "select" and state.selected_area is not None:
+            defines["SELECTED"] = 1
+            inputs |= {"selected": self._selection(state.selected_area), "dash": 8.0 * scale, "dash_width": scale}
         if shown["velocity"].shown:
             defines["ARROWS"] = 1
             inputs |= {"velocity": replay.fluid.carrier(), "arrow": ARROW * scale, "speed": 0.4}

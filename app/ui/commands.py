@@ -17,6 +17,7 @@ from app.ui.files import Files
 from app.ui.messages import Messages
 from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
+from app.ui.selecting import Selecting
 from app.ui.workspace import Workspace
 
 
@@ -38,6 +39,7 @@ class Commands:
     dialogs: Dialogs
     messages: Messages
     preferences: Preferences
+    selecting: Selecting
     clipboard: Callable[[str], None] = imgui.set_clipboard_text
     closed: bool = False
 
@@ -64,11 +66,21 @@ class Commands:
         self.workspace.session.device.timings.enabled = self.state.statistics
 
     def remove_selected(self) -> None:
-        """Take away the handle or the pin that is selected."""
+        """Take away the handle or the pin that is selected; what an area is selected for, off its mask."""
+        if self.state.tool_name == "select":
+            self.selecting.fill(off=True)
+            return
         session, selected = self.workspace.session, self.state.selected
         if selected in dict(labelled(session.recipe.handle, session.recipe.pin)):
             session.let_go(selected)
         self.state.selected = ""
+
+    def cancel(self) -> None:
+        """Give up what is being drawn, or what is selected."""
+        if self.state.tool_name == "select" and not self.workspace.session.is_painting:
+            self.selecting.cancel()
+        else:
+            self.workspace.session.cancel()
 
     def clear_masks(self) -> None:
         """Take all paint off both masks."""

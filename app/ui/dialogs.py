@@ -277,7 +277,7 @@ class Shortcuts(Dialog):
             ("Back to default", "Double click"),
             ("Type a number", "Ctrl + click"),
         ]
-        columns = (("File", "Edit", "Time"), ("Tools", "Brush", "Masks"), ("View", "Help", "Mouse"))
+        columns = (("File", "Edit", "Time", "Masks"), ("Tools", "Brush"), ("View", "Help", "Mouse"))
         imgui.begin_child("keys", ImVec2(0, -ui.px(44)))
         across = min(max(int(imgui.get_content_region_avail().x / ui.px(230)), 1), len(columns))
         if imgui.begin_table("sheet", across, imgui.TableFlags_.sizing_stretch_same):

@@ -35,6 +35,7 @@ from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
 from app.ui.recovering import Recovery
+from app.ui.selecting import Selecting
 from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
@@ -77,12 +78,13 @@ class Editor:
         self.exports = Exports(self.messages)
         self.quality = Quality(self.workspace, self.state, self.files, self.exports, self.messages)
         self.recovery = Recovery(self.journals, self.dialogs, self.messages, self.files.restore)
+        self.selecting = Selecting(self.workspace, self.state, self.messages)
         self.pointer = PointerController(
-            self.workspace, self.state, self.ui, self.dialogs, likes, lambda: self.do("play")
+            self.workspace, self.state, self.ui, self.dialogs, likes, self.selecting, lambda: self.do("play")
         )
         self.commands = Commands(
             self.workspace, self.state, self.pointer, self.files, self.chooser, self.exports, self.dialogs,
-            self.messages, likes,
+            self.messages, likes, self.selecting,
         )  # fmt: skip
         self._styled: tuple[object, ...] = ()
         self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken
@@ -161,6 +163,7 @@ class Editor:
             with self.clock.measure("simulate"):
                 self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
             self.quality.look(dt)
+            self.selecting.look()
             self._draw(target, size, dt, events)
             self.workspace.keep()
         if self.quality.is_measuring:
@@ -179,7 +182,7 @@ class Editor:
             return PACE
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
         elsewhere = self.exports.is_running or self.chooser.is_waiting or self.files.is_loading or self.recovery.is_busy
-        if elsewhere or self.dialogs.is_busy:
+        if elsewhere or self.dialogs.is_busy or self.selecting.is_busy:
             return 0.1
         return min(self.messages.next_in or 60.0, 60.0)
 
@@ -266,11 +269,11 @@ class Editor:
 
     def _draw_panels(self) -> None:
         ui, layout, workspace, state, likes = self.ui, self.layout, self.workspace, self.state, self.preferences
-        marks.draw(ui, self.view, self.session, state, self.pointer)
-        hud.draw(ui, workspace, state, likes, self.numbers, self.clock, self.do)
+        marks.draw(ui, self.view, self.session, state, self.pointer, self.selecting.outline)
+        hud.draw(ui, workspace, state, self.selecting, likes, self.numbers, self.clock, self.do)
         strip.draw(ui, layout, state)
         if layout.inspector is not None:
-            inspector.draw(ui, layout.inspector, workspace, state, self.quality, self.clock, self.do)
+            inspector.draw(ui, layout.inspector, workspace, state, self.selecting, self.quality, self.clock, self.do)
         timebar.draw(ui, layout.timebar, self.session, state, self.do)
         bar.draw(ui, layout, workspace, state, likes.recent, self.files.open_work, self.do)
 

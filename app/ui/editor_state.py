@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from app.model.areas import Part
 from app.model.mask_edits import MaskName
 from app.model.tools import TOOL, BrushSettings, Tool
 
 MASK_OF: dict[str, MaskName] = {"freeze": "frozen", "thicken": "thickness"}
+SELECT_BY = {
+    "rectangle": "Drag over what you want.",
+    "ellipse": "Drag over what you want.",
+    "lasso": "Draw around what you want.",
+    "colour": "Click on a colour.",
+    "brightness": "Click on something as bright or dark.",
+    "subject": "Drag a rough box around it.",
+}
+"""By what is selected, and how."""
 SMALLEST, LARGEST = 0.005, 0.5  # of a brush's radius, in longer sides
 
 
@@ -51,6 +63,12 @@ class EditorState:
         mask: the one that the inspector edits; that of the tool that was chosen last.
         mask_reach: by how much it is feathered, grown and shrunk, longer sides.
         mask_decades: of thickness, with which it is filled.
+        dark_is_thick: thickness that comes of the picture's brightness does so the other way round.
+        select_by: one of `SELECT_BY`.
+        tolerance: how unlike a colour or a brightness may be to be selected, of 1.
+        connected: only what is connected with the place that was clicked on is.
+        selection: what is selected, the first part and what is added to it and taken away.
+        selected_area: the same as it is shown, (h, w) uint8, 255 in it; None where there is none.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
@@ -70,6 +88,12 @@ class EditorState:
     mask: MaskName = "frozen"
     mask_reach: float = 0.02
     mask_decades: float = 2.0
+    dark_is_thick: bool = False
+    select_by: str = "rectangle"
+    tolerance: float = 0.2
+    connected: bool = True
+    selection: tuple[Part, ...] = ()
+    selected_area: np.ndarray | None = None
     selected: str = ""
     before: bool = False
     split: float | None = None
@@ -105,6 +129,17 @@ class EditorState:
 
     def _set_brush(self, **settings: float) -> None:
         self.brush = replace(self.brush, **settings)
+
+    def select_next(self) -> None:
+        """Take the selecting tool in hand; if it is, select by the next of what can be selected by."""
+        ways = list(SELECT_BY)
+        if self.tool_name == "select":
+            self.select_by = ways[(ways.index(self.select_by) + 1) % len(ways)]
+        self.choose_tool("select", False)
+
+    def edits_mask(self, name: MaskName, *tools: str) -> bool:
+        """True if one of these tools is in hand, or selections are made for this mask: then it is shown."""
+        return self.tool_name in tools or (self.tool_name == "select" and self.mask == name)
 
     def show_mask(self) -> None:
         """Let the mask that is edited be seen, with any tool."""

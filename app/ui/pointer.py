@@ -13,6 +13,7 @@ from app.ui.dialogs import Dialogs
 from app.ui.editor_state import LARGEST, SMALLEST, EditorState
 from app.ui.events import LEFT, MIDDLE, RIGHT, Button, Event, Key, Mods, Move, Wheel
 from app.ui.preferences import Preferences
+from app.ui.selecting import Selecting
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.session import Held
@@ -31,7 +32,7 @@ class PointerController:
         play: called where Space was tapped.
         x, y: where the pointer is, in points.
         drag: what the button that is down does: "paint", "hold" a handle that may be dragged, "pan", "zoom", "brush",
-            "split", or None.
+            "split", "select", or None.
         space: Space is held, so that any tool pans.
     """
 
@@ -40,6 +41,7 @@ class PointerController:
     ui: Ui
     dialogs: Dialogs
     preferences: Preferences
+    selecting: Selecting
     play: Callable[[], None]
     x: float = -1e6
     y: float = -1e6
@@ -162,6 +164,10 @@ class PointerController:
             self.drag = "split"
         elif button == LEFT and tool.name == "zoom":
             self.drag = "zoom"
+        elif button == LEFT and tool.name == "select":
+            self.drag = "select"
+            self.preferences.dismiss_hint()
+            self.selecting.press(*self.workspace.view.to_picture(self.x, self.y), self.mods)
         elif button == LEFT and (held := self.hovered) is not None:
             if self.mods.alt:
                 self.workspace.session.let_go(held.label)
@@ -196,6 +202,8 @@ class PointerController:
                 workspace.session.move(*view.to_picture(x, y), pressure, mods.shift)
             case "pan":
                 workspace.view = view.panned(dx, dy)
+            case "select":
+                self.selecting.move(*view.to_picture(x, y))
             case "zoom":
                 workspace.view = view.zoomed((view.zoom or view.fit_zoom) * exp(0.008 * dx), *self._start)
             case "brush":
@@ -209,6 +217,8 @@ class PointerController:
         drag, self.drag = self.drag, None
         if drag == "paint":
             self.workspace.session.release()
+        elif drag == "select":
+            self.selecting.release()
         elif drag == "zoom" and not self._moved:
             self.workspace.view = self.workspace.view.stepped(not self.mods.alt, self.x, self.y)
 
@@ -242,7 +252,7 @@ class PointerController:
             return "hand"
         if self.drag == "split" or (self.drag is None and self._is_on_split()):
             return "resize_ew"
-        if self.state.tool_name == "zoom":
+        if self.state.tool_name in ("zoom", "select"):
             return "crosshair"
         if self.drag == "hold" or self.hovered is not None:
             return "hand"

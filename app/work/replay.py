@@ -19,9 +19,9 @@ from app.media.auxiliary import Pictures
 from app.model.forces import BuiltForce, build
 from app.model.handles import RecipeHandle, RecipePin, is_inside, labelled, objections
 from app.model.mask_edits import ClearMask, MaskStroke, edited, remaining
-from app.model.masks import FINEST, solid, viscosity
+from app.model.masks import solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
-from app.model.sampling import channels
+from app.model.sampling import FINEST, SmallPictures, channels
 from app.model.strokes import FINEST_DETAIL, Change, Dab, Stroke
 from app.model.timelaws import Feedback, Law
 from app.model.timeline import Observation, Sentinel
@@ -118,6 +118,7 @@ class Replay:
         tick: the steps made so far. What is done to masks at this tick in no time is done; strokes and changes at it
             come next.
         grid: of the whole picture.
+        small_pictures: its pictures as edits of masks look at them.
         window: where the flow is solved on finer cells instead, None if nowhere; `fluid.grid` are its cells.
         fluid, warp, masks, density: the simulation at this moment; `density` only in density mode.
         forces: the recipe's own.
@@ -129,6 +130,7 @@ class Replay:
         self.device = device
         self.recipe = recipe
         self.pictures = pictures
+        self.small_pictures = SmallPictures(pictures)
         self.tick = self.steps = 0
         self.checkpoints = Checkpoints(budget)
         self._brush = Brush(device)
@@ -298,6 +300,14 @@ class Replay:
         step = np.linalg.lstsq(jacobian, wanted - looked_up[j, i], rcond=None)[0]
         at_x, at_y = np.array([x[j, i], y[j, i]]) + np.clip(step, (-hx, -hy), (hx, hy))
         return float(at_x), float(at_y)
+
+    def seen(self, values: np.ndarray, grid: Grid) -> np.ndarray:
+        """Values of the original's cells, (ny, nx) or (ny, nx, c), where the warp shows them at this moment."""
+        if self.tick == 0 and self.recipe.map is None:
+            return values
+        moved, (hx, hy), (x, y) = self.warp.read(grid.size), grid.spacing, grid.centres()
+        column, row = np.floor((x + moved[..., 0]) / hx), np.floor((y + moved[..., 1]) / hy)
+        return values[np.clip(row, 0, grid.ny - 1).astype(int), np.clip(column, 0, grid.nx - 1).astype(int)]
 
     # -- one step ---------------------------------------------------------------------------------------------------
 
@@ -492,7 +502,7 @@ class Replay:
 
     def _edit_masks(self, before: Recipe | None = None) -> None:
         """Do what is done to the masks at this tick in no time, but for what was done of `before`."""
-        here, canvas = self.recipe.masks_at(self.tick), self.masks.canvas
+        here, canvas, pictures = self.recipe.masks_at(self.tick), self.masks.canvas, self.small_pictures
         left = remaining(here, before.masks_at(self.tick) if before is not None else ())
         assert left is not None
         for edit, first in left:
@@ -503,7 +513,7 @@ class Replay:
                 self.masks.take_off(edit.of)
             else:
                 try:
-                    self.masks.edit(edit.of, lambda words, edit=edit: edited(words, edit, canvas, self.pictures))
+                    self.masks.edit(edit.of, lambda words, edit=edit: edited(words, edit, canvas, pictures, self.seen))
                 except (ValueError, UserError) as error:
                     raise UserError(f"mask[{self.recipe.mask.index(edit) + 1}]: {error}") from None
         if left:

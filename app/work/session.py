@@ -19,7 +19,7 @@ from app.media.auxiliary import Pictures
 from app.media.project import Project
 from app.model.document import Document
 from app.model.handles import ARRIVED, MOST_HANDLES, RecipeHandle, RecipePin, is_inside, labelled
-from app.model.mask_edits import MaskEdit, MaskStroke
+from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.strokes import Change, Stroke
@@ -547,10 +547,12 @@ class Session:
 
     # -- edits ------------------------------------------------------------------------------------------------------
 
-    def edit_masks(self, name: str, *edits: MaskEdit) -> None:
+    def edit_masks(self, name: str, *edits: MaskEdit, commit: bool = True) -> None:
         """Do something to masks, in no time: where the recording ends, or the playhead was sent back to.
 
-        `edits`: whatever their ticks.
+        Args:
+            edits: whatever their ticks.
+            commit: as an entry of the history; not while a slider is dragged.
 
         Raises:
             UserError: what is wrong with it on this picture.
@@ -561,17 +563,22 @@ class Session:
         if not self.coasting:
             self._send(tick)
         self.replay.checkpoint()
-        self._keep_masks(name, *(edit.model_copy(update={"tick": tick}) for edit in edits))
+        self._keep_masks(name, *(edit.model_copy(update={"tick": tick}) for edit in edits), commit=commit)
 
-    def _keep_masks(self, name: str, *edits: MaskEdit) -> None:
-        recipe = self._base.edited(mask=(*self._base.mask, *edits))
+    def _keep_masks(self, name: str, *edits: MaskEdit, commit: bool = True) -> None:
+        masks = self._base.mask
+        for edit in edits:
+            masks = with_edit(masks, edit)
+        recipe = self._base.edited(mask=masks)
         try:
             self.replay.use(recipe)
         except UserError:
             self.replay.use(self._live)
             raise
         self._live = recipe
-        self.commit(name)
+        self.changes += 1
+        if commit:
+            self.commit(name)
 
     def change(self, name: str, **settings: Any) -> None:
         """Set something from the playhead on: viscosity, drag, walls, clear_velocity, reset_warp, clear_masks."""

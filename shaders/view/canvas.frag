@@ -7,10 +7,11 @@
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY: tint of decades over
 // u_base, u_viscosity of the recipe's and u_thickness painted. FROZEN: hatch where u_frozen is 1/2 or more. ARROWS: velocity
-// on MAC faces, lengths / s, of which u_speed fills an arrow.
+// on MAC faces, lengths / s, of which u_speed fills an arrow. SELECTED: dashes of half u_dash pixels along the edge of where
+// u_selected is 1/2 or more, u_dash_width pixels wide to each side.
 // FORCES: u_force on MAC faces, 1 at its strongest, as arrows of u_force_colour; where u_room swells or shrinks, a tint.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
-// reads: 2, and up to 8 with overlays
+// reads: 2, and up to 13 with overlays
 #include "lib/decades.glsl"
 #ifndef EDGES
 #define EDGES 2
@@ -47,6 +48,11 @@ uniform sampler2D u_frozen;
 uniform float u_frozen_opacity;
 uniform float u_hatch;
 #endif
+#ifdef SELECTED
+uniform sampler2D u_selected;
+uniform float u_dash;
+uniform float u_dash_width;
+#endif
 #ifdef ARROWS
 uniform sampler2D u_velocity;
 uniform float u_arrow;
@@ -64,6 +70,11 @@ uniform vec3 u_force_colour;
 layout(location = 0) out vec4 out_colour;
 
 float inside(vec2 place) { return float(all(greaterThanEqual(place, vec2(0.0))) && all(lessThanEqual(place, vec2(1.0)))); }
+
+#ifdef SELECTED
+// Beyond the picture nothing is selected, so that its edge is one too.
+bool selected(vec2 place) { return inside(place) * texture(u_selected, place).r >= 0.5; }
+#endif
 
 vec4 look_up(vec2 place) {
 #if EDGES == 3
@@ -163,6 +174,13 @@ void main() {
 #endif
 #ifdef ARROWS
         seen = with_arrows(seen, pixel, u_velocity, u_window, u_speed, u_arrow, u_arrow_colour, u_arrows_opacity);
+#endif
+#ifdef SELECTED
+        vec2 aside = u_dash_width * u_step;
+        bool here = selected(x);
+        if (here != selected(x + vec2(aside.x, 0.0)) || here != selected(x - vec2(aside.x, 0.0)) ||
+            here != selected(x + vec2(0.0, aside.y)) || here != selected(x - vec2(0.0, aside.y)))
+            seen = vec3(step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / u_dash)));
 #endif
     }
     out_colour = vec4(seen, 1.0);

@@ -130,10 +130,19 @@ class Masks:
         return self._painted[name].get() if name in self._painted else None
 
     def edit(self, name: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
-        """Make a mask anew from its texels: (h, w), uint16 of "thickness", uint8 of "frozen", in which 255 is all."""
+        """Make a mask anew from its texels, by a function that leaves what it is given as it is.
+
+        The texels are (h, w), uint16 of "thickness", uint8 of "frozen", in which 255 is all.
+        """
         field = self._field(name)
-        field.set(change(field.get()))
-        self._note_change(name, (0, 0, *self.canvas.size))
+        before = field.get()
+        after = change(before)
+        differs = after != before
+        rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+        if len(rows):
+            x, y, right, bottom = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+            field.set(after[y:bottom, x:right], (x, y, right - x, bottom - y))
+            self._note_change(name, (x, y, right - x, bottom - y))
 
     def take_off(self, name: str) -> None:
         """Take all paint off one mask."""

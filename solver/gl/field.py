@@ -88,8 +88,11 @@ class Field:
         self.device.fences.hold()
         self.drawn()
 
-    def set(self, array: np.ndarray) -> None:
+    def set(self, array: np.ndarray, region: tuple[int, int, int, int] | None = None) -> None:
         """Write an array of shape (height, width) or (height, width, components), row 0 on top.
+
+        Args:
+            region: (x, y, width, height) in texels of where it is written; by default all.
 
         Raises:
             FieldError: on another shape, or on a value that is no number or not finite.
@@ -97,7 +100,8 @@ class Field:
         array = np.asarray(array)
         if array.dtype.kind not in "fiub":
             raise FieldError(f"{self.label}: an array of {array.dtype} was given, real numbers are wanted")
-        shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
+        _, _, width, height = region or (0, 0, *self.size)
+        shape = (height, width) if self.components == 1 else (height, width, self.components)
         if array.shape != shape and array.shape != (*shape, 1):
             raise FieldError(f"{self.label}: an array of shape {array.shape} was given, {shape} is wanted")
         with np.errstate(over="ignore"):  # it is told below
@@ -105,8 +109,8 @@ class Field:
         if self.dtype in ("f2", "f4") and not np.isfinite(data).all():
             raise FieldError(f"{self.label}: the array holds a value that is not finite")
         self.device.use()
-        self.texture.write(np.ascontiguousarray(data).tobytes())
-        self.drawn()
+        self.texture.write(np.ascontiguousarray(data).tobytes(), viewport=region)
+        self.drawn(region)
 
     def get(self, region: tuple[int, int, int, int] | None = None) -> np.ndarray:
         """Read back as an array of shape (height, width) or (height, width, components), row 0 on top.

@@ -22,7 +22,7 @@ from app.model.mask_edits import (
 )
 from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.sampling import Segment, Window
+from app.model.sampling import Segment, SmallPictures, Window
 from solver.grid import Grid
 
 CANVAS = Grid.for_picture(60, 45, 60)
@@ -52,7 +52,7 @@ def words(of: MaskName, seed: int = 1) -> np.ndarray:
 
 
 def done(edit: WholeEdit, before: np.ndarray) -> np.ndarray:
-    after = edited(before.copy(), edit, CANVAS, OnePicture(RED))
+    after = edited(before.copy(), edit, CANVAS, SmallPictures(OnePicture(RED)))
     assert after.dtype == before.dtype
     assert after.shape == before.shape
     return after
@@ -132,10 +132,12 @@ def test_a_mask_written_as_a_picture_is_read_back_word_by_word(of: MaskName) -> 
     before = words(of)
     grey = as_grey(before, of)
     edit = PictureMask(kind="picture", tick=0, of=of, picture="mask.png")
-    after = edited(words(of, 2), edit, CANVAS, OnePicture(grey[..., None]))
+    after = edited(words(of, 2), edit, CANVAS, SmallPictures(OnePicture(grey[..., None])))
     assert np.array_equal(after, np.maximum(before, 24576) if of == "thickness" else before)
     assert (grey.min(), grey.max() > 65000) == (0, True)
-    half = edited(after, edit.model_copy(update={"white": -2.0}), CANVAS, OnePicture(np.full_like(RED, 128)))
+    half = edited(
+        after, edit.model_copy(update={"white": -2.0}), CANVAS, SmallPictures(OnePicture(np.full_like(RED, 128)))
+    )
     assert (half == (round(24576 - 2 * 8192 * 128 / 255) if of == "thickness" else 128)).all()
 
 

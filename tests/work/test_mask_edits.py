@@ -8,6 +8,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -16,16 +17,18 @@ from app.media import project as projects
 from app.media.auxiliary import Pictures
 from app.media.pictures import write_picture
 from app.media.project import Project
+from app.model.areas import Part
 from app.model.history import History
 from app.model.mask_edits import ClearMask, FeatherMask, FillMask, InvertMask, MaskStroke, PictureMask, SpreadMask
 from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.sampling import Window
+from app.model.sampling import Segment, Window, to_grid
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.work import journal
 from app.work.replay import THICKENING, Replay
 from app.work.session import Session
 from solver.gl.device import Device
+from solver.grid import Grid
 from support.editing import small_project
 
 MASKS = [tool.name for tool in TOOLS if tool.masks]
@@ -38,7 +41,16 @@ EDITS = (
     SpreadMask(kind="grow", tick=0, of="frozen", radius=0.03),
     SpreadMask(kind="shrink", tick=0, of="thickness", radius=0.03),
     FillMask(kind="fill", tick=0, of="frozen", amount=1.0, window=Window(box=(0.1, 0.1, 0.3, 0.4))),
-)
+    FillMask(
+        kind="fill", tick=0, of="frozen", amount=1.0, segment=Segment(above=0.4, at=(0.95, 0.95)),
+        then=(
+            Part(outline=((0.5, 0.1), (0.9, 0.3), (0.6, 0.6))),
+            Part(combine="subtract", window=Window(box=(0.6, 0.1, 0.8, 0.4), shape="ellipse")),
+        ),
+    ),
+    FillMask(kind="fill", tick=0, of="thickness", amount=-1.0, segment=Segment(color="#808080", tolerance=0.6)),
+    PictureMask(kind="picture", tick=0, of="thickness", white=2.0, invert=True),
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -273,3 +285,49 @@ def test_a_seek_between_two_ticks_leaves_the_masks_of_the_first(session: Session
     assert replay.masks.frozen.get().any()
     assert isinstance(recipe.mask[0], MaskStroke)
     replay.release()
+
+
+def test_what_is_selected_by_colour_is_where_it_is_seen(device: Device, tmp_path: Path) -> None:
+    """After a warp, it is what has the colour in the picture as OpenCV looks it up."""
+    y, x = np.mgrid[0:180, 0:240]
+    red = ((x - 90) / 50) ** 2 + ((y - 90) / 40) ** 2 < 1
+    pixels = np.where(red[..., None], (200, 30, 30), (20, 60, 90)).astype(np.uint8)
+    project = replace(small_project(tmp_path), picture=Picture(pixels))
+    session = Session(device, project)
+    paint(session, "push", (0.4, 0.5), (0.6, 0.55), (0.75, 0.5), hold=4)
+    session.settle()
+    fill = FillMask(kind="fill", tick=0, of="frozen", amount=1.0, segment=Segment(color="#c81e1e", tolerance=0.3))
+    session.edit_masks("Fill", fill)
+    frozen = to_grid((session.replay.masks.frozen.get() > 127).astype(np.float32), Grid(240, 180)) > 0.5
+    moved = session.replay.warp.read((240, 180)) * 240
+    places = (moved + np.stack([x, y], axis=-1)).astype(np.float32)
+    seen = cv2.remap(pixels[..., 0], places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) > 120
+    assert (frozen & seen).sum() / (frozen | seen).sum() > 0.97
+    assert (red & seen).sum() / (red | seen).sum() < 0.9
+    assert is_same(masks(session.replay), replayed(session))
+    session.release_gpu()
+
+
+def test_brightness_while_a_slider_is_dragged_is_one_edit_below_what_was_painted(session: Session) -> None:
+    def brightness(white: float, commit: bool = False) -> None:
+        edit = PictureMask(kind="picture", tick=0, of="thickness", white=white)
+        session.edit_masks("Thickness by brightness", edit, commit=commit)
+
+    for white in (1.0, 2.5, 2.0):
+        brightness(white)
+        assert is_same(masks(session.replay), replayed(session))
+    assert len(session.document.history.entries) == 1
+    session.commit("Thickness by brightness")
+    first = masks(session.replay)
+    paint(session, "thicken", (0.5, 0.5), hold=10)
+    stroke = session.recipe.mask[-1]
+    brightness(1.0)
+    brightness(3.0, commit=True)
+    assert [entry.name for entry in session.document.history.entries][1:] == [
+        "Thickness by brightness", "Thicken", "Thickness by brightness",
+    ]  # fmt: skip
+    assert session.recipe.mask == (PictureMask(kind="picture", tick=0, of="thickness", white=3.0), stroke)
+    assert is_same(masks(session.replay), replayed(session))
+    session.undo()
+    session.undo()
+    assert is_same(masks(session.replay), first)

@@ -94,6 +94,7 @@ def _title(ui: Ui, tool: Tool, room: float) -> None:
         start += width + ui.px(12)
         if tool.gesture is None and start + imgui.calc_text_size(tool.hint).x <= room:
             imgui.same_line(0, ui.px(12))
+            imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(9))
             ui.dim(tool.hint, 14)
     imgui.end_group()
 

@@ -11,6 +11,7 @@ from app.ui.editor_state import EditorState
 from app.ui.numbers import Numbers
 from app.ui.panels.marks import BEHIND
 from app.ui.preferences import Preferences
+from app.ui.selecting import Selecting
 from app.ui.theme import packed
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
@@ -24,6 +25,7 @@ def draw(
     ui: Ui,
     workspace: Workspace,
     state: EditorState,
+    selecting: Selecting,
     preferences: Preferences,
     numbers: Numbers,
     clock: Clock,
@@ -34,8 +36,9 @@ def draw(
     if canvas.width > ui.px(ZOOM):
         _zoom(ui, workspace, do)
     if state.tool_name == "handle" and not session.recipe.leads and canvas.width > ui.px(HINT):
-        with ui.floating("how", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
-            ui.text("  Drag a point to where it should go. Click to pin one where it is.  ", size=14)
+        _how(ui, canvas, "Drag a point to where it should go. Click to pin one where it is.")
+    elif selecting.hint and canvas.width > ui.px(HINT):
+        _how(ui, canvas, selecting.hint)
     elif preferences.hint and canvas.width > ui.px(HINT):
         _hint(ui, canvas, preferences)
     if state.statistics:
@@ -68,6 +71,11 @@ def _zoom(ui: Ui, workspace: Workspace, do: Do) -> None:
         fitted = workspace.view.zoom is None
         if ui.icon_button("fit", "fit", "Fit", "0", size=24, icon_size=15, active=fitted):
             do("fit")
+
+
+def _how(ui: Ui, canvas: Rect, words: str) -> None:
+    with ui.floating("how", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
+        ui.text(f"  {words}  ", size=14)
 
 
 def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:

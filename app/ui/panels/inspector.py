@@ -11,13 +11,14 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.model.handles import ARRIVED, RecipeHandle, labelled
-from app.model.mask_edits import MASKS, THICKEST, THINNEST
+from app.model.mask_edits import MASKS, THICKEST, THINNEST, MaskStroke, PictureMask, is_brightness
 from app.model.presets import DEFAULT
 from app.ui.actions import ACTIONS, Do
 from app.ui.clock import Clock
-from app.ui.editor_state import SMALLEST, EditorState
+from app.ui.editor_state import SELECT_BY, SMALLEST, EditorState
 from app.ui.panels import feels
 from app.ui.quality import Quality
+from app.ui.selecting import Selecting
 from app.ui.theme import packed
 from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS, TIMES, Unit
 from app.ui.viewport import Rect
@@ -38,13 +39,23 @@ ABOUT_MASKS = {
 }
 
 
-def draw(ui: Ui, rect: Rect, workspace: Workspace, state: EditorState, quality: Quality, clock: Clock, do: Do) -> None:
+def draw(
+    ui: Ui,
+    rect: Rect,
+    workspace: Workspace,
+    state: EditorState,
+    selecting: Selecting,
+    quality: Quality,
+    clock: Clock,
+    do: Do,
+) -> None:
     """All sections, one below the other."""
     session = workspace.session
     with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none):
         imgui.begin_child("sections")
         for name, label, section, opened in (
             *_about_handles(ui, workspace, state, do),
+            *_about_selection(ui, session, state, selecting, do),
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("view", "Overlays", lambda: _view(ui, state), True),
             ("quality", "Picture and quality", lambda: _quality(ui, workspace, quality), False),
@@ -68,6 +79,57 @@ def _about_handles(
     if state.tool_name != "handle" and not session.recipe.leads:
         return []
     return [("handles", "Handles and pins", lambda: _handles(ui, workspace, state, do), True)]
+
+
+def _about_selection(
+    ui: Ui, session: Session, state: EditorState, selecting: Selecting, do: Do
+) -> list[tuple[str, str, Callable[[], None], bool]]:
+    """The section about what is selected, with its tool in hand."""
+    if state.tool_name != "select":
+        return []
+    return [("selection", "Selection", lambda: _selection(ui, session, state, selecting, do), True)]
+
+
+def _selection(ui: Ui, session: Session, state: EditorState, selecting: Selecting, do: Do) -> None:
+    ways = list(SELECT_BY)
+    for first in (0, 3):
+        row, now = ways[first : first + 3], ways.index(state.select_by)
+        chosen = ui.segmented(f"select {first}", [way.capitalize() for way in row], now - first, -1)
+        if chosen != now - first:
+            state.select_by = row[chosen]
+    if state.select_by in ("colour", "brightness"):
+        slid = ui.slider(
+            "tolerance", "Tolerance", state.tolerance, 0.01, 1.0, PERCENT, 0.2,
+            title="Tolerance", more="How unlike what you click on it may be.",
+        )  # fmt: skip
+        connected = ui.check("Only what is connected", state.connected)
+        if slid.changed or connected != state.connected:
+            selecting.set_tolerance(slid.value, connected)
+    ui.wrapped(f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, Esc gives up.", ui.palette.dim, 13)
+    _which_mask(ui, state)
+    words = ("Freeze", "Thaw") if state.mask == "frozen" else ("Fill", "Clear")
+    width = (imgui.get_content_region_avail().x / ui.scale - 8) / 2
+    with ui.enabled(bool(state.selection)):
+        for number, (name, label) in enumerate(zip(("select_fill", "select_clear"), words, strict=True)):
+            if number:
+                imgui.same_line(0, ui.px(8))
+            if ui.button(f"{label}##selection", width=width, height=30, primary=number == 0):
+                do(name)
+            ui.tooltip(f"{label} what is selected", ACTIONS[name].key)
+    if state.mask == "thickness":
+        _brightness(ui, session, state)
+
+
+def _which_mask(ui: Ui, state: EditorState) -> None:
+    """The mask that is edited, and what it is filled with."""
+    names = list(MASKS)
+    state.mask = names[ui.segmented("mask", ("Frozen", "Thickness"), names.index(state.mask), -1)]
+    if state.mask == "thickness":
+        slid = ui.slider(
+            "mask amount", "Fill with", 10**state.mask_decades, 10**THINNEST, 10**THICKEST, TIMES, 100.0,
+            logarithmic=True, title="What Fill fills with", more="So many times as thick as the fluid.",
+        )  # fmt: skip
+        state.mask_decades = round(log10(slid.value), 3)
 
 
 def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
@@ -197,14 +259,10 @@ def _quality(ui: Ui, workspace: Workspace, quality: Quality) -> None:
 
 
 def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
-    names = list(MASKS)
-    state.mask = names[ui.segmented("mask", ("Frozen", "Thickness"), names.index(state.mask), -1)]
-    if state.mask == "thickness":
-        slid = ui.slider(
-            "mask amount", "Fill with", 10**state.mask_decades, 10**THINNEST, 10**THICKEST, TIMES, 100.0,
-            logarithmic=True, title="What Fill fills with", more="So many times as thick as the fluid.",
-        )  # fmt: skip
-        state.mask_decades = round(log10(slid.value), 3)
+    if state.tool_name != "select":
+        _which_mask(ui, state)
+        if state.mask == "thickness":
+            _brightness(ui, workspace.session, state)
     slid = ui.slider(
         "mask reach", "By", state.mask_reach, 0.001, 0.25, Unit(" px", max(workspace.canvas.size)), 0.02,
         logarithmic=True, title="How far", more="By so much Feather, Grow and Shrink move its edges.",
@@ -230,6 +288,28 @@ def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
                 do(name)
     if ui.button("Copy as recipe", width=-1, height=30):
         do("copy_recipe")
+
+
+def _brightness(ui: Ui, session: Session, state: EditorState) -> None:
+    """Thickness from the picture's own brightness, as long as nothing but strokes has come over it."""
+    last = next((edit for edit in reversed(session.recipe.mask) if not isinstance(edit, MaskStroke)), None)
+    own = last if last is not None and last.of == "thickness" and is_brightness(last) else None
+    contrast, dark_is_thick = (own.white, own.invert) if own else (0.0, state.dark_is_thick)
+    slid = ui.slider(
+        "brightness", "By brightness", 10**contrast, 1.0, 10**THICKEST, TIMES, 1.0, logarithmic=True,
+        title="Thickness from the picture's own brightness",
+        more="So many times as thick is the brightest as the darkest, or the other way round.",
+    )  # fmt: skip
+    way = bool(ui.segmented("thick", ("Bright is thick", "Dark is thick"), int(dark_is_thick), -1))
+    state.dark_is_thick, turned = way, own is not None and way != dark_is_thick
+    if slid.again:
+        session.undo()
+    if slid.changed or turned:
+        edit = PictureMask(kind="picture", tick=0, of="thickness", white=round(log10(slid.value), 3), invert=way)
+        session.edit_masks("Thickness by brightness", edit, commit=turned)
+        state.show_mask()
+    if slid.done:
+        session.commit("Thickness by brightness")
 
 
 def _history(ui: Ui, session: Session, state: EditorState) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from math import hypot
 from typing import Any
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.model.sampling import Point
 from app.ui.editor_state import EditorState, Overlay
 from app.ui.pointer import PointerController
 from app.ui.theme import Colour, packed, rgb
@@ -20,8 +23,15 @@ MOST_WAITING = 100  # strokes that are drawn
 WHITE, BLACK, WARN = rgb("ffffff"), rgb("000000"), rgb("f2a93b")
 
 
-def draw(ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: PointerController) -> None:
-    """Everything that is drawn over the picture."""
+def draw(
+    ui: Ui,
+    view: Viewport,
+    session: Session,
+    state: EditorState,
+    pointer: PointerController,
+    selecting: Sequence[Point],
+) -> None:
+    """Everything that is drawn over the picture; `selecting`: what is being dragged around."""
     canvas = view.canvas
     lines = imgui.get_background_draw_list()
     lines.push_clip_rect(ImVec2(canvas.x, canvas.y), ImVec2(canvas.right, canvas.bottom), True)
@@ -33,9 +43,29 @@ def draw(ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: 
     _waiting(ui, view, session, lines)
     if not state.before:
         _handles(ui, view, session, state, pointer, lines)
+    _dashes(ui, [view.to_screen(*place) for place in selecting], lines)
     if pointer.shows_ring:
         _ring(ui, view, state, pointer, lines)
     lines.pop_clip_rect()
+
+
+def _dashes(ui: Ui, corners: list[Point], lines: imgui.ImDrawList) -> None:
+    """A closed line in white dashes on black."""
+    points: list[Any] = [ImVec2(*corner) for corner in corners]
+    if len(points) < 2:
+        return
+    lines.add_polyline(points, packed(BLACK, 0.7), ui.px(1.6), int(imgui.ImDrawFlags_.closed))
+    dash, gone = ui.px(4), 0.0
+    for (x0, y0), (x1, y1) in pairwise([*corners, corners[0]]):
+        length = hypot(x1 - x0, y1 - y0)
+        at = -gone
+        while at < length:
+            start, end = max(at, 0.0) / length, min(at + dash, length) / length
+            if end > start:
+                first, last = (ImVec2(x0 + (x1 - x0) * part, y0 + (y1 - y0) * part) for part in (start, end))
+                lines.add_line(first, last, packed(WHITE), ui.px(1.6))
+            at += 2 * dash
+        gone = (gone + length) % (2 * dash)
 
 
 def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList) -> None:

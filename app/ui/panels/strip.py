@@ -10,7 +10,7 @@ from app.ui.editor_state import EditorState
 from app.ui.layout import BETWEEN, GROUP, TOOL, Layout
 from app.ui.widgets import Ui
 
-GROUP_ENDS = ("handle", "smooth", "restore")
+GROUP_ENDS = ("handle", "select", "restore")
 
 
 def draw(ui: Ui, layout: Layout, state: EditorState) -> None:

@@ -1,0 +1,362 @@
+"""Selections in the window: made by the pointer, filled into a mask, and the same in a recipe."""
+
+from __future__ import annotations
+
+import random
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from app.media import project as projects
+from app.model.mask_edits import FillMask, PictureMask
+from app.model.picture import Picture
+from app.model.recipe import Recipe
+from app.ui.editor_state import SELECT_BY
+from app.ui.events import Mods
+from app.work.replay import Replay
+from solver.gl.device import Device
+from support.commands import Run
+from support.desk import Desk, needs_a_screen
+from support.editing import Robot, pattern, small_project
+from support.widgets import Widgets
+
+WIDTH, HEIGHT = 240, 180
+Y, X = np.mgrid[0:HEIGHT, 0:WIDTH]
+BLOB = ((X - 80) / 40) ** 2 + ((Y - 90) / 50) ** 2 < 1
+SPOT = (X - 200) ** 2 + (Y - 40) ** 2 < 20**2
+
+
+def blobs() -> Picture:
+    """Two reddish ones with grain before something greenish."""
+    colours = np.where((BLOB | SPOT)[..., None], (190, 70, 60), (60, 120, 80)).astype(float)
+    return Picture(np.clip(colours + np.random.default_rng(1).normal(0, 8, colours.shape), 0, 255).astype(np.uint8))
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    robot = Robot(device, replace(small_project(tmp_path), picture=blobs()))
+    robot.key("m")
+    yield robot
+    robot.close()
+
+
+def frozen(robot: Robot) -> np.ndarray:
+    """What is frozen of the picture's pixels, (h, w) bool."""
+    texels = robot.editor.session.replay.masks.frozen.get()
+    if texels.shape == (1, 1):
+        return np.zeros((HEIGHT, WIDTH), bool)
+    times = texels.shape[0] // HEIGHT
+    return texels.reshape(HEIGHT, times, WIDTH, times).mean(axis=(1, 3)) > 127
+
+
+def select(robot: Robot, by: str, *places: tuple[float, float], mods: Mods | None = None) -> None:
+    """Drag from place to place, with modifiers held; at one place, click."""
+    robot.editor.state.select_by = by
+    robot.mods = mods or Mods()
+    robot.move(*robot.at(*places[0]))
+    robot.press()
+    for place in places[1:]:
+        robot.move(*robot.at(*place))
+    robot.release()
+    robot.mods = Mods()
+    robot.until(lambda: not robot.editor.selecting.is_busy)
+
+
+def is_like(seen: np.ndarray, wanted: np.ndarray, part: float = 0.96) -> bool:
+    return (seen & wanted).sum() / (seen | wanted).sum() > part
+
+
+def box(left: float, top: float, right: float, bottom: float) -> np.ndarray:
+    x, y = (X + 0.5) / WIDTH, (Y + 0.5) / HEIGHT
+    return (x > left) & (x < right) & (y > top) & (y < bottom)
+
+
+def test_a_rectangle_is_selected_and_frozen_by_enter_in_no_time(robot: Robot) -> None:
+    session = robot.editor.session
+    select(robot, "rectangle", (0.6, 0.7), (0.5, 0.5), (0.2, 0.3))
+    assert session.recipe.mask == ()
+    robot.key("enter")
+    assert is_like(frozen(robot), box(0.2, 0.3, 0.6, 0.7))
+    assert (session.end, session.is_moving) == (0, False)
+    assert [entry.name for entry in session.document.history.entries] == ["Open", "Freeze the selection"]
+    robot.key("ctrl+z")
+    assert not frozen(robot).any()
+    robot.key("ctrl+shift+z")
+    assert is_like(frozen(robot), box(0.2, 0.3, 0.6, 0.7))
+
+
+def test_shift_adds_alt_takes_away_and_neither_begins_anew(robot: Robot) -> None:
+    state, one, other = robot.editor.state, ((0.1, 0.1), (0.5, 0.5)), ((0.4, 0.4), (0.8, 0.8))
+    select(robot, "rectangle", *one, mods=Mods(alt=True))  # from nothing it is what is selected
+    select(robot, "rectangle", *other, mods=Mods(shift=True))
+    select(robot, "ellipse", (0.3, 0.3), (0.5, 0.5), mods=Mods(alt=True))
+    x, y = (X + 0.5) / WIDTH, (Y + 0.5) / HEIGHT
+    hole = (x - 0.4) ** 2 + (y - 0.4) ** 2 < 0.1**2
+    robot.key("enter")
+    assert is_like(frozen(robot), (box(0.1, 0.1, 0.5, 0.5) | box(0.4, 0.4, 0.8, 0.8)) & ~hole)
+    select(robot, "rectangle", (0.6, 0.6), (0.9, 0.9))
+    assert len(state.selection) == 1
+    robot.key("delete")
+    assert not frozen(robot)[box(0.6, 0.6, 0.9, 0.9)].any()
+    assert frozen(robot)[box(0.15, 0.15, 0.25, 0.25)].all()
+    edit = robot.editor.session.recipe.mask[-1]
+    assert isinstance(edit, FillMask)
+    assert edit.amount == 0
+
+
+def test_a_lasso_is_what_was_drawn_around(robot: Robot) -> None:
+    turns = np.linspace(0, 2 * np.pi, 40)[:-1]
+    select(robot, "lasso", *((0.5 + 0.2 * np.cos(turn), 0.5 + 0.3 * np.sin(turn)) for turn in turns))
+    robot.key("enter")
+    x, y = (X + 0.5) / WIDTH, (Y + 0.5) / HEIGHT
+    assert is_like(frozen(robot), ((x - 0.5) / 0.2) ** 2 + ((y - 0.5) / 0.3) ** 2 < 1)
+
+
+@pytest.mark.parametrize("by", ["colour", "brightness"])
+def test_a_click_selects_what_is_like_it(robot: Robot, monkeypatch: pytest.MonkeyPatch, by: str) -> None:
+    """Where it is connected or, with the switch, everywhere; and as unlike as the slider says, at once."""
+    widgets, state = Widgets(robot, monkeypatch), robot.editor.state
+    select(robot, by, (0.33, 0.5))
+    assert state.selected_area is not None
+    robot.key("enter")
+    if by == "colour":
+        assert is_like(ndimage.binary_fill_holes(frozen(robot)), BLOB)
+        widgets.click("Only what is connected")
+        robot.key("enter")
+        assert is_like(ndimage.binary_fill_holes(frozen(robot)), BLOB | SPOT)
+    less = int((state.selected_area > 127).sum())
+    widgets.type("Tolerance", "2")
+    assert 0 < int((state.selected_area > 127).sum()) < less
+    widgets.type("Tolerance", "100")
+    assert int((state.selected_area > 127).sum()) >= less
+    edit = state.selection[0].segment
+    assert edit is not None
+    assert (edit.at is None) == (by == "colour")
+
+
+def test_a_subject_is_found_in_a_rough_box_while_frames_go_on(robot: Robot) -> None:
+    robot.editor.state.select_by = "subject"
+    robot.drag((0.1, 0.15), (0.6, 0.85))
+    assert robot.editor.selecting.is_busy
+    assert robot.editor.wait() <= 0.1
+    robot.until(lambda: not robot.editor.selecting.is_busy)
+    robot.key("enter")
+    assert is_like(frozen(robot), BLOB)
+    assert "outline" in robot.editor.session.recipe.text()
+
+
+def test_without_opencv_a_subject_is_a_sentence(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    select(robot, "subject", (0.1, 0.15), (0.6, 0.85))
+    assert "pip install" in robot.editor.messages.shown[-1].text
+    assert robot.editor.state.selection == ()
+
+
+def test_escape_gives_up_the_drag_and_then_the_selection(robot: Robot) -> None:
+    state = robot.editor.state
+    select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
+    kept = state.selection
+    robot.move(*robot.at(0.6, 0.6))
+    robot.press()
+    robot.move(*robot.at(0.9, 0.9))
+    robot.key("escape")
+    robot.move(*robot.at(0.95, 0.95))
+    robot.release()
+    assert state.selection == kept
+    robot.key("escape")
+    assert state.selection == ()
+    robot.key("enter")
+    assert robot.editor.messages.shown[-1].text == "Nothing is selected yet."
+    assert robot.editor.session.recipe.mask == ()
+    robot.editor.state.select_by = "subject"
+    robot.drag((0.1, 0.15), (0.6, 0.85))
+    robot.key("escape")
+    time.sleep(0.5)
+    robot.frame(count=3)
+    assert state.selection == ()
+
+
+@pytest.mark.parametrize("by", ["rectangle", "ellipse", "lasso"])
+def test_dashes_are_seen_while_it_is_made_and_afterwards(robot: Robot, by: str) -> None:
+    robot.editor.state.select_by = by
+    robot.move(5, 5)
+    before = robot.pixels().astype(int)
+    robot.move(*robot.at(0.2, 0.2))
+    robot.press()
+    for place in ((0.5, 0.25), (0.55, 0.5), (0.6, 0.6)):
+        robot.move(*robot.at(*place))
+
+    def changed() -> int:
+        """Pixels near the way of the drag that became black or white."""
+        (left, top), (right, bottom) = robot.at(0.15, 0.15), robot.at(0.65, 0.65)
+        here = slice(round(top), round(bottom)), slice(round(left), round(right))
+        seen, old = robot.pixels()[here], before[here]
+        extreme = (seen.min(axis=2) > 240) | (seen.max(axis=2) < 60)
+        return int((extreme & (np.abs(seen - old).max(axis=2) > 40)).sum())
+
+    assert changed() > 200
+    robot.release()
+    robot.frame()
+    assert changed() > 200
+    robot.key("p")
+    robot.move(5, 5)
+    robot.frame()
+    assert changed() == 0
+
+
+def test_a_click_drops_it_and_so_does_another_picture(robot: Robot, tmp_path: Path) -> None:
+    state = robot.editor.state
+    for drop in (lambda: select(robot, "rectangle", (0.5, 0.5)), lambda: robot.editor.open(small_project(tmp_path))):
+        select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
+        assert state.selection
+        drop()
+        robot.frame()
+        assert state.selection == ()
+        assert state.selected_area is None
+
+
+def test_with_another_tool_in_hand_nothing_is_filled(robot: Robot) -> None:
+    select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
+    robot.key("p")
+    robot.key("enter")
+    robot.key("shift+enter")
+    robot.key("delete")
+    assert robot.editor.session.recipe.mask == ()
+    robot.key("m")
+    robot.key("enter")
+    assert frozen(robot).any()
+
+
+def test_its_key_goes_through_what_can_be_selected_by(robot: Robot) -> None:
+    state, seen = robot.editor.state, []
+    for _ in SELECT_BY:
+        seen.append(state.select_by)
+        robot.key("shift+m")
+    assert seen == list(SELECT_BY)
+    robot.key("p")
+    robot.key("shift+m")
+    assert (state.tool_name, state.select_by) == ("select", "rectangle")
+
+
+def test_a_selection_thickens_with_what_the_slider_says(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    widgets, masks = Widgets(robot, monkeypatch), robot.editor.session.replay.masks
+    widgets.click("Thickness")
+    widgets.type("Fill with", "1000")
+    select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
+    widgets.click("Fill")
+    assert masks.thickness.get().max() == 24576 + 3 * 8192
+    widgets.click("Clear")
+    assert (masks.thickness.get() == 24576).all()
+
+
+def test_thickness_by_brightness_is_live_and_one_edit(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    widgets, session = Widgets(robot, monkeypatch), robot.editor.session
+    widgets.click("Thickness")
+    widgets.look()
+    slider = widgets.at["By brightness"]
+    robot.move(slider.x + 20, slider.middle[1])
+    robot.press()
+    seen = []
+    for step in range(1, 5):
+        robot.move(slider.x + 20 + 0.2 * step * slider.width, slider.middle[1])
+        robot.frame()
+        seen.append(int(session.replay.masks.thickness.get().max()))
+    robot.release()
+    robot.frame(count=2)
+    assert seen == sorted(set(seen))
+    assert [entry.name for entry in session.document.history.entries] == ["Open", "Thickness by brightness"]
+    widgets.click("Dark is thick")
+    (edit,) = session.recipe.mask
+    assert isinstance(edit, PictureMask)
+    assert edit.invert
+    thickness = session.replay.masks.thickness.get()
+    assert thickness.shape == BLOB.shape
+    assert thickness[BLOB].mean() > thickness[~(BLOB | SPOT)].mean()  # it is a little darker
+    robot.key("ctrl+z")
+    (edit,) = session.recipe.mask
+    assert isinstance(edit, PictureMask)
+    assert not edit.invert
+    robot.key("ctrl+z")
+    assert session.recipe.mask == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_selections_are_replayed_to_the_byte(robot: Robot, seed: int) -> None:
+    """Also after a warp, undone and redone."""
+    dice, session, ways = random.Random(seed), robot.editor.session, list(SELECT_BY)[:5]
+
+    def masks(replay: Replay) -> list[np.ndarray]:
+        size = replay.masks.canvas.size[::-1]
+        painted = (np.broadcast_to(mask.get(), size) for mask in (replay.masks.frozen, replay.masks.thickness))
+        return [*painted, replay.warp.read()]
+
+    states = []
+    for number in range(9):
+        if number == 3:
+            robot.key("p")
+            robot.drag((0.3, 0.5), (0.5, 0.5), steps=3)
+            robot.rest()
+            robot.key("m")
+        places = [(dice.random(), dice.random()) for _ in range(dice.randrange(1, 5))]
+        select(robot, dice.choice(ways), *places, mods=dice.choice((Mods(), Mods(shift=True), Mods(alt=True))))
+        robot.editor.state.mask = dice.choice(("frozen", "thickness"))
+        robot.key(dice.choice(("enter", "enter", "delete")))
+        states.append((session.document.history.index, masks(session.replay)))
+    assert session.document.history.index > 4
+    for index, wanted in dice.sample(states, 5):
+        session.go_to(index)
+        session.settle()
+        assert all(np.array_equal(a, b) for a, b in zip(masks(session.replay), wanted, strict=True))
+    session.go_to(states[-1][0])
+    session.settle()
+    again = Replay(session.device, Recipe.parse(session.recipe.text()), session.pictures)
+    again.seek(session.end)
+    assert all(np.array_equal(a, b) for a, b in zip(masks(again), states[-1][1], strict=True))
+    again.release()
+
+
+@needs_a_screen
+def test_a_person_selects_freezes_and_renders_the_same(tmp_path: Path, fluidwarp: Run) -> None:
+    """With a real pointer and real keys; what the command line makes of the project is what was exported."""
+    from app.media.pictures import read_picture, write_picture
+
+    desk, work = Desk(tmp_path), tmp_path / "work.fluidwarp"
+    try:
+        write_picture(tmp_path / "pattern.png", pattern())
+        desk.open(tmp_path / "pattern.png")
+        desk.key("m")
+        desk.drag((300, 200), (500, 400))
+        desk.do("keydown", "shift", "sleep", "0.2")
+        desk.drag((450, 300), (600, 500))
+        desk.do("keyup", "shift", "keydown", "alt", "sleep", "0.2")
+        desk.drag((320, 220), (360, 260))
+        desk.do("keyup", "alt", "sleep", "0.2")
+        desk.insist(lambda: desk.key("Return"), lambda: desk.title() == "pattern * - fluidwarp", "it to be frozen")
+        desk.key("p")
+        desk.drag((480, 350), (700, 350))
+        time.sleep(2)
+        desk.save(work)
+    finally:
+        desk.close()
+    recipe = projects.load(work).recipe
+    fill = recipe.mask[0]
+    assert isinstance(fill, FillMask)
+    assert [part.combine for part in fill.then] == ["add", "subtract"]
+    assert [stroke.tool for stroke in recipe.stroke] == ["push"]
+    for name in ("one.png", "other.png"):
+        assert fluidwarp(tmp_path, "render", str(work), "-o", name).returncode == 0
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "other.png").read_bytes()
+    assert fill.window is not None
+    left, top, right, bottom = (
+        round(part * side) for part, side in zip(fill.window.box, (WIDTH, HEIGHT) * 2, strict=True)
+    )
+    kept = slice(top + 20, bottom - 2), slice(left + 20, right - 2)
+    rendered, before = read_picture(tmp_path / "one.png").pixels, pattern().pixels
+    assert np.array_equal(rendered[kept][..., :3], before[kept])
+    assert not np.array_equal(rendered[..., :3], before)
