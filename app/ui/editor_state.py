@@ -52,6 +52,7 @@ class EditorState:
         mask_reach: by how much it is feathered, grown and shrunk, longer sides.
         mask_decades: of thickness, with which it is filled.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
+        is_scaling: the amount of the warp is being dragged.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
         statistics: numbers are shown over the canvas.
@@ -71,6 +72,7 @@ class EditorState:
     mask_reach: float = 0.02
     mask_decades: float = 2.0
     selected: str = ""
+    is_scaling: bool = False
     before: bool = False
     split: float | None = None
     statistics: bool = False
