@@ -187,6 +187,7 @@ def render(
     grid: Annotated[int | None, typer.Option(help="Cells along the longer side.")] = None,
     solver: Annotated[str | None, typer.Option(help="mac, or paper for the paper's own scheme.")] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds to simulate.")] = None,
+    amount: Annotated[float | None, typer.Option(help="How much of the warp: 0 to 1.5; 1 is all of it.")] = None,
     fps: Annotated[
         float | None, typer.Option(help="Frames per second of a picture's animation; a clip keeps its own.")
     ] = None,
@@ -220,7 +221,7 @@ def render(
         "output": {"size": size, "fps": fps, "quality": quality},
         "time": {"start": start, "end": end},
     }
-    edits = Edits.of(tables, {"duration": duration})
+    edits = Edits.of(tables, {"duration": duration, "amount": amount})
     edits.applied(opened(recipe, max_pixels).recipe)
     if output is None and map_ is None:
         output = Path("out.png")

@@ -159,6 +159,7 @@ class Recipe(Model):
         picture: the source, relative to the recipe's own folder.
         map: a warp map to begin with instead of the picture as it is, in any format of `app.media.maps`.
         duration: T, in simulated seconds.
+        amount: how much of the warp is seen; 1 is all of it.
         edges: what lies beyond the picture's edge.
         mode: "coordinates" warps the picture's coordinates, "density" moves its values (see `Density`).
         viscosity, freeze, force, stroke, change: applied in the order they are written in.
@@ -171,6 +172,7 @@ class Recipe(Model):
     picture: FileName | None = None
     map: FileName | None = None
     duration: Annotated[float, Field(gt=0, le=1_000_000)] = 1.0
+    amount: Annotated[float, Field(ge=0, le=1.5)] = 1.0
     edges: Literal["transparent", "black", "clamp", "mirror", "wrap"] = "transparent"
     mode: Literal["coordinates", "density"] = "coordinates"
     fluid: FluidSettings = FluidSettings()
@@ -201,6 +203,8 @@ class Recipe(Model):
             raise ValueError(f"'duration' / 'fluid.dt' is more than {MOST_TICKS} ticks; make dt larger")
         if self.map is not None and self.mode == "density":
             raise ValueError("a 'map' warps coordinates, and mode \"density\" has none; remove one of them")
+        if self.amount != 1 and self.mode == "density":
+            raise ValueError("'amount' scales a warp of coordinates, and mode \"density\" has none; remove one of them")
         if len(self.handle) + len(self.pin) > MOST_HANDLES:
             raise ValueError(
                 f"there are {len(self.handle) + len(self.pin)} handles and pins; at most {MOST_HANDLES} work"

@@ -91,7 +91,7 @@ class Canvas:
         if replay.density is not None:
             texture = replay.density.values.texture
         elif not state.before:
-            displacement, shown = self._seen(session, viewport, seen)
+            displacement, shown = self._seen(session, state, viewport, seen)
         self._filter(viewport)
         defines: dict[str, object] = {"EDGES": EDGES[session.recipe.edges]}
         inputs: dict[str, object] = {
@@ -160,12 +160,14 @@ class Canvas:
         self._force_fields, self._forces_of = fields, key
         return fields
 
-    def _seen(self, session: Session, viewport: Viewport, seen: Pixels) -> tuple[Field, tuple[float, ...]]:
+    def _seen(
+        self, session: Session, state: EditorState, viewport: Viewport, seen: Pixels
+    ) -> tuple[Field, tuple[float, ...]]:
         """The displacement to show, and where it lies: left, top, width and height, 0-1 of the picture.
 
         Found for the pixels of the screen only, so that it costs the same at any zoom and on any picture.
         """
-        warp = session.replay.warp
+        warp = session.seen
         if session.is_rebuilding and self._kept is not None:
             return self._kept, WHOLE
         if not session.is_moving and session.changes != self._kept_at:
@@ -174,7 +176,7 @@ class Canvas:
                 size = [max(1, round(KEPT * side / max(self.size))) for side in self.size]
                 self._kept = self.device.field((size[0], size[1]), 2, "warp last seen")
             warp.draw(self._kept, (0.0, 0.0), self._kept.texel)
-        apart = MOVING if session.is_moving else 1
+        apart = MOVING if session.is_moving or state.is_scaling else 1
         (left, top, right, bottom), rect, density = seen, viewport.rect, viewport.density
         # One more on every side, to be interpolated between.
         size = -(-(right - left) // apart) + 2, -(-(bottom - top) // apart) + 2

@@ -70,6 +70,7 @@ class EditorState:
         selection: what is selected, the first part and what is added to it and taken away.
         selected_area: the same as it is shown, (h, w) uint8, 255 in it; None where there is none.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
+        is_scaling: the amount of the warp is being dragged.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
         statistics: numbers are shown over the canvas.
@@ -95,6 +96,7 @@ class EditorState:
     selection: tuple[Part, ...] = ()
     selected_area: np.ndarray | None = None
     selected: str = ""
+    is_scaling: bool = False
     before: bool = False
     split: float | None = None
     statistics: bool = False

@@ -41,10 +41,9 @@ from app.work.replay import Replay
 from app.work.states import StoredStates, code
 from app.work.threads import prefetch, write_behind
 from solver.gl.device import Device
-from solver.resample.plan import GivenMap, Quality, Sampling, SamplingError
+from solver.resample.plan import GivenMap, Map, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.warp.inverse import ForwardMap
-from solver.warp.map import WarpMap
 
 T = TypeVar("T")
 Numbered = tuple[int, Frame]
@@ -352,7 +351,7 @@ class _Export:
             how = replace(self._how, premultiplied=picture.premultiplied)
             try:
                 target = Target(self.size, how, heard, alpha)
-                return looked_up(self.sampler, self.replay.warp, picture.pixels, target)
+                return looked_up(self.sampler, self.replay.seen, picture.pixels, target)
             except SamplingError as error:
                 raise UserError(f"The map cannot be applied: {error}.") from None
 
@@ -392,7 +391,7 @@ class _Export:
             if not self._has_layers or "layers" not in keeps:
                 return still
             layers = picture.cropped().layers
-            return replace(still, layers=along(layers, partial(self._look_up, self.replay.warp, self.size)))
+            return replace(still, layers=along(layers, partial(self._look_up, self.replay.seen, self.size)))
         given = displacement(self.replay, self.size, 0, False, self.progress.check)
         warp = GivenMap(self.device, widened(given, picture.margins))
         try:
@@ -406,9 +405,7 @@ class _Export:
         finally:
             warp.release()
 
-    def _look_up(
-        self, warp: WarpMap | GivenMap, size: tuple[int, int], pixels: np.ndarray, quality: Quality
-    ) -> np.ndarray:
+    def _look_up(self, warp: Map, size: tuple[int, int], pixels: np.ndarray, quality: Quality) -> np.ndarray:
         """The pixels of layers; see `along`."""
         target = Target(size, replace(self._how, quality=quality), lambda rows: self.progress.check())
         return looked_up(self.sampler, warp, pixels, target)
@@ -552,7 +549,7 @@ def displacement(
     """
     # A size in whole pixels has nearly the picture's aspect.
     fit = np.divide(size, max(size)) / replay.grid.extent
-    with ForwardMap(replay.warp) if forward else nullcontext(replay.warp) as warp:
+    with ForwardMap(replay.seen) if forward else nullcontext(replay.seen) as warp:
         if not overscan and max(size) <= replay.device.limits.max_texture_size:
             return Displacement((warp.read(size) * fit).astype(np.float32), 0, forward)
         (width, height), (right, bottom) = size, replay.grid.extent
@@ -581,7 +578,7 @@ class Target:
     alpha: bool = False
 
 
-def looked_up(sampler: Sampler, warp: WarpMap | GivenMap, pixels: np.ndarray, target: Target) -> np.ndarray:
+def looked_up(sampler: Sampler, warp: Map, pixels: np.ndarray, target: Target) -> np.ndarray:
     """The pixels (h, w, c) looked up through a map, in bands, so that little more than the result is in memory."""
     size, how = target.size, target.how
     result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)

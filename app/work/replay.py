@@ -43,6 +43,7 @@ from solver.state import State
 from solver.warp.accumulated import map_size
 from solver.warp.density import Density
 from solver.warp.map import WarpMap
+from solver.warp.scaled import ScaledMap
 
 CHECKPOINT_EVERY = 16  # ticks
 FINER = 3  # times finer than the simulation's grid a point is sought
@@ -243,6 +244,12 @@ class Replay:
     def time(self) -> float:
         """Simulated seconds so far."""
         return self.tick * self.recipe.fluid.dt
+
+    @property
+    def seen(self) -> WarpMap | ScaledMap:
+        """What the picture is looked up through: the warp, or as much of it as the recipe says."""
+        self._scaled.amount = self.recipe.amount
+        return self.warp if self.recipe.amount == 1 else self._scaled
 
     @property
     def settings(self) -> FluidSettings:
@@ -534,6 +541,7 @@ class Replay:
         largest = self.device.limits.max_texture_size
         fine = map_size(self.grid, (source.width, source.height), largest)
         self.warp = warp(self.device, self.grid, fine)
+        self._scaled = ScaledMap(self.warp)
         if recipe.map is not None:
             self._begin_with(recipe.map)
         canvas = Grid(max(fine[0], SMALLEST_GRID), max(fine[1], SMALLEST_GRID), self.grid.picture)
@@ -606,7 +614,16 @@ class Replay:
 
     def _release_simulation(self) -> None:
         fields = [field for force in self.forces for field in (force.faces, force.divergence, force.motion)]
-        for thing in (self._on_whole, self._in_window, self.warp, self.masks, self.density, self.handles, *fields):
+        for thing in (
+            self._on_whole,
+            self._in_window,
+            self._scaled,
+            self.warp,
+            self.masks,
+            self.density,
+            self.handles,
+            *fields,
+        ):
             if thing is not None:
                 thing.release()
 

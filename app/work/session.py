@@ -27,6 +27,8 @@ from app.model.tools import Gesture, Made, Press, Tool, Touch
 from app.model.windows import detail_for
 from app.work.replay import Replay
 from solver.gl.device import Device
+from solver.warp.map import WarpMap
+from solver.warp.scaled import ScaledMap
 
 REST = 0.004  # longer sides a second: a pixel of a screen in four frames
 LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each waits for the GPU
@@ -119,6 +121,11 @@ class Session:
     def recipe(self) -> Recipe:
         """The recipe as it is now, with the stroke that is open."""
         return self._live
+
+    @property
+    def seen(self) -> WarpMap | ScaledMap:
+        """What the picture is seen through; all of the warp while a brush moves it."""
+        return self.replay.warp if self.is_painting else self.replay.seen
 
     @property
     def tick(self) -> int:

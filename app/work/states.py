@@ -24,7 +24,14 @@ EVERY = 64  # ticks between two states
 BUDGET = 4 * 2**30  # bytes of a folder
 FORMAT = 2
 SUFFIX = ".state.npz"
-NOT_SIMULATED = {"name", "time", "stop", "output", "edges"}  # parts of a recipe that the fluid knows nothing of
+NOT_SIMULATED = {
+    "name",
+    "time",
+    "stop",
+    "output",
+    "edges",
+    "amount",
+}  # parts of a recipe that the fluid knows nothing of
 
 
 class StoredStates:

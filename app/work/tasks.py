@@ -32,7 +32,7 @@ COMMAND_LINE = "the command line"
 FLAGS = {  # by which the command line sets a key of the recipe
     "'fluid.grid'": "--grid", "'fluid.solver'": "--solver", "'output.size'": "--size", "'output.fps'": "--fps",
     "'output.quality'": "--quality", "'time.start'": "--from", "'time.end'": "--to", "'duration'": "--duration",
-    "time: 'end'": "--to", "'start'": "--from", "'edges'": "--edges",
+    "'amount'": "--amount", "time: 'end'": "--to", "'start'": "--from", "'edges'": "--edges",
 }  # fmt: skip
 
 

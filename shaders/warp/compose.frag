@@ -5,6 +5,7 @@
 // Define GATHER for what the submaps alone add up to.
 // Define KEEP (with REMAP) to draw nothing but what is newly held: where u_now, whose first texel is u_corner, is not 0, and
 // u_before, over the picture, is.
+// Define FROM for W(x + P(x)) - x: u_from (P), texel for texel, longer sides.
 // reads: 48, and 24 with CUBIC, 12 with GATHER; 12 more for each of LEVELS above 1
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
@@ -12,6 +13,10 @@
 uniform sampler2D u_now;
 uniform sampler2D u_before;
 uniform vec2 u_corner;
+#endif
+#ifdef FROM
+uniform sampler2D u_from;
+in vec2 v_uv;
 #endif
 layout(location = 0) out vec2 out_displacement;
 
@@ -26,10 +31,15 @@ void main() {
     if (texture(u_now, (place - u_corner) / vec2(textureSize(u_now, 0))).r == 0.0 || texture(u_before, place / size).r > 0.0)
         discard;
 #endif
+    vec2 from = vec2(0.0);
+#ifdef FROM
+    from = within_picture(place * texel, texture(u_from, v_uv).rg);
+    place += from / texel;
+#endif
     vec2 x = place * texel;
 #ifdef HELD
     if (is_held(place)) {
-        out_displacement = within(u_limits, x, held_displacement(place));
+        out_displacement = from + within(u_limits, x, held_displacement(place));
         return;
     }
 #endif
@@ -44,5 +54,5 @@ void main() {
 #else
     moved += quintic_displacement(u_accumulated, place);
 #endif
-    out_displacement = within(u_limits, x, moved);
+    out_displacement = from + within(u_limits, x, moved);
 }

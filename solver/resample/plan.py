@@ -12,6 +12,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.warp.map import WarpMap
+from solver.warp.scaled import ScaledMap
 
 Quality = Literal["catmull-rom", "bilinear", "nearest"]
 Edges = Literal["transparent", "black", "clamp", "mirror", "wrap"]
@@ -90,6 +91,9 @@ class GivenMap:
     def release(self) -> None:
         """Free the texture."""
         self._field.release()
+
+
+Map = WarpMap | ScaledMap | GivenMap
 
 
 @dataclass(frozen=True)
@@ -215,9 +219,9 @@ class Plan:
         return values
 
 
-def plan_for(warp: WarpMap | GivenMap, picture: np.ndarray, size: tuple[int, int] | None, how: Sampling) -> Plan:
+def plan_for(warp: Map, picture: np.ndarray, size: tuple[int, int] | None, how: Sampling) -> Plan:
     """What follows from a map, a picture and how it is to be looked up; raises `SamplingError`."""
-    if not isinstance(warp, WarpMap | GivenMap) or not isinstance(picture, np.ndarray):
+    if not isinstance(warp, Map) or not isinstance(picture, np.ndarray):
         given = f"a {type(picture).__name__} through a {type(warp).__name__}"
         raise SamplingError(f"{given} was to be looked up; an array through a WarpMap or a GivenMap is wanted")
     if picture.dtype not in KINDS or picture.ndim not in (2, 3) or picture.size == 0:
@@ -228,7 +232,7 @@ def plan_for(warp: WarpMap | GivenMap, picture: np.ndarray, size: tuple[int, int
     size = size or (picture.shape[1], picture.shape[0])
     if np.shape(size) != (2,) or not all(isinstance(side, Integral) and side >= 1 for side in size):
         raise SamplingError(f"a result of {size!r} was asked for, (width, height) in whole pixels is wanted")
-    if isinstance(warp, WarpMap):
+    if not isinstance(warp, GivenMap):
         field = warp.composed(warp.size_for((picture.shape[1], picture.shape[0]), size))
         held, slack = warp.held, 0.5 * picture.shape[1] / field.width
     else:

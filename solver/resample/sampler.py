@@ -11,11 +11,10 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldPool
 from solver.gl.passes import Region
-from solver.resample.plan import KINDS, TARGET_COMPONENTS, GivenMap, Plan, Sampling, SamplingError, plan_for
+from solver.resample.plan import KINDS, TARGET_COMPONENTS, Map, Plan, Sampling, SamplingError, plan_for
 from solver.resample.sample_points import SamplePoints
 from solver.resample.tiles import SMALLEST_TILE, Piece, Tiling, halves_of, overlap, piece_of, rectangles, size_of
 from solver.resample.transfer import Source, read_result
-from solver.warp.map import WarpMap
 
 BLOCK = 64  # pixels along a block of the result that is drawn by a shader of its own kind; as llvmpipe's tiles
 
@@ -45,7 +44,7 @@ class Sampler:
 
     def apply(
         self,
-        warp: WarpMap | GivenMap,
+        warp: Map,
         picture: np.ndarray,
         size: tuple[int, int] | None = None,
         how: Sampling | None = None,
@@ -74,7 +73,7 @@ class Sampler:
 
     def bands(
         self,
-        warp: WarpMap | GivenMap,
+        warp: Map,
         picture: np.ndarray,
         size: tuple[int, int] | None = None,
         how: Sampling | None = None,

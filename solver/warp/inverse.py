@@ -9,6 +9,7 @@ import numpy as np
 from solver.gl.points import draw_at
 from solver.limits import places
 from solver.warp.map import WarpMap
+from solver.warp.scaled import ScaledMap
 
 MOST_ALONG = 1024  # texels along a side of the first guess
 
@@ -21,10 +22,10 @@ class ForwardMap:
     folded one of the branches is taken; a point that is looked up nowhere keeps the nearest place that was tried.
     """
 
-    def __init__(self, warp: WarpMap) -> None:
+    def __init__(self, warp: WarpMap | ScaledMap) -> None:
         self._warp = warp
         self._guess = warp.device.field(_bounded(warp.size), 2, "forward map, guess")
-        self._guessed = -1
+        self._guessed: object = None
 
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
         """The displacement F at the pixel centres of a picture of `size`, by default the map's `coarse_size`.

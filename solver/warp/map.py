@@ -18,10 +18,11 @@ from solver.limits import check_size, check_step, check_type, numbers, places, r
 from solver.state import State
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
+from solver.warp.factors import Factors
 from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
-from solver.warp.state import SUBMAPS, MapState, grid_in, values_of
+from solver.warp.state import FACTOR, SUBMAPS, MapState, grid_in, values_of
 from solver.warp.submap import Level, Submap, depth, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
@@ -50,6 +51,7 @@ class WarpMap:
         grid: of the submap.
         extent: (width, height) of the picture, the longer of them 1.
         version: counts the changes, for those who keep what they made of the map.
+        factors: what it is made of but for the submap, for `ScaledMap`.
     """
 
     def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None, remap_every: int = 64) -> None:
@@ -62,6 +64,7 @@ class WarpMap:
         self._accumulated = AccumulatedMap(device, self.size, self.extent)
         self._remapping = Remapping(device, self._accumulated)
         self._frozen = Frozen(device, self.size)
+        self.factors = Factors(device, Grid(across, down, self.extent))
         self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
         self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last remap
@@ -71,6 +74,11 @@ class WarpMap:
     @property
     def grid(self) -> Grid:
         return self._submap.grid
+
+    @property
+    def submap(self) -> Level:
+        """What has moved since the last remap."""
+        return Level(self._submap.read, self.grid)
 
     @property
     def held(self) -> Field | None:
@@ -216,6 +224,8 @@ class WarpMap:
                     target, region=regions, displacement=accumulated.now, window=(0.0, 0.0, *self.extent), **inputs
                 ),
             )
+        window = 0.0, 0.0, *self.extent
+        self.factors.change(lambda target, factor: restore(target, displacement=factor, window=window, **inputs))
         if still is not None:
             still.release()
         self._changed()
@@ -227,6 +237,7 @@ class WarpMap:
         self._remapping.drop()
         self._submap.read.clear()
         self._accumulated.clear()
+        self.factors.clear()
         self._steps = 0
         self._is_settled = True
         self._frozen.draw_anew(self._keep)
@@ -259,6 +270,9 @@ class WarpMap:
             lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel),
             (*lowest.tolist(), *np.maximum(self.extent, highest).tolist()),
         )
+        self.factors.begin_with(
+            lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel)
+        )
         given.release()
         self._frozen.draw_anew(self._keep)
 
@@ -267,6 +281,7 @@ class WarpMap:
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._accumulated.limits}
         values |= {"grid": values_of(self.grid), "settled": self._is_settled}
+        fields |= self.factors.save()
         for name, level in self._remapping.saved():
             fields[name] = level.field
             values |= {SUBMAPS[name]: values_of(level.grid), "remapping": self._remapping.progress}
@@ -300,12 +315,13 @@ class WarpMap:
             if name != "submap" and name in state.fields
         }
         self._remapping.restore(waiting, int(state.values.get("remapping", 0)))
+        self.factors.restore({name: field for name, field in state.fields.items() if name.startswith(FACTOR)})
         self._changed()
 
     def release(self) -> None:
         """Free the textures."""
         self._remapping.drop()
-        for thing in (self._submap, self._accumulated, self._frozen, *self._composed.values()):
+        for thing in (self._submap, self._accumulated, self._frozen, self.factors, *self._composed.values()):
             thing.release()
 
     # -- reading it -------------------------------------------------------------------------------------------------
@@ -368,10 +384,23 @@ class WarpMap:
         shader, defines = "warp/distortion.frag", self._held_defines() | depth(self._levels)
         return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())[:, 1]
 
-    def draw(self, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
-        """Draw the displacement at (fragment + origin) step, 0-1 of the picture, to be looked at between its texels."""
-        compose = self.device.pass_("warp/compose.frag", **self._defines() | {"CUBIC": 1})
-        compose(target, **self._parts(), origin=origin, step=step)
+    def draw(
+        self,
+        target: Field,
+        origin: tuple[float, float],
+        step: tuple[float, float],
+        exact: bool = False,
+        moved: Field | None = None,
+    ) -> None:
+        """Draw the displacement at (fragment + origin) step, 0-1 of the picture.
+
+        Args:
+            exact: not to be looked at between its texels.
+            moved: another displacement of `target`'s size, after which this one is drawn.
+        """
+        defines = self._defines() | ({} if exact else {"CUBIC": 1}) | ({} if moved is None else {"FROM": 1})
+        inputs = self._parts() | ({} if moved is None else {"from": moved})
+        self.device.pass_("warp/compose.frag", **defines)(target, **inputs, origin=origin, step=step)
 
     def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:
         """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the picture."""
@@ -396,6 +425,7 @@ class WarpMap:
     def _begin_remap(self) -> None:
         """Let what has moved stand by to be taken in, and begin with a submap of nothing."""
         if self._steps:
+            self.factors.take(self.submap)
             self._remapping.give(self._submap)
             self._steps = 0
             self._is_settled = True
@@ -428,7 +458,7 @@ class WarpMap:
     @property
     def _levels(self) -> list[Level]:
         """All above the accumulated map."""
-        return [Level(self._submap.read, self.grid), *self._remapping.levels]
+        return [self.submap, *self._remapping.levels]
 
     def _defines(self) -> dict[str, object]:
         """How the whole map is put together."""

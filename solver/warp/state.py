@@ -12,10 +12,11 @@ from solver.grid import Grid
 from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
+FACTOR = "factor "  # and its number
 
 
 class MapState(State):
-    """The state of a warp map: of its submap and of those that wait, each of a grid, and of its tiles."""
+    """The state of a warp map: its submap and those that wait, each of a grid, its factors and its tiles."""
 
     def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> MapState:
         """A state of a map of the same picture, on whatever grid, that holds what `arrays()` gave.
@@ -34,6 +35,13 @@ class MapState(State):
                     made.fields[name] = device.upload(given, f"{name}, given")
             if "gathered" in made.fields and "pending" not in made.fields:
                 raise ValueError("what its map has gathered waits for nothing")
+            size = next(field.size for name, field in self.fields.items() if name.startswith(FACTOR))
+            for number in range(sum(name.startswith(FACTOR) for name in arrays)):
+                name = f"{FACTOR}{number}"
+                given = rest.pop(name, None)
+                if given is None or (given.shape, given.dtype) != ((*size[::-1], 2), np.float32):
+                    raise ValueError(f"its {name} is missing or of another size")
+                made.fields[name] = device.upload(given, f"{name}, given")
             accumulated = self.tiles["accumulated map"]
             tiles = {"accumulated map": accumulated}
             for name, kind in held_kinds(accumulated.kind.size).items():

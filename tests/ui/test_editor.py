@@ -358,19 +358,6 @@ def test_painting_goes_on_from_anywhere(robot: Robot) -> None:
     assert session.recipe == whole
 
 
-def test_the_amount_slider_follows_the_way_the_picture_came(robot: Robot) -> None:
-    robot.drag((0.4, 0.5), (0.55, 0.5))
-    robot.rest()
-    rect = robot.editor.layout.timebar
-    x, y = rect.right - 90, rect.y + 28
-    robot.move(x, y)
-    robot.press()
-    robot.move(x - 2, y)
-    robot.release()
-    robot.rest()
-    assert 0.3 < robot.editor.session.tick / robot.editor.session.end < 0.7
-
-
 # Undo ---------------------------------------------------------------------------------------------------------------
 
 

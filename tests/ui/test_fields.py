@@ -188,14 +188,36 @@ def test_the_track_is_as_long_as_the_recording(robot: Robot, part: float) -> Non
     assert session.tick == round(part * session.end)
 
 
-def test_amount_is_the_part_of_the_recording_that_is_seen(robot: Robot, widgets: Widgets) -> None:
+def test_amount_is_the_part_of_the_warp_that_is_seen_at_any_time(robot: Robot, widgets: Widgets) -> None:
     robot.drag((0.4, 0.5), (0.5, 0.5), steps=6)
     robot.rest()
     session = robot.editor.session
-    for percent in (75, 20, 100):
+    tick, whole, entries = session.tick, robot.warp(), len(session.document.history.entries)
+    for percent in (75, 20, 150):
         widgets.type("Amount", f"{percent} %")
         robot.rest()
-        assert session.tick == round(percent / 100 * session.end)
+        assert session.tick == tick
+        assert session.recipe.amount == percent / 100
+    assert len(session.document.history.entries) == entries + 3
+    widgets.type("Amount", "50 %")
+    robot.rest()
+    assert np.array_equal(session.seen.read(), 0.5 * whole)  # of a push this short
+    robot.key("ctrl+z")
+    assert session.recipe.amount == 1.5
+
+
+def test_all_of_the_warp_is_seen_while_a_brush_moves_it(robot: Robot, widgets: Widgets) -> None:
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=6)
+    robot.rest()
+    widgets.type("Amount", "50 %")
+    session = robot.editor.session
+    robot.move(*robot.at(0.6, 0.6))
+    robot.press()
+    robot.move(*robot.at(0.65, 0.6))
+    assert session.seen is session.replay.warp
+    robot.release()
+    robot.rest()
+    assert np.abs(session.seen.read()).max() < 0.9 * np.abs(robot.warp()).max()
 
 
 @pytest.fixture

@@ -49,14 +49,22 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         _track(ui, session, state, imgui.get_content_region_avail().x - amount - ui.px(16))
         imgui.same_line(0, ui.px(16))
         imgui.set_cursor_pos_y(ui.px(14))
-        part = session.target / session.end if some else 1.0
-        with ui.enabled(some):
-            slid = ui.slider(
-                "amount", "Amount", part, 0, 1, PERCENT, 1.0, width=across, title="Amount of the warp",
-                more="Goes back along the path of the warp, so that nothing folds on the way.",
-            )  # fmt: skip
-        if slid.changed and some:
-            session.seek(round(slid.value * session.end))
+        _amount(ui, session, state, across)
+
+
+def _amount(ui: Ui, session: Session, state: EditorState, across: float) -> None:
+    with ui.enabled(session.recipe.mode == "coordinates"):
+        slid = ui.slider(
+            "amount", "Amount", session.recipe.amount, 0, 1.5, PERCENT, 1.0, width=across, title="Amount of the warp",
+            more="How much of it is seen and exported, whatever the time. Nothing folds on the way.",
+        )  # fmt: skip
+        state.is_scaling = imgui.is_item_active() and not slid.done
+    if slid.again:
+        session.undo()
+    if slid.changed:
+        session.preview(amount=round(slid.value, 4))
+    if slid.done:
+        session.commit("Amount")
 
 
 def _time(ui: Ui, now: float, end: float) -> None:

@@ -1,0 +1,19 @@
+// Scale: a D + P - a Q, the part a of a displacement D whose factors, scaled by a, make P, and unscaled Q; all of them after
+// another displacement, if there is one. Texel for texel. Without BENT there is one factor and no other, and P = a Q.
+// u_displacement (D), u_scaled (P), u_unscaled (Q): longer sides; u_amount: a.
+// reads: 3
+uniform sampler2D u_displacement;
+uniform float u_amount;
+#ifdef BENT
+uniform sampler2D u_scaled;
+uniform sampler2D u_unscaled;
+#endif
+in vec2 v_uv;
+layout(location = 0) out vec2 out_displacement;
+
+void main() {
+    out_displacement = u_amount * texture(u_displacement, v_uv).rg;
+#ifdef BENT
+    out_displacement += texture(u_scaled, v_uv).rg - u_amount * texture(u_unscaled, v_uv).rg;
+#endif
+}

@@ -1,0 +1,141 @@
+"""A warp map as a product of factors, each of which may be scaled without folding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from solver.gl.device import Device
+from solver.gl.field import DoubleField, Field
+from solver.gl.reduction import Reduction
+from solver.grid import Grid
+from solver.warp.state import FACTOR
+from solver.warp.submap import Level, depth, inputs_of
+
+# Of min(1, det J) at 100 %, what det J may fall to where a factor is scaled: 1/2 is a quarter turn. What is on its
+# way may turn on by 41 degrees before a remap, and then det J still falls to no less than 0.1 of it.
+CLOSED, SPLIT = 0.5, 0.05
+TEXELS = 2  # of a factor along a cell: with one, of twelve random recipes that do not fold two do between 60 and 90 %
+
+
+class Factors:
+    """What a map's submaps have added up to, cut where more of a turn could not be scaled any more.
+
+    W = F_1 F_2 ... F_n S, with S the submap that moves, each F a displacement of the whole picture.
+
+    Args:
+        device: the device.
+        grid: the whole picture's.
+    """
+
+    def __init__(self, device: Device, grid: Grid) -> None:
+        self.device = device
+        self.picture = grid.picture
+        self._closed: list[Field] = []
+        size = grid.refined(TEXELS).size
+        self._open = DoubleField(device, size, 2, "open factor")
+        self._scaling = device.field(size, 1, "scaling of a factor")
+        self._find_largest = Reduction(device, size, 1, "max")
+
+    @property
+    def is_one(self) -> bool:
+        """True if all of the map may be scaled as it is."""
+        return not self._closed
+
+    def take(self, submap: Level) -> None:
+        """Take in what a submap has moved, which begins anew with nothing."""
+        before = self._open.read
+        self._merge(self._open.write, submap)
+        self._open.swap()
+        if (left := self._left(self._open.read)) < SPLIT:  # one step has turned it too far: it is a factor by itself
+            self._close(before)
+            before.clear()
+            self._merge(self._open.read, submap)
+            left = self._left(self._open.read)
+        if left < CLOSED:
+            self._close(self._open.read)
+            self._open.read.clear()
+
+    def begin_with(self, draw: Callable[[Field], None]) -> None:
+        """One factor, which is drawn."""
+        self.clear()
+        draw(self._open.read)
+
+    def change(self, draw: Callable[[Field, Field], None]) -> None:
+        """Draw all factors anew, each from what it is into another field."""
+        kept = [self._open.read, *self._closed]
+        for field in kept:
+            draw(self._open.write, field)
+            field.copy_from(self._open.write)
+
+    def draw(
+        self,
+        targets: tuple[Field, Field],
+        amount: float,
+        submap: Level,
+        origin: tuple[float, float],
+        step: tuple[float, float],
+        moved: Field | None = None,
+    ) -> Field:
+        """Draw the product with every factor scaled at (fragment + origin) step, 0-1 of the picture, after `moved`.
+
+        Returns:
+            The one of both targets that holds it.
+        """
+        self._merge(self._open.write, submap)
+        target, other = targets
+        for factor in (self._open.write, *reversed(self._closed)):
+            inputs: dict[str, Any] = {"factor": factor, "amount": amount, "picture": self.picture}
+            inputs |= {"origin": origin, "step": step} | ({} if moved is None else {"moved": moved})
+            follow = self.device.pass_("warp/follow_factor.frag", **({"FIRST": 1} if moved is None else {}))
+            follow(target, **inputs)
+            moved, target, other = target, other, target
+        return other
+
+    # -- its state --------------------------------------------------------------------------------------------------
+
+    def save(self) -> dict[str, Field]:
+        """The factors by name, the first one first; not to be changed."""
+        return {f"{FACTOR}{number}": field for number, field in enumerate((*self._closed, self._open.read))}
+
+    def restore(self, saved: dict[str, Field]) -> None:
+        """Be what `save` gave, or copies of it."""
+        self.clear()
+        *closed, last = (saved[name] for name in sorted(saved, key=_number))
+        for field in closed:
+            self._close(field)
+        self._open.read.copy_from(last)
+
+    def clear(self) -> None:
+        """The identity."""
+        for field in self._closed:
+            field.release()
+        self._closed.clear()
+        self._open.read.clear()
+
+    def release(self) -> None:
+        """Free the textures."""
+        self.clear()
+        for thing in (self._open, self._scaling, self._find_largest):
+            thing.release()
+
+    def _close(self, field: Field) -> None:
+        closed = self.device.field(field.size, 2, f"factor {len(self._closed)}")
+        closed.copy_from(field)
+        self._closed.append(closed)
+
+    def _merge(self, target: Field, submap: Level) -> None:
+        """Draw the open factor after what a submap has moved."""
+        levels = [submap]
+        follow = self.device.pass_("warp/follow_factor.frag", FIRST=1, SUBMAP=1, **depth(levels))
+        place: dict[str, Any] = {"origin": (0.0, 0.0), "step": target.texel}
+        follow(target, factor=self._open.read, amount=1.0, picture=self.picture, **inputs_of(levels), **place)
+
+    def _left(self, factor: Field) -> float:
+        """What is left of its least det J where it is scaled; waits for the GPU."""
+        self.device.pass_("warp/scaling.frag")(self._scaling, factor=factor, picture=self.picture)
+        return -float(self._find_largest(self._scaling)[0])
+
+
+def _number(name: str) -> int:
+    return int(name.removeprefix(FACTOR))

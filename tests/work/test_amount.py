@@ -1,0 +1,131 @@
+"""Amount: as much of a warp as a recipe says, without folding what is not folded."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.media.auxiliary import Pictures
+from app.media.pictures import read_picture, write_picture
+from app.model.picture import Picture
+from app.model.recipe import FluidSettings, Recipe
+from app.model.strokes import Stroke
+from app.work.replay import Replay
+from solver.gl.device import Device
+from solver.warp.distortion import distortion
+from solver.warp.scaled import ScaledMap
+from support.commands import Run
+
+PICTURE = Picture(np.random.default_rng(0).integers(0, 256, (80, 120, 3), np.uint8))
+TWIRL = Stroke(tool="twirl", radius=0.25, samples=((0, 0.5, 0.5, 1.0), (30, 0.5, 0.5, 1.0)))
+TURNED = Recipe(stroke=(TWIRL,), duration=1.2, fluid=FluidSettings(grid=96, dt=1 / 30))
+
+
+def random_recipe(seed: int) -> Recipe:
+    """Up to five strokes, each of a tool that moves the fluid."""
+    rng, strokes, tick = np.random.default_rng(seed), list[Stroke](), 0
+    for _ in range(rng.integers(1, 6)):
+        tool, count = rng.choice(["push", "push", "twirl", "bloat", "pinch"]), int(rng.integers(3, 20))
+        start, way = rng.uniform(0.1, 0.9, 2), rng.uniform(-0.25, 0.25, 2)
+        path = np.clip(start + way * np.linspace(0, 1, count)[:, None], 0, 1).tolist()
+        samples = tuple((tick + n, x, y, 1.0) for n, (x, y) in enumerate(path))
+        strokes.append(Stroke(tool=tool, radius=rng.uniform(0.06, 0.2), samples=samples))
+        tick += count
+    fluid = FluidSettings(grid=96, dt=1 / 30, viscosity=10 ** rng.uniform(-4, -1.5))
+    return Recipe(stroke=tuple(strokes), duration=(tick + 5) / 30, fluid=fluid)
+
+
+def at_end(device: Device, recipe: Recipe) -> Replay:
+    replay = Replay(device, recipe, Pictures(PICTURE), budget=0)
+    replay.seek(recipe.ticks)
+    return replay
+
+
+def least_det(device: Device, replay: Replay, amount: float) -> float:
+    """The least det J; beyond 1, where a part comes after all of it, by the chain rule."""
+    warp, part = replay.warp, ScaledMap(replay.warp, amount if amount <= 1 else amount - 1)
+    if amount > 1:
+        y, x = (np.mgrid[: warp.size[1], : warp.size[0]] + 0.5) / max(warp.size)
+        at = (np.stack([x, y], axis=-1) + warp.read(warp.size)).reshape(-1, 2)
+        near = part.at(at + [1e-3, 0]) - part.at(at - [1e-3, 0]), part.at(at + [0, 1e-3]) - part.at(at - [0, 1e-3])
+        across, down = (difference / 2e-3 for difference in near)
+        dets = (1 + across[:, 0]) * (1 + down[:, 1]) - across[:, 1] * down[:, 0]
+        return min(float(dets.min()), warp.statistics().det_min)
+    nothing, field = device.field((8, 8), 2, "no submap"), part.composed(exact=True)
+    parts = {"submap": nothing, "window": (0.0, 0.0, *warp.extent), "picture": warp.extent, "accumulated": field}
+    found = distortion(device, field.size, {}, parts)
+    part.release()
+    nothing.release()
+    return found.det_min
+
+
+@pytest.mark.parametrize("seed", [2, 5, 9, 10, 11, 12, 13])
+def test_what_is_not_folded_is_folded_at_no_amount(device: Device, seed: int) -> None:
+    replay = at_end(device, random_recipe(seed))
+    assert least_det(device, replay, 1.0) > 0, "choose another seed"
+    for amount in (0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 0.98, 1.2, 1.5):
+        assert least_det(device, replay, amount) > 0, amount
+    replay.release()
+
+
+def test_half_of_a_half_turn_folds_only_if_it_is_scaled_in_one(device: Device) -> None:
+    replay = at_end(device, TURNED)
+    y, x = (np.mgrid[:80, :120] + 0.5) / 120
+    half = np.stack([x, y], axis=-1) + 0.5 * replay.warp.read((120, 80))
+    across, down = (np.gradient(half, 1 / 120, axis=axis) for axis in (1, 0))
+    assert (across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]).min() < 0
+    assert not replay.warp.factors.is_one
+    assert least_det(device, replay, 0.5) > 0.1
+    replay.release()
+
+
+def test_none_of_it_and_all_of_it_are_exact_and_what_is_between_is_even(device: Device) -> None:
+    replay = at_end(device, TURNED)
+    scaled, maps = ScaledMap(replay.warp), list[np.ndarray]()
+    for amount in np.linspace(0, 1.5, 31):
+        scaled.amount = round(float(amount), 4)
+        maps.append(scaled.read((120, 80)))
+    assert not maps[0].any()
+    assert np.array_equal(maps[20], replay.warp.read((120, 80)))
+    steps = [np.abs(later - earlier).max() for earlier, later in pairwise(maps)]
+    assert max(steps) < 2 * np.mean(steps)
+    scaled.release()
+    replay.release()
+
+
+def test_it_is_the_same_whichever_way_a_tick_is_reached(device: Device) -> None:
+    recipe = TURNED.edited(amount=0.5)
+    replay = at_end(device, recipe)
+    there, kept = replay.seen.read(), replay.snapshot()
+    replay.seek(5)
+    assert not np.array_equal(replay.seen.read(), there)
+    replay.resume(recipe.ticks, kept)
+    assert np.array_equal(replay.seen.read(), there)
+    replay.release()
+
+
+def test_the_command_line_takes_an_amount(fluidwarp: Run, tmp_path: Path) -> None:
+    write_picture(tmp_path / "picture.png", PICTURE)
+    whole = TURNED.on_grid(48).edited(picture="picture.png")
+    (tmp_path / "whole.toml").write_text(whole.text())
+    (tmp_path / "part.toml").write_text(whole.edited(amount=0.4).text())
+    fluidwarp(tmp_path, "render", "whole.toml", "-o", "a.png", "--amount", "0.4")
+    fluidwarp(tmp_path, "render", "part.toml", "-o", "b.png")
+    fluidwarp(tmp_path, "render", "part.toml", "-o", "none.png", "--amount", "0")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert np.array_equal(read_picture(tmp_path / "none.png").pixels, PICTURE.pixels)
+    assert not np.array_equal(read_picture(tmp_path / "a.png").pixels, PICTURE.pixels)
+    refused = fluidwarp(tmp_path, "render", "whole.toml", "-o", "c.png", "--amount", "2")
+    assert refused.returncode == 1
+    assert "--amount must be at most 1.5, not 2" in refused.stderr
+
+
+def test_an_amount_that_is_none_is_refused() -> None:
+    with pytest.raises(UserError, match=r"'amount' must be at most 1.5, not 2"):
+        Recipe.parse("amount = 2.0")
+    with pytest.raises(UserError, match="'amount' scales a warp of coordinates"):
+        Recipe.parse('amount = 0.5\nmode = "density"')
