@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from app.model.mask_edits import MaskName
+from app.model.strokes import Symmetry
 from app.model.tools import TOOL, BrushSettings, Tool
 
 MASK_OF: dict[str, MaskName] = {"freeze": "frozen", "thicken": "thickness"}
@@ -53,6 +54,7 @@ class EditorState:
         mask_decades: of thickness, with which it is filled.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
         is_scaling: the amount of the warp is being dragged.
+        symmetry, sectors: of the strokes that are painted.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
         statistics: numbers are shown over the canvas.
@@ -73,6 +75,8 @@ class EditorState:
     mask_decades: float = 2.0
     selected: str = ""
     is_scaling: bool = False
+    symmetry: Symmetry = "none"
+    sectors: int = 6
     before: bool = False
     split: float | None = None
     statistics: bool = False

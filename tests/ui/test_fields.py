@@ -14,7 +14,7 @@ from app.media import project as projects
 from app.media.animation import ANIMATIONS as CONTAINERS
 from app.media.formats import FORMATS
 from app.media.maps import MAP_ENDINGS
-from app.model.strokes import Change
+from app.model.strokes import Change, Stroke
 from app.progress import Progress
 from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PRESETS, ExportDialog
 from app.ui.panels import inspector
@@ -220,6 +220,38 @@ def test_all_of_the_warp_is_seen_while_a_brush_moves_it(robot: Robot, widgets: W
     robot.release()
     robot.rest()
     assert np.abs(session.seen.read()).max() < 0.9 * np.abs(robot.warp()).max()
+
+
+@pytest.mark.parametrize(("tool", "words"), [("p", "Left and right"), ("p", "Radial"), ("f", "Both")])
+def test_a_stroke_is_painted_with_symmetry_and_undone_as_one(
+    robot: Robot, widgets: Widgets, tool: str, words: str
+) -> None:
+    session = robot.editor.session
+    widgets.click("Symmetry")
+    plain = robot.canvas()
+    widgets.choose("##symmetry", words)
+    robot.move(5, 5)
+    robot.frame(count=2)
+    assert not np.array_equal(robot.canvas(), plain)  # the axes
+    if words == "Radial":
+        widgets.type("Sectors", "5")
+    before = session.recipe
+    robot.key(tool)
+    robot.drag((0.2, 0.3), (0.28, 0.36), steps=6)
+    robot.rest()
+    stroke = (*session.recipe.stroke, *session.recipe.mask)[-1]
+    assert isinstance(stroke, Stroke)
+    assert stroke.symmetry == {"Left and right": "left-right", "Radial": "radial", "Both": "both"}[words]
+    assert stroke.sectors == (5 if words == "Radial" else 6)
+    frozen = session.replay.masks.frozen.get()
+    moved = np.abs(robot.warp()).max(axis=2)
+    changed = frozen if tool == "f" else moved > 0.2 * moved.max()
+    height, width = changed.shape[:2]
+    assert changed[: height // 2, : width // 2].any()
+    assert changed[: height // 2, width // 2 :].any()
+    robot.key("ctrl+z")
+    robot.rest()
+    assert session.recipe == before
 
 
 @pytest.fixture
