@@ -89,7 +89,8 @@ class ScaledMap:
         if amount == 1:
             warp.draw(target, origin, step, exact)
             return
-        before, whole, bent = None, fields.get("whole", target.size, 2), dict[str, Any]()
+        before, whole = None, fields.get("whole", target.size, 2)
+        bent: dict[str, Any] = {}
         if amount > 1:  # first all of it, and a part of it after that
             amount, before = amount - 1, fields.get("before", target.size, 2)
             warp.draw(before, origin, step, exact)
