@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
-from math import hypot
+from math import cos, hypot, pi, sin
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
@@ -11,6 +12,7 @@ from pydantic import Field, model_validator
 from app.model.schema import Fraction01, Model, Place, Several
 
 Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
+Symmetry = Literal["none", "left-right", "up-down", "both", "radial"]
 Tick = Annotated[int, Field(ge=0, le=10_000_000)]
 FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1 / 200 of such a cell
 SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
@@ -44,6 +46,9 @@ class Stroke(Model):
         detail: cells along the picture's longer side that the flow is solved with, in a window around the brush (see
             `app.model.windows`), and then the brush takes back nearby the area and momentum that it gives (see `Tip`);
             0: on the grid of the whole picture.
+        symmetry: it acts again on the other sides of the picture's middle: "left-right" and "up-down" mirror it, "both"
+            does both, "radial" turns it about the middle.
+        sectors: how many times a radial one acts in all.
         local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 
@@ -53,6 +58,8 @@ class Stroke(Model):
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0
     reverse: bool = False
     detail: Annotated[int, Field(ge=0, le=FINEST_DETAIL)] = 0
+    symmetry: Symmetry = "none"
+    sectors: Annotated[int, Field(ge=2, le=16)] = 6
     local: Fraction01 = 0.0
     samples: Annotated[Several[Sample], Field(min_length=1)]
 
@@ -87,6 +94,21 @@ class Stroke(Model):
         before = None if tick == self.first_tick else self._interpolated(tick - 1)
         after = [] if inside else [self._interpolated(tick)]
         return self._joined(([before] if before else []) + inside + after)
+
+    def images(self, dabs: tuple[Dab, ...], extent: tuple[float, float]) -> Iterator[tuple[tuple[Dab, ...], bool]]:
+        """Pieces of its path, and what its symmetry makes of them, each with whether it is a mirror image.
+
+        `extent`: (width, height) of the picture, the longer of them 1.
+        """
+        yield dabs, False
+        width, height = extent
+        for a, b, c, d in _turns(self.symmetry, self.sectors):
+
+            def place(x: float, y: float) -> tuple[float, float]:
+                x, y = (x - 0.5) * width, (y - 0.5) * height
+                return 0.5 + (a * x + b * y) / width, 0.5 + (c * x + d * y) / height  # noqa: B023
+
+            yield tuple(Dab(*place(p.x0, p.y0), *place(p.x1, p.y1), p.pressure) for p in dabs), a * d < b * c
 
     def before(self, tick: int) -> Stroke | None:
         """What of it acts before a tick; None if nothing does. A curve is whole or not at all."""
@@ -145,7 +167,17 @@ class Stroke(Model):
         return last if last in following else last + 1
 
     def _head(self) -> tuple[object, ...]:
-        return self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.local
+        brush = self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.local
+        return *brush, self.symmetry, self.sectors
+
+
+def _turns(symmetry: Symmetry, sectors: int) -> list[tuple[float, float, float, float]]:
+    """The matrices of all images but the first."""
+    if symmetry == "radial":
+        angles = (2 * pi * k / sectors for k in range(1, sectors))
+        return [(cos(angle), -sin(angle), sin(angle), cos(angle)) for angle in angles]
+    sides = {"left-right": [(-1, 1)], "up-down": [(1, -1)], "both": [(-1, 1), (1, -1), (-1, -1)]}
+    return [(x, 0.0, 0.0, y) for x, y in sides.get(symmetry, [])]
 
 
 class Change(Model):

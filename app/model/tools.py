@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from app.model.handles import RecipeHandle
 from app.model.mask_edits import MaskStroke
-from app.model.strokes import Stroke
+from app.model.strokes import Stroke, Symmetry
 from app.model.strokes import Tool as StrokeTool
 from app.model.windows import FLOWING
 
@@ -51,6 +51,7 @@ class Press:
         detail: how finely the flow of such a brush is solved; see `app.model.windows`.
         slack: how far the pointer may shake, in longer sides, and is not moved yet.
         at: the place in the original of what was pressed on.
+        symmetry, sectors: of strokes.
         held: the handle that was taken hold of, and `rests`, where it is led.
         timeless: what is painted on masks takes no time.
     """
@@ -66,6 +67,8 @@ class Press:
     held: RecipeHandle | None = None
     rests: tuple[float, float] | None = None
     timeless: bool = False
+    symmetry: Symmetry = "none"
+    sectors: int = 6
 
 
 Made = Stroke | RecipeHandle
@@ -107,7 +110,10 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> S
         hardness=brush.hardness,
         strength=brush.strength,
         reverse=reverse,
-        detail=press.detail if name in FLOWING else 0,
+        # Its images lie apart, and a window around one of them would not hold the others.
+        detail=press.detail if name in FLOWING and press.symmetry == "none" else 0,
+        symmetry=press.symmetry,
+        sectors=press.sectors if press.symmetry == "radial" else 6,
         local=brush.local if name == "push" else 0.0,
         samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )

@@ -53,6 +53,12 @@ class Commands:
     def step_back(self) -> None:
         self.workspace.session.seek(self.workspace.session.target - 1)
 
+    def repeat(self) -> None:
+        """Play once, then over and over, then there and back again, then once."""
+        session = self.workspace.session
+        returns = session.recipe.time.ping_pong
+        session.repeat(not session.loops and not returns, session.loops and not returns)
+
     def toggle_inspector(self) -> None:
         state = self.state
         if state.is_narrow:

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.model.areas import Part
 from app.model.mask_edits import MaskName
+from app.model.strokes import Symmetry
 from app.model.tools import TOOL, BrushSettings, Tool
 
 MASK_OF: dict[str, MaskName] = {"freeze": "frozen", "thicken": "thickness"}
@@ -71,6 +72,7 @@ class EditorState:
         selected_area: the same as it is shown, (h, w) uint8, 255 in it; None where there is none.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
         is_scaling: the amount of the warp is being dragged.
+        symmetry, sectors: of the strokes that are painted.
         before: the picture is shown as it was, as long as a key is held.
         split: where the picture is divided into before and after, as a fraction of its width; None where it is not.
         statistics: numbers are shown over the canvas.
@@ -97,6 +99,8 @@ class EditorState:
     selected_area: np.ndarray | None = None
     selected: str = ""
     is_scaling: bool = False
+    symmetry: Symmetry = "none"
+    sectors: int = 6
     before: bool = False
     split: float | None = None
     statistics: bool = False

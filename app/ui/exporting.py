@@ -50,6 +50,29 @@ class FileKind:
     variants: tuple[Variant, ...]
 
 
+@dataclass(frozen=True)
+class Preset:
+    """What an export is for, and all that is chosen for it.
+
+    Attributes:
+        kind, format, variant: positions in `KINDS`, its kinds of file and their variants.
+        size: pixels along the longer side at most; None is the picture's own.
+        quality: of kinds of file that have one.
+        fps: frames a second of an animation.
+        returns: an animation goes there and back again.
+    """
+
+    name: str
+    use: str
+    kind: int
+    format: int
+    variant: int = 0
+    size: int | None = None
+    quality: int = 90
+    fps: float = 30.0
+    returns: bool = False
+
+
 def _depths(ending: str, *bits: int) -> tuple[Variant, ...]:
     return (Variant("As the picture", ending), *(Variant(f"{n} bits", ending, bits=n) for n in bits))
 
@@ -93,6 +116,12 @@ MAPS = (
 )
 KINDS = (("Picture", PICTURES), ("Animation", ANIMATIONS), ("Warp map", MAPS))
 PICTURE, ANIMATION, MAP = range(3)
+PRESETS = (
+    Preset("Web", "JPEG, at most 2048 pixels, quality 85.", PICTURE, 1, size=2048, quality=85),
+    Preset("Print", "TIFF of 16 bits, all pixels.", PICTURE, 4, 2),
+    Preset("Film", "ProRes 4444 with alpha, all pixels, 24 frames a second.", ANIMATION, 1, fps=24.0),
+    Preset("Loop", "MP4, at most 1280 pixels, there and back without a jump.", ANIMATION, 0, size=1280, returns=True),
+)
 RATED = (".jpg", ".webp", ".avif", ".mp4", ".webm", ".%04d.jpg")  # endings of files that have a quality
 PREVIEW = 640  # pixels along the longer side
 FINER = (("As seen", 1), ("2 x", 2))
@@ -183,6 +212,27 @@ class ExportDialog(Dialog):
     def _told(self) -> str:
         return f"{KINDS[self.kind][0]} {self.file_kind.name}"
 
+    def take(self, preset: Preset) -> None:
+        """Choose all that a preset says; place and part stay."""
+        self._choose(preset.kind)
+        self.format[preset.kind] = preset.format
+        self.variant[preset.kind][preset.format] = preset.variant
+        self.size, self.quality, self.fps, self.returns = self._of(preset)
+
+    def _of(self, preset: Preset) -> tuple[int, int, float, bool]:
+        own = max(self.picture.width, self.picture.height)
+        return min(own, preset.size or own), preset.quality, preset.fps, preset.returns
+
+    @property
+    def preset(self) -> int:
+        """The one that says what is chosen; -1 if none does."""
+        chosen = self.kind, self.format[self.kind], self.variant[self.kind][self.format[self.kind]]
+        now = self.size, self.quality, self.fps, self.returns
+        for number, preset in enumerate(PRESETS):
+            if chosen == (preset.kind, preset.format, preset.variant) and now == self._of(preset):
+                return number
+        return -1
+
     @property
     def output(self) -> Path:
         return self.folder / (self.name + self.ending)
@@ -219,6 +269,13 @@ class ExportDialog(Dialog):
         # Enter belongs to the field that is being typed in, or to what the arrows have gone to.
         entered = imgui.is_key_pressed(imgui.Key.enter, False)
         entered = entered and not imgui.is_any_item_active() and not imgui.get_io().nav_visible
+        imgui.align_text_to_frame_padding()
+        ui.dim("Preset")
+        imgui.same_line(0, ui.px(12))
+        chosen = ui.segmented("preset", [preset.name for preset in PRESETS], now := self.preset, -1)
+        if chosen != now:
+            self.take(PRESETS[chosen])
+        ui.tooltip("Presets", more="\n".join(f"{preset.name}: {preset.use}" for preset in PRESETS))
         self._choose(ui.segmented("kind", [label for label, _ in KINDS], self.kind, -1))
         files, chosen = KINDS[self.kind][1], self.format[self.kind]
         chosen = self.format[self.kind] = ui.segmented("format", [file.name for file in files], chosen, -1)

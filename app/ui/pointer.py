@@ -182,7 +182,15 @@ class PointerController:
         """A gesture begins where the button went down; with a handle that is there, if one was taken hold of."""
         self.preferences.dismiss_hint()
         view, session, state = self.workspace.view, self.workspace.session, self.state
-        press = Press(state.brush, self.is_opposite, session.extent, session.dt, slack=SHAKE / view.longer)
+        press = Press(
+            state.brush,
+            self.is_opposite,
+            session.extent,
+            session.dt,
+            slack=SHAKE / view.longer,
+            symmetry=state.symmetry,
+            sectors=state.sectors,
+        )
         session.press(state.tool, press, *view.to_picture(*self._start), self.pressure, self.mods.shift, held)
         if isinstance(session.made, RecipeHandle):
             recipe = session.recipe

@@ -432,8 +432,15 @@ class Replay:
         return pushes
 
     def _draw(self, stroke: Stroke, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
-        """Let a stroke act; True if it painted on the masks."""
-        strength = -stroke.strength if stroke.reverse else stroke.strength
+        """Let a stroke act, with its images; True if it painted on the masks."""
+        painted = False
+        for image, mirrored in stroke.images(dabs, self.grid.extent):
+            painted |= self._draw_image(stroke, image, mirrored, dt, part)
+        return painted
+
+    def _draw_image(self, stroke: Stroke, dabs: tuple[Dab, ...], mirrored: bool, dt: float, part: float) -> bool:
+        reverse = stroke.reverse != (mirrored and stroke.tool == "twirl")
+        strength = -stroke.strength if reverse else stroke.strength
         tips = [(self._tip(stroke, dab), strength * dab.pressure) for dab in dabs]
         # Several samples in one tick: the fluid is carried by the whole way, a mask is painted piece by piece.
         whole = replace(tips[0][0], end=tips[-1][0].end)

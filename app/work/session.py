@@ -72,6 +72,7 @@ class Session:
         document: the recipe with all its edits.
         replay: the simulation.
         playing: the recording is being played.
+        loops: the recording begins anew where it ends, as it does there and back again with its `time.ping_pong`.
         coasting: time goes on because the fluid still moves.
         path: where the gesture that is under way has been, as fractions of the picture.
         made: the stroke that is open, or the handle in hand.
@@ -88,6 +89,7 @@ class Session:
         self.pictures = Pictures(project.picture, project.folder)
         self.replay = Replay(device, project.recipe, self.pictures, budget)
         self.playing = False
+        self.loops = False
         self.coasting = False
         self.path: list[tuple[float, float]] = []
         self.made: Made | None = None
@@ -113,6 +115,7 @@ class Session:
         self._live = project.recipe
         self._target: int | None = self.end or None
         self._still = True
+        self._backwards = False  # it is played from its end to its start
         self._coasted = 0
 
     # -- what it is now ---------------------------------------------------------------------------------------------
@@ -399,8 +402,8 @@ class Session:
             elif self.coasting:
                 self._record()
                 self._look_for_rest()
-            elif self.playing and self.tick < self.end:
-                self._step()
+            elif self.playing and (self.tick < self.end or self._repeats):
+                self._play_on()
             else:
                 self.playing = False
                 break
@@ -417,12 +420,37 @@ class Session:
             self.pause()
         elif not self._went_back and self.tick < self.end:
             self._finish()
-        elif self.end and self.target >= self.end and self._is_fast():
+        elif self.end and self.target >= self.end and self._is_fast() and not self._repeats:
             self._coast()
         elif self.end:
+            self._backwards = False
             if self.target >= self.end:
                 self.seek(0)
             self.playing = True
+
+    @property
+    def _repeats(self) -> bool:
+        return self.loops or self._live.time.ping_pong
+
+    def _play_on(self) -> None:
+        """A tick of the recording, on or back; after its end it begins anew, or turns."""
+        goes_back = self._live.time.ping_pong
+        self._backwards = goes_back and (self.tick >= self.end or (self._backwards and self.tick > 0))
+        if self._backwards:
+            self.replay.seek(self.tick - 1)
+        elif self.tick < self.end:
+            self._step()
+        else:
+            self.replay.seek(0)
+        self._went_back = self.tick < self.end
+        self.changes += 1
+
+    def repeat(self, loops: bool, returns: bool) -> None:
+        """Play the recording over and over, or not; `returns`: there and back again, in what is exported too."""
+        self.loops = loops
+        if returns != self._live.time.ping_pong:
+            name = "There and back again" if returns else "One way"
+            self.edit(name, time=self._live.time.model_copy(update={"ping_pong": returns}))
 
     def pause(self) -> None:
         """Let time stand still, also while strokes are waiting; a playhead that was sent back still arrives."""

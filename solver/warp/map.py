@@ -399,7 +399,7 @@ class WarpMap:
             moved: another displacement of `target`'s size, after which this one is drawn.
         """
         defines = self._defines() | ({} if exact else {"CUBIC": 1}) | ({} if moved is None else {"FROM": 1})
-        inputs = self._parts() | ({} if moved is None else {"from": moved})
+        inputs: dict[str, Any] = self._parts() | ({} if moved is None else {"from": moved})
         self.device.pass_("warp/compose.frag", **defines)(target, **inputs, origin=origin, step=step)
 
     def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:

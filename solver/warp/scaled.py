@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from solver.gl.field import Field, FieldPool
@@ -87,7 +89,8 @@ class ScaledMap:
         if amount == 1:
             warp.draw(target, origin, step, exact)
             return
-        before, whole, bent = None, fields.get("whole", target.size, 2), dict[str, Field]()
+        before, whole = None, fields.get("whole", target.size, 2)
+        bent: dict[str, Any] = {}
         if amount > 1:  # first all of it, and a part of it after that
             amount, before = amount - 1, fields.get("before", target.size, 2)
             warp.draw(before, origin, step, exact)

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from app.media import project as projects
 from app.media.animation import ANIMATIONS as CONTAINERS
 from app.media.formats import FORMATS
 from app.media.maps import MAP_ENDINGS
-from app.model.strokes import Change
-from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, ExportDialog
+from app.model.strokes import Change, Stroke
+from app.progress import Progress
+from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PRESETS, ExportDialog
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
+from app.work.export import run
 from solver.gl.device import Device
-from support.editing import Robot, export_dialog, small_project
+from support.editing import Robot, command_line, export_dialog, small_project
 from support.widgets import Widgets
 
 
@@ -220,6 +223,38 @@ def test_all_of_the_warp_is_seen_while_a_brush_moves_it(robot: Robot, widgets: W
     assert np.abs(session.seen.read()).max() < 0.9 * np.abs(robot.warp()).max()
 
 
+@pytest.mark.parametrize(("tool", "words"), [("p", "Left and right"), ("p", "Radial"), ("f", "Both")])
+def test_a_stroke_is_painted_with_symmetry_and_undone_as_one(
+    robot: Robot, widgets: Widgets, tool: str, words: str
+) -> None:
+    session = robot.editor.session
+    widgets.click("Symmetry")
+    plain = robot.canvas()
+    widgets.choose("##symmetry", words)
+    robot.move(5, 5)
+    robot.frame(count=2)
+    assert not np.array_equal(robot.canvas(), plain)  # the axes
+    if words == "Radial":
+        widgets.type("Sectors", "5")
+    before = session.recipe
+    robot.key(tool)
+    robot.drag((0.2, 0.3), (0.28, 0.36), steps=6)
+    robot.rest()
+    stroke = (*session.recipe.stroke, *session.recipe.mask)[-1]
+    assert isinstance(stroke, Stroke)
+    assert stroke.symmetry == {"Left and right": "left-right", "Radial": "radial", "Both": "both"}[words]
+    assert stroke.sectors == (5 if words == "Radial" else 6)
+    frozen = session.replay.masks.frozen.get()
+    moved = np.abs(robot.warp()).max(axis=2)
+    changed = frozen if tool == "f" else moved > 0.2 * moved.max()
+    height, width = changed.shape[:2]
+    assert changed[: height // 2, : width // 2].any()
+    assert changed[: height // 2, width // 2 :].any()
+    robot.key("ctrl+z")
+    robot.rest()
+    assert session.recipe == before
+
+
 @pytest.fixture
 def dialog(robot: Robot) -> ExportDialog:
     robot.drag((0.4, 0.5), (0.5, 0.5), steps=6)
@@ -229,6 +264,39 @@ def dialog(robot: Robot) -> ExportDialog:
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     return dialog
+
+
+def test_a_part_of_the_warp_is_exported_as_the_command_line_writes_it(
+    robot: Robot, widgets: Widgets, tmp_path: Path
+) -> None:
+    robot.key("t")
+    robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=30)
+    robot.rest()
+    widgets.type("Amount", "40 %")
+    session, dialog = robot.editor.session, export_dialog(robot, tmp_path)
+    dialog.name = "window"
+    run(robot.device, dialog.job(), Progress())
+    projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "work.fluidwarp")
+    command_line("render", str(tmp_path / "work.fluidwarp"), "-o", str(tmp_path / "line.png"))
+    assert (tmp_path / "window.png").read_bytes() == (tmp_path / "line.png").read_bytes()
+
+
+@pytest.mark.parametrize("number", range(len(PRESETS)))
+def test_a_preset_chooses_all_that_it_says(
+    robot: Robot, widgets: Widgets, dialog: ExportDialog, tmp_path: Path, number: int
+) -> None:
+    preset = PRESETS[number]
+    widgets.click(preset.name)
+    assert dialog.preset == number
+    assert dialog.file_kind is KINDS[preset.kind][1][preset.format]
+    dialog.folder = tmp_path
+    job = dialog.job()
+    job.check()
+    assert job.is_animation == (preset.kind == ANIMATION)
+    assert job.recipe.time.ping_pong == preset.returns
+    assert job.recipe.output.size is None  # the picture is smaller than any preset
+    widgets.click("Animation" if preset.kind == PICTURE else "Picture")
+    assert dialog.preset == -1
 
 
 def test_the_button_of_the_bar_exports(robot: Robot, widgets: Widgets) -> None:

@@ -51,8 +51,7 @@ def least_det(device: Device, replay: Replay, amount: float) -> float:
     if amount > 1:
         y, x = (np.mgrid[: warp.size[1], : warp.size[0]] + 0.5) / max(warp.size)
         at = (np.stack([x, y], axis=-1) + warp.read(warp.size)).reshape(-1, 2)
-        near = part.at(at + [1e-3, 0]) - part.at(at - [1e-3, 0]), part.at(at + [0, 1e-3]) - part.at(at - [0, 1e-3])
-        across, down = (difference / 2e-3 for difference in near)
+        across, down = ((part.at(at + step) - part.at(at - step)) / 2e-3 for step in 1e-3 * np.eye(2))
         dets = (1 + across[:, 0]) * (1 + down[:, 1]) - across[:, 1] * down[:, 0]
         return min(float(dets.min()), warp.statistics().det_min)
     nothing, field = device.field((8, 8), 2, "no submap"), part.composed(exact=True)

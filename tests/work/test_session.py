@@ -499,3 +499,27 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     session.replay.seek(0)
     session.replay.seek(tick)
     assert np.array_equal(session.replay.warp.read(), seen)
+
+
+@pytest.mark.parametrize(("loops", "returns"), [(False, False), (True, False), (False, True)])
+def test_the_recording_is_played_once_or_over_and_over_or_there_and_back(
+    session: Session, loops: bool, returns: bool
+) -> None:
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    session.repeat(loops, returns)
+    end, maps, ticks = session.end, dict[int, bytes](), list[int]()
+    session.seek(0)
+    while session.is_behind:
+        session.advance(1)
+    session.play()
+    for _ in range(3 * end):
+        session.advance(1)
+        ticks.append(session.tick)
+        seen = session.replay.warp.read().tobytes()
+        assert maps.setdefault(session.tick, seen) == seen
+    there, back = list(range(1, end + 1)), list(range(end - 1, -1, -1))
+    expected = [*there, *back, *there] if returns else [*there, 0, *there, 0, *there] if loops else there
+    assert ticks[: len(expected)] == expected[: 3 * end]
+    assert session.playing == (loops or returns)
+    assert session.document.recipe.time.ping_pong == returns

@@ -13,6 +13,7 @@ from imgui_bundle.imgui import ImVec2
 from app.model.handles import ARRIVED, RecipeHandle, labelled
 from app.model.mask_edits import MASKS, THICKEST, THINNEST, MaskStroke, PictureMask, is_brightness
 from app.model.presets import DEFAULT
+from app.model.strokes import Symmetry
 from app.ui.actions import ACTIONS, Do
 from app.ui.clock import Clock
 from app.ui.editor_state import SELECT_BY, SMALLEST, EditorState
@@ -28,6 +29,9 @@ from app.work.session import Session
 
 GRIDS = (128, 160, 192, 256, 384)
 EDGES = ("clamp", "mirror", "wrap", "transparent", "black")
+SYMMETRIES: dict[Symmetry, str] = {
+    "none": "Off", "left-right": "Left and right", "up-down": "Top and bottom", "both": "Both", "radial": "Radial",
+}  # fmt: skip
 WALLS = ("free-slip", "no-slip")
 ABOUT_MASKS = {
     "invert": "What is thickest becomes what is thinnest, what is frozen thaws and the rest freezes.",
@@ -57,6 +61,7 @@ def draw(
             *_about_handles(ui, workspace, state, do),
             *_about_selection(ui, session, state, selecting, do),
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
+            ("symmetry", "Symmetry", lambda: _symmetry(ui, state), False),
             ("view", "Overlays", lambda: _view(ui, state), True),
             ("quality", "Picture and quality", lambda: _quality(ui, workspace, quality), False),
             ("masks", "Masks and motion", lambda: _masks(ui, workspace, state, do), False),
@@ -218,6 +223,19 @@ def _set(session: Session, name: str, slid: Slid, **setting: float) -> None:
         session.preview_change(**setting)
     if slid.done:
         session.commit(name)
+
+
+def _symmetry(ui: Ui, state: EditorState) -> None:
+    names = list(SYMMETRIES)
+    imgui.set_next_item_width(-1)
+    _, chosen = imgui.combo("##symmetry", names.index(state.symmetry), list(SYMMETRIES.values()))
+    state.symmetry = names[chosen]
+    ui.tooltip(
+        "A stroke acts on the other sides of the middle too", more="It is one stroke: Undo takes all of it back."
+    )
+    if state.symmetry == "radial":
+        slid = ui.slider("sectors", "Sectors", state.sectors, 2, 16, default=6, title="How many times in all")
+        state.sectors = round(slid.value)
 
 
 def _view(ui: Ui, state: EditorState) -> None:

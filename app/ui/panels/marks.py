@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import hypot
+from math import cos, hypot, pi, sin
 from typing import Any
 
 from imgui_bundle import imgui
@@ -39,6 +39,8 @@ def draw(
         _forces(ui, view, session, forces, lines)
     if state.split is not None and not state.before:
         _split(ui, view, state.split, lines)
+    if state.symmetry != "none" and not state.before:
+        _axes(ui, view, state, lines)
     _path(ui, view, session, lines)
     _waiting(ui, view, session, lines)
     if not state.before:
@@ -66,6 +68,21 @@ def _dashes(ui: Ui, corners: list[Point], lines: imgui.ImDrawList) -> None:
                 lines.add_line(first, last, packed(WHITE), ui.px(1.6))
             at += 2 * dash
         gone = (gone + length) % (2 * dash)
+
+
+def _axes(ui: Ui, view: Viewport, state: EditorState, lines: imgui.ImDrawList) -> None:
+    """The axes of symmetry, or the sides of the sectors, through the picture's middle."""
+    rect = view.rect
+    x, y = rect.x + rect.width / 2, rect.y + rect.height / 2
+    angles = {"left-right": [pi / 2], "up-down": [0.0], "both": [0.0, pi / 2]}
+    turns = [angle + side for angle in angles.get(state.symmetry, []) for side in (0.0, pi)]
+    turns += [2 * pi * k / state.sectors - pi / 2 for k in range(state.sectors) if state.symmetry == "radial"]
+    for angle in turns:
+        across, down = cos(angle), sin(angle)
+        sides = (rect.width / 2 / max(abs(across), 1e-9), rect.height / 2 / max(abs(down), 1e-9))
+        end = ImVec2(x + across * min(sides), y + down * min(sides))
+        lines.add_line(ImVec2(x, y), end, packed(BLACK, 0.45), ui.px(2.6))
+        lines.add_line(ImVec2(x, y), end, packed(WHITE, 0.8), ui.px(1.0))
 
 
 def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList) -> None:

@@ -23,6 +23,15 @@ KINDS: dict[str, Colour] = {
 }  # fmt: skip
 MASKS = rgb("0f86c9")
 HANDLES = rgb("4fc1a6")
+REPEATS = {  # how the recording is played: icon, name, and what a click makes of it
+    "once": ("once", "Plays once", "Click to play it over and over."),
+    "loop": ("loop", "Plays over and over", "Click to play it there and back again, in what is exported too."),
+    "returns": (
+        "returns",
+        "Plays there and back again",
+        "Without a jump, in what is exported too. Click to play it once.",
+    ),
+}
 LANES = 4  # of bars of handles, one below the other
 
 
@@ -40,6 +49,11 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         imgui.same_line(0, ui.px(2))
         if ui.icon_button("step", "step", "One step on", ".", enabled=some):
             do("step")
+        imgui.same_line(0, ui.px(2))
+        returns = session.recipe.time.ping_pong
+        icon, now, coming = REPEATS["returns" if returns else "loop" if session.loops else "once"]
+        if ui.icon_button("repeat", icon, now, more=coming, active=icon != "once", enabled=some):
+            do("repeat")
         imgui.same_line(0, ui.px(10))
         if imgui.get_window_width() > ui.px(560):
             _time(ui, session.target * session.dt, session.end * session.dt)
