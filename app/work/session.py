@@ -557,7 +557,8 @@ class Session:
         tick = self._go_on()
         if not self.coasting:
             self._send(tick)
-        self.replay.checkpoint()
+        if self._live is self._base:
+            self.replay.checkpoint()
         self._keep_masks(name, *(edit.model_copy(update={"tick": tick}) for edit in edits), commit=commit)
 
     def _keep_masks(self, name: str, *edits: MaskEdit, commit: bool = True) -> None:
@@ -566,7 +567,7 @@ class Session:
             masks = with_edit(masks, edit)
         recipe = self._base.edited(mask=masks)
         try:
-            self.replay.use(recipe)
+            self.replay.use(recipe, keep=self._live is self._base)
         except UserError:
             self.replay.use(self._live)
             raise
