@@ -547,7 +547,7 @@ class Session:
 
         Args:
             edits: whatever their ticks.
-            commit: as an entry of the history; not while a slider is dragged.
+            commit: as an entry of the history; not while a slider is dragged, for which what moves stands still.
 
         Raises:
             UserError: what is wrong with it on this picture.
@@ -555,6 +555,7 @@ class Session:
         self.release()
         self.playing = False
         tick = self._go_on()
+        self.coasting &= commit
         if not self.coasting:
             self._send(tick)
         if self._live is self._base:

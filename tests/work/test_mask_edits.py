@@ -331,3 +331,18 @@ def test_brightness_while_a_slider_is_dragged_is_one_edit_below_what_was_painted
     session.undo()
     session.undo()
     assert is_same(masks(session.replay), first)
+
+
+def test_brightness_set_while_the_fluid_moves_is_one_undo_away(session: Session) -> None:
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    assert session.coasting
+    for white in (1.0, 2.0, 3.0):
+        edit = PictureMask(kind="picture", tick=0, of="thickness", white=white)
+        session.edit_masks("Thickness by brightness", edit, commit=False)
+        session.advance(2)
+    session.commit("Thickness by brightness")
+    assert [edit.kind for edit in session.recipe.mask] == ["picture"]
+    session.settle()
+    assert is_same(masks(session.replay), replayed(session))
+    session.undo()
+    assert session.recipe.mask == ()
