@@ -106,8 +106,10 @@ def strips(values: np.ndarray, grid: Grid, rows: int = 64) -> Iterator[tuple[sli
 
     Rows in which all of them are 0 are left out.
     """
+    values = values.astype(np.float32, copy=False)
     above, below, down = _between(len(values), grid.ny)
     left, right, across = _between(values.shape[1], grid.nx)
+    down, across = down.astype(np.float32), across.astype(np.float32)
     for top in range(0, grid.ny, rows):
         here = slice(top, min(top + rows, grid.ny))
         part = down[here, None]

@@ -42,13 +42,13 @@ class Selecting:
     _before: tuple[Part, ...] = field(default=(), init=False)  # what the last part was added to or taken from
     _picked: Point | None = field(default=None, init=False)  # the place in the original that was clicked on last
     _search: _Search | None = field(default=None, init=False)
-    _shown: object = field(default=None, init=False)  # what the area was worked out for
+    _shown: tuple[Session | None, int] = field(default=(None, 0), init=False)  # what it was worked out for
 
     # -- making it --------------------------------------------------------------------------------------------------
 
     def press(self, x: float, y: float, mods: Mods) -> None:
         """The pointer went down: Shift adds to what is selected, Alt takes from it."""
-        self._search = None
+        self._search, self._shown = None, self._now()
         self._combine = "add" if mods.shift else "subtract" if mods.alt else "replace"
         self.path = [_within(x, y)]
 
@@ -189,18 +189,17 @@ class Selecting:
 
     def look(self) -> None:
         """See whether a subject has been found, and whether what is selected is still where it was."""
+        (session, version), parts = self._now(), self.state.selection
+        if (parts or self._search) and session is not self._shown[0]:
+            self._forget()
+        elif version != self._shown[1] and not session.is_moving and any(part.segment for part in parts):
+            self._show(parts)
         if self._search is not None and not self._search.thread.is_alive():
             search, self._search = self._search, None
             try:
                 self._add(Area(outline=search.outcome()))
             except UserError as error:
                 self.messages.warn(error.in_window)
-        state, now = self.state, self._now()
-        if state.selection and now != self._shown:
-            if self._shown is None or now[0] is not self._shown[0]:  # type: ignore[index]
-                self._forget()
-            elif not self.workspace.session.is_moving and any(part.segment for part in state.selection):
-                self._show(state.selection)
 
     def _now(self) -> tuple[Session, int]:
         session = self.workspace.session

@@ -172,8 +172,11 @@ class Replay:
         if tick < self.tick or (nearest is not None and nearest.tick > self.tick):
             self.seek(nearest.tick if nearest is not None else 0)
 
-    def use(self, recipe: Recipe) -> None:
-        """Go on with another recipe at the same tick, making again what differs in its past."""
+    def use(self, recipe: Recipe, keep: bool = True) -> None:
+        """Go on with another recipe at the same tick, making again what differs in its past.
+
+        `keep`: what is left behind may be wanted again, by redo.
+        """
         self._leave_passing()
         before, self.recipe = self.recipe, recipe
         if not recipe.is_set_up_as(before):
@@ -183,8 +186,8 @@ class Replay:
             self._build()
             self.seek(tick)
         elif not recipe.goes_on_from(before, self.tick):
-            # What is left behind may be wanted again: by redo.
-            self._keep(before)
+            if keep:
+                self._keep(before)
             tick = self.tick
             self.handles.replace(self._handles_in_picture())
             self._load(self.checkpoints.nearest(recipe, tick))

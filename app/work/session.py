@@ -587,7 +587,7 @@ class Session:
 
         Args:
             edits: whatever their ticks.
-            commit: as an entry of the history; not while a slider is dragged.
+            commit: as an entry of the history; not while a slider is dragged, for which what moves stands still.
 
         Raises:
             UserError: what is wrong with it on this picture.
@@ -595,9 +595,11 @@ class Session:
         self.release()
         self.playing = False
         tick = self._go_on()
+        self.coasting &= commit
         if not self.coasting:
             self._send(tick)
-        self.replay.checkpoint()
+        if self._live is self._base:
+            self.replay.checkpoint()
         self._keep_masks(name, *(edit.model_copy(update={"tick": tick}) for edit in edits), commit=commit)
 
     def _keep_masks(self, name: str, *edits: MaskEdit, commit: bool = True) -> None:
@@ -606,7 +608,7 @@ class Session:
             masks = with_edit(masks, edit)
         recipe = self._base.edited(mask=masks)
         try:
-            self.replay.use(recipe)
+            self.replay.use(recipe, keep=self._live is self._base)
         except UserError:
             self.replay.use(self._live)
             raise

@@ -18,6 +18,7 @@ from app.model.sampling import FINEST, Segment, SmallPictures, Window, connected
 from solver.grid import Grid
 
 SIZE = 160, 120
+GRID = Grid(*SIZE)
 
 
 class OnePicture:
@@ -38,12 +39,18 @@ def textured(seed: int = 3, size: tuple[int, int] = SIZE) -> np.ndarray:
     return np.clip(128 + 400 * soft, 0, 255).astype(np.uint8)
 
 
+def labelled(chosen: np.ndarray) -> np.ndarray:
+    labels = np.zeros(chosen.shape, np.int32)
+    ndimage.label(chosen, output=labels)
+    return labels
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_what_is_connected_is_as_scipy_labels_it(seed: int) -> None:
     dice = np.random.default_rng(seed)
     height, width = dice.integers(1, 60, 2)
     chosen = dice.random((height, width)) < dice.choice([0.3, 0.59, 0.8, 1.0])
-    labels, _ = ndimage.label(chosen)
+    labels = labelled(chosen)
     for place in np.argwhere(chosen)[:: max(chosen.sum() // 5, 1)]:
         here = int(place[0]), int(place[1])
         assert np.array_equal(connected(chosen, here), labels == labels[here])
@@ -65,8 +72,8 @@ def test_by_brightness_as_opencv_floods(place: tuple[float, float], tolerance: i
     # Half a step more, since a segment takes neither end.
     low, high = ((int(grey[row, column]) + way * (tolerance + 0.5)) / 255 for way in (-1, 1))
     band = {"above": low if low > 0 else None, "below": high if high < 1 else None}
-    segment = Segment(at=place, **band)
-    seen = segment.chosen("source", Grid(*SIZE), OnePicture(grey[..., None]))
+    segment = Segment.model_validate({"at": place, **band})
+    seen = segment.chosen("source", GRID, OnePicture(grey[..., None]))
     assert np.array_equal(seen, flooded[1:-1, 1:-1])
 
 
@@ -75,10 +82,10 @@ def test_by_colour_everywhere_or_only_where_it_is_connected() -> None:
     wanted = pixels[40, 60]
     near = np.linalg.norm((pixels.astype(float) - wanted) / 255, axis=2) <= 0.3
     colour = "#" + bytes(wanted.tolist()).hex()
-    labels, _ = ndimage.label(near)
+    labels = labelled(near)
     for at, expected in ((None, near), ((60.5 / SIZE[0], 40.5 / SIZE[1]), labels == labels[40, 60])):
         segment = Segment(color=colour, tolerance=0.3, at=at)
-        assert np.array_equal(segment.chosen("source", Grid(*SIZE), OnePicture(pixels)), expected)
+        assert np.array_equal(segment.chosen("source", GRID, OnePicture(pixels)), expected)
 
 
 def reference(part: Area, x: np.ndarray, y: np.ndarray, pixels: np.ndarray) -> np.ndarray:
@@ -95,7 +102,7 @@ def reference(part: Area, x: np.ndarray, y: np.ndarray, pixels: np.ndarray) -> n
         cv2.fillPoly(drawn, [corners], 1, shift=16)
         return drawn > 0
     assert part.segment is not None
-    return part.segment.chosen("source", Grid(*SIZE), OnePicture(pixels)) > 0
+    return part.segment.chosen("source", GRID, OnePicture(pixels)) > 0
 
 
 def anything(dice: random.Random) -> Area:
@@ -122,7 +129,7 @@ def test_random_parts_added_and_taken_away_are_sets(seed: int) -> None:
     first = {name: getattr(parts[0], name) for name in Area.model_fields}
     edit = FillMask(kind="fill", tick=0, of="frozen", amount=1.0, then=tuple(parts[1:]), **first)
     before = np.zeros((SIZE[1], SIZE[0]), np.uint8)
-    grid = Grid(*SIZE)
+    grid = GRID
     after = edited(before, edit, grid, SmallPictures(OnePicture(pixels)))
     x, y = grid.centres()
     x, y = x / grid.extent[0], y / grid.extent[1]
@@ -130,7 +137,7 @@ def test_random_parts_added_and_taken_away_are_sets(seed: int) -> None:
     for number, part in enumerate(parts):
         here = reference(part, x, y, pixels)
         if part.segment is None:
-            edges |= ndimage.binary_dilation(here, iterations=2) & ~ndimage.binary_erosion(here, iterations=2)
+            edges |= ndimage.binary_dilation(here, iterations=2) != ndimage.binary_erosion(here, iterations=2)
         if part.outline is not None:
             line = np.rint(np.array(part.outline) * SIZE - 0.5).astype(np.int32)
             edges |= cv2.polylines(np.zeros(x.shape, np.uint8), [line], True, 1, 3) > 0
@@ -199,7 +206,7 @@ def test_brightness_makes_thick_what_is_bright_or_dark() -> None:
     before = np.random.default_rng(1).integers(0, 65535, SIZE[::-1], np.uint16)
     for invert in (False, True):
         edit = PictureMask(kind="picture", tick=0, of="thickness", white=2.0, invert=invert)
-        after = edited(before, edit, Grid(*SIZE), SmallPictures(OnePicture(ramp)))
+        after = edited(before, edit, GRID, SmallPictures(OnePicture(ramp)))
         grey = ramp[..., 0] / 255
         assert np.abs(after - (24576 + 8192 * 2 * (1 - grey if invert else grey))).max() <= 0.51
 

@@ -14,6 +14,7 @@ import pytest
 
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
+from app.ui.events import Mods
 from solver.gl.device import Device
 from support.editing import Robot, small_project
 
@@ -82,6 +83,16 @@ def light_masks(robot: Robot) -> None:
     robot.move(700, 20)
 
 
+def selected(robot: Robot) -> None:
+    robot.key("m")
+    robot.drag((0.1, 0.2), (0.6, 0.7))
+    robot.editor.state.select_by = "ellipse"
+    robot.mods = Mods(alt=True)
+    robot.drag((0.3, 0.3), (0.5, 0.6))
+    robot.mods = Mods()
+    robot.move(700, 20)
+
+
 def light_export(robot: Robot) -> None:
     robot.key("ctrl+l")
     export(robot)
@@ -100,7 +111,7 @@ def coarse(pixels: np.ndarray) -> np.ndarray:
     return squares.mean(axis=(1, 3))
 
 
-STATES = [start, warped, shortcuts, export, light, light_masks, light_export, error]
+STATES = [start, warped, shortcuts, export, light, light_masks, selected, light_export, error]
 
 
 @pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)

@@ -300,8 +300,8 @@ def test_what_is_selected_by_colour_is_where_it_is_seen(device: Device, tmp_path
     session.edit_masks("Fill", fill)
     frozen = to_grid((session.replay.masks.frozen.get() > 127).astype(np.float32), Grid(240, 180)) > 0.5
     moved = session.replay.warp.read((240, 180)) * 240
-    places = (moved + np.stack([x, y], axis=-1)).astype(np.float32)
-    seen = cv2.remap(pixels[..., 0], places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) > 120
+    across, down = ((moved[..., k] + at).astype(np.float32) for k, at in enumerate((x, y)))
+    seen = cv2.remap(pixels[..., 0], across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) > 120
     assert (frozen & seen).sum() / (frozen | seen).sum() > 0.97
     assert (red & seen).sum() / (red | seen).sum() < 0.9
     assert is_same(masks(session.replay), replayed(session))
@@ -331,3 +331,18 @@ def test_brightness_while_a_slider_is_dragged_is_one_edit_below_what_was_painted
     session.undo()
     session.undo()
     assert is_same(masks(session.replay), first)
+
+
+def test_brightness_set_while_the_fluid_moves_is_one_undo_away(session: Session) -> None:
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    assert session.coasting
+    for white in (1.0, 2.0, 3.0):
+        edit = PictureMask(kind="picture", tick=0, of="thickness", white=white)
+        session.edit_masks("Thickness by brightness", edit, commit=False)
+        session.advance(2)
+    session.commit("Thickness by brightness")
+    assert [edit.kind for edit in session.recipe.mask] == ["picture"]
+    session.settle()
+    assert is_same(masks(session.replay), replayed(session))
+    session.undo()
+    assert session.recipe.mask == ()
