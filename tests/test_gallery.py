@@ -13,7 +13,9 @@ from app.errors import UserError
 from app.gallery import Studio, arrows, contact_sheet, light, load, shades, sharpness, spline_warp
 from app.media.auxiliary import Pictures
 from app.media.pictures import read_picture
+from app.model.picture import Picture
 from app.progress import Progress
+from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.grid import Grid
 
@@ -60,10 +62,16 @@ def test_a_sheet_is_as_high_as_its_panels(studio: Studio) -> None:
     assert read_picture(studio.folder / "one-sheet.png").height == 40 + 4 * gallery.MARGIN
 
 
-def test_what_is_played_ends_as_the_still(studio: Studio) -> None:
+def test_what_is_played_ends_as_the_still_and_as_a_replay(studio: Studio) -> None:
     recipe = load("figure-5")
-    short = {"duration": recipe.fluid.dt, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
-    assert np.array_equal(studio.play("figure-5", **short).result, studio.still(recipe.edited(**short)))
+    short = {"duration": 2 * recipe.fluid.dt, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
+    played = studio.play("figure-5", **short)
+    assert np.array_equal(played.result, studio.still(recipe.edited(**short)))
+    replay = Replay(studio.device, played.recipe, Pictures(Picture(played.source), gallery.recipes_folder()))
+    replay.seek(2)
+    size = played.source.shape[1], played.source.shape[0]
+    assert np.array_equal(played.displacement, replay.warp.read(size))
+    replay.release()
 
 
 @pytest.mark.parametrize("name", sorted({*gallery.RECIPES, *gallery.GUIDE} - {"handles-smile"}))

@@ -87,7 +87,7 @@ def animation_writer(
 
         def write_one(file: Path, frame: Frame) -> None:
             picture = frame if isinstance(frame, Picture) else template.with_pixels(frame)
-            write_picture(file, picture, bits=bits, codec=codec, **({} if quality is None else {"quality": quality}))
+            write_picture(file, picture, bits=bits, quality=95 if quality is None else quality, codec=codec)
 
         with sequence_writer(path, write_one, first, cancel, written, resumed) as write:
             yield write

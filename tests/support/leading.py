@@ -80,10 +80,16 @@ FEELS = ((0.3, 0.0), (0.03, 2.0), (0.0065, 0.0))  # viscosity and drag of Putty,
 
 
 def led(
-    device: Device, points: np.ndarray, targets: np.ndarray, pins: np.ndarray, seed: int = 1, cells: int = 128
+    device: Device,
+    points: np.ndarray,
+    targets: np.ndarray,
+    pins: np.ndarray,
+    seed: int = 1,
+    cells: int = 128,
+    dt: float = 1 / 60,
 ) -> Led:
-    """Lead handles from points to targets between pins, with the feel that is the seed's turn."""
-    grid, (viscosity, drag), dt = Grid(cells, cells), FEELS[seed % 3], 1 / 60
+    """Lead handles from points to targets between pins, with the feel that is the seed's turn, by steps of `dt`."""
+    grid, (viscosity, drag) = Grid(cells, cells), FEELS[seed % 3]
     fluid, warp = Fluid(device, grid, FluidParams(drag=drag)), WarpMap(device, grid, (PIXELS, PIXELS))
     fluid.set_viscosity(viscosity)
     ways = [
@@ -93,12 +99,12 @@ def led(
     handles = Handles(fluid, warp, [*ways, *(Handle((p[0], p[1]), radius=RADIUS) for p in pins.tolist())])
     try:
         moved, before, still = 0.0, handles.places, round(0.25 / dt)
-        steps = round((SECONDS + REST) / dt)
+        steps, every = round((SECONDS + REST) / dt), round(1 / 6 / dt)
         for tick in range(steps):
             if tick == steps - still:
                 before = handles.places
             handles.advance(dt)
-            if len(pins) and tick % 10 == 9:
+            if len(pins) and tick % every == every - 1:
                 moved = max(moved, float(handles.away[len(points) :].max()))
         drift = np.hypot(*(handles.places - before).T).max() / (still * dt)
         found, error = warp.statistics(), float(handles.away[: len(points)].max())

@@ -19,6 +19,7 @@ from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
 
 BLACK = np.zeros((96, 128, 3), np.uint8)
 EXTENT = (1.0, 0.75)
+DT = 1 / 30  # of the editor: each step is twice as far as one of a recipe
 
 
 def replay_of(device: Device, **parts: Any) -> Replay:
@@ -32,14 +33,14 @@ def led_to(at: list[float], to: list[float], **rest: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize(("count", "seed"), [(1, 0), (4, 1), (16, 2), (16, 3)])
 def test_handles_arrive_and_stay_where_the_spline_may_fold(count: int, seed: int, device: Device):
-    found = led(device, *arrangement(seed, count), seed=seed)
+    found = led(device, *arrangement(seed, count), seed=seed, dt=DT)
     assert found.is_within, found.told
 
 
 def test_a_handle_between_pins_does_not_fold_where_the_spline_does(device: Device):
     points, targets = np.array([[0.42, 0.5]]), np.array([[0.42 + 80 / PIXELS, 0.5]])
     pins = np.array([[0.5, 0.4], [0.5, 0.6], [0.68, 0.5], [0.32, 0.5]])
-    found = led(device, points, targets, pins)
+    found = led(device, points, targets, pins, dt=DT)
     assert distortion(spline(points, targets, pins)).least < 0
     assert found.is_within, found.told
     assert distortion(found.displacement).least > 0
