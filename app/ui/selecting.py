@@ -123,7 +123,7 @@ class Selecting:
             width, height = session.replay.masks.canvas.size
             grid = Grid.for_picture(width, height, min(SHOWN, max(width, height)))
             try:
-                share = self._fill(parts, 0.0).coverage(grid, session.replay.small_pictures, session.replay.seen)
+                share = self._fill(parts, 0.0).coverage(grid, session.replay.small_pictures, session.replay.as_seen)
             except ValueError as error:
                 raise UserError(f"Nothing can be selected so: {error}.") from None
             area = np.rint(255 * share).astype(np.uint8)
@@ -136,7 +136,7 @@ class Selecting:
         picture = replay.small_pictures.load(SOURCE)
         grid = Grid.for_picture(picture.width, picture.height, min(SHOWN, max(picture.width, picture.height)))
         colours = np.stack([to_grid(channel, grid) for channel in np.moveaxis(channels(picture)[0], 2, 0)], axis=-1)
-        return np.rint(255 * replay.seen(colours, grid)).astype(np.uint8)
+        return np.rint(255 * replay.as_seen(colours, grid)).astype(np.uint8)
 
     # -- what becomes of it -----------------------------------------------------------------------------------------
 

@@ -311,7 +311,7 @@ class Replay:
         at_x, at_y = np.array([x[j, i], y[j, i]]) + np.clip(step, (-hx, -hy), (hx, hy))
         return float(at_x), float(at_y)
 
-    def seen(self, values: np.ndarray, grid: Grid) -> np.ndarray:
+    def as_seen(self, values: np.ndarray, grid: Grid) -> np.ndarray:
         """Values of the original's cells, (ny, nx) or (ny, nx, c), where the warp shows them at this moment."""
         if self.tick == 0 and self.recipe.map is None:
             return values
@@ -530,7 +530,7 @@ class Replay:
                 self.masks.take_off(edit.of)
             else:
                 try:
-                    self.masks.edit(edit.of, lambda words, edit=edit: edited(words, edit, canvas, pictures, self.seen))
+                    self.masks.edit(edit.of, lambda words, edit=edit: edited(words, edit, canvas, pictures, self.as_seen))
                 except (ValueError, UserError) as error:
                     raise UserError(f"mask[{self.recipe.mask.index(edit) + 1}]: {error}") from None
         if left:
