@@ -530,7 +530,9 @@ class Replay:
                 self.masks.take_off(edit.of)
             else:
                 try:
-                    self.masks.edit(edit.of, lambda words, edit=edit: edited(words, edit, canvas, pictures, self.as_seen))
+                    self.masks.edit(
+                        edit.of, lambda words, edit=edit: edited(words, edit, canvas, pictures, self.as_seen)
+                    )
                 except (ValueError, UserError) as error:
                     raise UserError(f"mask[{self.recipe.mask.index(edit) + 1}]: {error}") from None
         if left:
