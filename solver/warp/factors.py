@@ -15,6 +15,7 @@ from solver.warp.submap import Level, depth, inputs_of
 # Of min(1, det J) at 100 %, what det J may fall to where a factor is scaled: 1/2 is a quarter turn. What is on its
 # way may turn on by 41 degrees before a remap, and then det J still falls to no less than 0.1 of it.
 CLOSED, SPLIT = 0.5, 0.05
+MOST = 12  # that are closed: every checkpoint has a copy of them; what comes after goes into one
 TEXELS = 2  # of a factor along a cell: with one, of twelve random recipes that do not fold two do between 60 and 90 %
 
 
@@ -47,12 +48,14 @@ class Factors:
         before = self._open.read
         self._merge(self._open.write, submap)
         self._open.swap()
+        if len(self._closed) >= MOST:
+            return
         if (left := self._left(self._open.read)) < SPLIT:  # one step has turned it too far: it is a factor by itself
             self._close(before)
             before.clear()
             self._merge(self._open.read, submap)
             left = self._left(self._open.read)
-        if left < CLOSED:
+        if left < CLOSED and len(self._closed) < MOST:
             self._close(self._open.read)
             self._open.read.clear()
 

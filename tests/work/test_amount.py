@@ -16,6 +16,7 @@ from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Stroke
 from app.work.replay import Replay
 from solver.gl.device import Device
+from solver.resample.sampler import Sampler
 from solver.warp.distortion import distortion
 from solver.warp.scaled import ScaledMap
 from support.commands import Run
@@ -128,3 +129,19 @@ def test_an_amount_that_is_none_is_refused() -> None:
         Recipe.parse("amount = 2.0")
     with pytest.raises(UserError, match="'amount' scales a warp of coordinates"):
         Recipe.parse('amount = 0.5\nmode = "density"')
+
+
+def test_what_is_frozen_keeps_every_bit_at_every_amount(device: Device) -> None:
+    freeze = Stroke(tool="freeze", radius=0.12, hardness=1.0, samples=((0, 0.5, 0.35, 1.0), (1, 0.5, 0.35, 1.0)))
+    twirl = TWIRL.model_copy(update={"samples": ((2, 0.5, 0.6, 1.0), (32, 0.5, 0.6, 1.0))})
+    recipe = TURNED.edited(stroke=(freeze, twirl))
+    replay, sampler = at_end(device, recipe), Sampler(device)
+    y, x = np.mgrid[:80, :120] + 0.5
+    inside = np.hypot(x / 120 - 0.5, y / 120 - 0.35 * 2 / 3) < 0.1
+    for amount in (0.3, 0.7, 1.5):
+        replay.use(recipe.edited(amount=amount))
+        found = sampler.apply(replay.seen, PICTURE.pixels)
+        assert np.array_equal(found[inside], PICTURE.pixels[inside])
+        assert not np.array_equal(found, PICTURE.pixels)
+    sampler.release()
+    replay.release()
