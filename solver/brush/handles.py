@@ -29,6 +29,7 @@ SAME_TIME = 1e-6  # steps between two times that are the same but for their roun
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
 # Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
+# what becomes of the area of triangles of texels, as the local one, since a remap keeps what is at its texels only;
 # and how many times farther apart in the original two neighbours on a lattice lie. From the first of
 # each on it goes slower, at the second it stops: before anything folds.
 SLOWING, STOPPED = 0.92, 0.8
@@ -347,18 +348,21 @@ class Handles:
         angles = 2 * np.pi * np.arange(AROUND + 1) / AROUND
         rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         close = self._places[numbers, None, None] + rings * radii[:, None, None, None]
-        near = _distorted(self._warp, np.clip(close, 0.0, extent)).reshape(len(numbers), -1, 2)
+        near = _distorted(self._warp, np.clip(close, 0.0, extent)).reshape(len(numbers), -1, 3)
         least, most = near[..., 0].min(axis=1), near[..., 1].max(axis=1)
+        area = near[..., 2].min(axis=1)
         low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
         high = np.ceil((self._places[numbers] + radii[:, None]) / extent * count).astype(int)
         for row, ((left, top), (right, bottom)) in enumerate(zip(low, high, strict=True)):
             box = over[top : max(bottom, top + 1), left : max(right, left + 1)]
             least[row] = min(least[row], box[..., 0].min())
             most[row] = max(most[row], box[..., 1].max())
+            area[row] = min(area[row], box[..., 2].min())
         local = self._local[numbers]
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
-        return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
+        bears = _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
+        return bears * _smoothstep((area - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
 
     # -- what they do to the fluid ----------------------------------------------------------------------------------
 
@@ -453,10 +457,19 @@ def _brushes(lead: Lead) -> tuple[list[Point], list[float]]:
 
 
 def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
-    """At lattices of places (k, n, m, 2): det J, and how many times nearer than in the original a neighbour lies."""
-    listed, found = points.reshape(-1, 2), np.zeros(points.shape)
+    """At lattices of places (k, n, m, 2): det J, how many times nearer than in the original a neighbour lies, and area.
+
+    That is how many times larger in the original the triangle with the next texel to the right and below is, negative
+    where it is folded.
+    """
+    listed, found = points.reshape(-1, 2), np.zeros((*points.shape[:-1], 3))
     found[..., 0] = warp.determinants(listed).reshape(points.shape[:-1])
-    original = points + warp.at(listed).reshape(points.shape)
+    moved, texel = warp.at(listed).astype(np.float64), np.divide(warp.extent, warp.size)
+    original = points + moved.reshape(points.shape)
+    right, below = (
+        np.eye(2)[axis] + (warp.at(listed + texel * np.eye(2)[axis]) - moved) / texel[axis] for axis in (0, 1)
+    )
+    found[..., 2] = (right[:, 0] * below[:, 1] - right[:, 1] * below[:, 0]).reshape(points.shape[:-1])
     for axis in (1, 2):
         apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, points))
         ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)

@@ -110,6 +110,23 @@ def test_a_handle_takes_hold_of_what_has_been_moved_to_elsewhere(device: Device)
     replay.release()
 
 
+def test_no_fold_waits_for_a_remap_of_what_has_long_halted(device: Device):
+    # All ten halt at a third of a second, det J .68 at the least; taken into texels half a second later it was -.7.
+    points = np.random.default_rng(4).uniform(0.1, 0.9, (2, 10, 2)).tolist()
+    grid = Grid(48, 48)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid, (192, 192))
+    fluid.set_viscosity(0.3)
+    handles = Handles(
+        fluid, warp, [Handle((p[0], p[1]), (q[0], q[1]), RADIUS, duration=0.8) for p, q in zip(*points, strict=True)]
+    )
+    for _ in range(18):
+        handles.advance(1 / 30)
+    warp.remap()
+    assert warp.statistics((256, 256)).folds == 0
+    for thing in (handles, warp, fluid):
+        thing.release()
+
+
 HANDLES = [led_to([0.3, 0.4], [0.4, 0.5]), led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=0.5, stiffness=0.8)]
 PINS = [{"at": [0.5, 0.2]}]
 
