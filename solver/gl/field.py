@@ -88,8 +88,12 @@ class Field:
         self.device.fences.hold()
         self.drawn()
 
-    def set(self, array: np.ndarray) -> None:
+    def set(self, array: np.ndarray, region: tuple[int, int, int, int] | None = None) -> None:
         """Write an array of shape (height, width) or (height, width, components), row 0 on top.
+
+        Args:
+            array: of the field's size, or of the region's.
+            region: (x, y, width, height) in texels of what is written; by default all.
 
         Raises:
             FieldError: on another shape, or on a value that is no number or not finite.
@@ -97,7 +101,8 @@ class Field:
         array = np.asarray(array)
         if array.dtype.kind not in "fiub":
             raise FieldError(f"{self.label}: an array of {array.dtype} was given, real numbers are wanted")
-        shape = (self.height, self.width) if self.components == 1 else (self.height, self.width, self.components)
+        width, height = region[2:] if region else self.size
+        shape = (height, width) if self.components == 1 else (height, width, self.components)
         if array.shape != shape and array.shape != (*shape, 1):
             raise FieldError(f"{self.label}: an array of shape {array.shape} was given, {shape} is wanted")
         with np.errstate(over="ignore"):  # it is told below
@@ -105,8 +110,8 @@ class Field:
         if self.dtype in ("f2", "f4") and not np.isfinite(data).all():
             raise FieldError(f"{self.label}: the array holds a value that is not finite")
         self.device.use()
-        self.texture.write(np.ascontiguousarray(data).tobytes())
-        self.drawn()
+        self.texture.write(np.ascontiguousarray(data).tobytes(), viewport=region)
+        self.drawn(region)
 
     def get(self, region: tuple[int, int, int, int] | None = None) -> np.ndarray:
         """Read back as an array of shape (height, width) or (height, width, components), row 0 on top.
