@@ -45,7 +45,7 @@ vec3 in_window(vec4 window, vec2 x) {
 
 // The part w of what a submap moves at x, 0-1, with its slopes along x and y, texels of A: a spline times a weight that is
 // zero on a border is zero there too, continuously (Kantorovich and Krylov). w is 0 where the map is held and 1 from a cell
-// of the submap on, or FADED texels.
+// of the submap on, or FADED texels: equation (S7).
 #ifdef WEIGHED
 const float FADED = 31.0;
 float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
