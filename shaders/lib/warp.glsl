@@ -6,7 +6,8 @@
 // u_submap, u_second, u_third, u_accumulated: displacements, longer sides; u_window, u_second_window, u_third_window: left,
 // top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
 // bottom, longer sides.
-// Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held.
+// Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps that are carried
+// less and less before that, 1, 2 and 4 or their sum: see weight.
 #include "lib/displacement.glsl"
 uniform sampler2D u_submap;
 uniform sampler2D u_accumulated;
@@ -24,8 +25,10 @@ uniform vec4 u_second_window;
 uniform sampler2D u_third;
 uniform vec4 u_third_window;
 #endif
-#ifdef HELD
+#if defined(HELD) || defined(WEIGHED)
 uniform sampler2D u_held;
+#endif
+#ifdef HELD
 uniform sampler2D u_kept;
 #endif
 
@@ -40,19 +43,44 @@ vec3 in_window(vec4 window, vec2 x) {
     return vec3(across, inside.x * inside.y);
 }
 
-vec2 displacement_of(sampler2D submap, vec4 window, vec2 x) {
+// The part w of what a submap moves at x, 0-1, with its slopes along x and y, texels of A: a spline times a weight that is
+// zero on a border is zero there too, continuously (Kantorovich and Krylov). w is 0 where the map is held and 1 from a cell
+// of the submap on, or FADED texels: equation (S7).
+#ifdef WEIGHED
+const float FADED = 31.0;
+float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
+    slope = vec2(0.0);
+    if ((WEIGHED & level) == 0) return 1.0;
+    vec2 size = vec2(textureSize(u_held, 0)), place = x / u_picture * size - 0.5, texel = floor(place), f = place - texel;
+    vec4 at = vec4(texel + 0.5, texel + 1.5) / size.xyxy;
+    vec4 far = max(127.0 - 255.0 * vec4(texture(u_held, at.xy).r, texture(u_held, at.zy).r,
+                                        texture(u_held, at.xw).r, texture(u_held, at.zw).r), 0.0);
+    vec2 cell = window.zw / vec2(textureSize(submap, 0)) * size / u_picture, along = mix(far.xz, far.yw, f.x);
+    float over = clamp(max(cell.x, cell.y), 1.0, FADED), part = clamp(mix(along.x, along.y, f.y) / over, 0.0, 1.0);
+    slope = 2.0 * (1.0 - part) / over * vec2(mix(far.y - far.x, far.w - far.z, f.y), along.y - along.x);
+    return part * (2.0 - part);
+}
+#else
+float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
+    slope = vec2(0.0);
+    return 1.0;
+}
+#endif
+
+vec2 displacement_of(int level, sampler2D submap, vec4 window, vec2 x) {
+    vec2 slope;
     vec3 at = in_window(window, x);
-    return cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0))) * at.z;
+    return cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0))) * at.z * weight(level, submap, window, x, slope);
 }
 
 // Where the submaps lead from x.
 vec2 displacement_of_submaps(vec2 x) {
-    vec2 moved = within_picture(x, displacement_of(u_submap, u_window, x));
+    vec2 moved = within_picture(x, displacement_of(1, u_submap, u_window, x));
 #if LEVELS > 1
-    moved = within_picture(x, moved + displacement_of(u_second, u_second_window, x + moved));
+    moved = within_picture(x, moved + displacement_of(2, u_second, u_second_window, x + moved));
 #endif
 #if LEVELS > 2
-    moved = within_picture(x, moved + displacement_of(u_third, u_third_window, x + moved));
+    moved = within_picture(x, moved + displacement_of(4, u_third, u_third_window, x + moved));
 #endif
     return moved;
 }

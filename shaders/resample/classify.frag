@@ -61,7 +61,7 @@ void main() {
     float kind = farthest > ONE_SAMPLE ? (longest > FOUR_SAMPLES ? most : four) : 0.0;
 #if defined(HELD) && !defined(SINGLE)
     bool copies = u_zoom == vec2(1.0) && low == vec2(0.0) && high == vec2(0.0);
-    kind = held > 0.0 && !copies ? most : kind;
+    kind = held >= 0.5 && !copies ? most : kind;
 #endif
     // Between texels, and beyond the outermost ones, the map is never farther than that from those around.
     vec2 margin = 4.0 * change + 1.0;

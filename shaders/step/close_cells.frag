@@ -1,11 +1,13 @@
 // Close cells: how far a cell is closed to the flow, by the distance d of its middle from what is frozen, in cells: 1 (solid)
 // where d <= u_solid, less and less over one cell more, then 0.
-// u_frozen: on a canvas, frozen from 1/2; u_covered: cells, the part of each that is frozen.
+// u_frozen: on a canvas, frozen from 1/2; u_covered: cells, the part of each that is frozen; u_reach: cells, how far off one
+// may be that closes another.
 // reads: 5000
 #include "lib/texels.glsl"
 uniform sampler2D u_frozen;
 uniform sampler2D u_covered;
 uniform float u_solid;
+uniform float u_reach;
 layout(location = 0) out float out_solid;
 
 // Squared distance of the middle of a cell from a box, in cells.
@@ -18,9 +20,10 @@ void main() {
     vec2 cell = floor(gl_FragCoord.xy), middle = cell + 0.5, canvas = vec2(textureSize(u_frozen, 0));
     ivec2 cells = textureSize(u_covered, 0);
     float far = 1e3;
-    for (int j = -2; j <= 2; ++j)
-        for (int i = -2; i <= 2; ++i) {
-            vec2 other = cell + vec2(i, j);
+    vec2 off;
+    for (off.y = -u_reach; off.y <= u_reach; ++off.y)
+        for (off.x = -u_reach; off.x <= u_reach; ++off.x) {
+            vec2 other = cell + off;
             ivec2 at = ivec2(other);
             if (at != clamp(at, ivec2(0), cells - 1)) continue;
             float covered = texelFetch(u_covered, at, 0).r;

@@ -3,10 +3,10 @@
 // Define CUBIC to look into A by the cubic: where it has four texels a cell, or whoever looks between the texels of the
 // result will again.
 // Define GATHER for what the submaps alone add up to.
-// Define KEEP (with REMAP) to draw nothing but what is newly held: where u_now, whose first texel is u_corner, is not 0, and
-// u_before, over the picture, is.
+// Define KEEP (with REMAP) to draw nothing but what is newly held: where u_now, whose first texel is u_corner, is 1/2 or
+// more, and u_before, over the picture, is not.
 // Define FROM for W(x + P(x)) - x: u_from (P), texel for texel, longer sides.
-// reads: 48, and 24 with CUBIC, 12 with GATHER; 12 more for each of LEVELS above 1
+// reads: 48, and 24 with CUBIC, 12 with GATHER; 12 more for each of LEVELS above 1, 4 for each of WEIGHED
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
 #ifdef KEEP
@@ -28,7 +28,7 @@ void main() {
     vec2 place = fragment_place() * size;
 #endif
 #ifdef KEEP
-    if (texture(u_now, (place - u_corner) / vec2(textureSize(u_now, 0))).r == 0.0 || texture(u_before, place / size).r > 0.0)
+    if (texture(u_now, (place - u_corner) / vec2(textureSize(u_now, 0))).r < 0.5 || texture(u_before, place / size).r >= 0.5)
         discard;
 #endif
     vec2 from = vec2(0.0);

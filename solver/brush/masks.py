@@ -26,7 +26,6 @@ STEPS, ZERO, MOST = 8192, 24576, 65535
 BLANK = {"thickness": ZERO / MOST, "frozen": 0.0}
 LEAST_VISCOSITY = 1e-6  # that painting starts from where there is none
 SMOOTHED = 1 / 8  # radii over which `smooth` takes means
-FARTHEST_SOLID = 1.5  # cells from what is frozen; `close_cells.frag` looks for that as far as two cells away
 
 Base = float | np.ndarray | Callable[[Grid], np.ndarray | float]
 
@@ -198,15 +197,15 @@ class Masks:
             covered = self._cells.get("covered", grid.size, 1, "f1")
             x, y, width, height = region = self._cells_over(changed, grid)
             self.device.pass_("step/average_frozen.frag")(covered, region=region, frozen=self.frozen, **cells)
-            around = (x - 2, y - 2, width + 4, height + 4)
-            close = self.device.pass_("step/close_cells.frag")
-            held = REACH * max(a / b for a, b in zip(self.canvas.spacing, grid.spacing, strict=True))
-            close(
+            solid = 0.5 + REACH * max(a / b for a, b in zip(self.canvas.spacing, grid.spacing, strict=True))
+            reach = ceil(solid + 0.5)
+            self.device.pass_("step/close_cells.frag")(
                 fluid.solid,
-                region=around,
+                region=(x - reach, y - reach, width + 2 * reach, height + 2 * reach),
                 frozen=self.frozen,
                 covered=covered,
-                solid=min(0.5 + held, FARTHEST_SOLID),
+                solid=solid,
+                reach=float(reach),
                 **cells,
             )
         self._applied_to = fluid, grid

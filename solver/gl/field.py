@@ -92,7 +92,8 @@ class Field:
         """Write an array of shape (height, width) or (height, width, components), row 0 on top.
 
         Args:
-            region: (x, y, width, height) in texels of where it is written; by default all.
+            array: of the field's size, or of the region's.
+            region: (x, y, width, height) in texels of what is written; by default all.
 
         Raises:
             FieldError: on another shape, or on a value that is no number or not finite.
@@ -100,7 +101,7 @@ class Field:
         array = np.asarray(array)
         if array.dtype.kind not in "fiub":
             raise FieldError(f"{self.label}: an array of {array.dtype} was given, real numbers are wanted")
-        _, _, width, height = region or (0, 0, *self.size)
+        width, height = region[2:] if region else self.size
         shape = (height, width) if self.components == 1 else (height, width, self.components)
         if array.shape != shape and array.shape != (*shape, 1):
             raise FieldError(f"{self.label}: an array of shape {array.shape} was given, {shape} is wanted")

@@ -10,7 +10,7 @@ from solver.gl.field import DoubleField, Field
 from solver.gl.reduction import Reduction
 from solver.grid import Grid
 from solver.warp.state import FACTOR
-from solver.warp.submap import Level, depth, inputs_of
+from solver.warp.submap import Level, defines_of, inputs_of
 
 # Of min(1, det J) at 100 %, what det J may fall to where a factor is scaled: 1/2 is a quarter turn. What is on its
 # way may turn on by 41 degrees before a remap, and then det J still falls to no less than 0.1 of it.
@@ -43,17 +43,17 @@ class Factors:
         """True if all of the map may be scaled as it is."""
         return not self._closed
 
-    def take(self, submap: Level) -> None:
-        """Take in what a submap has moved, which begins anew with nothing."""
+    def take(self, submap: Level, held: Field | None) -> None:
+        """Take in what a submap has moved, which begins anew with nothing; `held`: as the map has it."""
         before = self._open.read
-        self._merge(self._open.write, submap)
+        self._merge(self._open.write, submap, held)
         self._open.swap()
         if len(self._closed) >= MOST:
             return
         if (left := self._left(self._open.read)) < SPLIT:  # one step has turned it too far: it is a factor by itself
             self._close(before)
             before.clear()
-            self._merge(self._open.read, submap)
+            self._merge(self._open.read, submap, held)
             left = self._left(self._open.read)
         if left < CLOSED and len(self._closed) < MOST:
             self._close(self._open.read)
@@ -76,6 +76,7 @@ class Factors:
         targets: tuple[Field, Field],
         amount: float,
         submap: Level,
+        held: Field | None,
         origin: tuple[float, float],
         step: tuple[float, float],
         moved: Field | None = None,
@@ -85,7 +86,7 @@ class Factors:
         Returns:
             The one of both targets that holds it.
         """
-        self._merge(self._open.write, submap)
+        self._merge(self._open.write, submap, held)
         target, other = targets
         for factor in (self._open.write, *reversed(self._closed)):
             inputs: dict[str, Any] = {"factor": factor, "amount": amount, "picture": self.picture}
@@ -127,12 +128,13 @@ class Factors:
         closed.copy_from(field)
         self._closed.append(closed)
 
-    def _merge(self, target: Field, submap: Level) -> None:
+    def _merge(self, target: Field, submap: Level, held: Field | None) -> None:
         """Draw the open factor after what a submap has moved."""
         levels = [submap]
-        follow = self.device.pass_("warp/follow_factor.frag", FIRST=1, SUBMAP=1, **depth(levels))
+        known = {} if held is None else {"held": held}
+        follow = self.device.pass_("warp/follow_factor.frag", FIRST=1, SUBMAP=1, **defines_of(levels))
         place: dict[str, Any] = {"origin": (0.0, 0.0), "step": target.texel}
-        follow(target, factor=self._open.read, amount=1.0, picture=self.picture, **inputs_of(levels), **place)
+        follow(target, factor=self._open.read, amount=1.0, picture=self.picture, **inputs_of(levels, known), **place)
 
     def _left(self, factor: Field) -> float:
         """What is left of its least det J where it is scaled; waits for the GPU."""

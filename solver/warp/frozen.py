@@ -16,10 +16,11 @@ from solver.gl.tiled import SavedTiles, TiledField
 # Texels: a place in a frozen pixel may lie nearest to the next texel, and what is looked up there is interpolated from
 # two more to each side.
 INNER, REACH = 1, 3
+FADED = 31  # texels along an axis in which the distance is told; `lib/warp.glsl` has it too
 BLOCK = 64  # texels along a block that is drawn or not
 
 Draw = Callable[[Field, list[Region], Field, tuple[int, int], Field], None]
-"""Draws the map into regions of a field, where what is held now, from a corner on, is not 0 and what was held is."""
+"""Draws the map into regions of a field, where it is held now, told from a corner on, and was not held before."""
 
 
 class Frozen:
@@ -30,7 +31,8 @@ class Frozen:
         size: (width, height) of the accumulated map in texels.
 
     Attributes:
-        held: 1 where a place is held, 2/3 where only a texel's middle is, else 0; None as long as nothing was frozen.
+        held: 1 where a place is held, 2/3 where only a texel's middle is; else (127 - so many texels away) / 255 along
+            the axes, or 0; None as long as nothing was frozen.
         kept: the displacement where it is held, longer sides.
     """
 
@@ -44,23 +46,25 @@ class Frozen:
         """Hold what a mask over the whole picture, of any size, has frozen in a region; let go of the rest of it."""
         held, kept = self._fields()
         (x, right), (y, bottom) = (
-            (
-                max(floor(changed[k] * n / of) - REACH, 0),
-                min(ceil((changed[k] + changed[k + 2]) * n / of) + REACH, n),
-            )
+            (floor(changed[k] * n / of), ceil((changed[k] + changed[k + 2]) * n / of))
             for k, n, of in zip((0, 1), self.size, mask.size, strict=True)
         )
-        region = x, y, width, height = x, y, right - x, bottom - y
+        region = x, y, width, height = _grown((x, y, right - x, bottom - y), REACH, self.size)
         rows = self.device.field((width, height + 2 * REACH), 1, "frozen, along x", "f1")
         now = self.device.field((width, height), 1, "held now", "f1")
         along_x, along_y = (self.device.pass_("warp/hold.frag", **defines) for defines in ({"ALONG_X": 1}, {}))
         reach: dict[str, Any] = {"inner": float(INNER), "reach": float(REACH)}
         along_x(rows, frozen=mask, offset=(x, y - REACH), size=self.size, **reach)
         along_y(now, frozen=rows, offset=(0.0, REACH), size=rows.size, **reach)
-        new = (now.get() > 0) & (held.get(region) == 0)
-        blocks = [(x + left, y + top, across, down) for left, top, across, down in _blocks_of(new)]
+        values = now.get()
+        blocks = [(x + i, y + j, w, h) for i, j, w, h in _blocks_of((values > 0) & (held.get(region) < 128))]
         draw(kept, blocks, now, (x, y), held)
-        self.device.pass_("gl/copy.frag")(held, region=region, field=now, offset=(-x, -y))
+        left, top, *_ = around = _grown(region, 2 * FADED, self.size)
+        near = held.get(around)
+        near[near < 128] = 0
+        near[y - top :, x - left :][:height, :width] = values
+        x, y, width, height = region = _grown(region, FADED, self.size)
+        held.set(_faded(near)[y - top :, x - left :][:height, :width], region)
         rows.release()
         now.release()
 
@@ -68,7 +72,7 @@ class Frozen:
         """Draw the displacement again wherever it is held."""
         if self.held and self.kept:
             nothing = self.device.field((1, 1), 1, "nothing held", "f1")
-            draw(self.kept, _blocks_of(self.held.get() > 0), self.held, (0, 0), nothing)
+            draw(self.kept, _blocks_of(self.held.get() > 127), self.held, (0, 0), nothing)
             nothing.release()
 
     def widen(self, target: Field, window: tuple[float, float, float, float], extent: tuple[float, float]) -> None:
@@ -86,6 +90,10 @@ class Frozen:
         average(cells, frozen=self.held, origin=origin, cell=cell)
         self.device.pass_("step/widen_solid.frag")(target, frozen=cells)
         cells.release()
+
+    def inputs(self) -> dict[str, Any]:
+        """It as `lib/warp.glsl` has it; nothing if nothing was frozen."""
+        return {"held": self.held, "kept": self.kept} if self.held and self.kept else {}
 
     def save(self) -> dict[str, SavedTiles]:
         """What is held, by name; nothing if nothing was frozen. Whoever has it releases it."""
@@ -112,6 +120,31 @@ class Frozen:
             self.held = TiledField(self.device, self.size, 1, "held", "f1")
             self.kept = TiledField(self.device, self.size, 2, "kept")
         return self.held, self.kept
+
+
+def _grown(region: Region, by: int, size: tuple[int, int]) -> Region:
+    """A region with so many texels more on each side, within a size."""
+    (x, right), (y, bottom) = (
+        (max(region[k] - by, 0), min(region[k] + region[k + 2] + by, n)) for k, n in enumerate(size)
+    )
+    return x, y, right - x, bottom - y
+
+
+def _faded(held: np.ndarray) -> np.ndarray:
+    """What is held, with 127 less the texels to it, counted along both axes, where it is not; 0 beyond `FADED`."""
+    rows, columns = (np.flatnonzero(held.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return held
+    faded = held.copy()
+    box = tuple(slice(max(at[0] - FADED, 0), at[-1] + FADED + 1) for at in (rows, columns))
+    near = np.minimum(held[box], 127)
+    for along in (near, near.T):
+        for apart in (1, 2, 4, 8, 16):  # which add up to each distance up to `FADED`
+            less = np.maximum(along, apart) - apart
+            np.maximum(along[apart:], less[:-apart], out=along[apart:])
+            np.maximum(along[:-apart], less[apart:], out=along[:-apart])
+    faded[box] = np.maximum(held[box], near)
+    return faded
 
 
 def _blocks_of(wanted: np.ndarray) -> list[Region]:

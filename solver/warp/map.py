@@ -23,7 +23,7 @@ from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
 from solver.warp.state import FACTOR, SUBMAPS, MapState, grid_in, values_of
-from solver.warp.submap import Level, Submap, depth, inputs_of, window_of
+from solver.warp.submap import Level, Submap, defines_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
 MOST_PLACES = 2**19  # at which its distortion is looked at
@@ -62,13 +62,13 @@ class WarpMap:
         across, down = self.coarse_size
         self.size = size or (LEAST_TEXELS * across, LEAST_TEXELS * down)
         self._accumulated = AccumulatedMap(device, self.size, self.extent)
-        self._remapping = Remapping(device, self._accumulated)
         self._frozen = Frozen(device, self.size)
+        self._remapping = Remapping(device, self._accumulated, self._frozen)
         self.factors = Factors(device, Grid(across, down, self.extent))
         self._composed: dict[tuple[tuple[int, int], bool], Field] = {}
         self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last remap
-        self._is_settled = True  # the submap leads nowhere where the map is held
+        self._is_settled = True  # the submap began with what is held now
         self.version = 0
 
     @property
@@ -78,7 +78,7 @@ class WarpMap:
     @property
     def submap(self) -> Level:
         """What has moved since the last remap."""
-        return Level(self._submap.read, self.grid)
+        return Level(self._submap.read, self.grid, self._is_weighed)
 
     @property
     def held(self) -> Field | None:
@@ -119,7 +119,8 @@ class WarpMap:
         self._changed()
         self._remapping.advance(self.grid)
         # The look waits for the GPU, so not at every step; at fixed steps, so that a replay remaps at the same ones.
-        if self._steps >= self.remap_every or (self._steps % CHECK_EVERY == 0 and self._submap.is_steep):
+        looks = self._steps % CHECK_EVERY == 0
+        if self._steps >= self.remap_every or (looks and (not self._is_settled or self._submap.is_steep)):
             self._begin_remap()
 
     def advance_prescribed(self, velocity: Vector, dt: float, time: float = 0.0) -> None:
@@ -170,19 +171,23 @@ class WarpMap:
         """From now on, change nothing where a mask over the whole picture, of any size, is 1.
 
         Nor within three texels of the accumulated map around it: what is looked up on a frozen pixel is interpolated
-        from there. What the map is there is kept to the bit, however it came about. Within two cells the submap stands
-        still, so that what is around goes on from it without a step.
+        from there. What the map is there is kept to the bit, however it came about; what moves from now on does so
+        less and less over the last cell before it, so that what is around goes on from it without a step.
 
         Args:
             frozen: the mask; None holds nothing.
             changed: (x, y, width, height) in the mask's texels, outside of which it is as it was given before.
         """
+        if frozen is not None:
+            check_type("what is frozen", frozen, Field)
+        if self._frozen.held is not None and self._is_settled:
+            self._begin_remap()
+        self._is_settled = not self._steps
+        self._remapping.settle()
         if frozen is None:
             self._frozen.release()
         else:
-            check_type("what is frozen", frozen, Field)
             self._frozen.hold(frozen, changed or (0, 0, *frozen.size), self._keep)
-            self._is_settled &= not self._steps
         self._changed()
 
     def restore_under(
@@ -285,6 +290,7 @@ class WarpMap:
         for name, level in self._remapping.saved():
             fields[name] = level.field
             values |= {SUBMAPS[name]: values_of(level.grid), "remapping": self._remapping.progress}
+            values["weighed"] = self._remapping.is_weighed
         state = MapState.of(self.device, fields, **values)
         state.tiles.update(self._frozen.save())
         return state
@@ -309,8 +315,9 @@ class WarpMap:
         self._steps = int(state.values["steps"])
         self._is_settled = bool(state.values["settled"])
         self._frozen.restore(state.tiles)
+        is_weighed = bool(state.values.get("weighed", False))
         waiting = {
-            name: Level(state.fields[name], grid_in(state.values, place))
+            name: Level(state.fields[name], grid_in(state.values, place), name == "pending" and is_weighed)
             for name, place in SUBMAPS.items()
             if name != "submap" and name in state.fields
         }
@@ -381,7 +388,7 @@ class WarpMap:
 
     def determinants(self, points: np.ndarray) -> np.ndarray:
         """det J at points (n, 2) of the result, in longer sides, by the chain rule: float32 (n,)."""
-        shader, defines = "warp/distortion.frag", self._held_defines() | depth(self._levels)
+        shader, defines = "warp/distortion.frag", self._held_defines()
         return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())[:, 1]
 
     def draw(
@@ -418,22 +425,22 @@ class WarpMap:
             width, height = self.size
             apart = math.ceil(math.sqrt(width * height / MOST_PLACES))
             size = -(-width // apart), -(-height // apart)
-        return distortion(self.device, size, self._held_defines() | depth(self._levels), self._parts())
+        return distortion(self.device, size, self._held_defines(), self._parts())
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
     def _begin_remap(self) -> None:
         """Let what has moved stand by to be taken in, and begin with a submap of nothing."""
         if self._steps:
-            self.factors.take(self.submap)
-            self._remapping.give(self._submap)
+            self.factors.take(self.submap, self.held)
+            self._remapping.give(self._submap, self._is_weighed)
             self._steps = 0
             self._is_settled = True
 
     def _keep(self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field) -> None:
         """Draw the map where it is held now and was not before; see `Frozen`."""
         fine = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **depth(self._levels))
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **defines_of(self._levels))
         compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
 
     def _still_under(
@@ -460,18 +467,22 @@ class WarpMap:
         """All above the accumulated map."""
         return [self.submap, *self._remapping.levels]
 
+    @property
+    def _is_weighed(self) -> bool:
+        """Whether the submap is."""
+        return self._is_settled and self._frozen.held is not None
+
     def _defines(self) -> dict[str, object]:
         """How the whole map is put together."""
         fine: dict[str, object] = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        return fine | self._held_defines() | depth(self._levels)
+        return fine | self._held_defines()
 
     def _held_defines(self) -> dict[str, object]:
-        return {} if self._frozen.held is None else {"HELD": 1}
+        return defines_of(self._levels) | ({} if self._frozen.held is None else {"HELD": 1})
 
     def _parts(self) -> dict[str, Any]:
         """What `lib/warp.glsl` puts together."""
-        parts = self._accumulated.inputs() | inputs_of(self._levels)
-        return parts if self._frozen.held is None else parts | {"held": self._frozen.held, "kept": self._frozen.kept}
+        return self._accumulated.inputs() | inputs_of(self._levels, self._frozen.inputs())
 
     def _changed(self) -> None:
         self.version += 1

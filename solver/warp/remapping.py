@@ -10,7 +10,8 @@ import numpy as np
 from solver.gl.device import Device
 from solver.grid import Grid
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
-from solver.warp.submap import Level, Submap, depth, inputs_of, window_of
+from solver.warp.frozen import Frozen
+from solver.warp.submap import Level, Submap, defines_of, inputs_of, window_of
 
 REMAP_STEPS = 8  # steps over which a remap is spread, at least
 MOST_TILES = 8  # that are made anew in a step, unless something has to be out of the way: the work of one of the fluid
@@ -26,11 +27,13 @@ class Remapping:
     Args:
         device: the device.
         accumulated: the map that takes in.
+        frozen: where it is held.
     """
 
-    def __init__(self, device: Device, accumulated: AccumulatedMap) -> None:
+    def __init__(self, device: Device, accumulated: AccumulatedMap, frozen: Frozen) -> None:
         self.device = device
         self._accumulated = accumulated
+        self._frozen = frozen
         self._gathered: Level | None = None  # only while another is pending
         self._pending: Level | None = None
         self._tiles = 0  # that are made anew for it
@@ -54,16 +57,25 @@ class Remapping:
             self._done += self._whole // REMAP_STEPS if waits else REMAP_STEPS
             self._take_in(min(self._done / self._whole, 1.0))
 
-    def give(self, submap: Submap) -> None:
-        """Take over what a submap holds, which begins anew with nothing."""
+    def give(self, submap: Submap, is_weighed: bool) -> None:
+        """Take over what a submap holds, weighed or not, which begins anew with nothing."""
         if self._gathered is not None and self._gathered.grid != submap.grid:
             self.finish()
         elif self._tiles * (1 - self._done / self._whole) <= MOST_TILES:
             self._take_in(1.0)  # which is less work than to gather
         if self._pending is not None:
-            self._gather(submap)
-        elif self._stand_by(Level(submap.read, submap.grid)):
+            self._gather(submap, is_weighed)
+        elif self._stand_by(Level(submap.read, submap.grid, is_weighed)):
             submap.replace()
+
+    def settle(self) -> None:
+        """Let what is on its way go on with the weights that it has now, whatever is held from now on."""
+        if self._pending is not None and self.is_weighed:
+            coarse, fine = self._pending, self._resampled([self._pending])
+            coarse.field.release()
+            if not self._stand_by(fine, self._done):
+                fine.field.release()
+                self._go_on()
 
     def finish(self) -> None:
         """Let the accumulated map take in all of it at once."""
@@ -93,12 +105,17 @@ class Remapping:
         """How far the pending level is, for `restore`."""
         return self._done
 
+    @property
+    def is_weighed(self) -> bool:
+        """True if the pending level is."""
+        return self._pending is not None and self._pending.is_weighed
+
     def restore(self, saved: dict[str, Level], progress: int) -> None:
         """Go on with copies of what `saved` gave; the accumulated map is that of then."""
         self.drop()
         copies = {}
-        for name, (field, grid) in saved.items():
-            copies[name] = Level(self.device.field(field.size, 2, f"{name} submap"), grid)
+        for name, (field, grid, is_weighed) in saved.items():
+            copies[name] = Level(self.device.field(field.size, 2, f"{name} submap"), grid, is_weighed)
             copies[name].field.copy_from(field)
         self._gathered, pending = copies.get("gathered"), copies.get("pending")
         if pending is not None:
@@ -113,22 +130,32 @@ class Remapping:
         self._pending = moved if self._tiles else None
         return self._tiles > 0
 
-    def _gather(self, submap: Submap) -> None:
+    def _gather(self, submap: Submap, is_weighed: bool) -> None:
         """Let a submap go into what is to be taken in after what is pending."""
-        grid, (most, in_all) = submap.grid, MOST_GATHERED
+        before, level = self._gathered, Level(submap.read, submap.grid, is_weighed)
+        self._gathered = self._resampled([level, *([] if before is None else [before])])
+        submap.read.clear()
+        if before is not None:
+            before.field.release()
+
+    def _resampled(self, levels: list[Level]) -> Level:
+        """What levels of a grid add up to, of several texels a cell."""
+        grid, (most, in_all) = levels[0].grid, MOST_GATHERED
         times = max(LEAST_TEXELS, min(math.isqrt(in_all // (grid.nx * grid.ny)), most))
         field = self.device.field((times * grid.nx, times * grid.ny), 2, "gathered submap")
-        levels = [Level(submap.read, grid), *([] if self._gathered is None else [self._gathered])]
-        compose = self.device.pass_("warp/compose.frag", GATHER=1, **depth(levels))
+        compose = self.device.pass_("warp/compose.frag", GATHER=1, **defines_of(levels))
         left, top, width, height = window_of(grid)
         step = width / field.width, height / field.height
         origin = left / step[0], top / step[1]
         fractions = np.divide(step, grid.picture).tolist()
-        compose(field, **self._accumulated.inputs(), **inputs_of(levels), origin=origin, step=fractions)
-        submap.read.clear()
-        if self._gathered is not None:
-            self._gathered.field.release()
-        self._gathered = Level(field, grid)
+        compose(
+            field,
+            **self._accumulated.inputs(),
+            **inputs_of(levels, self._frozen.inputs()),
+            origin=origin,
+            step=fractions,
+        )
+        return Level(field, grid)
 
     def _take_in(self, part: float) -> None:
         """Come to a `part`, 0-1, of what the pending level wants."""
@@ -137,17 +164,21 @@ class Remapping:
         begun = self._begun / self._whole
         self._draw_anew([self._pending], (part - begun) / (1 - begun))
         if part >= 1:
-            gathered, self._gathered = self._gathered, None
-            self.drop()
-            if gathered is not None and not self._stand_by(gathered):
-                gathered.field.release()
+            self._pending.field.release()
+            self._go_on()
+
+    def _go_on(self) -> None:
+        """With what was gathered, now that nothing is pending any more."""
+        gathered, self._gathered, self._pending = self._gathered, None, None
+        if gathered is not None and not self._stand_by(gathered):
+            gathered.field.release()
 
     def _draw_anew(self, levels: list[Level], part: float) -> None:
         """Come to a `part` of the accumulated map's tiles that are planned for levels."""
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
         # Also where the map is held: places beside that may look into it, and once it is thawed it goes on from there.
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **depth(levels))
-        inputs = self._accumulated.inputs() | inputs_of(levels)
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **defines_of(levels))
+        inputs = self._accumulated.inputs() | inputs_of(levels, self._frozen.inputs())
         self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
 
     @property

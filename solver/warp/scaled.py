@@ -13,7 +13,7 @@ from solver.warp.map import WarpMap
 
 
 class ScaledMap:
-    """A part of what a warp map W does, or more than all of it: (S7) of solver/README.md; 0 and 1 are exact to the bit.
+    """A part of what a warp map W does, or more than all of it: (S8) of solver/README.md; 0 and 1 are exact to the bit.
 
     Args:
         warp: the map; what it looks like follows it.
@@ -99,7 +99,7 @@ class ScaledMap:
         if not warp.factors.is_one:
             for name, part in (("scaled", amount), ("unscaled", 1.0)):
                 targets = fields.get(name, target.size, 2), fields.get(f"{name}, too", target.size, 2)
-                bent[name] = warp.factors.draw(targets, part, warp.submap, origin, step, before)
+                bent[name] = warp.factors.draw(targets, part, warp.submap, warp.held, origin, step, before)
         defines = {"BENT": 1} if bent else {}
         if bent and warp.held is not None:
             bent |= {"held": warp.held, "origin": origin, "step": step}

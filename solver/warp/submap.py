@@ -68,10 +68,15 @@ class Submap(DoubleField):
 
 
 class Level(NamedTuple):
-    """A submap and the grid it moved on: with a texel, or a whole number both ways, for each of its cells."""
+    """A submap and the grid it moved on: with a texel, or a whole number both ways, for each of its cells.
+
+    Attributes:
+        is_weighed: it moves less and less before what is held; see `lib/warp.glsl`.
+    """
 
     field: Field
     grid: Grid
+    is_weighed: bool = False
 
 
 def window_of(grid: Grid) -> tuple[float, float, float, float]:
@@ -79,14 +84,16 @@ def window_of(grid: Grid) -> tuple[float, float, float, float]:
     return *grid.origin, *grid.extent
 
 
-def depth(levels: list[Level]) -> dict[str, object]:
-    """The define of `lib/warp.glsl` for so many levels."""
-    return {"LEVELS": len(levels)} if len(levels) > 1 else {}
+def defines_of(levels: list[Level]) -> dict[str, object]:
+    """The defines of `lib/warp.glsl` for levels, the uppermost first."""
+    weighed = sum(1 << k for k, level in enumerate(levels) if level.is_weighed)
+    counts = {"LEVELS": len(levels) if len(levels) > 1 else 0, "WEIGHED": weighed}
+    return {name: count for name, count in counts.items() if count}
 
 
-def inputs_of(levels: list[Level]) -> dict[str, Any]:
-    """Levels, the uppermost first, as `lib/warp.glsl` has them."""
-    parts: dict[str, Any] = {}
+def inputs_of(levels: list[Level], held: dict[str, Any]) -> dict[str, Any]:
+    """Levels, the uppermost first, and what is held as `lib/warp.glsl` has them."""
+    parts = dict(held)
     for (name, window), level in zip(NAMES, levels, strict=False):
         parts |= {name: level.field, window: window_of(level.grid)}
     return parts

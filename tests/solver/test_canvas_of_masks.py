@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from solver.brush.masks import FARTHEST_SOLID, LEAST_VISCOSITY, MOST, STEPS, ZERO, Masks
+from solver.brush.masks import LEAST_VISCOSITY, MOST, STEPS, ZERO, Masks
 from solver.brush.tip import Tip
 from solver.fluid import Fluid
 from solver.gl.device import Device
@@ -164,7 +164,7 @@ def test_cells_are_closed_by_their_distance_from_what_is_frozen(grid: Grid, devi
     for part in np.array_split(np.arange(len(middles)), 1 + len(middles) // 100):
         beyond = np.maximum(np.maximum(low - middles[part], middles[part] - low - texel), 0) / grid.spacing
         far[part] = np.sqrt((beyond**2).sum(axis=-1).min(axis=-1))
-    solid = min(0.5 + REACH * texel / min(grid.spacing), FARTHEST_SOLID)
+    solid = 0.5 + REACH * texel / min(grid.spacing)
     wanted = np.clip(solid + 1 - far, 0, 1).reshape(grid.ny, grid.nx)
     np.testing.assert_allclose(fluid.solid.get() / 255, wanted, atol=0.01)
     assert wanted.min() < 1

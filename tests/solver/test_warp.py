@@ -13,7 +13,7 @@ from solver.gl.tiled import TILE, TiledField
 from solver.grid import Grid
 from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
-from solver.warp.frozen import Frozen
+from solver.warp.frozen import FADED, Frozen
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 from solver.warp.remapping import MOST_TILES, REMAP_STEPS
@@ -404,7 +404,12 @@ def test_what_is_held_is_found_where_the_mask_has_changed(device: Device, texels
         assert frozen.held is not None
         assert frozen.kept is not None
         within, around = (np.asarray(ndimage.binary_dilation(fine, np.ones((n, n))), bool) for n in (3, 7))
-        np.testing.assert_array_equal(frozen.held.get(), np.where(within, 255, np.where(around, 170, 0)))
+        found, far = frozen.held.get(), np.full(around.shape, FADED + 1)
+        if around.any():
+            far = np.asarray(ndimage.distance_transform_cdt(~around, "taxicab"))
+        wanted_held, near = np.where(within, 255, np.where(around, 170, 127 - far)), far <= FADED
+        np.testing.assert_array_equal(found[near], wanted_held[near])
+        assert found[~near].max(initial=0) < 127 - FADED
         wanted[around & ~before] = warp.composed().get()[around & ~before]
         np.testing.assert_array_equal(frozen.kept.get()[around], wanted[around])
         before = around
