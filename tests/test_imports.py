@@ -24,7 +24,7 @@ ROOMS = {
     "app.progress": {"app.errors"},
     "app.model": {"app.errors", "app.progress", "solver.limits", "solver.components", "solver.grid"},
     "app.media": {"app.errors", "app.progress", "solver.grid", "app.model"},
-    "app.work": {"app.errors", "app.progress", "solver", "solver.grid", "app.model", "app.media"},
+    "app.work": {"app.errors", "app.progress", "solver", "solver.components", "solver.grid", "app.model", "app.media"},
     "app.ui": {"app.errors", "app.progress", "solver", "solver.grid", "app.model", "app.media", "app.work", "assets"},
     "app": {
         "app.errors",
