@@ -45,7 +45,7 @@ def test_files_of_late_are_newest_first_and_each_once(tmp_path: Path) -> None:
 
 def test_nothing_is_saved_among_the_shipped_recipes(tmp_path: Path) -> None:
     """One of them was opened: what is saved next goes to where the person was before."""
-    preferences = Preferences(None)
+    preferences = Preferences()
     preferences.opened(tmp_path / "own.png")
     for path in shipped_recipes().values():
         preferences.opened(path)
