@@ -119,8 +119,7 @@ class Factors:
 
     def release(self) -> None:
         """Free the textures."""
-        self.clear()
-        for thing in (self._open, self._scaling, self._find_largest):
+        for thing in (*self._closed, self._open, self._scaling, self._find_largest):
             thing.release()
 
     def _close(self, field: Field) -> None:

@@ -227,6 +227,7 @@ def test_all_of_the_warp_is_seen_while_a_brush_moves_it(robot: Robot, widgets: W
 def test_a_stroke_is_painted_with_symmetry_and_undone_as_one(
     robot: Robot, widgets: Widgets, tool: str, words: str
 ) -> None:
+    robot.see()
     session = robot.editor.session
     widgets.click("Symmetry")
     plain = robot.canvas()

@@ -179,7 +179,7 @@ def test_the_size_of_an_export_is_typed_as_it_is_shown(
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 202, f"{typed} pixels")
+    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, f"{typed} pixels")
     assert dialog.size == 120
     robot.close()
 
@@ -202,10 +202,10 @@ def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robo
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 202, "100")
+    type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, "100")
     assert dialog.size == 100
     assert not robot.editor.exports.is_running
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 325)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
     robot.key("end")
     robot.type("2")
     robot.frame(count=2)
@@ -255,7 +255,7 @@ def test_a_chord_in_a_field_counts_with_the_modifier_that_it_was_pressed_with(
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 325)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
     robot.key("end")
     for events in frames:
         robot.frame(*events)
@@ -382,7 +382,7 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
     assert isinstance(dialog, ExportDialog)
     top, heights = dialog.rect.y, set()
     for kind in (1, 2, 0, 1):
-        robot.click(dialog.rect.x + 100 + 150 * kind, top + 73)
+        robot.click(dialog.rect.x + 100 + 150 * kind, top + 109)
         robot.frame(count=5)
         assert dialog.kind == kind
         assert dialog.rect.y == top
@@ -488,7 +488,7 @@ def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 325)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
     robot.key("end")
     robot.type("2")
     robot.frame(count=2)
@@ -496,7 +496,7 @@ def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
     robot.key("escape")
     robot.frame(count=2)
     assert robot.editor.dialogs.shown == [dialog]
-    ctrl_click(robot, dialog.rect.x + 250, dialog.rect.y + 202)
+    ctrl_click(robot, dialog.rect.x + 250, dialog.rect.y + 238)
     robot.frame(count=2)
     robot.key("escape")
     robot.frame(count=2)

@@ -184,6 +184,7 @@ def test_escape_gives_up_the_drag_and_then_the_selection(robot: Robot) -> None:
 
 @pytest.mark.parametrize("by", ["rectangle", "ellipse", "lasso"])
 def test_dashes_are_seen_while_it_is_made_and_afterwards(robot: Robot, by: str) -> None:
+    robot.see()
     robot.editor.state.select_by = by
     robot.move(5, 5)
     before = robot.pixels().astype(int)

@@ -286,8 +286,8 @@ def test_keys_of_files_work_while_a_number_is_typed(desk: Desk, tmp_path: Path) 
 
 
 # Where in a window of 1280 x 800 the export dialog has its kinds, and how far down its formats.
-KINDS = {"picture": (489, 141), "animation": (639, 141), "map": (790, 141)}
-FORMATS = 177
+KINDS = {"picture": (489, 177), "animation": (639, 177), "map": (790, 177)}
+FORMATS = 213
 
 
 @pytest.mark.parametrize(
