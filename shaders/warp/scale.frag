@@ -1,20 +1,12 @@
 // Scale: a D + P - a Q, the part a of a displacement D whose factors, scaled by a, make P, and unscaled Q; all of them after
 // another displacement, if there is one. Texel for texel. Without BENT there is one factor and no other, and P = a Q.
-// Define HELD if something is held (u_held, over the picture): there P and Q are the other displacement, u_before, or 0.
 // u_displacement (D), u_scaled (P), u_unscaled (Q): longer sides; u_amount: a.
-// reads: 5
+// reads: 3
 uniform sampler2D u_displacement;
 uniform float u_amount;
 #ifdef BENT
 uniform sampler2D u_scaled;
 uniform sampler2D u_unscaled;
-#endif
-#ifdef HELD
-uniform sampler2D u_held;
-#include "lib/place.glsl"
-#endif
-#ifdef AFTER
-uniform sampler2D u_before;
 #endif
 in vec2 v_uv;
 layout(location = 0) out vec2 out_displacement;
@@ -23,15 +15,6 @@ void main() {
     out_displacement = u_amount * texture(u_displacement, v_uv).rg;
 #ifdef BENT
     vec2 scaled = texture(u_scaled, v_uv).rg, unscaled = texture(u_unscaled, v_uv).rg;
-#ifdef HELD
-    if (texture(u_held, fragment_place()).r > 0.5) {
-        scaled = vec2(0.0);
-#ifdef AFTER
-        scaled = texture(u_before, v_uv).rg;
-#endif
-        unscaled = scaled;
-    }
-#endif
     out_displacement += scaled - u_amount * unscaled;
 #endif
 }

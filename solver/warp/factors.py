@@ -76,17 +76,18 @@ class Factors:
         targets: tuple[Field, Field],
         amount: float,
         submap: Level,
-        held: Field | None,
         origin: tuple[float, float],
         step: tuple[float, float],
         moved: Field | None = None,
     ) -> Field:
         """Draw the product with every factor scaled at (fragment + origin) step, 0-1 of the picture, after `moved`.
 
+        The map must be held nowhere.
+
         Returns:
             The one of both targets that holds it.
         """
-        self._merge(self._open.write, submap, held)
+        self._merge(self._open.write, submap, None)
         target, other = targets
         for factor in (self._open.write, *reversed(self._closed)):
             inputs: dict[str, Any] = {"factor": factor, "amount": amount, "picture": self.picture}

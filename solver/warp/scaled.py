@@ -96,13 +96,10 @@ class ScaledMap:
             warp.draw(before, origin, step, exact)
             bent = {"scaled": before, "unscaled": before}
         warp.draw(whole, origin, step, exact, before)
-        if not warp.factors.is_one:
+        # Beside what is held the factors, of two texels a cell, are far from the map's own slopes.
+        if not warp.factors.is_one and warp.held is None:
             for name, part in (("scaled", amount), ("unscaled", 1.0)):
                 targets = fields.get(name, target.size, 2), fields.get(f"{name}, too", target.size, 2)
-                bent[name] = warp.factors.draw(targets, part, warp.submap, warp.held, origin, step, before)
-        defines = {"BENT": 1} if bent else {}
-        if bent and warp.held is not None:
-            bent |= {"held": warp.held, "origin": origin, "step": step}
-            bent |= {} if before is None else {"before": before}
-            defines |= {"HELD": 1} | ({} if before is None else {"AFTER": 1})
-        self.device.pass_("warp/scale.frag", **defines)(target, displacement=whole, amount=amount, **bent)
+                bent[name] = warp.factors.draw(targets, part, warp.submap, origin, step, before)
+        scale = self.device.pass_("warp/scale.frag", **({"BENT": 1} if bent else {}))
+        scale(target, displacement=whole, amount=amount, **bent)

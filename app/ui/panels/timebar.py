@@ -70,7 +70,7 @@ def _amount(ui: Ui, session: Session, state: EditorState, across: float) -> None
     with ui.enabled(session.recipe.mode == "coordinates"):
         slid = ui.slider(
             "amount", "Amount", session.recipe.amount, 0, 1.5, PERCENT, 1.0, width=across, title="Amount of the warp",
-            more="How much of it is seen and exported, whatever the time. Nothing folds on the way.",
+            more="How much of it is seen and exported, whatever the time.",
         )  # fmt: skip
         state.is_scaling = imgui.is_item_active() and not slid.done
     if slid.again:
