@@ -214,6 +214,12 @@ def test_what_was_once_an_accident(tmp_path: Path):
         assert SMALL_AND_HARMFUL[Path(name).stem][1] in sentence
 
 
+def test_samples_are_no_words() -> None:
+    """Lists of numbers count as one, or a project of six minutes would not open again."""
+    samples, pairs = "[100, 0.25, -0.5, 1.0], [101, 1e-3, 0.5, 1], ", toml.MOST_WORDS // 8
+    assert len(toml.parsed(f"samples = [{samples * pairs}]", "a.toml")["samples"]) == 2 * pairs
+
+
 def test_what_recipes_hold_is_looked_through_and_taken():
     """Every shipped recipe, and nesting, texts and dots up to what is allowed."""
     for path in [*ROOT.glob("assets/recipes/*.toml"), *ROOT.glob("assets/gallery/*.toml")]:
