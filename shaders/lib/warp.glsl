@@ -6,8 +6,8 @@
 // u_submap, u_second, u_third, u_accumulated: displacements, longer sides; u_window, u_second_window, u_third_window: left,
 // top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
 // bottom, longer sides.
-// Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps that are carried
-// less and less before that, 1, 2 and 4 or their sum: see weight.
+// Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
+// that are carried less and less before that, 1, 2 and 4 or their sum: see weight.
 #include "lib/displacement.glsl"
 uniform sampler2D u_submap;
 uniform sampler2D u_accumulated;

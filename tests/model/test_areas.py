@@ -12,24 +12,13 @@ from scipy import ndimage
 from app.errors import UserError
 from app.model.areas import Area, Part
 from app.model.mask_edits import FillMask, PictureMask, edited, with_edit
-from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.sampling import FINEST, Segment, SmallPictures, Window, connected, strips
 from solver.grid import Grid
+from support.pictures import OnePicture
 
 SIZE = 160, 120
 GRID = Grid(*SIZE)
-
-
-class OnePicture:
-    def __init__(self, pixels: np.ndarray) -> None:
-        self.picture = Picture(pixels)
-
-    def load(self, name: str) -> Picture:
-        return self.picture
-
-    def notice(self, text: str) -> None:
-        raise AssertionError(text)
 
 
 def textured(seed: int = 3, size: tuple[int, int] = SIZE) -> np.ndarray:

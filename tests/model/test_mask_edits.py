@@ -20,24 +20,13 @@ from app.model.mask_edits import (
     edited,
     remaining,
 )
-from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.sampling import Segment, SmallPictures, Window
 from solver.grid import Grid
+from support.pictures import OnePicture
 
 CANVAS = Grid.for_picture(60, 45, 60)
 KINDS: dict[MaskName, type] = {"frozen": np.uint8, "thickness": np.uint16}
-
-
-class OnePicture:
-    def __init__(self, pixels: np.ndarray) -> None:
-        self.picture = Picture(pixels)
-
-    def load(self, name: str) -> Picture:
-        return self.picture
-
-    def notice(self, text: str) -> None:
-        raise AssertionError(text)
 
 
 RED = np.zeros((45, 60, 3), np.uint8)

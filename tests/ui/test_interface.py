@@ -53,6 +53,17 @@ def ctrl_click(robot: Robot, x: float, y: float) -> None:
     robot.frame(Key("", False))
 
 
+def naming_an_export(robot: Robot) -> ExportDialog:
+    """The export dialog, opened, with the cursor at the end of the file's name."""
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
+    robot.key("end")
+    return dialog
+
+
 def type_into(robot: Robot, x: float, y: float, text: str) -> None:
     """Ctrl+click a slider, type, and take it by Enter."""
     ctrl_click(robot, x, y)
@@ -251,12 +262,7 @@ CTRL = Mods(ctrl=True)
 def test_a_chord_in_a_field_counts_with_the_modifier_that_it_was_pressed_with(
     robot: Robot, frames: list[list[Event]]
 ) -> None:
-    robot.key("ctrl+e")
-    robot.frame(count=3)
-    dialog = robot.editor.dialogs.shown[-1]
-    assert isinstance(dialog, ExportDialog)
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
-    robot.key("end")
+    dialog = naming_an_export(robot)
     for events in frames:
         robot.frame(*events)
     robot.type("new")
@@ -484,12 +490,7 @@ def test_messages_of_the_window_name_no_options_of_the_command_line(robot: Robot
 
 
 def test_escape_leaves_a_field_before_its_dialog(robot: Robot) -> None:
-    robot.key("ctrl+e")
-    robot.frame(count=3)
-    dialog = robot.editor.dialogs.shown[-1]
-    assert isinstance(dialog, ExportDialog)
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
-    robot.key("end")
+    dialog = naming_an_export(robot)
     robot.type("2")
     robot.frame(count=2)
     assert dialog.name.endswith("2")
