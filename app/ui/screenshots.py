@@ -31,13 +31,14 @@ class OffscreenEditor:
         device: where it is drawn.
         density: pixels a point.
         grid: of the simulation.
+        file: that is open in it, the sample picture if not given.
     """
 
-    def __init__(self, device: Device, density: float = 1.0, grid: int = 256) -> None:
+    def __init__(self, device: Device, density: float = 1.0, grid: int = 256, file: Path | None = None) -> None:
         self.density = density
         self.size = round(SIZE[0] * density), round(SIZE[1] * density)
         self.target = device.ctx.framebuffer([device.ctx.texture(self.size, 4)])
-        self.editor = Editor(device, load_any(sample()), Preferences(auto_quality=False))
+        self.editor = Editor(device, load_any(file or sample()), Preferences(auto_quality=False))
         self.editor.session.begin_with(grid=grid)
         self.frame()
         self.frame()

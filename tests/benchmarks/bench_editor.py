@@ -1,4 +1,4 @@
-"""What a frame of the editor costs while someone paints: python tests/benchmarks/bench_editor.py [--window]
+"""What a frame of the editor costs while someone paints: python tests/benchmarks/bench_editor.py [--window [--open FILE]]
 
 A Push stroke of 60 moves over the sample picture with the default preset, 1280 x 800, one tick a frame, without a
 window. First the frame as it is, waiting for the GPU at its end only; then its parts, waiting around each of them. J is
@@ -30,7 +30,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.ui.clock import Clock
-from app.ui.events import LEFT, Button, Move
+from app.ui.events import LEFT, Button, Move, Wheel
 from app.ui.screenshots import TICK, OffscreenEditor, line
 from solver import Device
 
@@ -60,9 +60,9 @@ class Waiting(Clock):
 
 def stroke(offscreen: OffscreenEditor, each: Callable[[Callable[[], None]], None]) -> None:
     """One stroke, each frame of it by `each`; then everything as before it."""
-    editor, path = offscreen.editor, line((0.45, 0.55), (0.65, 0.45), -0.03)
+    editor, path = offscreen.editor, line((450.0, 380.0), (650.0, 310.0), -20.0)
     for move in range(MOVES + 1):
-        events = [Move(*editor.view.to_screen(*path(move / MOVES))), *([Button(LEFT, True)] if move == 0 else [])]
+        events = [Move(*path(move / MOVES)), *([Button(LEFT, True)] if move == 0 else [])]
         each(lambda events=events: editor.frame(offscreen.target, offscreen.size, TICK, events, offscreen.density))
     offscreen.frame(Button(LEFT, False))
     editor.session.pause()
@@ -71,9 +71,13 @@ def stroke(offscreen: OffscreenEditor, each: Callable[[Callable[[], None]], None
         offscreen.frame()
 
 
-def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
+def frames(device: Device, cells: int, options: argparse.Namespace, table: Table) -> None:
     """The rows of one grid."""
-    offscreen = OffscreenEditor(device, grid=cells)
+    offscreen, rounds = OffscreenEditor(device, grid=cells, file=options.open), options.rounds
+    for key in options.keys:
+        offscreen.key(key)
+    for _ in range(options.zoom):
+        offscreen.frame(Move(550.0, 345.0), Wheel(0.0, 1.0))
     jacobi = Jacobi(device, offscreen.editor.session.replay.grid, pairs=1)
     walls: list[float] = []
     works: list[float] = []
@@ -143,16 +147,21 @@ def frames(device: Device, cells: int, rounds: int, table: Table) -> None:
 
 # The real window ------------------------------------------------------------------------------------------------------
 
-# Runs in the editor's process: tells when each frame was shown.
+# Runs in the editor's process: tells when each frame was shown, and the grid then.
 CHILD = """
 import sys, time, glfw
-real = glfw.swap_buffers
-def swap(window):
-    real(window)
-    print(f"{time.time():.6f}", flush=True)
-glfw.swap_buffers = swap
-sys.argv = ["fluidwarp", "edit"]
 from app.cli import main
+from app.ui.editor import Editor
+editors = []
+made, shown = Editor.__init__, glfw.swap_buffers
+def make(editor, *args, **more):
+    editors.append(editor)
+    made(editor, *args, **more)
+def swap(window):
+    shown(window)
+    print(f"{time.time():.6f} {editors[0].session.recipe.fluid.grid} {editors[0].session.replay.steps}", flush=True)
+Editor.__init__, glfw.swap_buffers = make, swap
+sys.argv = ["fluidwarp", "edit", *sys.argv[1:]]
 main()
 """
 
@@ -173,8 +182,8 @@ def processor_time(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def window(console: Console, rounds: int) -> None:
-    """The real window's figures."""
+def window(console: Console, rounds: int, file: Path | None, keys: list[str], zoom: int) -> None:
+    """The real window's figures; with a file, keys and turns of the wheel before painting, if any."""
     screen = subprocess.Popen(
         ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"],
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
@@ -190,7 +199,7 @@ def window(console: Console, rounds: int) -> None:
                 begun = time.time()
                 log = Path(folder) / "frames"
                 with log.open("w") as out:
-                    child = subprocess.Popen([sys.executable, "-c", CHILD], env=env, cwd=ROOT, stdout=out)
+                    child = subprocess.Popen([sys.executable, "-c", CHILD, *([str(file)] if file else [])], env=env, cwd=ROOT, stdout=out)
                 while not (shown := log.read_text().split()):
                     assert child.poll() is None, "the editor ended"
                     time.sleep(0.02)
@@ -203,19 +212,26 @@ def window(console: Console, rounds: int) -> None:
             before = processor_time(child.pid)
             time.sleep(REST)
             console.print(f"at rest: {(processor_time(child.pid) - before) / REST:.2%} of a core")
+            prepare = [word for key in keys for word in ("key", "--delay", "200", key, "sleep", "0.5")]
+            prepare += ["mousemove", "460", "300"]
+            prepare += [word for _ in range(zoom) for word in ("click", "4", "sleep", "0.3")]
+            subprocess.run(["xdotool", *prepare], env=env, check=True)
+            time.sleep(1)
             drag(env, 3.0)  # whatever has to be compiled
             time.sleep(3)
             start, used = time.time(), processor_time(child.pid)
             drag(env, 6.0)
             end = time.time()
-            times = [float(word) for word in log.read_text().split()]
+            lines = [line.split() for line in log.read_text().splitlines()]
+            times = [float(moment) for moment, _, _ in lines]
             times = [moment for moment in times if start + 0.3 < moment < end - 0.1]
             gaps = sorted((b - a) * 1e3 for a, b in pairwise(times))
+            steps = [int(count) for moment, _, count in lines if times[0] <= float(moment) <= times[-1]]
             used = (processor_time(child.pid) - used) / (end - start)
             console.print(
                 f"painting: {len(gaps) / (times[-1] - times[0]):.1f} frames a second; between two frames "
                 f"{statistics.median(gaps):.1f} ms, 95 of 100 within {gaps[int(0.95 * len(gaps))]:.1f} ms; "
-                f"{used:.0%} of a core"
+                f"{used:.0%} of a core; grid {lines[-1][1]}, {(steps[-1] - steps[0]) / len(gaps):.2f} steps a frame"
             )
             child.kill()
             child.wait()
@@ -230,17 +246,20 @@ def main() -> None:
     parser.add_argument("--grids", type=int, nargs="*", default=[192, 256])
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--window", action="store_true", help="the real window, under Xvfb")
+    parser.add_argument("--open", type=Path, help="a picture, recipe or project, instead of the sample picture")
+    parser.add_argument("--keys", nargs="*", default=[], help="pressed before painting, as xdotool calls them")
+    parser.add_argument("--zoom", type=int, default=0, help="turns of the wheel before painting")
     args = parser.parse_args()
-    console = Console(width=110)
+    console = Console(width=150)
     if args.window:
-        window(console, args.rounds)
+        window(console, args.rounds, args.open, args.keys, args.zoom)
         return
     with Device.headless() as device:
         table = Table(title=f"{device.limits.renderer}, {os.cpu_count()} cores")
         for head in ("grid", "part", "ms", "J", "share", ""):
             table.add_column(head, justify="right" if head in ("ms", "J", "share") else "left")
         for cells in args.grids:
-            frames(device, cells, args.rounds, table)
+            frames(device, cells, args, table)
         console.print(table)
 
 
