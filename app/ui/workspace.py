@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,32 @@ from solver.gl.device import Device
 OPENED_BUDGET = 2**30
 
 
+@dataclass
+class Work:
+    """Something that has been opened; without a canvas it is asleep, and has nothing on the GPU."""
+
+    session: Session
+    canvas: Canvas | None
+
+    def wake(self, device: Device) -> Canvas:
+        """What draws it; it is played again if it was asleep."""
+        if self.canvas is None:
+            self.canvas = Canvas(device, self.session.project.picture)
+            self.session.wake()
+        return self.canvas
+
+    def sleep(self) -> None:
+        """Keep only what makes it."""
+        if self.canvas is not None:
+            self.session.release_gpu()
+            self.canvas.release()
+            self.canvas = None
+
+
 class Workspace:
     """The works that have been opened one after another, as a history: Undo at the start of one is back in the last.
+
+    Only the one that is worked on and those beside it are on the GPU.
 
     Args:
         device: the GL of the window.
@@ -36,16 +61,16 @@ class Workspace:
         self.placeholder: Session | None = None
         self._device = device
         self._journals = journals
-        self._works: list[tuple[Session, Canvas]] = []
+        self._works: list[Work] = []
         self._index = -1
 
     @property
     def session(self) -> Session:
-        return self._works[self._index][0]
+        return self._works[self._index].session
 
     @property
     def canvas(self) -> Canvas:
-        return self._works[self._index][1]
+        return self._works[self._index].wake(self._device)
 
     @property
     def is_dirty(self) -> bool:
@@ -66,19 +91,16 @@ class Workspace:
             session.document.restore(found.work.history, found.work.saved)
         self._journals.open(session, found)
         for old in self._works[self._index + 1 :]:
-            self._close(*old)
+            self._close(old)
         kept = self._works[: self._index + 1]
-        replaced = kept.pop() if kept and kept[-1][0] is self.placeholder and not self.is_dirty else None
-        # Those further back keep what makes them, and replay it when they are wanted.
-        for old, _ in kept[:-1]:
-            old.replay.checkpoints.clear()
-        while len(kept) > 1 and sum(old.project.picture.pixels.nbytes for old, _ in kept) > OPENED_BUDGET:
-            self._close(*kept.pop(0))
+        replaced = kept.pop() if kept and kept[-1].session is self.placeholder and not self.is_dirty else None
+        while len(kept) > 1 and sum(old.session.project.picture.pixels.nbytes for old in kept) > OPENED_BUDGET:
+            self._close(kept.pop(0))
         self._leave()
-        self._works = [*kept, (session, canvas)]
+        self._works = [*kept, Work(session, canvas)]
         self._turn_to(len(self._works) - 1)
         if replaced is not None:
-            self._close(*replaced)
+            self._close(replaced)
 
     def undo(self) -> None:
         if self.session.document.history.can_undo:
@@ -113,7 +135,7 @@ class Workspace:
 
     def release(self) -> None:
         for work in self._works:
-            self._close(*work)
+            self._close(work)
 
     def _leave(self) -> None:
         if self._index >= 0:
@@ -123,9 +145,11 @@ class Workspace:
 
     def _turn_to(self, index: int) -> None:
         self._index = index
+        for place, work in enumerate(self._works):
+            if abs(place - index) > 1:
+                work.sleep()
         self.view = Viewport(self.view.canvas, self.canvas.size, self.view.density)
 
-    def _close(self, session: Session, canvas: Canvas) -> None:
-        self._journals.close(session)
-        session.release_gpu()
-        canvas.release()
+    def _close(self, work: Work) -> None:
+        self._journals.close(work.session)
+        work.sleep()

@@ -831,9 +831,17 @@ class Session:
         self.document.saved(project.path)
 
     def release_gpu(self) -> None:
-        """Free the textures."""
+        """Free the textures; what makes them is kept."""
         self.forget_grid()
         self.replay.release()
+
+    def wake(self) -> None:
+        """Go on after `release_gpu`: what was there is played again over the next frames."""
+        tick = self.replay.tick if self._target is None else self._target
+        self.replay = Replay(self.device, self._live, self.pictures, self.replay.checkpoints.budget)
+        self._send(tick)
+        self.is_rebuilding = self._target is not None
+        self.changes += 1
 
 
 def _ended(led: RecipeHandle | RecipePin, time: float) -> RecipeHandle | RecipePin:

@@ -1,0 +1,40 @@
+"""Which objects of OpenGL there are: what was made and never released shows."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+from collections import Counter
+from ctypes.util import find_library
+
+from solver.gl.device import Device
+
+KINDS = "Texture", "Framebuffer", "Buffer", "Query", "VertexArray", "Program", "Shader"
+UNUSED = 30_000  # names in a row that are nobody's: a driver may go on counting when some are free again
+
+
+def living(device: Device, *kinds: str) -> Counter[str]:
+    """How many objects of each kind live in the device's context, once what nobody holds any more is released.
+
+    Asked of the driver itself (`glIsTexture` and its like), name by name.
+
+    Args:
+        device: whose context is counted; it is made current.
+        kinds: of `KINDS`; all of them if none is given.
+    """
+    gc.collect()
+    device.collect()
+    return Counter({kind: _count(kind) for kind in kinds or KINDS})
+
+
+def _count(kind: str) -> int:
+    """How many names of this kind are an object's."""
+    library = ctypes.CDLL(find_library("EGL") or "libEGL.so.1")
+    library.eglGetProcAddress.restype = ctypes.c_void_p
+    is_one = ctypes.CFUNCTYPE(ctypes.c_ubyte, ctypes.c_uint)(library.eglGetProcAddress(f"glIs{kind}".encode()))
+    found = name = last = 0
+    while name < last + UNUSED:
+        name += 1
+        if is_one(name):
+            found, last = found + 1, name
+    return found

@@ -1,0 +1,46 @@
+"""Works that are opened one after another: what is not worked on has nothing on the GPU, and comes back as it was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from app.media.project import from_picture
+from app.media.pictures import write_picture
+from app.ui.files import fresh_recipe
+from solver.gl.device import Device
+from support.editing import Robot, pattern, small_project
+from support.gl_objects import living
+
+DRAWN_WITH = "Texture", "Framebuffer", "Buffer", "Query"
+
+
+def test_many_works_need_no_more_of_the_gpu_than_a_few(device: Device, tmp_path: Path) -> None:
+    """Undo goes back through all of them, to the bit, and closing leaves nothing behind."""
+    before = living(device, *DRAWN_WITH)
+    robot = Robot(device, small_project(tmp_path))
+    editor, warps, objects = robot.editor, [robot.warp()], []
+    for number in range(5):
+        name = tmp_path / f"{number}.png"
+        write_picture(name, pattern(200 + 20 * number, 180))
+        recipe = fresh_recipe()
+        recipe = recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": 48}))
+        editor.open(from_picture(name, recipe))
+        robot.frame()
+        robot.drag((0.3, 0.5), (0.6, 0.4), 4)
+        robot.rest()
+        warps.append(robot.warp())
+        objects.append(sum(living(device, *DRAWN_WITH).values()))
+    assert max(objects[1:]) < 1.2 * objects[1]
+    for warp in reversed(warps):
+        robot.rest()
+        assert np.array_equal(robot.warp(), warp)
+        editor.do("undo")  # the stroke
+        editor.do("undo")  # the work before it
+    editor.do("redo")
+    editor.do("redo")
+    robot.rest()
+    assert np.array_equal(robot.warp(), warps[1])
+    robot.close()
+    assert living(device, *DRAWN_WITH) == before
