@@ -1,4 +1,4 @@
-"""What a frame of the editor costs while someone paints: python tests/benchmarks/bench_editor.py [--window [--open FILE]]
+"""What a frame of the editor costs while someone paints: python tests/benchmarks/bench_editor.py [--window]
 
 A Push stroke of 60 moves over the sample picture with the default preset, 1280 x 800, one tick a frame, without a
 window. First the frame as it is, waiting for the GPU at its end only; then its parts, waiting around each of them. J is
@@ -194,12 +194,13 @@ def window(console: Console, rounds: int, file: Path | None, keys: list[str], zo
         with tempfile.TemporaryDirectory() as folder:
             env = {**os.environ, "DISPLAY": display, "XDG_CONFIG_HOME": folder, "HOME": folder}
             env.pop("WAYLAND_DISPLAY", None)
+            command = [sys.executable, "-c", CHILD, *([str(file.resolve())] if file else [])]
             starts = []
             for number in range(rounds):
                 begun = time.time()
                 log = Path(folder) / "frames"
                 with log.open("w") as out:
-                    child = subprocess.Popen([sys.executable, "-c", CHILD, *([str(file)] if file else [])], env=env, cwd=ROOT, stdout=out)
+                    child = subprocess.Popen(command, env=env, cwd=ROOT, stdout=out)
                 while not (shown := log.read_text().split()):
                     assert child.poll() is None, "the editor ended"
                     time.sleep(0.02)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.media.project import from_picture
 from app.media.pictures import write_picture
+from app.media.project import from_picture
 from app.ui.files import fresh_recipe
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
