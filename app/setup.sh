@@ -35,10 +35,11 @@ need_environment() {
         "$python" -c 'import ensurepip' 2>/dev/null || need_packages python3-venv
         "$python" -m venv "$root/.venv" >&2 || { say "could not make the virtual environment $root/.venv"; exit 1; }
     fi
-    wanted="$1 $(cksum < "$root/pyproject.toml")"
+    wanted="$1 $(cat "$root/pyproject.toml" "$root/app/constraints.txt" | cksum)"
     if [ "$(cat "$root/.venv/fluidwarp-$1" 2>/dev/null)" != "$wanted" ]; then
         say "installing Python packages into $root/.venv"
-        "$root/.venv/bin/pip" install -q --disable-pip-version-check -e "$root${1:+[$1]}" >&2
+        "$root/.venv/bin/pip" install -q --disable-pip-version-check -c "$root/app/constraints.txt" \
+            -e "$root${1:+[$1]}" >&2
         printf '%s' "$wanted" > "$root/.venv/fluidwarp-$1"
     fi
 }

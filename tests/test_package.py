@@ -6,12 +6,15 @@ import os
 import subprocess
 import sys
 import tarfile
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from PIL import Image
 
 ROOT = Path(__file__).parent.parent
@@ -37,6 +40,23 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
             target.write_bytes((ROOT / name).read_bytes())
     run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, folder / "source", cwd=folder)
     return folder
+
+
+def test_every_dependency_has_the_version_that_was_tested():
+    """`app/constraints.txt` names one for each that the project asks for, and no older one than it admits."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    asked = [
+        Requirement(line)
+        for line in [*project["dependencies"], *extras["test"], *extras["cluster"], *extras["subject"]]
+    ]
+    lines = [line for line in (ROOT / "app" / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
+    tested = {canonicalize_name(name): version for name, version in (line.split("==") for line in lines)}
+    missing = [wanted.name for wanted in asked if canonicalize_name(wanted.name) not in tested]
+    assert missing == ["setuptools"]  # pip freeze leaves it out
+    for wanted in asked:
+        if wanted.name not in missing:
+            assert tested[canonicalize_name(wanted.name)] in wanted.specifier, wanted
 
 
 def test_the_wheel_holds_the_program_and_no_tests(built: Path):
