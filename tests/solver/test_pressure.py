@@ -274,6 +274,16 @@ def test_a_source_makes_its_divergence_less_the_mean(device: Device) -> None:
     assert np.linalg.norm(result - exact) <= 1e-3 * np.linalg.norm(exact)
 
 
+@pytest.mark.parametrize("seed", [7000286, 7000496, 7000804])
+def test_more_cycles_than_float32_holds_leave_no_more(device: Device, seed: int) -> None:
+    """Among hundreds of enclosed regions what is rounded off has no pressure: going on after that must not add to it."""
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(8, 80)), int(rng.integers(8, 80))
+    solid = rng.random(size[::-1]) < rng.uniform(0.05, 0.6)
+    velocity = closed(rng.standard_normal((*size[::-1], 2)).astype(np.float32), solid)
+    assert left_over(device, velocity, solid, 40) <= 1e-5
+
+
 def test_the_pressure_is_what_was_subtracted(device: Device) -> None:
     size = (61, 40)
     pressure, field = Projection(device, size), device.double_field(size, 2)
