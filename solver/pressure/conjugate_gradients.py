@@ -16,7 +16,7 @@ MOST_ITERATIONS = 40
 
 # Times the smallest residual, in squares, that the next may be. Among many enclosed regions what is rounded off to
 # float32 does not sum to zero in each; no pressure accounts for it, and once it is all that is left the residual grows
-# without end (Kaasschieter, J. Comput. Appl. Math. 24, 1988). In a solve that goes well it may be ten times as large again.
+# without end (Kaasschieter, J. Comput. Appl. Math. 24, 1988). In a solve that goes well its norm may grow tenfold.
 GROWTH = 100.0
 
 

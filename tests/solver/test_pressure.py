@@ -276,7 +276,7 @@ def test_a_source_makes_its_divergence_less_the_mean(device: Device) -> None:
 
 @pytest.mark.parametrize("seed", [7000286, 7000496, 7000804])
 def test_more_cycles_than_float32_holds_leave_no_more(device: Device, seed: int) -> None:
-    """Among hundreds of enclosed regions what is rounded off has no pressure: going on after that must not add to it."""
+    """Among hundreds of enclosed regions what is rounded off has no pressure: going on after that adds nothing."""
     rng = np.random.default_rng(seed)
     size = int(rng.integers(8, 80)), int(rng.integers(8, 80))
     solid = rng.random(size[::-1]) < rng.uniform(0.05, 0.6)
