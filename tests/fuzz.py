@@ -45,6 +45,7 @@ MOST_MEMORY = 2**30  # bytes beyond what a reader's process has before its first
 PICTURES = ".png", ".jpg", ".webp", ".avif", ".tif", ".exr", ".gif", ".bmp", ".tga", ".ppm"
 CLIPS = ".mp4", ".webm", ".apng"
 SIZE = 24, 20
+MOST_PIXELS = 2**24  # that a picture may have here; what a person admits is another matter
 RECIPE = """version = 1
 picture = "cat.png"
 duration = 0.06
@@ -131,12 +132,15 @@ def read_journal(path: Path) -> None:
 
 Maker = Callable[[Path], None]
 READERS: dict[str, tuple[Maker, Callable[[Path], object]]] = {
-    **{f"picture{ending}": (make_picture, open_source) for ending in PICTURES},
-    **{f"clip{ending}": (make_clip, open_source) for ending in CLIPS},
-    **{f"map{ending}": (make_map, read_map) for ending in (".exr", ".tif", ".flo", ".npy")},
+    **{f"picture{ending}": (make_picture, lambda path: open_source(path, MOST_PIXELS)) for ending in PICTURES},
+    **{f"clip{ending}": (make_clip, lambda path: open_source(path, MOST_PIXELS)) for ending in CLIPS},
+    **{
+        f"map{ending}": (make_map, lambda path: read_map(path, max_pixels=MOST_PIXELS))
+        for ending in (".exr", ".tif", ".flo", ".npy")
+    },
     **{f"pairs{ending}": (make_pairs, lambda path: read_pairs([path], SIZE)) for ending in (".csv", ".tps")},
     "recipe.toml": (make_recipe, read_recipe),
-    "project.fluidwarp": (make_project, load),
+    "project.fluidwarp": (make_project, lambda path: load(path, MOST_PIXELS)),
     "journal.txt": (make_journal, read_journal),
 }
 

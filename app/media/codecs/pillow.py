@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import UserError
 from app.media.codecs.cmyk import INK, cmyk_to_rgb
 from app.media.codecs.metadata import ORIENTATION, sized_exif, upright, upright_dpi, upright_exif, upright_xmp
 from app.media.inputs import check_size
@@ -30,11 +32,18 @@ def opened(name: str, file: Path, max_pixels: int) -> Iterator[Any]:
     """Pillow's image of a file that is of its kind `name`, not decoded yet."""
     from PIL import Image, PngImagePlugin
 
-    Image.MAX_IMAGE_PIXELS = None  # its limit cannot be raised for one file; ours is in check_size
+    # Only frames after the first meet its limit, of twice this; ours is in check_size.
+    Image.MAX_IMAGE_PIXELS = max(max_pixels // 2, 1)
+    warnings.simplefilter("ignore", Image.DecompressionBombWarning)
     PngImagePlugin.MAX_TEXT_CHUNK = MOST_TEXT  # 1 MiB of its own is less than some profiles have
     with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
         check_size(file, *image.size, max_pixels)
-        yield image
+        try:
+            yield image
+        except Image.DecompressionBombError:
+            raise UserError(
+                f"Cannot read {file}: a frame of it has more than the limit of {max_pixels} pixels; get it again."
+            ) from None
 
 
 def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | None = None) -> Picture:
