@@ -596,3 +596,15 @@ def test_a_still_takes_no_more_of_an_animation_than_its_first_frame(tmp_path: Pa
     assert open_source(tmp_path / "a.gif", animated=False).picture.width == 64
     with pytest.raises(UserError, match="truncated or damaged"):
         open_source(tmp_path / "a.gif")
+
+
+def test_a_later_frame_of_a_gif_has_the_limit_of_pixels_too(tmp_path: Path) -> None:
+    """Of some 2 gigapixels, said by a file of some hundred bytes: it would be refused after 90 s and 8 GB."""
+    frames = [Image.new("P", (24, 20), colour) for colour in (0, 1)]
+    frames[0].save(tmp_path / "a.gif", save_all=True, append_images=frames[1:])
+    data = bytearray((tmp_path / "a.gif").read_bytes())
+    frame = data.rindex(b"\x2c\x00\x00\x00\x00")  # its descriptor: left, top, width, height
+    data[frame + 5 : frame + 9] = b"\xff\xff\xff\x7f"
+    (tmp_path / "a.gif").write_bytes(data)
+    with pytest.raises(UserError, match="a frame of it has more than the limit of"):
+        open_source(tmp_path / "a.gif")
