@@ -600,7 +600,7 @@ def test_a_still_takes_no_more_of_an_animation_than_its_first_frame(tmp_path: Pa
 
 def test_a_later_frame_of_a_gif_has_the_limit_of_pixels_too(tmp_path: Path) -> None:
     """Of some 2 gigapixels, said by a file of some hundred bytes: it would be refused after 90 s and 8 GB."""
-    frames = [Image.new("P", (24, 20), colour) for colour in (0, 1)]
+    frames = [Image.fromarray(np.full((20, 24), value, np.uint8)) for value in (0, 255)]
     frames[0].save(tmp_path / "a.gif", save_all=True, append_images=frames[1:])
     data = bytearray((tmp_path / "a.gif").read_bytes())
     frame = data.rindex(b"\x2c\x00\x00\x00\x00")  # its descriptor: left, top, width, height
