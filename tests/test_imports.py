@@ -1,4 +1,4 @@
-"""Imports run one way, room by room, without a circle among modules; a plain import loads no more than it says."""
+"""Imports run one way, without a circle, and load no more than they say; tests use nothing private."""
 
 from __future__ import annotations
 
@@ -181,6 +181,52 @@ def test_only_the_window_is_imported_by_name():
             for node in ast.parse(path.read_text("utf-8")).body:
                 if isinstance(node, ast.ImportFrom):
                     assert not (node.module or "").startswith("app.ui"), f"{name} imports {node.module}"
+
+
+def private(path: Path) -> Iterator[str]:
+    """What a source file uses that is private to others: attributes, imports, and names that it hands to setattr."""
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        match node:
+            case ast.Attribute(value=ast.Name("self" | "cls")):
+                names = []
+            case ast.Attribute(attr=name):
+                names = [name]
+            case ast.ImportFrom(names=aliases):
+                names = [alias.name for alias in aliases]
+            case ast.Call(func=ast.Name(of) | ast.Attribute(attr=of), args=[_, ast.Constant(str(name)), *_]):
+                names = [name.rpartition(".")[2]] if of in ("getattr", "setattr", "delattr", "hasattr") else []
+            case ast.Call(func=ast.Attribute(attr="setattr"), args=[ast.Constant(str(name)), *_]):
+                names = [name.rpartition(".")[2]]
+            case _:
+                names = []
+        yield from (
+            f"{name}, line {node.lineno}" for name in names if name.startswith("_") and not name.startswith("__")
+        )
+
+
+PRIVATE = """
+import os
+from some import _hidden
+class Own:
+    def __init__(self, other): self._mine = other.__class__
+def uses(thing, monkeypatch):
+    thing._part.read()
+    getattr(thing, "_word")
+    monkeypatch.setattr(thing, "_word", 1)
+    monkeypatch.setattr("some.module._word", 1)
+"""
+
+
+def test_no_test_uses_what_is_private_to_others(tmp_path: Path):
+    (tmp_path / "some.py").write_text(PRIVATE)
+    assert sorted(private(tmp_path / "some.py")) == [
+        "_hidden, line 3",
+        "_part, line 7",
+        "_word, line 10",
+        "_word, line 8",
+        "_word, line 9",
+    ]
+    assert {path.name: found for path in (ROOT / "tests").rglob("*.py") if (found := [*private(path)])} == {}
 
 
 def loaded_by(code: str) -> set[str]:
