@@ -8,10 +8,12 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer.main
 from PIL import Image
 
 from app import cli, doctor
@@ -525,3 +527,20 @@ def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: R
         "fluidwarp: x.tif cannot tell the primaries (chromaticities) of the picture, and is read as BT.709\n"
     )
     assert fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.exr").stderr == ""
+
+
+def options() -> Iterator[str]:
+    """Each command, and for each of its words how it is called, what it takes, and what it is where it is left out."""
+    for name, command in typer.main.get_command(cli.cli).commands.items():  # pyright: ignore[reportAttributeAccessIssue]
+        yield f"{name}:"
+        for word in command.params:
+            takes = word.type.name + "".join(
+                f" {end} {bound}" for end in ("min", "max") if (bound := getattr(word.type, end, None)) is not None
+            )
+            many = ", several" if word.nargs != 1 else ""
+            yield f"  {' '.join((*word.opts, *word.secondary_opts))}: {takes}{many}; {word.default}"
+
+
+def test_every_word_of_the_command_line_takes_what_it_did():
+    """Other programs call it: what changes here is told in the changelog."""
+    assert [*options()] == (ROOT / "tests/golden/commands.txt").read_text("utf-8").splitlines()

@@ -22,7 +22,8 @@ from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from app.work.export import run
 from solver.gl.device import Device
-from support.editing import Robot, command_line, export_dialog, small_project
+from support.commands import Run
+from support.editing import Robot, export_dialog, small_project
 from support.widgets import Widgets
 
 
@@ -268,7 +269,7 @@ def dialog(robot: Robot) -> ExportDialog:
 
 
 def test_a_part_of_the_warp_is_exported_as_the_command_line_writes_it(
-    robot: Robot, widgets: Widgets, tmp_path: Path
+    robot: Robot, widgets: Widgets, tmp_path: Path, fluidwarp: Run
 ) -> None:
     robot.key("t")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=30)
@@ -278,7 +279,7 @@ def test_a_part_of_the_warp_is_exported_as_the_command_line_writes_it(
     dialog.name = "window"
     run(robot.device, dialog.job(), Progress())
     projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "work.fluidwarp")
-    command_line("render", str(tmp_path / "work.fluidwarp"), "-o", str(tmp_path / "line.png"))
+    assert fluidwarp(tmp_path, "render", "work.fluidwarp", "-o", "line.png").returncode == 0
     assert (tmp_path / "window.png").read_bytes() == (tmp_path / "line.png").read_bytes()
 
 
