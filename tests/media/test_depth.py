@@ -9,9 +9,9 @@ from app.media.depth import as_half, over, to_bits
 
 
 def test_of_floats_each_depth_is_the_nearest_and_alpha_is_not_curved() -> None:
-    light = np.array([[(0.2140411, 0.5, 4.0, 0.5), (0.0031308, np.nan, -1.0, 2.0)]], np.float32)
+    light = np.array([[(0.2, 0.5, 4.0, 0.5), (0.0031308, np.nan, -1.0, 2.0)]], np.float32)
     half, black = 0.7353570, 12.92 * 0.0031308
-    wanted = np.array([[(0.5, half, 1, 0.5), (black, 0, 0, 1)]])
+    wanted = np.array([[(0.4845292, half, 1, 0.5), (black, 0, 0, 1)]])
     assert np.array_equal(to_bits(light, 16), np.floor(wanted * 65535 + 0.5))
     assert np.array_equal(to_bits(light, 8, dither=False), np.floor(wanted * 255 + 0.5))
     back = to_bits(np.array([[(128, 51)]], np.uint8), 32)

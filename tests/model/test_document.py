@@ -19,8 +19,8 @@ def document(**how: object) -> Document:
 def test_what_is_edited_is_to_be_saved_until_it_is_or_is_undone(tmp_path: Path) -> None:
     work = document()
     assert not work.is_dirty
-    work.edit("Name", name="a")
-    assert (work.is_dirty, work.recipe.name, work.saved_recipe.name) == (True, "a", "")
+    work.edit("Amount", amount=0.5)
+    assert (work.is_dirty, work.recipe.amount, work.saved_recipe.amount) == (True, 0.5, 1.0)
     work.history.undo()
     assert not work.is_dirty
     work.history.redo()
@@ -33,18 +33,18 @@ def test_what_is_edited_is_to_be_saved_until_it_is_or_is_undone(tmp_path: Path) 
 
 def test_another_grid_is_nothing_to_save_and_nothing_to_undo() -> None:
     work = document()
-    work.edit("Name", name="a")
+    work.edit("Amount", amount=0.5)
     for is_dirty in (True, False):
         if not is_dirty:
             work.history.undo()
         work.simulate_on(64)
         assert (work.is_dirty, work.saved_recipe.fluid.grid, work.recipe.fluid.grid) == (is_dirty, 64, 64)
-    assert [entry.name for entry in work.history.entries] == ["Open", "Name"]
+    assert [entry.name for entry in work.history.entries] == ["Open", "Amount"]
 
 
 def test_to_begin_with_another_recipe_forgets_what_was() -> None:
     work = document(budget=10_000)
-    work.edit("Name", name="a")
+    work.edit("Amount", amount=0.5)
     work.begin_with(Recipe(name="b"))
     assert (work.recipe.name, work.is_dirty, work.history.can_undo, work.history.budget) == ("b", False, False, 10_000)
 

@@ -333,7 +333,7 @@ def test_a_field_of_floats_is_itself_and_acts_where_it_is_opaque() -> None:
     found = at_centres(force(kind="field", picture="f.png").faces(WIDE, OnePicture(codes)))
     np.testing.assert_allclose(found[32, 48], [0.2, -0.2], rtol=1e-6)
     with pytest.raises(ValueError, match="not finite"):
-        force(kind="field", picture="f.exr").faces(WIDE, OnePicture(light * np.float32(np.inf)))
+        force(kind="field", picture="f.exr").faces(WIDE, OnePicture(np.full_like(light, np.inf)))
 
 
 @pytest.mark.parametrize("falloff", ["smooth", "gaussian"])
@@ -348,7 +348,7 @@ def test_a_curve_s_push_across_it_is_the_profile(falloff: str, pictures: Picture
 
 def test_a_source_smaller_than_a_cell_still_makes_room(pictures: Pictures) -> None:
     tiny = force(kind="source", point=[0.503, 0.503], radius=0.001, room="everywhere").divergence(WIDE, pictures)
-    assert tiny.max() > 0.9
+    assert tiny.max() > 0.85
     as_wide = force(kind="source", point=[0.503, 0.503], radius=2 * WIDE.h, room="everywhere")
     np.testing.assert_array_equal(tiny, as_wide.divergence(WIDE, pictures))
 

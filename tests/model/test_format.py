@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -16,19 +17,28 @@ from pydantic_core import PydanticUndefined
 from app.model.recipe import Recipe
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "recipe.txt"
+BOUNDS = {"gt": "above", "ge": "from", "lt": "below", "le": "to", "min_length": "of at least"}
+
+
+def bounds_of(field: FieldInfo) -> list[str]:
+    found = ((word, getattr(item, name, None)) for item in field.metadata for name, word in BOUNDS.items())
+    return [f"{word} {bound}" for word, bound in found if bound is not None]
 
 
 def told(annotation: Any) -> str:
     """A type with its bounds, in words; of tables, their names."""
-    if isinstance(annotation, type):
-        return annotation.__name__
-    if get_origin(annotation) is Literal:
-        return " or ".join(map(repr, get_args(annotation)))
-    parts = [told(part) for part in get_args(annotation) if not isinstance(part, FieldInfo)]
-    bounds = [repr(item) for part in get_args(annotation) if isinstance(part, FieldInfo) for item in part.metadata]
-    name = getattr(get_origin(annotation), "__name__", "")
-    inside = " or ".join(parts) if "Union" in name else f"{name}[{', '.join(parts)}]" if name == "tuple" else parts[0]
-    return f"{inside} {' '.join(bounds)}".strip() if parts else str(annotation)
+    origin, given = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return " or ".join(map(repr, given))
+    bounds = [bound for part in given if isinstance(part, FieldInfo) for bound in bounds_of(part)]
+    parts = [told(part) for part in given if not isinstance(part, FieldInfo)]
+    if origin is Annotated:
+        return " ".join([parts[0], *bounds])
+    if origin is tuple:
+        return f"tuple[{', '.join(parts)}]"
+    if origin in (Union, UnionType):
+        return " or ".join(parts)
+    return "..." if annotation is ... else getattr(annotation, "__name__", type(annotation).__name__)
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -44,8 +54,7 @@ def lines() -> Iterator[str]:
         yield f"{model.__name__}:"
         for name, field in model.model_fields.items():
             default = "needed" if field.default is PydanticUndefined else repr(field.default)
-            bounds = " ".join(map(repr, field.metadata))
-            yield f"  {name}: {told(field.annotation)} {bounds}".rstrip() + f"; {default}"
+            yield f"  {name}: {' '.join([told(field.annotation), *bounds_of(field)])}; {default}"
             waiting += [each for each in models_in(field.annotation) if each not in waiting]
 
 

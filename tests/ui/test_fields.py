@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, replace
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -405,3 +406,45 @@ def test_the_next_export_begins_with_the_kind_of_the_last(robot: Robot, tmp_path
     assert (dialog.kind, dialog.ending) == (ANIMATION, ".webm")
     preferences.export_as = "Something of another version"
     assert ExportDialog(editor.session, editor.exports, editor.chooser, preferences).kind == PICTURE
+
+
+SLIDERS = """
+"""
+
+
+def test_every_slider_goes_as_far_as_it_did_and_back_to_its_default(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, slider, told = list[str](), Ui.slider, signature(Ui.slider)
+
+    def noting(*given: Any, **named: Any) -> Any:
+        bound = told.bind(*given, **named)
+        bound.apply_defaults()
+        _, name, label, _, low, high, unit, default, _, logarithmic, *_ = bound.arguments.values()
+        ends = f"{unit.text(low)} to {unit.text(high)}{' by ratios' if logarithmic else ''}"
+        line = f"{name}, {label}: {ends}{'' if default is None else f', {unit.text(default)}'}"
+        found.extend([] if line in found else [line])
+        return slider(*given, **named)
+
+    monkeypatch.setattr(Ui, "slider", noting)
+    state = robot.editor.state
+    state.sections = dict.fromkeys(("handles", "selection", "fluid", "symmetry", "view", "masks"), True)
+    state.symmetry = "radial"
+    for overlay in state.overlays.values():
+        overlay.shown = True
+    robot.key("g")
+    robot.drag((0.4, 0.5), (0.45, 0.5), steps=2)
+    robot.rest()
+    for key in ("p", "v", "m"):
+        robot.key(key)
+        robot.frame(count=2)
+    state.select_by = "colour"
+    robot.frame(count=2)
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog)
+    for preset in PRESETS:
+        dialog.take(preset)
+        robot.frame(count=2)
+    assert found == SLIDERS.strip().splitlines()
