@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
+import os
 import sys
+
+# The tests' processes keep the cores busy: threads of linear algebra would only wait for one another, at full speed.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is loaded
+# Or each of the processes that are started, a hundred or more, would compile all modules anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+import subprocess
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
