@@ -14,16 +14,21 @@ sys.dont_write_bytecode = False
 import subprocess
 import warnings
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import moderngl
 import pytest
+import typer.main
 
 import solver.gl.passes
 from app import cli
 from solver.gl.device import Device
 from support.commands import Run
 from support.khronos import Programs
+
+COMMAND = cache(typer.main.get_command)
+"""Typer reads all annotations anew for each command line, which is most of what a wrong one costs."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -74,6 +79,7 @@ def fluidwarp(device: Device, monkeypatch: pytest.MonkeyPatch, capfd: pytest.Cap
     """`fluidwarp(folder, *words)` is the command line in that folder, without the start of a process and of GL."""
     monkeypatch.setattr(Device, "headless", classmethod(lambda kind: device))
     monkeypatch.setattr(device, "release", lambda: None)
+    monkeypatch.setattr(typer.main, "get_command", COMMAND)
 
     def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         status = 0
