@@ -30,8 +30,8 @@ def test_noise_before_eight_bits_keeps_the_mean_and_is_the_same_each_time() -> N
 
 
 def test_laid_over_a_colour_alpha_mixes_the_values() -> None:
-    found = over(np.array([[(200, 100, 0, 51), (200, 100, 0, 0), (200, 100, 0, 255)]], np.uint8), (10, 20, 30))
-    assert found.tolist() == [[[48, 36, 24], [10, 20, 30], [200, 100, 0]]]
+    found = over(np.array([[(203, 100, 0, 51), (200, 100, 0, 0), (200, 100, 0, 255)]], np.uint8), (10, 20, 30))
+    assert found.tolist() == [[[49, 36, 24], [10, 20, 30], [200, 100, 0]]]
     assert over(np.array([[(200, 51)]], np.uint8), (10, 20, 30)).tolist() == [[[56]]]
 
 
