@@ -25,6 +25,7 @@ import solver.gl.passes
 from app import cli
 from solver.gl.device import Device
 from support.commands import Run
+from support.desk import Desk
 from support.khronos import Programs
 
 COMMAND = cache(typer.main.get_command)
@@ -32,8 +33,14 @@ COMMAND = cache(typer.main.get_command)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What waits for a window comes first, so that no process is left alone with it in the end."""
-    items.sort(key=lambda item: not hasattr(getattr(item, "module", None), "Desk"))
+    """What waits for a window comes first, then what is long: no process is left alone with it in the end."""
+
+    def turn(item: pytest.Item) -> int:
+        if getattr(getattr(item, "module", None), "Desk", None) is Desk:
+            return 0
+        return 1 if item.get_closest_marker("long") else 2
+
+    items.sort(key=turn)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from app.model.handles import RecipeHandle, RecipePin, labelled, objections
+from app.model.recipe import Recipe
 from app.model.schema import frozen
 
 
@@ -99,3 +100,10 @@ def test_handles_that_are_never_in_force_together_do_not_contradict_each_other()
     first, second = handle(to=[0.51, 0.5], end=1.0), handle(to=[0.49, 0.5], start=1.0)
     assert [*objections([first, second], [], (1.0, 1.0))] == []
     assert len([*objections([first, second.model_copy(update={"start": 0.9})], [], (1.0, 1.0))]) == 1
+
+
+def test_sixty_four_handles_and_pins_work() -> None:
+    pins = tuple(RecipePin(at=(k / 64, 0.5)) for k in range(60))
+    assert len(Recipe(handle=(handle(),) * 4, pin=pins).pin) == 60
+    with pytest.raises(ValueError, match="65 handles and pins; at most 64 work"):
+        Recipe(handle=(handle(),) * 5, pin=pins)

@@ -217,8 +217,9 @@ def test_a_formula_is_tried_at_256_moments_and_the_end() -> None:
 
 def test_comparisons_in_a_row_all_hold_and_words_bind_as_in_python() -> None:
     for text, value in (
-        ("1 < 2 < 3", 1), ("1 < 3 < 2", 0), ("3 < 4 > 2", 1), ("2 <= 2", 1), ("2 < 2", 0), ("2 >= 3", 0), ("2 > 2", 0),
-        ("1 or 1 and 0", 1), ("not 0 and 0", 0), ("2 if 0 else 3", 3), ("2 if 1 else 3", 2), ("-+-2", 2), ("e", math.e),
+        ("1 < 2 < 3", 1), ("1 < 3 < 2", 0), ("3 < 4 > 2", 1), ("2 <= 2", 1), ("2 < 2", 0), ("2 >= 3", 0), ("2 >= 2", 1),
+        ("2 > 2", 0), ("1 or 1 and 0", 1), ("not 0 and 0", 0), ("2 if 0 else 3", 3), ("2 if 1 else 3", 2), ("-+-2", 2),
+        ("e", math.e),
     ):  # fmt: skip
         assert Formula(text)(0.0) == value
 

@@ -465,6 +465,7 @@ def test_pictures_opened_before_take_no_more_than_their_budget(
 # Files --------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_session_saved_and_rendered_is_the_same_picture(device: Device, robot: Robot, tmp_path: Path) -> None:
     dice = random.Random(1)
     for _ in range(12):
@@ -1326,6 +1327,7 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(automatic:
     assert not automatic.editor.workspace.is_dirty
 
 
+@pytest.mark.long
 def test_the_grid_is_finer_again_where_there_is_time(automatic: Robot) -> None:
     automatic.until(lambda: not automatic.editor.quality.is_measuring)
     quality, session = automatic.editor.quality, automatic.editor.session

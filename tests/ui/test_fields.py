@@ -409,6 +409,30 @@ def test_the_next_export_begins_with_the_kind_of_the_last(robot: Robot, tmp_path
 
 
 SLIDERS = """
+viscosity, Viscosity: 1e-05 to 10 by ratios, 0.03
+drag, Drag: 0.00 / s to 10.00 / s, 2.00 / s
+sectors, Sectors: 2 to 16, 6
+opacity grid, Opacity: 0% to 100%, 70%
+opacity viscosity, Opacity: 0% to 100%, 70%
+opacity frozen, Opacity: 0% to 100%, 70%
+opacity velocity, Opacity: 0% to 100%, 70%
+opacity forces, Opacity: 0% to 100%, 70%
+mask reach, By: 0 px to 60 px by ratios, 5 px
+amount, Amount: 0% to 150%, 100%
+radius, Size: 2 px to 240 px by ratios, 72 px
+stiffness, Stiffness: 1% to 100%, 100%
+local, Local: 0% to 100%, 0%
+held radius, Reach: 1 px to 240 px by ratios, 36 px
+held stiffness, Stiffness: 1% to 100%, 100%
+held local, Local: 0% to 100%, 0%
+hardness, Hardness: 0% to 100%, 0%
+strength, Strength: 5% to 100%, 100%
+mask amount, Fill with: 0.001 x to 1e+05 x by ratios, 100 x
+brightness, By brightness: 1 x to 1e+05 x by ratios, 1 x
+tolerance, Tolerance: 1% to 100%, 20%
+size, Size: 16 pixels to 480 pixels, 240 pixels
+quality, Quality: 1 to 100, 90
+fps, Frames a second: 1 to 60, 30
 """
 
 
@@ -423,7 +447,8 @@ def test_every_slider_goes_as_far_as_it_did_and_back_to_its_default(
         _, name, label, _, low, high, unit, default, _, logarithmic, *_ = bound.arguments.values()
         ends = f"{unit.text(low)} to {unit.text(high)}{' by ratios' if logarithmic else ''}"
         line = f"{name}, {label}: {ends}{'' if default is None else f', {unit.text(default)}'}"
-        found.extend([] if line in found else [line])
+        if line not in found and name not in ("from", "to"):  # they go as far as the recording
+            found.append(line)
         return slider(*given, **named)
 
     monkeypatch.setattr(Ui, "slider", noting)
