@@ -6,6 +6,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,11 @@ def is_for_types(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text("utf-8"))
+
+
 def walk(node: ast.AST, types: bool) -> Iterator[ast.AST]:
     """All nodes below one; without `types`, none of what only a type checker sees."""
     for child in ast.iter_child_nodes(node):
@@ -89,7 +95,7 @@ def walk(node: ast.AST, types: bool) -> Iterator[ast.AST]:
 
 def imported(path: Path, types: bool = True) -> Iterator[str]:
     """The dotted names of all that a source file imports, wherever in it."""
-    for node in walk(ast.parse(path.read_text("utf-8")), types):
+    for node in walk(tree(path), types):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -178,14 +184,14 @@ def test_only_the_window_is_imported_by_name():
     """What of `app` imports `app.ui` does so inside a function, where the window is opened."""
     for name, path in MODULES.items():
         if room_of(name) == "app":
-            for node in ast.parse(path.read_text("utf-8")).body:
+            for node in tree(path).body:
                 if isinstance(node, ast.ImportFrom):
                     assert not (node.module or "").startswith("app.ui"), f"{name} imports {node.module}"
 
 
 def private(path: Path) -> Iterator[str]:
     """What a source file uses that is private to others: attributes, imports, and names that it hands to setattr."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in ast.walk(tree(path)):
         match node:
             case ast.Attribute(value=ast.Name("self" | "cls")):
                 names = []
