@@ -1,10 +1,12 @@
-"""Small passes, each alone, against the same formula in NumPy: brushes, scaled maps, energy, the paper's stages."""
+"""Small passes, each alone, against the same formula in NumPy."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
+from app.model.picture import srgb_to_linear
 from solver.gl.device import Device
 from solver.grid import Grid
 
@@ -161,3 +163,57 @@ def test_packed_faces_are_scaled(device: Device) -> None:
     device.pass_("step/scale.frag")(targets, u=device.upload(u), v=device.upload(v), factor=0.25)
     for target, given in zip(targets, (u, v), strict=True):
         np.testing.assert_array_equal(target.get(), 0.25 * given)
+
+
+def test_the_steepest_corner_of_each_block_is_found(device: Device) -> None:
+    moved = RNG.standard_normal((12, 20, 2)).astype(np.float32)
+    hx, hy = GRID.spacing
+    found = drawn(device, "warp/steepness.frag", 1, (3, 2), displacement=moved, spacing=GRID.spacing, side=8.0)
+    wide, high = np.diff(moved, axis=1), np.diff(moved, axis=0)
+    across, down = (wide[1:] + wide[:-1]) / 2 / hx, (high[:, 1:] + high[:, :-1]) / 2 / hy
+    squares = (across.astype(float) ** 2 + down.astype(float) ** 2).sum(axis=-1)
+    for row, column in np.ndindex(2, 3):
+        block = squares[8 * row : 8 * row + 8, 8 * column : 8 * column + 8]
+        assert found[row, column] == pytest.approx(block.max(), rel=1e-5)
+
+
+def test_through_a_face_flows_as_much_as_the_more_closed_cell_lets(device: Device) -> None:
+    velocity, local = RNG.standard_normal((2, 12, 20, 2)).astype(np.float32)
+    solid = RNG.choice([0, 51, 255], (12, 20)).astype(np.uint8)
+    closed = np.pad(solid / 255, ((1, 0), (1, 0)), "edge")
+    opened = 1 - np.stack(
+        [np.maximum(closed[1:, 1:], closed[1:, :-1]), np.maximum(closed[1:, 1:], closed[:-1, 1:])], axis=-1
+    )
+    found = drawn(device, "step/carry.frag", 2, velocity=velocity, solid=solid)
+    np.testing.assert_allclose(found, opened * velocity, atol=1e-6)
+    found = drawn(device, "step/carry.frag", 2, LOCAL=1, velocity=velocity, local=local, solid=solid)
+    np.testing.assert_allclose(found, velocity + opened * local, atol=1e-6)
+
+
+def test_solid_cells_are_widened_by_two(device: Device) -> None:
+    frozen = (RNG.random((12, 20)) < 0.03).astype(np.uint8)
+    found = drawn(device, "step/widen_solid.frag", 1, frozen=frozen)
+    np.testing.assert_array_equal(found, ndimage.maximum_filter(frozen, 5, mode="nearest"))
+
+
+@pytest.mark.parametrize("premultiplied", [False, True])
+@pytest.mark.parametrize("light", [False, True])
+def test_a_picture_is_looked_up_times_its_alpha_and_in_light(device: Device, premultiplied: bool, light: bool) -> None:
+    picture = RNG.random((12, 20, 4)).astype(np.float32)
+    if premultiplied:
+        picture[..., :3] *= picture[..., 3:]
+    defines = {"PREMULTIPLIED": 1} if premultiplied else {}
+    defines |= {"LINEAR_LIGHT": 1} if light else {}
+    found = drawn(device, "resample/prepare.frag", 4, picture=picture, **defines)
+    alpha = picture[..., 3:]
+    straight = picture[..., :3] / alpha if premultiplied else picture[..., :3]
+    wanted = (srgb_to_linear(straight) if light else straight) * alpha
+    np.testing.assert_allclose(found, np.concatenate([wanted, alpha], axis=-1), atol=1e-5)
+
+
+def test_faces_are_unpacked_two_by_two(device: Device) -> None:
+    u, v = RNG.standard_normal((2, 8, 12, 4)).astype(np.float32)
+    found = drawn(device, "viscosity/unpack.frag", 2, u=u, v=v)
+    for axis, packed in enumerate((u, v)):
+        inside = packed[1:-1, 1:-1].reshape(6, 10, 2, 2)  # within the ring
+        np.testing.assert_array_equal(found[..., axis], inside.swapaxes(1, 2).reshape(12, 20))
