@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from app.errors import UserError
@@ -66,14 +68,15 @@ def test_what_a_name_asks_for() -> None:
     assert [passes(name) for name in ("a.gif", "a.mp4", "a.%04d.png")] == [2, 1, 1]
     check_output("a.webp", animated=True, fps=30)
     check_output("a.png", bits=16)
-    for name, how, said in (
+    refused: list[tuple[str, dict[str, Any], str]] = [
         ("a.png", {"animated": True}, "an animation ends in one of"),
         ("a.mp4", {"codec": "av1"}, "h264 or h265, not av1"),
         ("a.%04d.gif", {}, "a sequence's files are pictures"),
         ("a.%04d.%02d.png", {}, "holds one number"),
         ("a.txt", {}, "a picture's name must end in one of"),
         ("a.png", {"bits": 32}, "holds 8 or 16 bits a channel, not 32"),
-    ):
+    ]
+    for name, how, said in refused:
         with pytest.raises(UserError, match=said):
             check_output(name, **how)
 
