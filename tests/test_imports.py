@@ -206,7 +206,9 @@ def private(path: Path) -> Iterator[str]:
             case _:
                 names = []
         yield from (
-            f"{name}, line {node.lineno}" for name in names if name.startswith("_") and not name.startswith("__")
+            f"{name}, line {getattr(node, 'lineno', 0)}"
+            for name in names
+            if name.startswith("_") and not name.startswith("__")
         )
 
 

@@ -20,7 +20,7 @@ PICTURE = Picture(np.zeros((60, 100, 3), np.uint8))
 
 
 def job(folder: Path, recipe: Recipe | None = None, **outputs: Any) -> Job:
-    given = {name: folder / path if isinstance(path, str) else path for name, path in outputs.items()}
+    given: dict[str, Any] = {name: folder / path if isinstance(path, str) else path for name, path in outputs.items()}
     return Job(recipe or Recipe(), PICTURE, folder, Outputs(given.pop("file", None), **given))
 
 
@@ -32,14 +32,15 @@ def test_a_size_keeps_its_proportions_and_at_least_a_pixel() -> None:
 
 
 def test_what_is_an_animation_and_what_has_frames(tmp_path: Path) -> None:
-    for outputs, is_animation, has_frames, label in (
+    cases: list[tuple[dict[str, Any], bool, bool, str]] = [
         ({"file": "a.png"}, False, False, "a.png"),
         ({"file": "a.mp4"}, True, True, "a.mp4"),
         ({"file": "a.webp"}, False, False, "a.webp"),
         ({"file": "a.webp", "animated": True}, True, True, "a.webp"),
         ({"maps": MapOutput(tmp_path / "m.npy")}, False, False, "m.npy"),
         ({"maps": MapOutput(tmp_path / "m.%04d.npy")}, False, True, "m.%04d.npy"),
-    ):
+    ]
+    for outputs, is_animation, has_frames, label in cases:
         one = job(tmp_path, **outputs)
         assert (one.is_animation, one.has_frames, one.label) == (is_animation, has_frames, label)
         one.check()
@@ -76,11 +77,12 @@ def test_an_animation_may_begin_at_its_end_and_not_after_it(tmp_path: Path) -> N
 
 def test_a_map_has_no_more_pixels_than_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With what is beyond the picture on each side."""
-    for how, pixels, said in (
+    cases: list[tuple[dict[str, Any], int, str]] = [
         ({}, 100 * 60, "the size of the result makes a map of 100 x 60 pixels"),
         ({"size": 50}, 50 * 30, "--map-size 50 makes a map of 50 x 30 pixels"),
         ({"overscan": 10}, 120 * 80, "--overscan 10 makes a map of 120 x 80 pixels"),
-    ):
+    ]
+    for how, pixels, said in cases:
         one = job(tmp_path, maps=MapOutput(tmp_path / "m.npy", **how))
         monkeypatch.setattr(jobs, "MAX_PIXELS", pixels)
         one.check()
