@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
-import subprocess
+import os
 import sys
+
+# The tests' processes keep the cores busy: threads of linear algebra would only wait for one another, at full speed.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is loaded
+# Or each of the processes that are started, a hundred or more, would compile all modules anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+import subprocess
 import warnings
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import moderngl
 import pytest
+import typer.main
 
 import solver.gl.passes
 from app import cli
 from solver.gl.device import Device
 from support.commands import Run
+from support.desk import Desk
 from support.khronos import Programs
+
+COMMAND = cache(typer.main.get_command)
+"""Typer reads all annotations anew for each command line, which is most of what a wrong one costs."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What waits for a window comes first, so that no process is left alone with it in the end."""
-    items.sort(key=lambda item: not hasattr(getattr(item, "module", None), "Desk"))
+    """What waits for a window comes first, then what is long: no process is left alone with it in the end."""
+
+    def turn(item: pytest.Item) -> int:
+        if getattr(getattr(item, "module", None), "Desk", None) is Desk:
+            return 0
+        return 1 if item.get_closest_marker("long") else 2
+
+    items.sort(key=turn)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -66,6 +86,7 @@ def fluidwarp(device: Device, monkeypatch: pytest.MonkeyPatch, capfd: pytest.Cap
     """`fluidwarp(folder, *words)` is the command line in that folder, without the start of a process and of GL."""
     monkeypatch.setattr(Device, "headless", classmethod(lambda kind: device))
     monkeypatch.setattr(device, "release", lambda: None)
+    monkeypatch.setattr(typer.main, "get_command", COMMAND)
 
     def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         status = 0

@@ -8,7 +8,10 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from inspect import signature
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -525,3 +528,21 @@ def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: R
         "fluidwarp: x.tif cannot tell the primaries (chromaticities) of the picture, and is read as BT.709\n"
     )
     assert fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.exr").stderr == ""
+
+
+def options() -> Iterator[str]:
+    """Each command, and for each of its words how it is called, what it takes, and what it is where it is left out."""
+    for command in cli.cli.registered_commands:
+        assert command.callback is not None
+        yield f"{command.name or command.callback.__name__}:"
+        for word in signature(command.callback, eval_str=True).parameters.values():
+            takes, how = get_args(word.annotation)
+            bounds = "".join(f", {end} {getattr(how, end)}" for end in ("min", "max") if getattr(how, end) is not None)
+            names = [name for name in (how.default, *(how.param_decls or ())) if isinstance(name, str)] or [word.name]
+            default = "needed" if word.default is word.empty else word.default
+            yield f"  {' '.join(names)}: {takes if get_args(takes) else takes.__name__}{bounds}; {default}"
+
+
+def test_every_word_of_the_command_line_takes_what_it_did():
+    """Other programs call it: what changes here is told in the changelog."""
+    assert [*options()] == (ROOT / "tests/golden/commands.txt").read_text("utf-8").splitlines()

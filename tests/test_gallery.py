@@ -86,6 +86,7 @@ def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str
     assert pictures.notices == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["figure-5", "figure-6"])
 def test_portraits_move_in_the_window_only(name: str, studio: Studio) -> None:
     numbers = gallery.FIGURES[name](studio)

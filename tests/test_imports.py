@@ -1,4 +1,4 @@
-"""Imports run one way, room by room, without a circle among modules; a plain import loads no more than it says."""
+"""Imports run one way, without a circle, and load no more than they say; tests use nothing private."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,11 @@ def is_for_types(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text("utf-8"))
+
+
 def walk(node: ast.AST, types: bool) -> Iterator[ast.AST]:
     """All nodes below one; without `types`, none of what only a type checker sees."""
     for child in ast.iter_child_nodes(node):
@@ -89,7 +95,7 @@ def walk(node: ast.AST, types: bool) -> Iterator[ast.AST]:
 
 def imported(path: Path, types: bool = True) -> Iterator[str]:
     """The dotted names of all that a source file imports, wherever in it."""
-    for node in walk(ast.parse(path.read_text("utf-8")), types):
+    for node in walk(tree(path), types):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -178,9 +184,57 @@ def test_only_the_window_is_imported_by_name():
     """What of `app` imports `app.ui` does so inside a function, where the window is opened."""
     for name, path in MODULES.items():
         if room_of(name) == "app":
-            for node in ast.parse(path.read_text("utf-8")).body:
+            for node in tree(path).body:
                 if isinstance(node, ast.ImportFrom):
                     assert not (node.module or "").startswith("app.ui"), f"{name} imports {node.module}"
+
+
+def private(path: Path) -> Iterator[str]:
+    """What a source file uses that is private to others: attributes, imports, and names that it hands to setattr."""
+    for node in ast.walk(tree(path)):
+        match node:
+            case ast.Attribute(value=ast.Name("self" | "cls")):
+                names = []
+            case ast.Attribute(attr=name):
+                names = [name]
+            case ast.ImportFrom(names=aliases):
+                names = [alias.name for alias in aliases]
+            case ast.Call(func=ast.Name(of) | ast.Attribute(attr=of), args=[_, ast.Constant(str(name)), *_]):
+                names = [name.rpartition(".")[2]] if of in ("getattr", "setattr", "delattr", "hasattr") else []
+            case ast.Call(func=ast.Attribute(attr="setattr"), args=[ast.Constant(str(name)), *_]):
+                names = [name.rpartition(".")[2]]
+            case _:
+                names = []
+        yield from (
+            f"{name}, line {getattr(node, 'lineno', 0)}"
+            for name in names
+            if name.startswith("_") and not name.startswith("__")
+        )
+
+
+PRIVATE = """
+import os
+from some import _hidden
+class Own:
+    def __init__(self, other): self._mine = other.__class__
+def uses(thing, monkeypatch):
+    thing._part.read()
+    getattr(thing, "_word")
+    monkeypatch.setattr(thing, "_word", 1)
+    monkeypatch.setattr("some.module._word", 1)
+"""
+
+
+def test_no_test_uses_what_is_private_to_others(tmp_path: Path):
+    (tmp_path / "some.py").write_text(PRIVATE)
+    assert sorted(private(tmp_path / "some.py")) == [
+        "_hidden, line 3",
+        "_part, line 7",
+        "_word, line 10",
+        "_word, line 8",
+        "_word, line 9",
+    ]
+    assert {path.name: found for path in (ROOT / "tests").rglob("*.py") if (found := [*private(path)])} == {}
 
 
 def loaded_by(code: str) -> set[str]:

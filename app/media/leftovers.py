@@ -24,7 +24,7 @@ _OWNED = re.compile(
     r"\..*\.fluidwarp-(?P<host>[0-9a-f]{8})-(?P<start>[0-9a-f]{8})-(?P<pid>\d+)-(?P<since>\d+)-[0-9a-f]{8}(\.[^.]*)?",
     re.DOTALL,
 )
-_PROC = Path("/proc")
+PROC = Path("/proc")
 
 _swept: set[str] = set()
 _sweeping = threading.Lock()
@@ -83,7 +83,7 @@ def _since(pid: int) -> int | None:
     """When a process started, in ticks since this host did; None if there is none, or it only waits to be buried."""
     try:
         # After the name in brackets, which may hold anything, comes the state as the third word (proc_pid_stat(5)).
-        words = (_PROC / str(pid) / "stat").read_bytes().rpartition(b")")[2].split()
+        words = (PROC / str(pid) / "stat").read_bytes().rpartition(b")")[2].split()
         return None if words[0] in (b"Z", b"X") else int(words[19])
     except (OSError, IndexError, ValueError):
         return None
@@ -92,7 +92,7 @@ def _since(pid: int) -> int | None:
 def _started() -> float:
     """When this host was started, in seconds of the epoch; 0 if that is not known."""
     with suppress(OSError):
-        if found := re.search(rb"^btime (\d+)$", (_PROC / "stat").read_bytes(), re.MULTILINE):
+        if found := re.search(rb"^btime (\d+)$", (PROC / "stat").read_bytes(), re.MULTILINE):
             return float(found[1])
     return 0.0
 
@@ -100,9 +100,9 @@ def _started() -> float:
 @cache
 def _here() -> tuple[str, str]:
     """This host; and its start, with the processes that are seen from here."""
-    start = _told(_PROC / "sys/kernel/random/boot_id")
+    start = _told(PROC / "sys/kernel/random/boot_id")
     with suppress(OSError):
-        start += os.readlink(_PROC / "self/ns/pid")
+        start += os.readlink(PROC / "self/ns/pid")
     return _digest(platform.node() + _told(Path("/etc/machine-id"))), _digest(start)
 
 

@@ -75,7 +75,9 @@ class Context:
             max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
         )
         self.timings = Timings(ctx)
-        self.fences = Fences(ctx, needed="llvmpipe" in self.limits.renderer.lower())
+        # Without threads of its own llvmpipe draws in ours, and no other holds a fence.
+        has_threads = os.environ.get("LP_NUM_THREADS") != "0"
+        self.fences = Fences(ctx, needed=has_threads and "llvmpipe" in self.limits.renderer.lower())
         self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
         self._rest = ctx.simple_framebuffer((1, 1))
         # Reads a texture between its texels, where a look is enough.

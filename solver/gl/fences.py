@@ -24,7 +24,7 @@ class Fences:
 
     Args:
         ctx: the context, current whenever something is drawn.
-        needed: False if the driver is another; then nothing is held.
+        needed: False if the driver is another, or has no threads of its own; then nothing is held.
     """
 
     def __init__(self, ctx: moderngl.Context, needed: bool) -> None:

@@ -187,7 +187,7 @@ class WarpMap:
         if frozen is None:
             self._frozen.release()
         else:
-            self._frozen.hold(frozen, changed or (0, 0, *frozen.size), self._keep)
+            self._frozen.hold(frozen, changed or (0, 0, *frozen.size), self.draw_held)
         self._changed()
 
     def restore_under(
@@ -245,7 +245,7 @@ class WarpMap:
         self.factors.clear()
         self._steps = 0
         self._is_settled = True
-        self._frozen.draw_anew(self._keep)
+        self._frozen.draw_anew(self.draw_held)
         self._changed()
 
     def set(self, displacement: np.ndarray) -> None:
@@ -279,7 +279,7 @@ class WarpMap:
             lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel)
         )
         given.release()
-        self._frozen.draw_anew(self._keep)
+        self._frozen.draw_anew(self.draw_held)
 
     def save(self) -> MapState:
         """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
@@ -409,6 +409,14 @@ class WarpMap:
         inputs: dict[str, Any] = self._parts() | ({} if moved is None else {"from": moved})
         self.device.pass_("warp/compose.frag", **defines)(target, **inputs, origin=origin, step=step)
 
+    def draw_held(
+        self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field
+    ) -> None:
+        """Draw the map where it is held now and was not before; see `Frozen`."""
+        fine = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **defines_of(self._levels))
+        compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
+
     def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:
         """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the picture."""
         origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
@@ -436,12 +444,6 @@ class WarpMap:
             self._remapping.give(self._submap, self._is_weighed)
             self._steps = 0
             self._is_settled = True
-
-    def _keep(self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field) -> None:
-        """Draw the map where it is held now and was not before; see `Frozen`."""
-        fine = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **defines_of(self._levels))
-        compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
 
     def _still_under(
         self, center: tuple[float, float], radius: float

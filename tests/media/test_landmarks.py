@@ -51,6 +51,8 @@ def test_a_pts_file_gets_where_the_points_should_be(tmp_path: Path) -> None:
         ("a.csv", "1,2,3,4\n1,2,3\n", "line 2: expected x0,y0,x1,y1, and not '1,2,3'"),
         ("a.csv", "1,2,3,4\n1,2,3,x\n", "line 2: expected"),
         ("a.csv", "x0,y0,x1,y1\nx0,y0,x1,y1\n", "line 2: expected"),
+        ("a.csv", "1,2,x,4\n1,2,3,4\n", "line 1: expected x0,y0,x1,y1"),
+        ("a.pts", "version: 1\nn_points: many\n{\n", "line 2: expected how many points"),
         ("a.csv", "1,2,nan,4\n", "line 1: no pixel lies at"),
         ("a.csv", "1,2,1e9,4\n", "line 1: no pixel lies at"),
         ("a.csv", "x0,y0,x1,y1\n", "has no pairs"),

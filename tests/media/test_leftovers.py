@@ -39,7 +39,6 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
-    monkeypatch.setattr(leftovers, "_swept", set())
 
 
 @pytest.fixture
@@ -152,7 +151,7 @@ def test_what_is_from_before_this_host_was_started_is_swept(tmp_path: Path):
 
 
 def test_without_a_list_of_processes_nothing_is_swept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(leftovers, "_PROC", tmp_path / "none")
+    monkeypatch.setattr(leftovers, "PROC", tmp_path / "none")
     path = tmp_path / owned(pid=dead())
     path.touch()
     sweep(tmp_path)

@@ -15,8 +15,10 @@ from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.forces import Force, build, pieces_of
 from app.model.picture import Picture
+from app.model.sampling import Window
 from app.model.schema import frozen
 from solver.grid import Grid
+from support.pictures import OnePicture
 
 WIDE = Grid(96, 64)
 
@@ -320,3 +322,66 @@ def test_what_cannot_be_built_names_the_force(keys: dict[str, Any], part: str, p
     Image.fromarray(np.full((128, 192), 77, np.uint8)).save(pictures.folder / "grey.png")
     with pytest.raises(UserError, match=rf'force\[2\] "hat": .*{part}'):
         build([force(**EVERY[0]), force(**keys, name="hat")], WIDE, pictures, 1.0)
+
+
+def test_a_field_of_floats_is_itself_and_acts_where_it_is_opaque() -> None:
+    """Of straight colours, half covered by alpha, half of them is left."""
+    light = np.broadcast_to(np.array([2.5, -0.75, 0], np.float32), (64, 96, 3))
+    found = at_centres(force(kind="field", picture="f.exr", strength=2).faces(WIDE, OnePicture(light)))
+    np.testing.assert_allclose(found[32, 48], [5, -1.5], rtol=1e-6)
+    codes = np.broadcast_to(np.array([255, 1, 0, 51], np.uint8), (64, 96, 4))
+    found = at_centres(force(kind="field", picture="f.png").faces(WIDE, OnePicture(codes)))
+    np.testing.assert_allclose(found[32, 48], [0.2, -0.2], rtol=1e-6)
+    with pytest.raises(ValueError, match="not finite"):
+        force(kind="field", picture="f.exr").faces(WIDE, OnePicture(np.full_like(light, np.inf)))
+
+
+@pytest.mark.parametrize("falloff", ["smooth", "gaussian"])
+def test_a_curve_s_push_across_it_is_the_profile(falloff: str, pictures: Pictures) -> None:
+    """Of the smooth one, integrated along the line: (1 - q^2)^3.5; the Gaussian also far out."""
+    grid = Grid(160, 160)
+    line = force(kind="curve", points=[[0.0, 0.5], [1.0, 0.5]], radius=0.1, falloff=falloff).faces(grid, pictures)
+    q = (grid.u_faces()[1][:, 80] - 0.5) / 0.1
+    wanted = np.maximum(1 - q**2, 0) ** 3.5 if falloff == "smooth" else np.exp(-2 * q**2)
+    np.testing.assert_allclose(line[:, 80, 0], wanted, rtol=2e-2, atol=1e-8)
+
+
+def test_a_source_smaller_than_a_cell_still_makes_room(pictures: Pictures) -> None:
+    tiny = force(kind="source", point=[0.503, 0.503], radius=0.001, room="everywhere").divergence(WIDE, pictures)
+    assert tiny.max() > 0.85
+    as_wide = force(kind="source", point=[0.503, 0.503], radius=2 * WIDE.h, room="everywhere")
+    np.testing.assert_array_equal(tiny, as_wide.divergence(WIDE, pictures))
+
+
+def test_a_ring_is_as_a_gradient_has_it(pictures: Pictures) -> None:
+    """rate + r / 2 d rate / dr is the divergence of x rate / 2."""
+    grid = Grid(400, 400)
+    x, y = grid.centres()
+    r = np.hypot(x - 0.5, y - 0.5) / 0.3
+    for falloff, profile in (("smooth", np.maximum(1 - r**2, 0) ** 3), ("gaussian", np.exp(-2 * r**2))):
+        rate = force(kind="source", point=[0.5, 0.5], radius=0.3, falloff=falloff).divergence(grid, pictures)
+        half = profile / 2
+        wanted = np.gradient((x - 0.5) * half, grid.h, axis=1) + np.gradient((y - 0.5) * half, grid.h, axis=0)
+        np.testing.assert_allclose(rate[5:-5, 5:-5], (wanted - wanted.mean())[5:-5, 5:-5], atol=3e-3)
+
+
+def test_a_gradient_s_strength_is_that_of_the_steepest_place_of_an_edge() -> None:
+    halves = np.where(np.arange(320) < 160, 0, 255).astype(np.uint8)[None, :, None].repeat(320, axis=0)
+    for blur in (0.05, 0.1):
+        found = force(kind="gradient", blur=blur, strength=3, direction="inward").faces(
+            Grid(320, 320), OnePicture(halves)
+        )
+        assert found[160, :, 0].max() == pytest.approx(3, rel=5e-3)
+        assert found[160, 160, 0] == found[160, :, 0].max()
+        assert np.abs(found[..., 1]).max() < 1e-4
+
+
+def test_a_gradient_within_a_window_is_weighed_by_it() -> None:
+    halves = np.where(np.arange(64) < 32, 0, 255).astype(np.uint8)[None, :, None].repeat(64, axis=0)
+    grid, window = Grid(64, 64), {"box": [0.1, 0.2, 0.9, 0.8], "soft": 0.2}
+    bare, within = (
+        force(kind="gradient", blur=0.3, **keys).faces(grid, OnePicture(halves)) for keys in ({}, {"within": window})
+    )
+    weight = Window.model_validate(frozen(window)).weight(grid)
+    at_faces = (weight[:, 1:] + weight[:, :-1]) / 2
+    np.testing.assert_allclose(within[:, 1:, 0], bare[:, 1:, 0] * at_faces, atol=1e-6)

@@ -105,3 +105,28 @@ def test_random_actions_against_a_plain_list():
 def test_no_such_entry():
     with pytest.raises(IndexError, match="1 entries"):
         History(Recipe()).go_to(1)
+
+
+def test_a_sample_takes_170_bytes_and_what_is_there_already_none():
+    def grown(recipe: Recipe, more: Recipe) -> int:
+        history = History(recipe)
+        before = history.nbytes
+        history.commit("More", more)
+        return history.nbytes - before
+
+    few, many = Recipe(stroke=(stroke(1, 10),)), Recipe(stroke=(stroke(1, 110),))
+    assert grown(Recipe(), many) - grown(Recipe(), few) == 100 * 170
+    assert grown(many, many.edited(stroke=(*many.stroke, stroke(2, 10)))) == grown(Recipe(), few) + 8
+    assert grown(many, many.edited(name="other")) < 1100
+
+
+def test_a_recording_that_goes_on_is_the_same_edit():
+    history = History(Recipe())
+    history.commit("Push", Recipe(name="a"))
+    history.commit("Other", Recipe(name="b"))
+    history.undo()
+    history.amend(Recipe(name="a"))
+    assert history.can_redo
+    history.amend(Recipe(name="c"))
+    assert [(entry.name, entry.recipe.name) for entry in history.entries] == [("Open", ""), ("Push", "c")]
+    assert (history.undo_name, history.can_redo) == ("Push", False)

@@ -345,3 +345,22 @@ def test_shipped_recipes_are_valid(path: Path):
     assert recipe.name
     assert recipe.picture
     assert (path.parent / recipe.picture).is_file()
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "wanted"),
+    [
+        ("none", [(0.75, 0.625, False)]),
+        ("left-right", [(0.75, 0.625, False), (0.25, 0.625, True)]),
+        ("up-down", [(0.75, 0.625, False), (0.75, 0.375, True)]),
+        ("both", [(0.75, 0.625, False), (0.25, 0.625, True), (0.75, 0.375, True), (0.25, 0.375, False)]),
+        # A quarter clockwise each, of a picture twice as wide as high.
+        ("radial", [(0.75, 0.625, False), (0.4375, 1.0, False), (0.25, 0.375, False), (0.5625, 0.0, False)]),
+    ],
+)
+def test_the_images_of_a_stroke_lie_about_the_picture_s_middle(symmetry: str, wanted: list[tuple[float, float, bool]]):
+    stroke = push((0, 0.75, 0.625, 0.5), symmetry=symmetry, sectors=4)
+    found = [(dabs[0], mirrored) for dabs, mirrored in stroke.images(stroke.at(0), (1.0, 0.5))]
+    assert [mirrored for _, mirrored in found] == [mirrored for *_, mirrored in wanted]
+    for (dab, _), (x, y, _) in zip(found, wanted, strict=True):
+        assert dab == pytest.approx((x, y, x, y, 0.5))

@@ -6,12 +6,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from app.media.auxiliary import Pictures
 from app.media.pictures import write_picture
 from app.model.picture import Picture
-from app.model.sampling import Segment, Window, distance_to_path, falloff, intensity
+from app.model.sampling import (
+    Segment,
+    SmallPictures,
+    Window,
+    blurred,
+    channels,
+    distance_to_path,
+    falloff,
+    intensity,
+    pixel_at,
+    quantised,
+)
 from solver.grid import Grid
+from support.pictures import OnePicture
 
 
 def row(*colours: tuple[int, ...]) -> Picture:
@@ -61,3 +74,87 @@ def test_a_color_s_tolerance_is_the_distance_in_rgb(tmp_path: Path) -> None:
         segment = Segment(color="#646464", tolerance=tolerance / 255)
         found = segment.weight("p.png", Grid(32, 16), Pictures(Picture(picture), tmp_path))
         assert found[8, 4::8].tolist() == columns
+
+
+def test_light_is_seen_through_the_curve_of_srgb_and_alpha_is_not() -> None:
+    light = np.array([[(0.2140411, 4.0, -1.0, 0.5), (np.nan, 1.0, 0.0, 7.0)]], np.float32)
+    colours, alpha = channels(Picture(light))
+    np.testing.assert_allclose(colours, [[(0.5, 1, 0), (0, 1, 0)]], atol=1e-6)
+    np.testing.assert_allclose(alpha, [[0.5, 1]])
+    colours, alpha = channels(Picture(np.array([[(51, 102)]], np.uint8)))
+    np.testing.assert_allclose([*colours[0, 0], alpha[0, 0]], [0.2, 0.2, 0.2, 0.4], atol=1e-6)
+    assert channels(row((51, 102, 204)))[1].tolist() == [[1.0]]
+
+
+def test_an_ellipse_is_soft_towards_its_middle() -> None:
+    """Of a circle the first order is the distance itself."""
+    grid = Grid(80, 80)
+    x, y = grid.centres()
+    depth = 0.4 - np.hypot(x - 0.5, y - 0.5)
+    weight = Window(box=(0.1, 0.1, 0.9, 0.9), shape="ellipse", soft=0.3).weight(grid)
+    part = (depth / 0.3).clip(0, 1)
+    np.testing.assert_allclose(weight, part**2 * (3 - 2 * part), atol=1e-9)
+    odd = Window(box=(0.1, 0.3, 0.9, 0.7), shape="ellipse", soft=0.4).weight(Grid(81, 81))
+    assert odd[40, 40] == pytest.approx(0.5)  # half the height of 0.4 is half as deep as the edge is soft
+
+
+def test_a_cell_that_an_edge_cuts_is_in_by_its_part() -> None:
+    grid = Grid(10, 10)
+    for soft in (0.0, 0.1):  # no more than a cell is no soft edge
+        weight = Window(box=(0.225, 0.0, 0.76, 1.0), soft=soft).weight(grid)
+        np.testing.assert_allclose(weight[5], [0, 0, 0.75, 1, 1, 1, 1, 0.6, 0, 0], atol=1e-12)
+
+
+def test_a_segment_holds_neither_of_its_limits() -> None:
+    grey = np.repeat(np.array([[0, 51, 102, 153, 255]], np.uint8), 8, axis=0)[..., None].repeat(2, axis=1)
+    pictures, grid = OnePicture(grey), Grid(10, 8, (1.0, 1.0))
+    for keys, chosen in (
+        ({"above": 0.2}, [0, 0, 1, 1, 1]),
+        ({"below": 0.6}, [1, 1, 1, 0, 0]),
+        ({"above": 0.0, "below": 0.61}, [0, 1, 1, 1, 0]),
+        ({"mask": "m.png"}, [0, 0, 0, 1, 1]),
+    ):
+        assert Segment.model_validate(keys).chosen("source", grid, pictures)[4, ::2].tolist() == chosen
+    windowed = Segment(above=0.2, window=Window(box=(0.0, 0.0, 0.55, 1.0))).chosen("source", grid, pictures)
+    assert windowed[4, ::2].tolist() == [0, 0, 1, 0, 0]
+
+
+def test_a_segment_that_chooses_no_half_of_any_cell_is_empty() -> None:
+    grey = np.zeros((8, 80, 1), np.uint8)
+    for width, is_empty in ((4, True), (5, False)):
+        grey[:, :width] = 255
+        segment = Segment(above=0.5)
+        if is_empty:
+            with pytest.raises(ValueError, match="the segmentation is empty"):
+                segment.chosen("source", Grid(8, 8, (1.0, 0.1)), OnePicture(grey))
+        else:
+            assert segment.chosen("source", Grid(8, 8, (1.0, 0.1)), OnePicture(grey)).max() == 0.5
+    with pytest.raises(ValueError, match="chooses the whole picture"):
+        Segment(below=0.5).weight("source", Grid(8, 8, (1.0, 0.1)), OnePicture(np.zeros((8, 80, 1), np.uint8)))
+
+
+def test_a_blur_is_scipys_with_mirrored_edges() -> None:
+    grid = Grid(40, 25)
+    values = np.random.default_rng(4).random((25, 40))
+    wanted = ndimage.gaussian_filter(values, (0.075 / grid.spacing[1], 0.075 / grid.spacing[0]), truncate=12)
+    np.testing.assert_allclose(blurred(values, 0.15, grid), wanted, atol=1e-6)
+
+
+def test_steps_are_equal_and_reach_both_ends() -> None:
+    found = quantised(np.array([0.0, 0.24, 0.26, 0.49, 0.51, 0.74, 0.76, 1.0]), 4)
+    np.testing.assert_allclose(found * 3, [0, 0, 1, 1, 2, 2, 3, 3])
+
+
+def test_a_picture_beyond_2048_pixels_is_halved_to_the_nearest_code() -> None:
+    pixels = np.zeros((2, 2050, 1), np.uint8)
+    pixels[:, :4, 0] = [[0, 1, 0, 1], [0, 0, 0, 1]]
+    small = SmallPictures(OnePicture(pixels)).load("source").pixels
+    assert small.shape == (1, 1025, 1)
+    assert small[0, :2, 0].tolist() == [0, 1]  # a quarter and a half
+    assert SmallPictures(OnePicture(pixels[:, :2048])).load("source").width == 2048
+
+
+def test_the_pixel_at_a_place_is_the_one_that_holds_it() -> None:
+    pixels = np.zeros((10, 20, 3))
+    for place, wanted in (((0.0, 0.0), (0, 0)), ((0.099, 0.55), (5, 1)), ((0.1, 0.99), (9, 2)), ((1.0, 1.0), (9, 19))):
+        assert pixel_at(place, pixels) == wanted

@@ -200,3 +200,34 @@ def test_a_law_that_never_acts_is_told(keys: dict[str, Any]) -> None:
     assert remark is not None
     assert remark.startswith("never acts: it starts at")
     assert timed(**keys).law.check(3.0) is None
+
+
+def test_a_law_that_acts_at_the_very_end_never_acts() -> None:
+    for keys in ({"at": 2}, {"during": [2, 4]}):
+        assert timed(**keys).law.check(2.0) == "never acts: it starts at 2 s, and the simulation ends at 2 s"
+        assert timed(**keys).law.check(2.001) is None
+
+
+def test_a_formula_is_tried_at_256_moments_and_the_end() -> None:
+    for moment in (0.5, 1.0, 1 / 256):
+        with pytest.raises(FormulaError, match=f"divides by zero at t = {moment:.6g}"):
+            timed(formula=f"1 / (t - {moment!r})").law.check(1.0)
+    timed(formula="1 / (t - 0.5001)").law.check(1.0)
+
+
+def test_comparisons_in_a_row_all_hold_and_words_bind_as_in_python() -> None:
+    for text, value in (
+        ("1 < 2 < 3", 1), ("1 < 3 < 2", 0), ("3 < 4 > 2", 1), ("2 <= 2", 1), ("2 < 2", 0), ("2 >= 3", 0), ("2 >= 2", 1),
+        ("2 > 2", 0), ("1 or 1 and 0", 1), ("not 0 and 0", 0), ("2 if 0 else 3", 3), ("2 if 1 else 3", 2), ("-+-2", 2),
+        ("e", math.e),
+    ):  # fmt: skip
+        assert Formula(text)(0.0) == value
+
+
+def test_a_formula_may_be_500_characters_and_50_deep() -> None:
+    timed(formula="-" * 50 + "1")
+    with pytest.raises(ValidationError, match="nested too deeply"):
+        timed(formula="-" * 51 + "1")
+    timed(formula="t" + " " * 499)
+    with pytest.raises(ValidationError, match="longer than 500"):
+        timed(formula="t" + " " * 500)

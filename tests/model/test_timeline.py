@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
@@ -104,3 +105,82 @@ def test_conditions(stop: Stop, seen: Observation, words: str):
 
 def test_nothing_to_watch():
     assert Sentinel(Stop(), 0.1).is_idle
+
+
+FAR = Watch(point=(0.5, 0.5), distance=0.25)
+NEAR = Watch(point=(0.5, 0.5), place=(0.25, 0.5), within=0.25)
+
+
+@pytest.mark.parametrize(
+    ("stop", "at_it", "beyond", "words"),
+    [
+        (
+            Stop(displacement_above=0.25),
+            {"displacement": 0.25},
+            {"displacement": 0.3},
+            "largest displacement 0.3 is above 0.25",
+        ),
+        (Stop(det_below=0.25), {"det": 0.25}, {"det": 0.2}, "smallest det J 0.2 is below 0.25"),
+        (
+            Stop(handles_within=0.25),
+            {"away": 0.26},
+            {"away": 0.25},
+            "all handles have arrived (0.25 away at most, within 0.25)",
+        ),
+        (
+            Stop(watch=(FAR,)),
+            {"points": ((0.5, 0.74),)},
+            {"points": ((0.5, 0.75),)},
+            "watched point 1 has moved 0.25, at least 0.25",
+        ),
+        (
+            Stop(watch=(FAR, NEAR)),
+            {"points": ((0.5, 0.5), (0.51, 0.5))},
+            {"points": ((0.5, 0.5), (0.5, 0.5))},
+            "watched point 2 has reached its place (0.25 away, within 0.25)",
+        ),
+    ],
+)
+def test_a_condition_ends_the_simulation_beyond_its_number(
+    stop: Stop, at_it: dict[str, Any], beyond: dict[str, Any], words: str
+):
+    sentinel = Sentinel(stop, 0.5)
+    assert sentinel.verdict(3, Observation(**at_it)) is None
+    assert sentinel.verdict(4, Observation(**beyond)) == f"stopped at t = 2 s (tick 4): {words}"
+
+
+def test_energy_counts_only_once_it_has_been_above():
+    sentinel = Sentinel(Stop(energy_below=0.5), dt=0.1)
+    assert [sentinel.verdict(0, Observation(energy=energy)) for energy in (0.4, 0.5, 0.5)] == [None] * 3
+    assert (
+        sentinel.verdict(0, Observation(energy=0.4)) == "stopped at t = 0 s (tick 0): kinetic energy 0.4 is below 0.5"
+    )
+
+
+@pytest.mark.parametrize(
+    ("stop", "needed"),
+    [
+        (Stop(energy_below=1), "motion"),
+        (Stop(speed_below=1), "motion"),
+        (Stop(displacement_above=1), "map"),
+        (Stop(det_below=0), "map"),
+        (Stop(handles_within=1), "handles"),
+        (Stop(watch=(FAR,)), "points"),
+    ],
+)
+def test_only_what_a_condition_looks_at_is_worked_out(stop: Stop, needed: str):
+    sentinel = Sentinel(stop, 0.1)
+    assert not sentinel.is_idle
+    assert [name for name in ("motion", "map", "handles", "points") if getattr(sentinel, f"needs_{name}")] == [needed]
+
+
+def test_a_million_frames_with_those_that_stand_still_are_the_most():
+    still = Playback(hold_first=300, hold_last=200)
+    assert len(frame_positions(Timeline(1000, 0.5), still, fps=1000)) == 500_001
+    with pytest.raises(UserError, match=r"more than 1000000 frames"):
+        frame_positions(Timeline(1000, 0.5), still.model_copy(update={"hold_last": 200.1}), fps=1000)
+
+
+def test_a_time_is_the_nearest_tick_within_the_timeline():
+    assert [TEN.tick_at(seconds) for seconds in (-1, 0.04, 0.06, 0.94, 0.96, 7)] == [0, 0, 1, 9, 10, 10]
+    assert TEN.time_of(2.5) == 0.25

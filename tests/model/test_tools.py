@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
 import pytest
 
+from app.model.handles import RecipeHandle
+from app.model.mask_edits import MaskStroke
 from app.model.strokes import Stroke
-from app.model.tools import TOOL, BrushSettings, Press, Touch
+from app.model.tools import TOOL, BrushSettings, Made, Press, Touch
 
 EXTENT = (1.0, 0.75)
 DT = 1 / 30
@@ -115,3 +120,74 @@ def test_a_curve_takes_up_points_by_their_distance_on_the_picture() -> None:
     assert down is not None
     assert [round((x - 0.2) / 0.005) for _, x, _, _ in across.samples] == [*range(8)]
     assert [round((y - 0.2) / 0.005) for _, _, y, _ in down.samples] == [0, 2, 4, 6]
+
+
+def test_a_straight_line_is_as_long_as_on_the_picture() -> None:
+    """Of a height of 0.75: 0.4 of it is 0.3 longer sides, which take 0.375 s."""
+    stroke = play("push", Touch(5, 0.5, 0.6, 0.5, True), last=(0.5, 0.2))
+    assert stroke is not None
+    assert stroke.last_tick - 5 == round(0.3 / 0.8 / DT)
+    assert stroke.samples[0] == (5, 0.5, 0.2, 0.5)
+    steps = [after[2] - before[2] for before, after in pairwise(stroke.samples)]
+    assert steps == pytest.approx([0.4 / len(steps)] * len(steps))
+    near = play("push", Touch(5, 0.5, 0.2, 1.0, True), last=(0.5, 0.2))
+    assert near is not None
+    assert near.last_tick == 7
+
+
+def test_shift_waits_for_a_hundredth_and_takes_the_longer_way_on_the_picture() -> None:
+    """0.012 of the height is 0.009 longer sides; 0.03 of the width is more than 0.035 of the height."""
+    for way, wanted in (((0.0, 0.012), (0.5, 0.5)), ((0.0, 0.014), (0.5, 0.514)), ((0.03, 0.035), (0.53, 0.5))):
+        stroke = play("push", Touch(0, 0.5, 0.5), Touch(1, 0.5 + way[0], 0.5 + way[1], 1.0, True))
+        assert stroke is not None
+        assert stroke.samples[-1][1:3] == pytest.approx(wanted)
+
+
+def gestured(name: str, press: Press, *touches: Touch) -> Made | None:
+    gesture = TOOL[name].gesture
+    assert gesture is not None
+    made = gesture(press, touches[0])
+    next(made)
+    for touch in touches[1:]:
+        made.send(touch)
+    with pytest.raises(StopIteration) as finished:
+        made.send(None)
+    return finished.value.value
+
+
+def test_a_point_that_is_only_clicked_is_pinned_and_one_that_is_dragged_is_led() -> None:
+    press = Press(BrushSettings(0.2, local=0.3, stiffness=0.4), False, EXTENT, DT, slack=0.01, at=(0.1, 0.2))
+    pinned = gestured("handle", press, Touch(6, 0.5, 0.5), Touch(7, 0.5, 0.513))
+    assert isinstance(pinned, RecipeHandle)
+    assert (pinned.at, pinned.radius, pinned.local, pinned.stiffness) == ((0.1, 0.2), 0.2, 0.3, 0.4)
+    assert (pinned.start, pinned.keys) == (pytest.approx(0.2), ())
+    led = gestured("handle", press, Touch(6, 0.5, 0.5), Touch(7, 0.5, 0.514))
+    assert isinstance(led, RecipeHandle)
+    assert led.keys == ((pytest.approx(7 * DT), 0.5, 0.5), (pytest.approx(8 * DT), 0.5, 0.514))
+
+
+def test_a_handle_that_is_taken_again_goes_as_far_as_the_pointer_but_not_out_of_the_picture() -> None:
+    held = RecipeHandle(at=(0.1, 0.1), keys=())
+    press = Press(BrushSettings(), False, EXTENT, DT, held=held, rests=(0.3, 0.9))
+    led = gestured("handle", press, Touch(0, 0.5, 0.5), Touch(1, 0.6, 0.45), Touch(2, 0.9, 0.9), Touch(3, -1.0, 0.5))
+    assert isinstance(led, RecipeHandle)
+    places = [place for key in led.keys or () for place in key[1:]]
+    assert places == pytest.approx([0.3, 0.9, 0.4, 0.85, 0.7, 1.0, 0.0, 0.9])
+
+
+def test_what_is_painted_on_masks_at_rest_takes_no_time_and_keeps_its_symmetry() -> None:
+    press = Press(BrushSettings(0.2), False, EXTENT, DT, timeless=True, symmetry="radial", sectors=5, detail=900)
+    painted = gestured("freeze", press, Touch(4, 0.5, 0.5), Touch(5, 0.52, 0.5))
+    assert isinstance(painted, MaskStroke)
+    assert (painted.tool, painted.symmetry, painted.sectors, painted.detail) == ("freeze", "radial", 5, 0)
+
+
+@pytest.mark.parametrize(
+    ("tool", "symmetry", "detail", "sectors"),
+    [("push", "none", 900, 6), ("push", "both", 0, 6), ("thicken", "none", 0, 6)],
+)
+def test_only_what_flows_in_one_place_is_solved_finely(tool: str, symmetry: Any, detail: int, sectors: int) -> None:
+    press = Press(BrushSettings(0.2), False, EXTENT, DT, detail=900, symmetry=symmetry, sectors=5)
+    stroke = gestured(tool, press, Touch(4, 0.5, 0.5))
+    assert isinstance(stroke, Stroke)
+    assert (stroke.detail, stroke.symmetry, stroke.sectors) == (detail, symmetry, sectors)

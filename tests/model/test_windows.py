@@ -207,6 +207,7 @@ def test_nothing_moves_at_the_sides_of_a_window(device: Device, feel: Feel, way:
     replay.release()
 
 
+@pytest.mark.long
 def test_a_replay_in_windows_gives_the_same_bytes_by_any_path(device: Device):
     """Strokes of several sizes and one on the whole picture: seeks, checkpoints, other strokes and snapshots."""
     rng = np.random.default_rng(5)

@@ -18,6 +18,7 @@ from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import MOST_ALONG, SMALLEST_GRID, Grid
 from solver.params import FluidParams, Walls
+from support.flows import saved
 
 SIZES = [(1500, 1000), (451, 300), (300, 451), (601, 599), (97, 1000), (4000, 9), (8, 4000), (12, 12)]
 
@@ -91,11 +92,11 @@ def test_a_window_moved_by_whole_cells_takes_the_pressure_along(device: Device):
     fluid = Fluid(device, here)
     fluid.set_velocity(np.random.default_rng(6).standard_normal((20, 24, 2)))
     fluid.step(1e-3)
-    before = fluid._carried.read.get()
+    before = saved(fluid)["carried"]
     flow = fluid.flow_on(there)
     fluid.lay_on(there)
     fluid.go_on_with(flow)
-    after = fluid._carried.read.get()
+    after = saved(fluid)["carried"]
     assert np.abs(before).max() > 0
     np.testing.assert_allclose(after[:, 1:20], before[:, 5:], atol=1e-6 * np.abs(before).max())
     flow.release()

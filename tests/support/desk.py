@@ -174,5 +174,6 @@ class Desk:
     def close(self) -> None:
         if self.editor is not None and self.editor.poll() is None:
             self.editor.kill()
+            self.editor.wait()
         self.screen.terminate()
         self.screen.wait(10)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -49,11 +47,6 @@ def write_foreign_map(path: Path, width: int, height: int, names: str = "RGB") -
     planes = ((x + 0.5) / width + 0.1, 1 - (y + 0.5) / height, np.ones_like(x))
     channels = {name: OpenEXR.Channel(np.ascontiguousarray(plane)) for name, plane in zip(names, planes, strict=False)}
     OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(path))
-
-
-def command_line(*words: str) -> None:
-    """Run `fluidwarp words...` in a process of its own."""
-    subprocess.run([sys.executable, "-m", "app", *words], check=True, cwd=Path(__file__).parents[2])
 
 
 class Robot:

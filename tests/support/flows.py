@@ -1,12 +1,22 @@
-"""Velocities with known answers."""
+"""Velocities with known answers, and what becomes of them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from solver.grid import Grid
+from solver.scheme import Scheme
+from solver.warp.map import WarpMap
 
 VORTEX_TIME = 8.0
+
+
+def saved(thing: Scheme | WarpMap) -> dict[str, np.ndarray]:
+    """All that a fluid or a map saves, by name."""
+    state = thing.save()
+    arrays = state.arrays()
+    state.release()
+    return arrays
 
 
 def vortex(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:

@@ -22,3 +22,31 @@ def test_a_slow_frame_is_worth_two_ticks_at_most(dt: float, most: int) -> None:
     assert max(made) <= 2
     assert made[5:] == [most] * 15
     assert clock.ticks(1 / 3000, 1 / 30, True) <= 1
+
+
+def test_a_tick_comes_a_tenth_early_rather_than_a_frame_late() -> None:
+    for part, made in ((0.91, 1), (0.89, 0)):
+        clock = Clock()
+        clock.ticks(1.0, 0.1, True)  # what came before the movement is worth one tick
+        assert clock.ticks(part * 0.1, 0.1, True) == made
+
+
+def test_what_may_still_come_does_so_in_four_frames_and_seven_tenths_of_a_second() -> None:
+    clock = Clock()
+    seen = []
+    for _ in range(8):
+        seen.append((clock.settling, clock.hovering))
+        clock.elapse(0.125)
+    assert seen == [(True, True)] * 4 + [(False, True)] * 2 + [(False, False)] * 2
+    clock.stir()
+    assert (clock.settling, clock.hovering) == (True, True)
+
+
+def test_parts_of_a_frame_are_told_in_smoothed_milliseconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    moments = iter((0.0, 0.010, 1.0, 1.030))
+    monkeypatch.setattr("time.perf_counter", lambda: next(moments))
+    clock = Clock()
+    for wanted in (10.0, 10.0 + 0.15 * 20.0):
+        with clock.measure("draw"):
+            pass
+        assert clock.milliseconds["draw"] == pytest.approx(wanted)

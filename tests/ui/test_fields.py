@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, replace
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from app.work.export import run
 from solver.gl.device import Device
-from support.editing import Robot, command_line, export_dialog, small_project
+from support.commands import Run
+from support.editing import Robot, export_dialog, small_project
 from support.widgets import Widgets
 
 
@@ -268,7 +270,7 @@ def dialog(robot: Robot) -> ExportDialog:
 
 
 def test_a_part_of_the_warp_is_exported_as_the_command_line_writes_it(
-    robot: Robot, widgets: Widgets, tmp_path: Path
+    robot: Robot, widgets: Widgets, tmp_path: Path, fluidwarp: Run
 ) -> None:
     robot.key("t")
     robot.drag((0.5, 0.5), (0.5, 0.5), steps=1, hold=30)
@@ -278,7 +280,7 @@ def test_a_part_of_the_warp_is_exported_as_the_command_line_writes_it(
     dialog.name = "window"
     run(robot.device, dialog.job(), Progress())
     projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "work.fluidwarp")
-    command_line("render", str(tmp_path / "work.fluidwarp"), "-o", str(tmp_path / "line.png"))
+    assert fluidwarp(tmp_path, "render", "work.fluidwarp", "-o", "line.png").returncode == 0
     assert (tmp_path / "window.png").read_bytes() == (tmp_path / "line.png").read_bytes()
 
 
@@ -404,3 +406,70 @@ def test_the_next_export_begins_with_the_kind_of_the_last(robot: Robot, tmp_path
     assert (dialog.kind, dialog.ending) == (ANIMATION, ".webm")
     preferences.export_as = "Something of another version"
     assert ExportDialog(editor.session, editor.exports, editor.chooser, preferences).kind == PICTURE
+
+
+SLIDERS = """
+viscosity, Viscosity: 1e-05 to 10 by ratios, 0.03
+drag, Drag: 0.00 / s to 10.00 / s, 2.00 / s
+sectors, Sectors: 2 to 16, 6
+opacity grid, Opacity: 0% to 100%, 70%
+opacity viscosity, Opacity: 0% to 100%, 70%
+opacity frozen, Opacity: 0% to 100%, 70%
+opacity velocity, Opacity: 0% to 100%, 70%
+opacity forces, Opacity: 0% to 100%, 70%
+mask reach, By: 0 px to 60 px by ratios, 5 px
+amount, Amount: 0% to 150%, 100%
+radius, Size: 2 px to 240 px by ratios, 72 px
+stiffness, Stiffness: 1% to 100%, 100%
+local, Local: 0% to 100%, 0%
+held radius, Reach: 1 px to 240 px by ratios, 36 px
+held stiffness, Stiffness: 1% to 100%, 100%
+held local, Local: 0% to 100%, 0%
+hardness, Hardness: 0% to 100%, 0%
+strength, Strength: 5% to 100%, 100%
+mask amount, Fill with: 0.001 x to 1e+05 x by ratios, 100 x
+brightness, By brightness: 1 x to 1e+05 x by ratios, 1 x
+tolerance, Tolerance: 1% to 100%, 20%
+size, Size: 16 pixels to 480 pixels, 240 pixels
+quality, Quality: 1 to 100, 90
+fps, Frames a second: 1 to 60, 30
+"""
+
+
+def test_every_slider_goes_as_far_as_it_did_and_back_to_its_default(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, slider, told = list[str](), Ui.slider, signature(Ui.slider)
+
+    def noting(*given: Any, **named: Any) -> Any:
+        bound = told.bind(*given, **named)
+        bound.apply_defaults()
+        _, name, label, _, low, high, unit, default, _, logarithmic, *_ = bound.arguments.values()
+        ends = f"{unit.text(low)} to {unit.text(high)}{' by ratios' if logarithmic else ''}"
+        line = f"{name}, {label}: {ends}{'' if default is None else f', {unit.text(default)}'}"
+        if line not in found and name not in ("from", "to"):  # they go as far as the recording
+            found.append(line)
+        return slider(*given, **named)
+
+    monkeypatch.setattr(Ui, "slider", noting)
+    state = robot.editor.state
+    state.sections = dict.fromkeys(("handles", "selection", "fluid", "symmetry", "view", "masks"), True)
+    state.symmetry = "radial"
+    for overlay in state.overlays.values():
+        overlay.shown = True
+    robot.key("g")
+    robot.drag((0.4, 0.5), (0.45, 0.5), steps=2)
+    robot.rest()
+    for key in ("p", "v", "m"):
+        robot.key(key)
+        robot.frame(count=2)
+    state.select_by = "colour"
+    robot.frame(count=2)
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog)
+    for preset in PRESETS:
+        dialog.take(preset)
+        robot.frame(count=2)
+    assert found == SLIDERS.strip().splitlines()

@@ -22,7 +22,8 @@ from app.work.journal import Origin, Work
 from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
-from support.editing import Robot, command_line, small_project
+from support.commands import Run
+from support.editing import Robot, small_project
 
 
 @pytest.fixture
@@ -197,7 +198,7 @@ def test_reset_lets_go(robot: Robot) -> None:
 
 
 def test_the_window_a_file_the_journal_and_the_command_line_give_the_same_bytes(
-    robot: Robot, device: Device, tmp_path: Path
+    robot: Robot, device: Device, tmp_path: Path, fluidwarp: Run
 ) -> None:
     session = robot.editor.session
     robot.click(*robot.at(0.6, 0.5))
@@ -220,6 +221,6 @@ def test_the_window_a_file_the_journal_and_the_command_line_give_the_same_bytes(
     lines = [*journal.beginning(Origin.of(project), first), journal.continuation(work, first)]
     assert journal.read(b"".join(lines))[1].recipe == session.recipe
     files = [tmp_path / "a.png", tmp_path / "b.png"]
-    command_line("render", str(tmp_path / "w.fluidwarp"), "-o", str(files[0]))
+    assert fluidwarp(tmp_path, "render", "w.fluidwarp", "-o", files[0].name).returncode == 0
     run(device, Job(session.recipe, session.project.picture, session.project.folder, Outputs(files[1])), Progress())
     assert np.array_equal(read_picture(files[0]).pixels, read_picture(files[1]).pixels)

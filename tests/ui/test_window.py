@@ -32,7 +32,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
     desk.close()
 
 
-def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
+def test_a_whole_session(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
     desk.open(picture)
@@ -69,12 +69,11 @@ def test_a_whole_session(desk: Desk, tmp_path: Path) -> None:
     desk.key("ctrl+q")
     desk.until_gone()
     rendered = tmp_path / "rendered.png"
-    command = [sys.executable, "-m", "app", "render", str(work), "-o", str(rendered)]
-    subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
+    assert fluidwarp(tmp_path, "render", work.name, "-o", rendered.name).returncode == 0
     assert np.array_equal(read_picture(exported).pixels, read_picture(rendered).pixels)
 
 
-def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path) -> None:
+def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     """Four of them are drawn while the first is simulated, and exported while the last ones still wait."""
     work, exported, rendered = (tmp_path / name for name in ("work.fluidwarp", "work warped.png", "rendered.png"))
     projects.save(small_project(tmp_path, grid=384), work)
@@ -98,8 +97,7 @@ def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path
     for stroke in strokes:
         assert stroke.samples[-1][1] - stroke.samples[0][1] == pytest.approx(400 / 864, abs=0.01)
     assert all(later.first_tick > stroke.last_tick for stroke, later in pairwise(strokes))
-    command = [sys.executable, "-m", "app", "render", str(work), "-o", str(rendered)]
-    subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
+    assert fluidwarp(tmp_path, "render", work.name, "-o", rendered.name).returncode == 0
     assert exported.read_bytes() == rendered.read_bytes()
 
 

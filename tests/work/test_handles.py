@@ -46,6 +46,7 @@ def test_a_handle_between_pins_does_not_fold_where_the_spline_does(device: Devic
     assert distortion(found.displacement).least > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("points", "targets", "pins"),
     [

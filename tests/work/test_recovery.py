@@ -14,6 +14,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -85,37 +86,34 @@ def desk(tmp_path: Path) -> Desk:
 
 
 class Late(threading.Event):
-    """An event after each waiting for which something happens before the waiter goes on."""
+    """An event after whose waiting for the pause something happens before the waiter goes on."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.then: list[Callable[[], None]] = []
+    then: ClassVar[list[Callable[[], None]]] = []
 
     def wait(self, timeout: float | None = None) -> bool:
         heard = super().wait(timeout)
-        while self.then:
-            self.then.pop()()
+        if timeout == recovery.PAUSE:
+            while self.then:
+                self.then.pop()()
         return heard
 
 
 def test_a_stroke_just_after_the_pause_for_the_fluid_is_written_through(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(threading, "Event", Late)
+    desk = Desk(tmp_path / "journals", small_project(tmp_path))
     written: list[int] = []
     desk.push()
     desk.write()
-    until(desk.journal._handed.is_set)
     sync = os.fsync
     monkeypatch.setattr(os, "fsync", lambda file: (sync(file), written.append(file)))
-    late = Late()
-    late.then.append(desk.push)
-    desk.journal._urgent = late
+    Late.then.append(desk.push)
     recipe = desk.document.recipe
     desk.document.history.amend(recipe.edited(duration=recipe.duration + 1 / 30))
     desk.keep()
-    until(lambda: not late.then and desk.journal._handed.is_set() and not desk.journal.is_behind)
-    time.sleep(3 * recovery.PAUSE)
-    assert written
+    until(lambda: not Late.then and not desk.journal.is_behind)
+    until(lambda: bool(written))
     desk.die()
 
 

@@ -52,6 +52,7 @@ def paint(
     session.release()
 
 
+@pytest.mark.long
 def test_two_hundred_strokes_saved_and_rendered_are_the_same_map(
     device: Device, session: Session, tmp_path: Path
 ) -> None:

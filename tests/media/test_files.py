@@ -1,0 +1,110 @@
+"""Names of numbered files, and what of them is missing."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from app.errors import UserError
+from app.media.files import (
+    cannot_write,
+    check_kept,
+    check_numbers,
+    is_sequence,
+    number_in,
+    numbered,
+    numbered_files,
+    takes_place,
+    unnumbered,
+)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "number", "name", "stem"),
+    [
+        ("plate.%04d.exr", 7, "plate.0007.exr", "plate"),
+        ("plate.%04d.exr", 123456, "plate.123456.exr", "plate"),
+        ("plate_####.exr", 7, "plate_0007.exr", "plate"),
+        ("plate-##.png", 7, "plate-07.png", "plate"),
+        ("%d.png", 7, "7.png", "frames"),
+        ("a%02db.png", 7, "a07b.png", "ab"),
+    ],
+)
+def test_the_file_of_a_number_and_back(pattern: str, number: int, name: str, stem: str) -> None:
+    assert is_sequence(pattern)
+    assert numbered(f"folder/{pattern}", number) == Path("folder", name)
+    assert number_in(pattern, name) == number
+    assert unnumbered(pattern) == stem
+
+
+def test_what_is_no_file_of_a_sequence() -> None:
+    for name in ("a.7.png", "a.00007.png", "a.007.jpg", "b.007.png", "a.-07.png", "a.007.png.part", "a..png"):
+        assert number_in("a.%03d.png", name) is None
+    assert number_in("a.png", "a.png") is None
+    assert [is_sequence(name) for name in ("a#.png", "a.png", "100%.png", "%04d/a.png")] == [False] * 4
+    assert unnumbered("plate.exr") == "plate"
+
+
+def test_files_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    for name in ("a.10.png", "a.9.png", "a.100.png", "a.txt"):
+        (tmp_path / name).touch()
+    assert [*numbered_files(tmp_path / "a.%d.png")] == [9, 10, 100]
+    with pytest.raises(UserError, match="there is no such file"):
+        numbered_files(tmp_path / "b.%d.png")
+
+
+@pytest.mark.parametrize(
+    ("there", "wanted", "said"),
+    [
+        ([1, 3], range(1, 4), "of 1-3 it lacks the frame 2;"),
+        ([], range(5, 6), "of 5 it lacks the frame 5;"),
+        ([4], range(1, 8), "of 1-7 it lacks the frames 1-3, 5-7;"),
+        (range(0, 17, 2), range(17), "the frames 1, 3, 5, 7, 9, 11, 13, 15;"),
+        (range(0, 19, 2), range(19), "the frames 1, 3, 5, 7, 9, 11, 13, 15 and others, 9 in all;"),
+    ],
+)
+def test_missing_numbers_are_named_in_runs_eight_at_most(there: list[int], wanted: range, said: str) -> None:
+    with pytest.raises(UserError) as raised:
+        check_numbers("a.%d.png", there, wanted)
+    assert said in str(raised.value)
+    check_numbers("a.%d.png", wanted, wanted)
+
+
+@pytest.mark.parametrize(
+    ("output", "source", "does"),
+    [
+        ("f/a.png", "f/a.png", True),
+        ("f/a.png", "g/a.png", False),
+        ("f/a.%d.png", "f/a.7.png", True),
+        ("f/a.%02d.png", "f/a.7.png", False),
+        ("f/a.7.png", "f/a.%d.png", True),
+        ("f/a.####.png", "f/a.%04d.png", True),
+        ("f/a.%d.png", "f/a.%04d.png", True),
+        ("f/a.%d.png", "f/b.%d.png", False),
+    ],
+)
+def test_what_takes_the_place_of_what(output: str, source: str, does: bool) -> None:
+    assert takes_place(output, source) is does
+
+
+def test_a_result_is_not_written_over_its_source(tmp_path: Path) -> None:
+    check_kept(tmp_path / "a.png", tmp_path / "b.png")
+    with pytest.raises(UserError, match="would be replaced by its own result"):
+        check_kept(tmp_path / "a.png", tmp_path / "x/../a.png")
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.ENOSPC, "the disk is full"),
+        (errno.EDQUOT, "quota is used up"),
+        (errno.EROFS, "read-only"),
+        (errno.ENAMETOOLONG, "the name is too long"),
+        (errno.EFBIG, "grows larger than this disk allows"),
+        (errno.EIO, "of its own"),
+    ],
+)
+def test_why_a_file_cannot_be_written_is_told_with_what_mends_it(number: int, said: str) -> None:
+    assert said in str(cannot_write("a.png", OSError(number, "of its own")))

@@ -1,0 +1,109 @@
+"""Handles as a recipe has them: when they are in force, where their keys lead, what cannot be met."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from app.model.handles import RecipeHandle, RecipePin, labelled, objections
+from app.model.recipe import Recipe
+from app.model.schema import frozen
+
+
+def handle(**keys: Any) -> RecipeHandle:
+    return RecipeHandle.model_validate(frozen({"at": [0.5, 0.5], "to": [0.6, 0.5], "radius": 0.1} | keys))
+
+
+def test_a_handle_is_in_force_from_the_tick_whose_middle_comes_after_its_start() -> None:
+    for start, end, wanted in ((0.0, None, range(8)), (0.25, 0.55, range(2, 5)), (0.24, 0.56, range(2, 6))):
+        led = handle(start=start, end=end)
+        assert [tick for tick in range(8) if led.is_in_force(tick, 0.1)] == [*wanted]
+        assert led.first_tick(0.1) == wanted[0]
+
+
+def test_where_a_handle_goes_and_when_it_is_there() -> None:
+    led = handle(start=1.0, duration=0.5)
+    assert (led.ready, led.last, led.goal) == (1.5, 1.5, (0.6, 0.5))
+    led = handle(start=1.0, duration=0.5, keys=[[2.0, 0.1, 0.2], [3.0, 0.3, 0.4]])
+    assert (led.ready, led.last, led.goal) == (1.5, 3.0, (0.3, 0.4))
+    led = handle(to=None, start=1.0, keys=[])
+    assert (led.ready, led.last, led.goal) == (1.0, 1.0, None)
+
+
+def test_the_hand_adds_a_key_and_first_one_of_where_it_rested() -> None:
+    led = handle(to=None, keys=[]).led_to(5, 0.1, (0.7, 0.5), (0.5, 0.5))
+    assert led.keys == ((0.5, 0.5, 0.5), (pytest.approx(0.6), 0.7, 0.5))
+    # Another place in the same tick takes the place of the first; what follows at once goes on from there.
+    assert led.led_to(5, 0.1, (0.8, 0.5), (0.5, 0.5)).keys == ((0.5, 0.5, 0.5), (pytest.approx(0.6), 0.8, 0.5))
+    more = led.led_to(6, 0.1, (0.9, 0.5), (0.7, 0.5))
+    assert [key[1] for key in more.keys or ()] == [0.5, 0.7, 0.9]
+    # After a rest it sets out from where it has rested.
+    later = led.led_to(9, 0.1, (0.9, 0.5), (0.7, 0.5))
+    assert [key[0] for key in later.keys or ()] == pytest.approx([0.5, 0.6, 0.9, 1.0])
+
+
+def test_what_is_led_before_a_tick() -> None:
+    led = handle(to=None, start=0.2, keys=[[0.3, 0.5, 0.5], [0.4, 0.6, 0.5]])
+    assert led.before(2, 0.1) is None
+    assert [len(cut.keys or ()) for tick in (3, 4, 5) if (cut := led.before(tick, 0.1))] == [1, 2, 2]
+    assert led.before(5, 0.1) is led
+
+
+def test_handles_agree_until_one_is_led_elsewhere() -> None:
+    led = handle(start=0.2, duration=0.3, keys=[[0.6, 0.5, 0.5], [0.8, 0.6, 0.5]])
+    assert led.agrees_until(led, 0.1) == math.inf
+    for other, tick in (
+        (led.model_copy(update={"radius": 0.2}), 2),
+        (led.model_copy(update={"end": 1.0}), 9),
+        (led.model_copy(update={"keys": (*(led.keys or ()), (1.0, 0.1, 0.1))}), 8),
+        (led.model_copy(update={"keys": (led.keys or ())[:1]}), 6),
+        (led.model_copy(update={"keys": None}), 5),
+    ):
+        assert led.agrees_until(other, 0.1) == other.agrees_until(led, 0.1) == tick
+
+
+def test_items_are_counted_from_one_handles_first() -> None:
+    pin = RecipePin(at=(0.1, 0.1), name="nose")
+    led = handle()
+    assert labelled([led, led], [pin]) == [("handle[1]", led), ("handle[2]", led), ('pin[1] "nose"', pin)]
+
+
+def pair(at: float, to: tuple[float, float], other: float, other_to: tuple[float, float]) -> list[str]:
+    """What is said of two handles of radius 0.1 on one line."""
+    two = [handle(at=[at, 0.5], to=to), handle(at=[other, 0.5], to=other_to)]
+    return [said.split("are ")[-1].split("handle[2] ")[-1] for said in objections(two, [], (1.0, 1.0))]
+
+
+def test_how_near_two_handles_may_lie_and_be_led() -> None:
+    """The same place is nearer than a twentieth of a radius; neighbours may come four times as far apart, or near."""
+    assert pair(0.5, (0.5, 0.5), 0.5049, (0.51, 0.5)) == ["led apart"]
+    assert pair(0.5, (0.5, 0.5), 0.5049, (0.5048, 0.5)) == []
+    assert pair(0.5, (0.5, 0.5), 0.52, (0.579, 0.5)) == []
+    assert pair(0.5, (0.5, 0.5), 0.52, (0.582, 0.5)) == ["led 4.1 times as far apart as they lie"]
+    assert pair(0.5, (0.5, 0.5), 0.61, (0.67, 0.5)) == []
+    assert pair(0.5, (0.5, 0.5), 0.58, (0.519, 0.5)) == ["led to nearly the same place"]
+    assert pair(0.5, (0.5, 0.5), 0.58, (0.521, 0.5)) == []
+    assert pair(0.5, (0.58, 0.5), 0.58, (0.5, 0.51)) == ["cross each other's way"]
+    assert pair(0.5, (0.5, 0.58), 0.58, (0.5, 0.5)) == []
+
+
+def test_a_handle_goes_two_radii_at_most() -> None:
+    assert [*objections([handle(to=[0.699, 0.5])], [], (1.0, 1.0))] == []
+    (said,) = objections([handle(to=[0.75, 0.5])], [], (1.0, 1.0))
+    assert said == "handle[1] goes only 2 of the 2.5 radii to its goal; give it a larger radius"
+    assert [*objections([handle(to=[0.5, 0.75])], [], (1.0, 0.75))] == []
+
+
+def test_handles_that_are_never_in_force_together_do_not_contradict_each_other() -> None:
+    first, second = handle(to=[0.51, 0.5], end=1.0), handle(to=[0.49, 0.5], start=1.0)
+    assert [*objections([first, second], [], (1.0, 1.0))] == []
+    assert len([*objections([first, second.model_copy(update={"start": 0.9})], [], (1.0, 1.0))]) == 1
+
+
+def test_sixty_four_handles_and_pins_work() -> None:
+    pins = tuple(RecipePin(at=(k / 64, 0.5)) for k in range(60))
+    assert len(Recipe(handle=(handle(),) * 4, pin=pins).pin) == 60
+    with pytest.raises(ValueError, match="65 handles and pins; at most 64 work"):
+        Recipe(handle=(handle(),) * 5, pin=pins)
