@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import cosh, hypot, tanh
+
 import pytest
 
 from app.model.strokes import Stroke
-from app.model.tools import TOOL, BrushSettings, Press, Touch
+from app.model.tools import TOOL, BrushSettings, Press, PulledString, Touch
 
 EXTENT = (1.0, 0.75)
 DT = 1 / 30
@@ -115,3 +117,34 @@ def test_a_curve_takes_up_points_by_their_distance_on_the_picture() -> None:
     assert down is not None
     assert [round((x - 0.2) / 0.005) for _, x, _, _ in across.samples] == [*range(8)]
     assert [round((y - 0.2) / 0.005) for _, _, y, _ in down.samples] == [0, 2, 4, 6]
+
+
+def test_a_pulled_string_draws_a_tractrix() -> None:
+    """The exact curve: a pen that leaves along x pulls the brush, one length above, at x(t) = t - a tanh(t / a)."""
+    length, steps = 0.2, 20_000
+    string = PulledString(length, (1.0, 1.0), (0.0, length))
+    string.pull(0.0, 0.0)
+    for step in range(1, steps + 1):
+        x, y = string.pull(0.5 * step / steps, 0.0)
+    assert y == pytest.approx(length / cosh(0.5 / length), abs=5e-4)
+    assert x == pytest.approx(0.5 - length * tanh(0.5 / length), abs=5e-4)
+
+
+def test_what_the_pen_shakes_within_the_string_moves_nothing() -> None:
+    string = PulledString(0.1, EXTENT, (0.5, 0.5))
+    for x, y in ((0.55, 0.5), (0.5, 0.62), (0.43, 0.45)):
+        assert hypot((x - 0.5) * EXTENT[0], (y - 0.5) * EXTENT[1]) < 0.1
+        assert string.pull(x, y) == (0.5, 0.5)
+    assert string.pull(0.7, 0.5) == (0.6, 0.5)
+
+
+def test_a_string_of_no_length_is_none() -> None:
+    string = PulledString(0.0, EXTENT, (0.1, 0.1))
+    assert string.pull(0.12346, 0.3) == (0.12346, 0.3)
+    assert list(string.catch_up(0.01)) == []
+
+
+def test_the_brush_catches_up_with_the_pen_in_even_steps() -> None:
+    string = PulledString(0.1, EXTENT, (0.2, 0.4))
+    string.pull(0.25, 0.4)
+    assert list(string.catch_up(0.02)) == [pytest.approx((x, 0.4), abs=1e-5) for x in (0.21667, 0.23333, 0.25)]
