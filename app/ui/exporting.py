@@ -266,9 +266,6 @@ class ExportDialog(Dialog):
         return Job(recipe, self.picture, session.project.folder, outputs)
 
     def body(self, ui: Ui) -> bool:
-        # Enter belongs to the field that is being typed in, or to what the arrows have gone to.
-        entered = imgui.is_key_pressed(imgui.Key.enter, False)
-        entered = entered and not imgui.is_any_item_active() and not imgui.get_io().nav_visible
         imgui.align_text_to_frame_padding()
         ui.dim("Preset")
         imgui.same_line(0, ui.px(12))
@@ -322,7 +319,7 @@ class ExportDialog(Dialog):
             return False
         imgui.same_line()
         with ui.enabled(self._can_start):
-            if ui.button("Export", primary=True, width=96) or (entered and self._can_start):
+            if ui.button("Export", primary=True, width=96) or (self.entered and self._can_start):
                 return not self.attempt(self._start)
         return True
 
@@ -430,7 +427,7 @@ class StillExporting(Dialog):
             return False
         imgui.same_line()
         with ui.enabled(not self._waits):
-            if ui.button("Quit when finished", primary=True, width=148):
+            if ui.button("Quit when finished", primary=True, width=148) or self.entered:
                 self._waits = True
         return True
 

@@ -26,7 +26,7 @@ from app.ui import workspace
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
 from app.ui.canvas import shown_pixels
-from app.ui.dialogs import PictureOrMap, Preferring, Shortcuts, Unsaved
+from app.ui.dialogs import PictureOrMap, Preferring, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
@@ -34,6 +34,7 @@ from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS, TRIALS, Speed
 from app.ui.saving import SaveDialog
+from app.ui.shortcuts import Shortcuts
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
 from solver.brush.masks import ZERO
