@@ -89,8 +89,8 @@ class History:
         """Make `recipe` the present, as the edit `name`; what could be redone is gone. An edit of nothing is none."""
         if recipe is self.recipe or recipe == self.recipe:
             return
-        del self._entries[self._index + 1 :]
         self._made += 1
+        del self._entries[self._index + 1 :]
         self._entries.append(Entry(name, recipe, _own_bytes(recipe, self.recipe), self._made))
         self._index += 1
         while self.nbytes > self.budget and self._index > 0:

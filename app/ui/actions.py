@@ -50,6 +50,8 @@ def _table() -> list[Action]:
         ("reset_warp", "Reset the warp", "ctrl+r"),
     ):
         add("Edit", name, label, key, lambda c, n=name, label=label: c.workspace.change(label, **{n: True}))
+    add("Edit", "copy_picture", "Copy the picture", "ctrl+c", lambda c: c.copy_picture())
+    add("Edit", "paste", "Paste a picture", "ctrl+v", lambda c: c.files.paste())
     add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
     add("Edit", "remove", "Remove the handle", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "cancel", "Give up the stroke or selection", "escape", lambda c: c.cancel())

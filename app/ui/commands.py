@@ -107,6 +107,12 @@ class Commands:
         self.workspace.session.edit_masks(f"{kind.capitalize()} {MASKS[state.mask]}", mask_edit(edit))
         state.show_mask()
 
+    def copy_picture(self) -> None:
+        """Put what is seen, in full size, on the clipboard."""
+        session = self.workspace.session
+        session.release()
+        self.exports.copy(session)
+
     def copy_recipe(self) -> None:
         self.clipboard(self.workspace.session.recipe.text())
         self.messages.done("The recipe is on the clipboard, as TOML.")

@@ -12,6 +12,7 @@ from typing import Any
 from app.errors import UserError
 from app.media.inputs import read_input
 from app.media.opening import shipped_recipes
+from app.ui.clipboard import pasted_folder
 
 MOST_RECENT = 10
 MOST_BYTES = 2**20  # of the file
@@ -97,7 +98,9 @@ class Preferences:
             pass  # preferences are not worth a message
 
     def opened(self, path: Path) -> None:
-        """Take note of a file that was opened or saved."""
+        """Take note of a file that was opened or saved; what was pasted is no file to the person."""
+        if path.parent == pasted_folder():
+            return
         name = str(path.resolve())
         self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
         if path.resolve() not in shipped_recipes().values():  # or what is saved next would go into the program's folder
