@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from app.model.recipe import Recipe
 
@@ -12,11 +12,16 @@ DEFAULT_BUDGET = 256 * 2**20
 
 @dataclass(frozen=True)
 class Entry:
-    """One state of the work, and the name of the edit that led to it."""
+    """One state of the work, and the name of the edit that led to it.
+
+    Attributes:
+        number: of the edit among all that were made, with those that are gone.
+    """
 
     name: str
     recipe: Recipe
     nbytes: int
+    number: int = field(default=0, compare=False)
 
 
 class History:
@@ -31,13 +36,14 @@ class History:
     def __init__(self, recipe: Recipe, name: str = "Open", budget: int = DEFAULT_BUDGET) -> None:
         self.budget = budget
         self._entries = [Entry(name, recipe, _own_bytes(recipe, None))]
-        self._index = 0
+        self._index = self._made = 0
 
     @classmethod
     def restored(cls, entries: Sequence[Entry], index: int) -> History:
         """The history that had these entries; `index` is the present."""
         history = cls(entries[0].recipe)
-        history._entries = list(entries)
+        history._entries = [replace(entry, number=number) for number, entry in enumerate(entries)]
+        history._made = len(entries) - 1
         history.go_to(index)
         return history
 
@@ -83,8 +89,9 @@ class History:
         """Make `recipe` the present, as the edit `name`; what could be redone is gone. An edit of nothing is none."""
         if recipe is self.recipe or recipe == self.recipe:
             return
+        self._made += 1
         del self._entries[self._index + 1 :]
-        self._entries.append(Entry(name, recipe, _own_bytes(recipe, self.recipe)))
+        self._entries.append(Entry(name, recipe, _own_bytes(recipe, self.recipe), self._made))
         self._index += 1
         while self.nbytes > self.budget and self._index > 0:
             del self._entries[0]
@@ -96,7 +103,8 @@ class History:
             return
         del self._entries[self._index + 1 :]
         before = self._entries[self._index - 1].recipe if self._index else None
-        self._entries[self._index] = Entry(self._entries[self._index].name, recipe, _own_bytes(recipe, before))
+        nbytes = _own_bytes(recipe, before)
+        self._entries[self._index] = replace(self._entries[self._index], recipe=recipe, nbytes=nbytes)
 
     def replace_all(self, change: Callable[[Recipe], Recipe]) -> None:
         """Let every state be another recipe, which is no edit: the list stays as it is, and so does the present."""

@@ -1,4 +1,4 @@
-"""Feels: named sets of fluid parameters, so that a person need not know what viscosity is."""
+"""Named sets of parameters: feels of the fluid, so that a person need not know what viscosity is, and brushes."""
 
 from __future__ import annotations
 
@@ -36,3 +36,23 @@ FEELS = (PUTTY, HONEY, WATER)
 """From stiff to thin."""
 
 DEFAULT = HONEY
+
+
+@dataclass(frozen=True)
+class BrushPreset:
+    """A named brush: its radius in longer sides, hardness and strength 0-1; the rest of a brush stays as it is."""
+
+    name: str
+    radius: float
+    hardness: float
+    strength: float
+
+
+BRUSHES = (
+    BrushPreset("Wide and soft", 0.25, 0.0, 1.0),
+    BrushPreset("Everyday", 0.15, 0.0, 1.0),
+    BrushPreset("Gentle", 0.12, 0.0, 0.4),
+    BrushPreset("Firm edge", 0.08, 1.0, 1.0),
+    BrushPreset("Detail", 0.03, 0.3, 0.7),
+)
+"""Those that come with fluidwarp, from large to small."""

@@ -274,6 +274,12 @@ class Recipe(Model):
         return max(1, round(self.duration / self.fluid.dt))
 
     @property
+    def recorded(self) -> int:
+        """Ticks in which something is done; 0 where nothing has been yet."""
+        acts = self.stroke or self.change or self.force or self.handle
+        return self.ticks if acts or any(edit.tick for edit in self.mask) else 0
+
+    @property
     def leads(self) -> bool:
         """True if it has handles or pins."""
         return bool(self.handle or self.pin)

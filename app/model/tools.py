@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from math import hypot
+from math import ceil, hypot
 from typing import NamedTuple
 
 from app.model.handles import RecipeHandle
@@ -50,6 +50,7 @@ class Press:
         last: where the last stroke ended, for a straight line from there.
         detail: how finely the flow of such a brush is solved; see `app.model.windows`.
         slack: how far the pointer may shake, in longer sides, and is not moved yet.
+        string: by how long a string the pen pulls the brush, in longer sides; see `PulledString`.
         at: the place in the original of what was pressed on.
         symmetry, sectors: of strokes.
         held: the handle that was taken hold of, and `rests`, where it is led.
@@ -63,12 +64,56 @@ class Press:
     last: tuple[float, float] | None = None
     detail: int = 0
     slack: float = 0.0
+    string: float = 0.0
     at: tuple[float, float] = (0.0, 0.0)
     held: RecipeHandle | None = None
     rests: tuple[float, float] | None = None
     timeless: bool = False
     symmetry: Symmetry = "none"
     sectors: int = 6
+
+
+class PulledString:
+    """A stabiliser: the pen pulls the brush behind it on a string, and what it shakes within that length moves nothing.
+
+    The brush goes straight towards the pen, and only as far as the string is too short: a tractrix, whatever the speed.
+
+    Args:
+        length: longer sides; 0 has the brush where the pen is.
+        extent: of the picture.
+        place: where both begin.
+    """
+
+    def __init__(self, length: float, extent: tuple[float, float], place: tuple[float, float]) -> None:
+        self._length, self._extent = length, extent
+        self._brush = self._pen = place
+
+    def pull(self, x: float, y: float) -> tuple[float, float]:
+        """Where the brush is once the pen is at (x, y), with as many digits as a recipe needs."""
+        self._pen = x, y
+        if (far := self._away) > self._length:
+            self._go(1 - self._length / far)
+        return self._place
+
+    def catch_up(self, reach: float) -> Iterator[tuple[float, float]]:
+        """The way of the brush to the pen when that is lifted, in steps of at most `reach` longer sides."""
+        for left in range(ceil(self._away / reach), 0, -1):
+            self._go(1 / left)
+            yield self._place
+
+    @property
+    def _away(self) -> float:
+        (x, y), (px, py) = self._brush, self._pen
+        return hypot((px - x) * self._extent[0], (py - y) * self._extent[1])
+
+    @property
+    def _place(self) -> tuple[float, float]:
+        return round(self._brush[0], 5), round(self._brush[1], 5)
+
+    def _go(self, part: float) -> None:
+        """Go so much of the way to the pen."""
+        (x, y), (px, py) = self._brush, self._pen
+        self._brush = (px, py) if part == 1 else (x + (px - x) * part, y + (py - y) * part)
 
 
 Made = Stroke | RecipeHandle

@@ -7,36 +7,24 @@ from dataclasses import dataclass
 
 from app.model.tools import TOOLS
 from app.ui.commands import Commands
-from app.ui.dialogs import Shortcuts
 from app.ui.editor_state import overlays
+from app.ui.keys import Keyed
 
 Do = Callable[[str], None]
 """Does the action of a name."""
 
 
 @dataclass(frozen=True)
-class Action:
+class Action(Keyed):
     """Something to do.
 
     Attributes:
-        name: by which the panels ask for it.
-        label: as the person reads it.
-        group: the heading it stands under.
-        keys: chords that do it, the first of which is shown.
         run: does it.
         repeats: doing it again while the key is held makes sense.
     """
 
-    name: str
-    label: str
-    group: str
-    keys: tuple[str, ...]
     run: Callable[[Commands], object]
     repeats: bool = False
-
-    @property
-    def key(self) -> str:
-        return self.keys[0] if self.keys else ""
 
 
 def _table() -> list[Action]:
@@ -62,6 +50,8 @@ def _table() -> list[Action]:
         ("reset_warp", "Reset the warp", "ctrl+r"),
     ):
         add("Edit", name, label, key, lambda c, n=name, label=label: c.workspace.change(label, **{n: True}))
+    add("Edit", "copy_picture", "Copy the picture", "ctrl+c", lambda c: c.copy_picture())
+    add("Edit", "paste", "Paste a picture", "ctrl+v", lambda c: c.files.paste())
     add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
     add("Edit", "remove", "Remove the handle", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "cancel", "Give up the stroke or selection", "escape", lambda c: c.cancel())
@@ -111,18 +101,9 @@ def _table() -> list[Action]:
     add("Time", "start", "To the start", "home", lambda c: c.workspace.session.seek(0))
     add("Time", "end", "To the end", "end", lambda c: c.workspace.session.seek(c.workspace.session.end))
 
-    add("Help", "shortcuts", "Keyboard shortcuts", "f1", lambda c: c.dialogs.show(Shortcuts(_sheet())))
+    add("Help", "shortcuts", "Keyboard shortcuts", "f1", lambda c: c.ask_shortcuts())
     return made
 
 
 ACTIONS = {action.name: action for action in _table()}
 BY_KEY = {key: action for action in ACTIONS.values() for key in action.keys}
-
-
-def _sheet() -> dict[str, list[tuple[str, str]]]:
-    """For each group, the labels and the keys of its actions."""
-    sheet: dict[str, list[tuple[str, str]]] = {}
-    for action in ACTIONS.values():
-        if action.keys:
-            sheet.setdefault(action.group, []).append((action.label, action.key))
-    return sheet

@@ -10,6 +10,7 @@ from app.media.depth import to_bits
 from app.model.picture import Picture
 from app.ui.editor_state import EditorState
 from app.ui.theme import Palette
+from app.ui.thumbnails import Thumbnails
 from app.ui.viewport import Rect, Viewport
 from app.work.session import Session
 from solver.gl.device import Device
@@ -59,6 +60,7 @@ class Canvas:
         self._kept_at = -1
         self._selected: Field | None = None
         self._selected_area: np.ndarray | None = None
+        self.thumbnails = Thumbnails(device, self.size, self._draw_small)
         self._force_fields: tuple[Field, Field] | None = None
         self._forces_of: object = None
 
@@ -124,8 +126,31 @@ class Canvas:
         )
         target.viewport = before
 
+    def _draw_small(self, target: moderngl.Framebuffer, session: Session) -> None:
+        """Draw all of the picture as it is now into a small framebuffer, with nothing laid over it."""
+        width, height = target.size
+        texture, displacement = self._texture, self._fields.get("thumbnail", target.size, 2)
+        if (density := session.replay.density) is not None:
+            texture, displacement = density.values.texture, self._still
+        else:
+            session.seen.draw(displacement, (0.0, 0.0), displacement.texel)
+        self._texture.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
+        self.device.pass_("view/canvas.frag", EDGES=EDGES[session.recipe.edges]).draw_into(
+            target,
+            ("displacement",),
+            picture=texture,
+            displacement=displacement,
+            shown=WHOLE,
+            origin=(0.0, 0.0),
+            step=(1 / width, 1 / height),
+            extent=session.extent,
+            window=WHOLE,
+            target_height=float(height),
+        )
+
     def release(self) -> None:
         self._texture.release()
+        self.thumbnails.release()
         self._still.release()
         self._fields.release()
         for field in (self._kept, self._selected):
@@ -213,11 +238,11 @@ class Canvas:
         if shown["grid"].shown:
             defines["GRID"] = 1
             inputs |= {"grid": GRID_LINES, "grid_opacity": shown["grid"].opacity, "pixel": scale}
-        if shown["viscosity"].shown or state.edits_mask("thickness", "thicken", "smooth"):
+        if state.shows_viscosity:
             defines["VISCOSITY"] = 1
             base = max(session.replay.settings.viscosity, 1e-6)
             inputs |= {"viscosity": replay.masks.base_viscosity, "thickness": replay.masks.thickness, "base": base}
-            inputs["viscosity_opacity"] = shown["viscosity"].opacity
+            inputs |= {"viscosity_opacity": shown["viscosity"].opacity, "contour": scale}
         if shown["frozen"].shown or state.edits_mask("frozen", "freeze", "smooth"):
             defines["FROZEN"] = 1
             inputs |= {"frozen": replay.masks.frozen, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}

@@ -14,10 +14,12 @@ from app.ui.dialogs import Dialogs, Preferring
 from app.ui.editor_state import EditorState
 from app.ui.exporting import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
+from app.ui.keys import Keys
 from app.ui.messages import Messages
 from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.selecting import Selecting
+from app.ui.shortcuts import Shortcuts
 from app.ui.workspace import Workspace
 
 
@@ -40,6 +42,7 @@ class Commands:
     messages: Messages
     preferences: Preferences
     selecting: Selecting
+    keys: Keys
     clipboard: Callable[[str], None] = imgui.set_clipboard_text
     closed: bool = False
 
@@ -104,9 +107,18 @@ class Commands:
         self.workspace.session.edit_masks(f"{kind.capitalize()} {MASKS[state.mask]}", mask_edit(edit))
         state.show_mask()
 
+    def copy_picture(self) -> None:
+        """Put what is seen, in full size, on the clipboard."""
+        session = self.workspace.session
+        session.release()
+        self.exports.copy(session)
+
     def copy_recipe(self) -> None:
         self.clipboard(self.workspace.session.recipe.text())
         self.messages.done("The recipe is on the clipboard, as TOML.")
+
+    def ask_shortcuts(self) -> None:
+        self.dialogs.show(Shortcuts(self.keys))
 
     def ask_preferences(self) -> None:
         self.dialogs.show(Preferring(self.preferences, self.state))

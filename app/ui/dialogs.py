@@ -12,7 +12,7 @@ from app.errors import UserError
 from app.ui.editor_state import EditorState
 from app.ui.preferences import Preferences
 from app.ui.viewport import Rect
-from app.ui.widgets import Ui, keys_shown
+from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 
 
@@ -23,6 +23,8 @@ class Dialog(ABC):
         width, height: in points of the design; a height of 0 is that of what is in it.
         tallest: to which it may grow; it begins as high up as leaves room for that.
         rect: where it was drawn last.
+        entered: Enter was pressed in this frame, and belongs neither to a field that is being typed in nor to what the
+            arrows have gone to.
         problem: why what the person wanted of it could not be done.
     """
 
@@ -33,6 +35,7 @@ class Dialog(ABC):
         self.title = title
         self.rect = Rect(0, 0, 0, 0)
         self.problem = ""
+        self.entered = False
         self._open = True
         self._top: float | None = None
         self._placed_for: tuple[float, float, float] | None = None
@@ -44,6 +47,14 @@ class Dialog(ABC):
 
     def close(self) -> None:
         self._open = False
+
+    @property
+    def is_listening(self) -> bool:
+        """Whatever key is pressed next is taken by `hear`, and does nothing else."""
+        return False
+
+    def hear(self, chord: str) -> None:  # noqa: B027
+        """A key was pressed."""
 
     def attempt(self, doing: Callable[[], object]) -> bool:
         """Do what the person wants; True if it went well. What went wrong is told here: a message would lie below."""
@@ -90,6 +101,8 @@ class Dialog(ABC):
             self._take_note(imgui.get_window_pos(), imgui.get_window_size(), dialogs.changed)
             # A field that is being typed in is left by Escape first.
             escaped = imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active()
+            entered = imgui.is_key_pressed(imgui.Key.enter, False) and not imgui.is_any_item_active()
+            self.entered = entered and not imgui.get_io().nav_visible
             going_on = self.body(ui) and self._open
             # Only the topmost dialog hears Escape; it may just have opened another one.
             is_topmost = dialogs.shown[-1] is self
@@ -138,6 +151,11 @@ class Dialogs:
     def is_busy(self) -> bool:
         """Something is going on in one, so that frames have to be drawn."""
         return any(dialog.is_busy for dialog in self.shown)
+
+    @property
+    def is_listening(self) -> bool:
+        """The topmost one takes the next key, whatever it does otherwise."""
+        return bool(self.shown) and self.shown[-1].is_listening
 
     def show(self, dialog: Dialog) -> None:
         self.shown.append(dialog)
@@ -207,13 +225,15 @@ class Unsaved(Dialog):
         ui.wrapped(f"What you have done to “{name}” is lost if you {self._what} without saving.", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(8)))
         if ui.button("Don't save", width=108):
+            session = self._workspace.session
             self._then()
+            self._workspace.give_up(session)
             return False
         imgui.same_line(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
         if ui.button("Cancel", width=96):
             return False
         imgui.same_line()
-        if ui.button("Save", primary=True, width=96):
+        if ui.button("Save", primary=True, width=96) or self.entered:
             self._save(self._then)
             return False
         return True
@@ -239,7 +259,7 @@ class PictureOrMap(Dialog):
         if ui.button("Use as map", width=112):
             chosen = self._use
         imgui.same_line()
-        if ui.button("Open as picture", primary=True, width=144):
+        if ui.button("Open as picture", primary=True, width=144) or self.entered:
             chosen = self._picture
         if chosen is None:
             return True
@@ -247,64 +267,6 @@ class PictureOrMap(Dialog):
         self.close()
         chosen()
         return False
-
-
-class Shortcuts(Dialog):
-    """The sheet of all keys.
-
-    Args:
-        keys: for each group, what can be done and the chord that does it.
-    """
-
-    width, height = 880, 672
-
-    def __init__(self, keys: dict[str, list[tuple[str, str]]]) -> None:
-        super().__init__("Keyboard and mouse")
-        self._keys = keys
-
-    def body(self, ui: Ui) -> bool:
-        groups = {name: [(label, keys_shown(key)) for label, key in rows] for name, rows in self._keys.items()}
-        groups["Mouse"] = [
-            ("Paint", "Drag"),
-            ("The other direction", "Alt + drag"),
-            ("Straight along an axis", "Shift + drag"),
-            ("Straight from the last end", "Shift + click"),
-            ("Brush size and hardness", "Right drag"),
-            ("Pan", "Middle drag"),
-            ("Pan with any tool", "Space + drag"),
-            ("Zoom", "Wheel"),
-            ("As it was, while held", "\\"),
-            ("Back to default", "Double click"),
-            ("Type a number", "Ctrl + click"),
-        ]
-        columns = (("File", "Edit", "Time", "Masks"), ("Tools", "Brush"), ("View", "Help", "Mouse"))
-        imgui.begin_child("keys", ImVec2(0, -ui.px(44)))
-        across = min(max(int(imgui.get_content_region_avail().x / ui.px(230)), 1), len(columns))
-        if imgui.begin_table("sheet", across, imgui.TableFlags_.sizing_stretch_same):
-            imgui.table_next_row()
-            for column in columns:
-                imgui.table_next_column()
-                for group in column:
-                    self._group(ui, group, groups[group])
-            imgui.end_table()
-        imgui.end_child()
-        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
-        return not ui.button("Close", primary=True, width=96)
-
-    def _group(self, ui: Ui, name: str, rows: list[tuple[str, str]]) -> None:
-        ui.text(name, ui.palette.accent, 13, bold=True)
-        imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(3)))
-        right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - ui.px(20)
-        for label, keys in rows:
-            ui.text(label, size=13.5)
-            imgui.push_font(ui.fonts.regular, 13.5)
-            width = imgui.calc_text_size(keys).x
-            imgui.pop_font()
-            imgui.same_line()
-            imgui.set_cursor_pos_x(right - width)
-            ui.text(keys, ui.palette.dim, 13.5)
-        imgui.pop_style_var()
-        imgui.dummy(ImVec2(0, ui.px(6)))
 
 
 class Preferring(Dialog):
@@ -329,11 +291,12 @@ class Preferring(Dialog):
         likes.scale = scales[ui.segmented("scale", names, nearest, -1)]
         imgui.dummy(ImVec2(0, ui.px(2)))
         likes.embed = ui.check("Keep the picture inside the project", likes.embed)
+        likes.names = ui.check("Names beside the tools", likes.names)
         automatic = ui.check("Choose the quality automatically", self._state.auto_quality)
         self._state.auto_quality = likes.auto_quality = automatic
         imgui.dummy(ImVec2(0, ui.px(8)))
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
-        if ui.button("Done", primary=True, width=96):
+        if ui.button("Done", primary=True, width=96) or self.entered:
             likes.save()
             return False
         return True

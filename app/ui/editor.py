@@ -15,18 +15,19 @@ from app.errors import UserError
 from app.media.project import Project
 from app.model.tools import TOOLS
 from app.ui import theme
-from app.ui.actions import ACTIONS, BY_KEY
+from app.ui.actions import ACTIONS
 from app.ui.canvas import Canvas
 from app.ui.chooser import FileChooser
 from app.ui.clock import PACE, Clock
 from app.ui.commands import Commands
 from app.ui.dialogs import Dialogs
 from app.ui.editor_state import EditorState
-from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Wheel
+from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Text, Wheel
 from app.ui.exporting import Exports
 from app.ui.files import Files
 from app.ui.imgui_backend import ImGuiBackend
 from app.ui.journals import Journals
+from app.ui.keys import Keys
 from app.ui.layout import NARROW, Layout
 from app.ui.messages import Messages
 from app.ui.numbers import Numbers
@@ -62,10 +63,11 @@ class Editor:
         journals: Path | None = None,
     ) -> None:
         self.preferences = likes = preferences or Preferences()
-        self.state = EditorState(inspector=likes.inspector, auto_quality=likes.auto_quality)
+        self.state = EditorState.recalled(likes)
+        self.keys = Keys(ACTIONS.values(), likes.keys, likes.save)
         self._device = device
         self.backend = ImGuiBackend(device)
-        self.ui = Ui(theme.PALETTES[likes.theme], self.backend.fonts, likes.scale)
+        self.ui = Ui(theme.PALETTES[likes.theme], self.backend.fonts, likes.scale, chord=self.keys.now)
         self.layout = self._layout(1280, 800)
         self.clock = Clock()
         self.numbers = Numbers()
@@ -80,11 +82,17 @@ class Editor:
         self.recovery = Recovery(self.journals, self.dialogs, self.messages, self.files.restore)
         self.selecting = Selecting(self.workspace, self.state, self.messages)
         self.pointer = PointerController(
-            self.workspace, self.state, self.ui, self.dialogs, likes, self.selecting, lambda: self.do("play")
+            self.workspace,
+            self.state,
+            self.ui,
+            self.dialogs,
+            likes,
+            self.selecting,
+            lambda: self._key("space", "space"),
         )
         self.commands = Commands(
             self.workspace, self.state, self.pointer, self.files, self.chooser, self.exports, self.dialogs,
-            self.messages, likes, self.selecting,
+            self.messages, likes, self.selecting, self.keys,
         )  # fmt: skip
         self._styled: tuple[object, ...] = ()
         self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken
@@ -123,13 +131,18 @@ class Editor:
         """Free everything."""
         self.exports.cancel()
         self.files.give_up_loading()
-        self.preferences.save()
+        self.remember()
         self.recovery.later()
         self.journals.release(discard=self.commands.closed)
         self.dialogs.release()
         self.quality.release()
         self.workspace.release()
         self.backend.release()
+
+    def remember(self) -> None:
+        """Keep for the next time what the person has set of the window and of the brushes."""
+        self.state.remember(self.preferences)
+        self.preferences.save()
 
     # -- a frame ----------------------------------------------------------------------------------------------------
 
@@ -158,12 +171,16 @@ class Editor:
         self.pointer.elapse(dt)
         with self.clock.measure("frame"):
             self._lay_out((size[0] / density, size[1] / density), density, scale)
+            takes_keys = self.dialogs.is_listening
             self._handle(events)
+            if takes_keys:
+                events = [event for event in events if not (isinstance(event, Text) or _is_press(event))]
             self.workspace.keep()
             with self.clock.measure("simulate"):
                 self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
             self.quality.look(dt)
             self.selecting.look()
+            self.canvas.thumbnails.look(self.session)
             self._draw(target, size, dt, events)
             self.workspace.keep()
         if self.quality.is_measuring:
@@ -202,7 +219,8 @@ class Editor:
         state = self.state
         state.is_narrow = width < NARROW * self.ui.scale
         is_open = state.over_narrow if state.is_narrow else state.inspector
-        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), len(strip.GROUP_ENDS) + 1)
+        names, groups = self.preferences.names, len(strip.GROUP_ENDS) + 1
+        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, names)
 
     def _handle(self, events: Sequence[Event]) -> None:
         for event in events:
@@ -217,7 +235,10 @@ class Editor:
             case Key(key, down, mods, repeat):
                 if key == "\\":
                     self.state.before = down and not self.backend.is_typing
-                if down and not self.dialogs.shown:
+                if down and self.dialogs.shown:
+                    if key and not repeat:
+                        self.dialogs.shown[-1].hear(mods.chord(key))
+                elif down and key != "space":  # which is also held to pan, so that it acts only once it is let go
                     self._key(key, mods.chord(key), repeat)
                 if not self.dialogs.shown and not self.backend.is_typing:
                     self.pointer.handle(event)
@@ -226,16 +247,17 @@ class Editor:
             case Focus(False):
                 self.pointer.release_all()
                 self.state.before = False
+                self.remember()
             # A dialog is about the work that is open, and is answered before there is another one.
             case Drop(paths) if paths and not self.dialogs.shown:
                 self.files.open(Path(paths[0]))
             case CloseWish():
                 self.do("quit")
 
-    def _key(self, key: str, chord: str, repeat: bool) -> None:
-        action = BY_KEY.get(chord) or (BY_KEY.get(key) if key in "{}+=" else None)
-        # Space is also held to pan, so that it plays only once it is let go.
-        if action is None or key == "space" or (repeat and not action.repeats):
+    def _key(self, key: str, chord: str, repeat: bool = False) -> None:
+        name = self.keys.action(chord) or (self.keys.action(key) if key in "{}+=" else None)
+        action = ACTIONS[name] if name else None
+        if action is None or (repeat and not action.repeats):
             return
         if not self.backend.is_typing:
             self.do(action.name)
@@ -275,7 +297,7 @@ class Editor:
         if layout.inspector is not None:
             inspector.draw(ui, layout.inspector, workspace, state, self.selecting, self.quality, self.clock, self.do)
         timebar.draw(ui, layout.timebar, self.session, state, self.do)
-        bar.draw(ui, layout, workspace, state, likes.recent, self.files.open_work, self.do)
+        bar.draw(ui, layout, workspace, state, likes, self.files.open_work, self.do)
 
     def _draw_over_canvas(self) -> None:
         """What tells of work under way, messages and dialogs."""
@@ -289,3 +311,7 @@ class Editor:
         self.chooser.poll()
         self.recovery.poll()
         self.dialogs.draw(self.ui)
+
+
+def _is_press(event: Event) -> bool:
+    return isinstance(event, Key) and event.down

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 
 import numpy as np
 
 from app.model.areas import Part
 from app.model.mask_edits import MaskName
+from app.model.presets import BRUSHES, BrushPreset
 from app.model.strokes import Symmetry
 from app.model.tools import TOOL, BrushSettings, Tool
+from app.ui.preferences import Preferences
 
 MASK_OF: dict[str, MaskName] = {"freeze": "frozen", "thicken": "thickness"}
 SELECT_BY = {
@@ -22,6 +24,11 @@ SELECT_BY = {
 }
 """By what is selected, and how."""
 SMALLEST, LARGEST = 0.005, 0.5  # of a brush's radius, in longer sides
+LIMITS = {
+    "radius": (SMALLEST, LARGEST), "hardness": (0.0, 1.0), "strength": (0.05, 1.0), "local": (0.0, 1.0),
+    "stiffness": (0.01, 1.0),
+}  # fmt: skip
+"""From where to where a brush can be set."""
 
 
 @dataclass
@@ -53,7 +60,9 @@ class EditorState:
 
     Attributes:
         tool_name: the tool in pointer.
-        brush: shared by all tools, so that changing the tool does not change its size.
+        brushes: of the tools for which something has been set, by their names.
+        stabiliser: points of the screen, of the string that the pen pulls the brush by; 0 is none.
+        preset_name: that has been typed for the brush, to keep it by.
         opposite: tools that are switched to their other direction.
         overlays: by name, in the order of their keys.
         is_narrow: the window has no room for the inspector beside the picture.
@@ -80,7 +89,9 @@ class EditorState:
     """
 
     tool_name: str = "push"
-    brush: BrushSettings = field(default_factory=BrushSettings)
+    brushes: dict[str, BrushSettings] = field(default_factory=dict)
+    stabiliser: float = 0.0
+    preset_name: str = ""
     opposite: dict[str, bool] = field(default_factory=dict)
     overlays: dict[str, Overlay] = field(default_factory=overlays)
     is_narrow: bool = False
@@ -106,9 +117,41 @@ class EditorState:
     statistics: bool = False
     auto_quality: bool = True
 
+    @classmethod
+    def recalled(cls, likes: Preferences) -> EditorState:
+        """As it was left."""
+        state = cls(inspector=likes.inspector, auto_quality=likes.auto_quality, stabiliser=likes.stabiliser)
+        state.sections = dict(likes.sections)
+        state.brushes = {name: _within(brush) for name, brush in likes.brushes.items() if name in TOOL}
+        return state
+
+    def remember(self, likes: Preferences) -> None:
+        """Take note in the preferences of what `recalled` takes from them."""
+        likes.stabiliser, likes.sections = self.stabiliser, dict(self.sections)
+        likes.brushes = {name: asdict(brush) for name, brush in self.brushes.items()}
+
     @property
     def tool(self) -> Tool:
         return TOOL[self.tool_name]
+
+    @property
+    def brush(self) -> BrushSettings:
+        """That of the tool in hand: each has its own."""
+        return self.brushes.get(self.tool_name, BrushSettings())
+
+    @brush.setter
+    def brush(self, brush: BrushSettings) -> None:
+        self.brushes[self.tool_name] = brush
+
+    def take_brush(self, preset: BrushPreset) -> None:
+        """Set the tool's brush as a preset has it."""
+        self._set_brush(radius=preset.radius, hardness=preset.hardness, strength=preset.strength)
+
+    def make_local(self, local: float) -> None:
+        """Let what pushes be so local, whichever tool it is done with."""
+        for name, tool in TOOL.items():
+            if "local" in tool.settings:
+                self.brushes[name] = replace(self.brushes.get(name, BrushSettings()), local=local)
 
     @property
     def is_opposite(self) -> bool:
@@ -147,6 +190,11 @@ class EditorState:
         """True if one of these tools is in hand, or selections are made for this mask: then it is shown."""
         return self.tool_name in tools or (self.tool_name == "select" and self.mask == name)
 
+    @property
+    def shows_viscosity(self) -> bool:
+        """It is laid over the picture."""
+        return self.overlays["viscosity"].shown or self.edits_mask("thickness", "thicken", "smooth")
+
     def show_mask(self) -> None:
         """Let the mask that is edited be seen, with any tool."""
         self.overlays["frozen" if self.mask == "frozen" else "viscosity"].shown = True
@@ -156,3 +204,18 @@ class EditorState:
 
     def toggle_overlay(self, name: str) -> None:
         self.overlays[name].shown = not self.overlays[name].shown
+
+
+def _within(kept: dict[str, float]) -> BrushSettings:
+    """A brush as it was kept, within its limits."""
+    names = {part.name for part in fields(BrushSettings)} & kept.keys()
+    return BrushSettings(**{name: min(max(kept[name], LIMITS[name][0]), LIMITS[name][1]) for name in names})
+
+
+def presets(likes: Preferences) -> list[BrushPreset]:
+    """Brushes that can be chosen: the person's own, and of those that come with fluidwarp the ones of other names."""
+    own = [
+        BrushPreset(name, brush.radius, brush.hardness, brush.strength)
+        for name, brush in ((name, _within(kept)) for name, kept in likes.presets.items())
+    ]
+    return [*(preset for preset in BRUSHES if preset.name not in likes.presets), *own]

@@ -13,10 +13,12 @@ import moderngl
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.errors import UserError
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
 from app.ui.canvas import shown_pixels
 from app.ui.chooser import FileChooser
+from app.ui.clipboard import Giving, check
 from app.ui.dialogs import Dialog, beside
 from app.ui.messages import Messages
 from app.ui.preferences import Preferences
@@ -266,9 +268,6 @@ class ExportDialog(Dialog):
         return Job(recipe, self.picture, session.project.folder, outputs)
 
     def body(self, ui: Ui) -> bool:
-        # Enter belongs to the field that is being typed in, or to what the arrows have gone to.
-        entered = imgui.is_key_pressed(imgui.Key.enter, False)
-        entered = entered and not imgui.is_any_item_active() and not imgui.get_io().nav_visible
         imgui.align_text_to_frame_padding()
         ui.dim("Preset")
         imgui.same_line(0, ui.px(12))
@@ -322,7 +321,7 @@ class ExportDialog(Dialog):
             return False
         imgui.same_line()
         with ui.enabled(self._can_start):
-            if ui.button("Export", primary=True, width=96) or (entered and self._can_start):
+            if ui.button("Export", primary=True, width=96) or (self.entered and self._can_start):
                 return not self.attempt(self._start)
         return True
 
@@ -430,7 +429,7 @@ class StillExporting(Dialog):
             return False
         imgui.same_line()
         with ui.enabled(not self._waits):
-            if ui.button("Quit when finished", primary=True, width=148):
+            if ui.button("Quit when finished", primary=True, width=148) or self.entered:
                 self._waits = True
         return True
 
@@ -442,10 +441,12 @@ class Exports:
         self.messages = messages
         self.went_well = False  # the last one that has ended
         self._process: ExportProcess | None = None
+        self._copied: tempfile.TemporaryDirectory[str] | None = None  # what is on its way to the clipboard
+        self._giving: Giving | None = None
 
     @property
     def is_running(self) -> bool:
-        return self._process is not None
+        return self._process is not None or self._giving is not None
 
     @property
     def name(self) -> str:
@@ -466,8 +467,29 @@ class Exports:
         job.check()
         self._process = ExportProcess(job)
 
+    def copy(self, session: Session) -> None:
+        """Make the picture that is seen, in its full size, and put it on the clipboard.
+
+        Raises:
+            UserError: if that cannot be done, as far as that can be known beforehand.
+        """
+        check()
+        if self.is_running:
+            raise UserError("An export is still running; copy the picture when that is finished.")
+        recipe = session.document.recipe
+        recipe = recipe.edited(
+            duration=max(session.target, 1) * recipe.fluid.dt,
+            output=recipe.output.model_copy(update={"size": None}),
+        )
+        folder = tempfile.TemporaryDirectory(prefix="fluidwarp-", ignore_cleanup_errors=True)
+        outputs = Outputs(Path(folder.name) / "the picture.png", bits=8, recorded=False)
+        picture = replace(session.project.picture, note="")
+        self.start(Job(recipe, picture, session.project.folder, outputs))
+        self._copied = folder
+
     def cancel(self) -> None:
         """Stop the job; nothing of it is left."""
+        self._copied = self._giving = None
         if self._process is not None:
             self._process.stop()
             self._process = None
@@ -475,6 +497,9 @@ class Exports:
     def draw(self, ui: Ui, canvas: Rect) -> None:
         """How far it is, with a button to stop it."""
         process = self._process
+        if self._giving is not None and self._giving.is_done:
+            error, self._giving, self._copied = self._giving.error, None, None
+            self.messages.warn(error) if error else self.messages.done("The picture is on the clipboard.")
         if process is None:
             return
         process.poll()
@@ -482,7 +507,10 @@ class Exports:
             self._process = None
             self.went_well = not process.error
             if process.error:
+                self._copied = None
                 self.messages.warn(process.error)
+            elif self._copied is not None:
+                self._giving = Giving(process.job.target)
             else:
                 for notice in process.notices:
                     self.messages.say(notice)
@@ -493,7 +521,8 @@ class Exports:
             state = f": {process.state}" if process.state else ""
             width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
             imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
-            ui.text(f"Exporting {process.job.target.name}{state}", size=14)
+            doing = "Copying" if self._copied is not None else "Exporting"
+            ui.text(f"{doing} {process.job.target.stem if self._copied else process.job.target.name}{state}", size=14)
             imgui.pop_text_wrap_pos()
             corner = imgui.get_cursor_screen_pos()
             lines = imgui.get_window_draw_list()
@@ -506,4 +535,4 @@ class Exports:
             imgui.same_line(0, ui.px(16))
             if ui.button("Cancel##export", height=30):
                 self.cancel()
-                self.messages.say("Export cancelled; nothing half-written is left.")
+                self.messages.say("Cancelled; nothing half-written is left.")

@@ -20,6 +20,7 @@ from app.model.mask_edits import MASKS, UNITS, MaskName, PictureMask, as_grey
 from app.model.picture import Picture
 from app.model.presets import DEFAULT
 from app.model.recipe import FluidSettings, Recipe
+from app.ui import clipboard
 from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialogs, PictureOrMap, Unsaved
 from app.ui.editor_state import EditorState
@@ -97,6 +98,17 @@ class Files:
         """What the person has set of the fluid; a recipe with forces of its own has been set by nobody here."""
         session = self.workspace.session
         return {} if session.recipe.force else settings_of(session.recipe.fluid_at(session.tick))
+
+    def paste(self) -> None:
+        """Open the picture that is on the clipboard, as a picture that is opened anew."""
+        clipboard.check()
+        path, fluid = clipboard.new_name(), self._feel()
+
+        def load() -> Project:
+            clipboard.paste(path)
+            return load_any(path, fluid)
+
+        self.read(path, load, leaves=True)
 
     def apply(self, path: Path) -> None:
         """Do to another picture what has been done to this one."""

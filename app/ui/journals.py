@@ -35,17 +35,19 @@ class Journals:
             self._journals[session] = Journal(self.root, found and found.held)
 
     def keep(self, session: Session) -> None:
-        """Take note of what has been done to a work."""
-        journal = self._journals.get(session)
-        if journal is None:
+        """Take note of what has been done to a work; Undo may have come back to one that was given up."""
+        if self.root is None:
             return
+        if session not in self._journals:
+            self.open(session, None)
+        journal = self._journals[session]
         journal.keep(session.project, session.document, session.is_grid_automatic)
         if journal.trouble is not None and not self._has_warned:
             self._has_warned = True
             self._messages.warn(journal.trouble)
 
     def close(self, session: Session) -> None:
-        """A work that was open is given up."""
+        """A work that was open is given up, with what is kept of it."""
         if session in self._journals:
             self._ended.append(self._journals.pop(session))
             self._ended[-1].end(discard=True)

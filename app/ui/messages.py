@@ -1,4 +1,4 @@
-"""Messages over the canvas that go by themselves; what must not be missed waits to be closed."""
+"""Messages in a corner of the canvas, one at a time: they go by themselves, or wait if they must not be missed."""
 
 from __future__ import annotations
 
@@ -52,33 +52,32 @@ class Messages:
 
     @property
     def next_in(self) -> float | None:
-        """Seconds until the next message goes."""
-        waits = [message.left for message in self.shown if message.left is not None]
-        return min(waits) if waits else None
+        """Seconds until the message that is seen goes."""
+        return self.shown[-1].left if self.shown else None
 
     def elapse(self, dt: float) -> None:
-        """Let `dt` seconds go by."""
-        for message in list(self.shown):
-            if message.left is not None:
-                message.left -= dt
-                if message.left <= 0:
-                    self.shown.remove(message)
-                    self._changed()
+        """Let `dt` seconds go by; only for the one that is seen."""
+        if self.shown and (message := self.shown[-1]).left is not None:
+            message.left -= dt
+            if message.left <= 0:
+                self.shown.remove(message)
+                self._changed()
 
     def draw(self, ui: Ui, canvas: Rect) -> None:
-        """Draw them on the canvas, the newest lowest."""
-        y = canvas.bottom - ui.px(60)
-        for number, message in enumerate(reversed(self.shown)):
-            y -= self._draw_one(ui, canvas, message, len(self.shown) - number, y) + ui.px(8)
-
-    def _draw_one(self, ui: Ui, canvas: Rect, message: Message, number: int, y: float) -> float:
-        width = min(ui.px(440), max(canvas.width - ui.px(32), ui.px(240)))
-        imgui.set_next_window_pos(ImVec2(canvas.x + canvas.width / 2, y), imgui.Cond_.always, ImVec2(0.5, 1.0))
+        """Draw the newest in the canvas's upper corner, below what tells of work under way; the others wait."""
+        if not self.shown:
+            return
+        message, others = self.shown[-1], len(self.shown) - 1
+        width = min(ui.px(440), max(canvas.width / 2 - ui.px(165), ui.px(260)), canvas.width - ui.px(24))
+        right, top = canvas.right - ui.px(12), canvas.y + ui.px(12)
+        above = (rect for rect in ui.covering if rect.y < top + ui.px(12) and rect.right > right - width)
+        top = max([top, *(rect.bottom + ui.px(8) for rect in above)])
+        imgui.set_next_window_pos(ImVec2(right, top), imgui.Cond_.always, ImVec2(1.0, 0.0))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(14), ui.px(10)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(9))
         imgui.push_style_var(imgui.StyleVar_.window_border_size, ui.px(1))
         flags = PANEL | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
-        imgui.begin(f"message {number}", None, flags)
+        imgui.begin("message", None, flags)
         imgui.pop_style_var(3)
         corner = imgui.get_cursor_screen_pos()
         ink = packed(ui.palette.accent)
@@ -86,17 +85,19 @@ class Messages:
         room = width - ui.px(80)
         text = imgui.calc_text_size(message.text, wrap_width=room)
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + ui.px(28))
+        imgui.begin_group()
         imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + min(room, text.x + 2))
         ui.text(message.text, size=14)
+        if others:
+            ui.dim(f"{others} more", 12)
         imgui.pop_text_wrap_pos()
+        imgui.end_group()
         imgui.same_line(0, ui.px(12))
         imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() - ui.px(2))
-        if ui.icon_button(f"close {number}", "close", size=22, icon_size=13):
+        if ui.icon_button("close", "close", size=22, icon_size=13):
             self.shown.remove(message)
         ui.cover()
-        height = imgui.get_window_height()
         imgui.end()
-        return height
 
     def _add(self, message: Message) -> None:
         self.shown = [*[other for other in self.shown if other.text != message.text][-(MOST - 1) :], message]

@@ -99,7 +99,10 @@ class PointerController:
 
     @property
     def ring_at(self) -> tuple[float, float]:
-        """The middle of the ring, which stays where it is while the brush is made larger."""
+        """The middle of the ring, which stays where it is while the brush is made larger, and follows on its string."""
+        session = self.workspace.session
+        if self.drag == "paint" and self.state.stabiliser and session.path:
+            return self.workspace.view.to_screen(*session.path[-1])
         return self._start if self.drag == "brush" else (self.x, self.y)
 
     @property
@@ -188,6 +191,7 @@ class PointerController:
             session.extent,
             session.dt,
             slack=SHAKE / view.longer,
+            string=0.0 if state.tool_name == "handle" else state.stabiliser / view.longer,
             symmetry=state.symmetry,
             sectors=state.sectors,
         )

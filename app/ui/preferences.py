@@ -12,9 +12,11 @@ from typing import Any
 from app.errors import UserError
 from app.media.inputs import read_input
 from app.media.opening import shipped_recipes
+from app.ui.clipboard import pasted_folder
 
 MOST_RECENT = 10
 MOST_BYTES = 2**20  # of the file
+LONGEST_STRING = 200.0  # points of the screen, of the stabiliser
 
 
 @dataclass
@@ -28,6 +30,12 @@ class Preferences:
         embed: projects hold their picture.
         folder: of what was opened or saved last.
         export_folder, export_as: of what was exported last, and as what.
+        names: the tools' names stand beside their icons.
+        sections: which of the inspector's are open, by name.
+        window: where the window was, as `GlfwWindow.place` tells it.
+        keys: chords of the actions for which the person has chosen others, by the action's name.
+        brushes: of each tool, by its name; `presets`: the person's own brushes, by theirs.
+        stabiliser: points of the screen, of the string that the pen pulls the brush by.
     """
 
     theme: str = "dark"
@@ -40,6 +48,13 @@ class Preferences:
     folder: str = ""
     export_folder: str = ""
     export_as: str = ""
+    names: bool = False
+    sections: dict[str, bool] = field(default_factory=dict)
+    window: list[int] = field(default_factory=list)
+    keys: dict[str, list[str]] = field(default_factory=dict)
+    brushes: dict[str, dict[str, float]] = field(default_factory=dict)
+    presets: dict[str, dict[str, float]] = field(default_factory=dict)
+    stabiliser: float = 0.0
     path: Path | None = field(default=None, compare=False)
 
     @classmethod
@@ -61,6 +76,12 @@ class Preferences:
         kept.theme = kept.theme if kept.theme in ("dark", "light") else "dark"
         kept.scale = min(max(kept.scale, 0.75), 3.0) if math.isfinite(kept.scale) else 1.0
         kept.recent = [str(name) for name in kept.recent][:MOST_RECENT]
+        kept.stabiliser = min(max(kept.stabiliser, 0.0), LONGEST_STRING) if math.isfinite(kept.stabiliser) else 0.0
+        kept.window = kept.window if len(kept.window) == 5 and _all(int, kept.window) else []
+        kept.sections = {name: shown for name, shown in kept.sections.items() if isinstance(shown, bool)}
+        kept.keys = {name: keys for name, keys in kept.keys.items() if isinstance(keys, list) and _all(str, keys)}
+        kept.brushes = _numbers(kept.brushes)
+        kept.presets = _numbers(kept.presets)
         return kept
 
     def save(self) -> None:
@@ -77,7 +98,9 @@ class Preferences:
             pass  # preferences are not worth a message
 
     def opened(self, path: Path) -> None:
-        """Take note of a file that was opened or saved."""
+        """Take note of a file that was opened or saved; what was pasted is no file to the person."""
+        if path.parent == pasted_folder():
+            return
         name = str(path.resolve())
         self.recent = [name, *(other for other in self.recent if other != name)][:MOST_RECENT]
         if path.resolve() not in shipped_recipes().values():  # or what is saved next would go into the program's folder
@@ -108,6 +131,20 @@ class Preferences:
     def export_to(self) -> Path:
         """The folder to export to."""
         return _first_of(self.export_folder, self.folder)
+
+
+def _all(kind: type, values: list[Any]) -> bool:
+    return all(isinstance(value, kind) for value in values)
+
+
+def _numbers(table: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """What of a table that was read holds finite numbers by name."""
+    rows = {name: row for name, row in table.items() if isinstance(row, dict)}
+    kinds = (int, float)
+    return {
+        name: {key: float(value) for key, value in row.items() if isinstance(value, kinds) and abs(value) < 1e9}
+        for name, row in rows.items()
+    }
 
 
 def _first_of(*folders: str) -> Path:

@@ -11,6 +11,7 @@ from imgui_bundle.imgui import ImVec2
 
 from app.media.project import SUFFIX, Project
 from app.ui.chooser import FileChooser
+from app.ui.clipboard import pasted_folder
 from app.ui.dialogs import Dialog
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
@@ -43,7 +44,7 @@ class SaveDialog(Dialog):
         self.folder = path.parent
         self.name = path.name.removesuffix(SUFFIX)
         # A picture that is only inside a project has no file to refer to.
-        self.must_embed = project.keeper is not None
+        self.must_embed = project.keeper is not None or project.folder == pasted_folder()
         self.embed = self.must_embed or preferences.embed
         self._picture = project.folder / (project.recipe.picture or "")
         self._bytes = len(project.data)

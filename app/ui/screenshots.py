@@ -88,6 +88,7 @@ def paint(offscreen: OffscreenEditor) -> None:
     offscreen.stroke(line((0.53, 0.19), (0.47, 0.31), 0.0), 12)
     offscreen.stroke(line((0.86, 0.15), (0.80, 0.25), 0.0), 12)
     editor.state.choose_tool("twirl", False)
+    editor.state.brush = replace(editor.state.brush, radius=0.11)
     offscreen.stroke(lambda part: (0.19 + 0.002 * cos(part), 0.15), 20)
     editor.state.choose_tool("push", False)
     editor.state.brush = replace(editor.state.brush, radius=0.15)
@@ -103,10 +104,9 @@ def editor(offscreen: OffscreenEditor) -> np.ndarray:
 
 def overlays(offscreen: OffscreenEditor) -> np.ndarray:
     """A frozen figure, the grid and the velocity while a stroke goes past it."""
-    offscreen.editor.state.brush = replace(offscreen.editor.state.brush, radius=0.07, hardness=0.6)
     offscreen.key("f")
+    offscreen.editor.state.brush = replace(offscreen.editor.state.brush, radius=0.07, hardness=0.6)
     offscreen.stroke(line((0.67, 0.37), (0.675, 0.50)), 8)
-    offscreen.editor.state.brush = replace(offscreen.editor.state.brush, radius=0.15, hardness=0.0)
     offscreen.key("p")
     for key in ("1", "3", "4"):
         offscreen.key(key)

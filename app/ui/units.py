@@ -33,6 +33,7 @@ class Unit:
 
 
 PLAIN = Unit()
+POINTS = Unit(" px")  # of the screen
 PERCENT = Unit("%", 100)
 SECONDS = Unit(" s", digits=".2f")
 PER_SECOND = Unit(" / s", digits=".2f")

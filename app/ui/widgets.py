@@ -5,7 +5,7 @@ One long class: each widget is a method of what it draws with, and there is noth
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite, log
@@ -47,7 +47,9 @@ class Ui:
 
     Attributes:
         covers: where the canvas is covered by something that can be clicked, as of the last frame.
+        covering: the same of the frame that is being drawn, as far as it is.
         has_popup: a menu or a dialog is open, as of then.
+        chord: the chord that the person has chosen for what another one does by default; "" if there is none.
     """
 
     palette: Palette
@@ -55,14 +57,19 @@ class Ui:
     scale: float
     density: float = 1.0
     covers: list[Rect] = field(default_factory=list)
+    covering: list[Rect] = field(default_factory=list)
     has_popup: bool = False
-    _covering: list[Rect] = field(default_factory=list)  # the same of the frame that is being drawn
+    chord: Callable[[str], str] = str
     _slid: tuple[str, float] = ("", -1.0)  # the slider that was let go of last, and when
     _untyped: dict[str, float] = field(default_factory=dict)  # values of sliders before one is typed
 
     def px(self, points: float) -> float:
         """Points of the design on this screen."""
         return points * self.scale
+
+    def shown(self, chord: str) -> str:
+        """What is pressed for what a chord does by default, as a person reads it."""
+        return keys_shown(self.chord(chord))
 
     # -- containers -------------------------------------------------------------------------------------------------
 
@@ -102,11 +109,11 @@ class Ui:
     def cover(self) -> None:
         """Take note that the window being drawn lies on the canvas."""
         place, size = imgui.get_window_pos(), imgui.get_window_size()
-        self._covering.append(Rect(place.x, place.y, size.x, size.y))
+        self.covering.append(Rect(place.x, place.y, size.x, size.y))
 
     def end_frame(self) -> None:
         """Everything has been drawn: what covers the canvas is known."""
-        self.covers, self._covering = self._covering, []
+        self.covers, self.covering = self.covering, []
         anywhere = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
         self.has_popup = imgui.is_popup_open("", anywhere)
 
@@ -142,23 +149,39 @@ class Ui:
         self.text(text, colour, size)
         imgui.pop_text_wrap_pos()
 
-    def tooltip(self, title: str, key: str = "", more: str = "") -> None:
-        """What the last item is, shown when the pointer rests on it."""
-        if not imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
+    def tooltip(self, title: str, key: str = "", more: str = "", at_once: bool = False) -> None:
+        """What the last item is, shown when the pointer rests on it; `at_once`: its name, beside it, on the way there.
+
+        `key`: the chord that does it by default.
+        """
+        rests = imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
+        if not (rests or (at_once and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled))):
             return
+        if at_once:
+            self._place_beside(imgui.get_item_rect_min(), imgui.get_item_rect_max())
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(10), self.px(7)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(6))
         if imgui.begin_tooltip():
             self.text(title, size=14)
-            if key:
+            if keys := self.shown(key):
                 imgui.same_line(0, self.px(12))
-                self.text(keys_shown(key), self.palette.accent, 13)
-            if more:
+                self.text(keys, self.palette.accent, 13)
+            if more and rests:
                 imgui.push_text_wrap_pos(self.px(280))
                 self.dim(more)
                 imgui.pop_text_wrap_pos()
             imgui.end_tooltip()
         imgui.pop_style_var(2)
+
+    def _place_beside(self, low: ImVec2, high: ImVec2) -> None:
+        """Put the next window beside an item: to the right of one at the left edge, else below or above it."""
+        display, gap = imgui.get_io().display_size, self.px(6)
+        if low.x < self.px(GRID) and low.y > self.px(GRID):
+            imgui.set_next_window_pos(ImVec2(high.x + gap, low.y), imgui.Cond_.always)
+            return
+        right, below = low.x > 0.6 * display.x, high.y < 0.7 * display.y
+        at = ImVec2(high.x if right else low.x, high.y + gap if below else low.y - gap)
+        imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(float(right), 0.0 if below else 1.0))
 
     # -- buttons ----------------------------------------------------------------------------------------------------
 
@@ -173,23 +196,29 @@ class Ui:
         enabled: bool = True,
         size: float = 32,
         icon_size: float = 20,
+        width: float = 0.0,
     ) -> bool:
-        """A square button with an icon; `active` shows it as pressed in."""
+        """A square button with an icon, or a wide one with its title beside that; `active` shows it as pressed in."""
         side = self.px(size)
+        across = self.px(width) or side
         corner = imgui.get_cursor_screen_pos()
         with self.enabled(enabled):
-            clicked = imgui.invisible_button(name, ImVec2(side, side))
+            clicked = imgui.invisible_button(name, ImVec2(across, side))
             hovered, held = imgui.is_item_hovered(), imgui.is_item_active()
         if title:
-            self.tooltip(title, key, more)
+            self.tooltip(title, key, more, at_once=True)
         draw, palette = imgui.get_window_draw_list(), self.palette
         ground = palette.accent_soft if active else palette.pressed if held else palette.hover if hovered else None
         if ground is not None:
-            draw.add_rect_filled(corner, corner + ImVec2(side, side), packed(ground), self.px(7))
+            draw.add_rect_filled(corner, corner + ImVec2(across, side), packed(ground), self.px(7))
         colour = palette.accent if active else palette.text if hovered else palette.dim
-        inner = self.px(icon_size)
+        inner, ink = self.px(icon_size), packed(colour, 1.0 if enabled else 0.35)
         at = (side - inner) / 2
-        icons.draw(draw, icon, corner.x + at, corner.y + at, inner, packed(colour, 1.0 if enabled else 0.35))
+        icons.draw(draw, icon, corner.x + at, corner.y + at, inner, ink)
+        if width:
+            imgui.push_font(self.fonts.regular, 13.5)
+            draw.add_text(ImVec2(corner.x + side, corner.y + (side - imgui.get_font_size()) / 2), ink, title)
+            imgui.pop_font()
         return clicked
 
     def button(self, label: str, primary: bool = False, width: float = 0.0, icon: str = "", height: float = 32) -> bool:
@@ -273,7 +302,7 @@ class Ui:
         draw.add_text(ImVec2(corner.x, y), packed(ink), words)
         if key:
             at = ImVec2(corner.x + text.x + self.px(8), y)
-            draw.add_text(at, packed(palette.faint), keys_shown(key))
+            draw.add_text(at, packed(palette.faint), self.shown(key))
         imgui.pop_font()
         track, thick = self.px(26), self.px(15)
         x0, y0 = corner.x + width - track, corner.y + (height - thick) / 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -24,6 +25,7 @@ from solver.gl.device import Device
 TITLE = "fluidwarp"
 SIZE = (1280, 800)
 SMALLEST = (800, 520)
+GRASP = 24  # of a window's height, that has to be on a screen for it to be got hold of
 FASTEST = 1 / 120  # seconds between two frames where the screen does not set the pace
 NO_DISPLAY = 2
 
@@ -56,9 +58,13 @@ class _Loader:
 
 
 class GlfwWindow:
-    """A window of the system with a GL, and the events that happen in it."""
+    """A window of the system with a GL, and the events that happen in it.
 
-    def __init__(self) -> None:
+    Args:
+        place: left, top, width and height as `place` told them last, and whether it filled the screen; or nothing.
+    """
+
+    def __init__(self, place: Sequence[int] = ()) -> None:
         # Errors are read where they matter; glfw's warnings about them would only be noise.
         glfw.ERROR_REPORTING = False
         if not glfw.init():
@@ -79,6 +85,7 @@ class GlfwWindow:
         glfw.make_context_current(self.handle)
         glfw.swap_interval(1)
         glfw.set_window_size_limits(self.handle, *SMALLEST, glfw.DONT_CARE, glfw.DONT_CARE)
+        self._go_to(place)
         self.events: list[Event] = []
         self._held = Mods()
         self._title = TITLE
@@ -106,6 +113,29 @@ class GlfwWindow:
     def scale(self) -> float:
         """Of the interface, in points."""
         return max(glfw.get_window_content_scale(self.handle)[0] / self.density, 0.5)
+
+    @property
+    def place(self) -> list[int]:
+        """Left, top, width and height, and whether it fills the screen; nothing while it is minimised."""
+        if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
+            return []
+        fills = glfw.get_window_attrib(self.handle, glfw.MAXIMIZED)
+        return [*glfw.get_window_pos(self.handle), *glfw.get_window_size(self.handle), fills]
+
+    def _go_to(self, place: Sequence[int]) -> None:
+        """Be where the window was the last time, as far as a screen is there still."""
+        if not place:
+            return
+        left, top, width, height, fills = place
+        for monitor in glfw.get_monitors():
+            x, y, across, down = glfw.get_monitor_workarea(monitor)
+            if x <= left + width / 2 < x + across and y <= top + GRASP <= y + down:
+                if fills:
+                    glfw.maximize_window(self.handle)
+                else:
+                    glfw.set_window_size(self.handle, min(width, across), min(height, down))
+                    glfw.set_window_pos(self.handle, left, max(top, y))
+                return
 
     def show(self, editor: Editor) -> None:
         """Run the editor until the person leaves."""
@@ -225,15 +255,17 @@ def run(file: Path | None = None) -> None:
     """
     if file is not None and not os.path.exists(file):
         load_any(file)
-    window = GlfwWindow()
+    likes = Preferences.load()
+    window = GlfwWindow(likes.window)
     try:
-        editor = Editor(window.device, load_any(sample()), Preferences.load(), default_folder())
+        editor = Editor(window.device, load_any(sample()), likes, default_folder())
         if file is not None:
             editor.workspace.placeholder = editor.session
             window.events.append(Drop((str(file),)))
         try:
             window.show(editor)
         finally:
+            likes.window = window.place or likes.window
             editor.release()
     finally:
         window.close()

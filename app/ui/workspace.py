@@ -129,6 +129,11 @@ class Workspace:
         if self.session.end or settings.keys() <= {"viscosity", "drag", "walls"}:
             self.session.change(name, **settings)
 
+    def give_up(self, session: Session) -> None:
+        """Nobody wants a work back that has been left, unless Undo comes back to it: no crash brings it up again."""
+        if session is not self.session:
+            self._journals.close(session)
+
     def keep(self) -> None:
         """Take note in the journal of what has been done."""
         self._journals.keep(self.session)

@@ -23,7 +23,7 @@ from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.strokes import Change, Stroke
-from app.model.tools import Gesture, Made, Press, Tool, Touch
+from app.model.tools import LINE_SPEED, Gesture, Made, Press, PulledString, Tool, Touch
 from app.model.windows import detail_for
 from app.work.replay import Replay
 from solver.gl.device import Device
@@ -109,6 +109,9 @@ class Session:
         self._opposite = False
         self._taken: int | None = None  # the number of the handle in hand, if there was one where it was pressed
         self._touch: Touch | None = None
+        self._string = PulledString(0.0, self.replay.grid.extent, (0.0, 0.0))
+        # Where the playhead was sent back to, if a push that stays where it is does nothing there.
+        self._idles_at: int | None = None
         self._held: tuple[object, list[Held]] = (None, [])
         # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
         self._base = project.recipe
@@ -138,9 +141,7 @@ class Session:
     @property
     def end(self) -> int:
         """Ticks recorded; 0 where nothing has been yet."""
-        recipe = self._live
-        acts = recipe.stroke or recipe.change or recipe.force or recipe.handle
-        return recipe.ticks if acts or any(edit.tick for edit in recipe.mask) else 0
+        return self._live.recorded
 
     @property
     def has_begun(self) -> bool:
@@ -219,16 +220,19 @@ class Session:
         self._taken = None
         if tool.name == "handle" and held is None:
             press = replace(press, at=self._under(x, y))
-        stands = not self.is_moving
+        stands, came_from = not self.is_moving, self.target
         self.playing = False
         self._pen = self._go_on()
-        press = replace(press, timeless=tool.masks and stands and self._pen == self.tick)
+        stands &= self._pen == self.tick
+        self._idles_at = came_from if tool.name == "push" and stands and self._is_at_rest() else None
+        press = replace(press, timeless=tool.masks and stands)
         if held is not None:
             press = replace(press, held=self._take(held.led), rests=held.target)
         self._target = None
         self._tool, self._opposite = tool, press.opposite
         self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
         self.path = [self._touch[1:3]]
+        self._string = PulledString(press.string, self.extent, self.path[0])
         detail = detail_for(press.brush.radius, self._base, self._base.fluid_at(self._pen))
         self._gesture = tool.gesture(replace(press, last=self.last_place, detail=detail), self._touch)
         self.replay.checkpoint()
@@ -238,14 +242,24 @@ class Session:
         """The pointer moved; every sample counts."""
         if self._gesture is None:
             return
-        self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
+        self._touch = Touch(self._pen, *self._string.pull(*self._inside(x, y)), pressure, shift)
         self.path.append(self._touch[1:3])
         self._hear(self._gesture.send(self._touch))
+
+    def _catch_up(self, gesture: Gesture) -> None:
+        """The brush comes to where the pen was lifted, as calmly as a straight stroke is drawn."""
+        assert self._touch is not None
+        for place in self._string.catch_up(LINE_SPEED * self.dt):
+            self._touch = Touch(self._pen, *place, *self._touch[3:])
+            self.path.append(place)
+            self._hear(gesture.send(self._touch))
+            self._pen += 1
 
     def release(self) -> None:
         """The pointer went up: the gesture becomes an entry of the history, and the fluid comes to rest by itself."""
         if self._gesture is None:
             return
+        self._catch_up(self._gesture)
         gesture, self._gesture = self._gesture, None
         made = self.made
         try:
@@ -253,9 +267,13 @@ class Session:
         except StopIteration as finished:
             made = finished.value
         self.made, path, self.path = None, self.path, []
+        if self._idles_at is not None and isinstance(made, Stroke) and made.stays:
+            made, self.last_place = None, path[-1]
         if made is None:
             if not self.coasting:
                 self._show(self.document.recipe)
+            if self._idles_at is not None:
+                self.seek(self._idles_at)
             return
         if isinstance(made, Stroke):
             self.last_place, last = path[-1], made.last_tick
@@ -554,6 +572,10 @@ class Session:
             self.coasting = False
             self.replay.checkpoint()
             self.changes += 1
+
+    def _is_at_rest(self) -> bool:
+        """Nothing happens by itself; else a brush that stays where it is holds what flows under it."""
+        return not (self._base.force or self._base.leads or self._is_fast())
 
     def _is_fast(self) -> bool:
         return self.replay.fluid.motion().largest_speed > REST

@@ -6,8 +6,9 @@
 // square of the checkerboard, pixels.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY: tint of decades over
-// u_base, u_viscosity of the recipe's and u_thickness painted. FROZEN: hatch where u_frozen is 1/2 or more. ARROWS: velocity
-// on MAC faces, lengths / s, of which u_speed fills an arrow. SELECTED: dashes of half u_dash pixels along the edge of where
+// u_base, u_viscosity of the recipe's and u_thickness painted, and contour lines of whole ones, u_contour pixels wide.
+// FROZEN: hatch where u_frozen is 1/2 or more. ARROWS: velocity on MAC faces, lengths / s, of which u_speed fills an arrow.
+// SELECTED: dashes of half u_dash pixels along the edge of where
 // u_selected is 1/2 or more, u_dash_width pixels wide to each side.
 // FORCES: u_force on MAC faces, 1 at its strongest, as arrows of u_force_colour; where u_room swells or shrinks, a tint.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
@@ -42,6 +43,7 @@ uniform sampler2D u_viscosity;
 uniform sampler2D u_thickness;
 uniform float u_base;
 uniform float u_viscosity_opacity;
+uniform float u_contour;
 #endif
 #ifdef FROZEN
 uniform sampler2D u_frozen;
@@ -146,6 +148,13 @@ void main() {
                       + decades(texture(u_thickness, x).r);
         vec3 tint = thicker > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
         seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(thicker) * 0.28, 0.0, 0.75));
+        // Where it is the same all around there is no line, whatever it is.
+        float steep = fwidth(thicker), off = abs(fract(thicker - 0.5) - 0.5);
+        if (steep > 2e-4 && abs(thicker) > 0.5) {
+            float far = off / (steep * u_contour);
+            seen = mix(seen, vec3(0.0), u_viscosity_opacity * 0.4 * (1.0 - smoothstep(0.8, 1.8, far)));
+            seen = mix(seen, vec3(1.0), u_viscosity_opacity * (1.0 - smoothstep(0.3, 0.9, far)));
+        }
 #endif
 #ifdef FROZEN
         // One pixel wide at the edge, whether the mask's texels are smaller or larger than that.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import cosh, hypot, tanh
 from typing import Any
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from app.model.handles import RecipeHandle
 from app.model.mask_edits import MaskStroke
 from app.model.strokes import Stroke
-from app.model.tools import TOOL, BrushSettings, Made, Press, Touch
+from app.model.tools import TOOL, BrushSettings, Made, Press, PulledString, Touch
 
 EXTENT = (1.0, 0.75)
 DT = 1 / 30
@@ -191,3 +192,34 @@ def test_only_what_flows_in_one_place_is_solved_finely(tool: str, symmetry: Any,
     stroke = gestured(tool, press, Touch(4, 0.5, 0.5))
     assert isinstance(stroke, Stroke)
     assert (stroke.detail, stroke.symmetry, stroke.sectors) == (detail, symmetry, sectors)
+
+
+def test_a_pulled_string_draws_a_tractrix() -> None:
+    """The exact curve: a pen that leaves along x pulls the brush, one length above, at x(t) = t - a tanh(t / a)."""
+    length, steps = 0.2, 20_000
+    string = PulledString(length, (1.0, 1.0), (0.0, length))
+    string.pull(0.0, 0.0)
+    for step in range(1, steps + 1):
+        x, y = string.pull(0.5 * step / steps, 0.0)
+    assert y == pytest.approx(length / cosh(0.5 / length), abs=5e-4)
+    assert x == pytest.approx(0.5 - length * tanh(0.5 / length), abs=5e-4)
+
+
+def test_what_the_pen_shakes_within_the_string_moves_nothing() -> None:
+    string = PulledString(0.1, EXTENT, (0.5, 0.5))
+    for x, y in ((0.55, 0.5), (0.5, 0.62), (0.43, 0.45)):
+        assert hypot((x - 0.5) * EXTENT[0], (y - 0.5) * EXTENT[1]) < 0.1
+        assert string.pull(x, y) == (0.5, 0.5)
+    assert string.pull(0.7, 0.5) == (0.6, 0.5)
+
+
+def test_a_string_of_no_length_is_none() -> None:
+    string = PulledString(0.0, EXTENT, (0.1, 0.1))
+    assert string.pull(0.12346, 0.3) == (0.12346, 0.3)
+    assert list(string.catch_up(0.01)) == []
+
+
+def test_the_brush_catches_up_with_the_pen_in_even_steps() -> None:
+    string = PulledString(0.1, EXTENT, (0.2, 0.4))
+    string.pull(0.25, 0.4)
+    assert list(string.catch_up(0.02)) == [pytest.approx((x, 0.4), abs=1e-5) for x in (0.21667, 0.23333, 0.25)]

@@ -25,8 +25,7 @@ class Widgets:
     def __init__(self, robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
         self.robot = robot
         self.at: dict[str, Rect] = {}
-        self.words: list[str] = []
-        self.index = 0
+        self.lists: dict[str, tuple[list[str], int]] = {}
         for kind in ("slider", "button", "check", "section"):
             self._note(monkeypatch, kind, 1 if kind == "slider" else 0)
         segmented, combo = Ui.segmented, imgui.combo
@@ -46,7 +45,7 @@ class Widgets:
 
         def listed(name: str, index: int, words: list[str]) -> tuple[bool, int]:
             said = combo(name, index, words)
-            self.at[name], self.words, self.index = _last(), words, index
+            self.at[name], self.lists[name] = _last(), (words, index)
             return said
 
         monkeypatch.setattr(Ui, "segmented", choices)
@@ -91,7 +90,8 @@ class Widgets:
     def choose(self, name: str, words: str) -> None:
         """Open a list and go to one of its rows by the arrows."""
         self.click(name)
-        steps = self.words.index(words) - self.index
+        rows, index = self.lists[name]
+        steps = rows.index(words) - index
         for _ in range(abs(steps)):
             self.robot.key("down" if steps > 0 else "up")
         self.robot.key("enter")

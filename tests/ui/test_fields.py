@@ -116,14 +116,17 @@ def test_every_kind_of_edge_of_the_picture_is_what_it_is_called(robot: Robot, wi
         assert robot.editor.session.recipe.edges == edges
 
 
-def test_a_grid_is_the_one_that_is_pressed(robot: Robot, widgets: Widgets) -> None:
+def test_a_grid_is_the_one_that_is_chosen(robot: Robot, widgets: Widgets) -> None:
     only(robot, "quality")
     for cells in inspector.GRIDS[:3]:
-        widgets.click(str(cells))
+        widgets.choose("##detail", f"Detail: {inspector.DETAILS[cells]} ({cells})")
         assert robot.editor.session.recipe.fluid.grid == cells
         assert robot.editor.session.document.history.entries[-1].name == f"Grid of {cells}"
-    widgets.click("Auto")
+    widgets.choose("##detail", "Detail: automatic")
     assert robot.editor.quality.is_on
+    widgets.look()
+    rows, index = widgets.lists["##detail"]
+    assert rows[index] == f"Detail: automatic ({robot.editor.session.recipe.fluid.grid})"
 
 
 @pytest.mark.parametrize("label", ["Warp grid", "Viscosity", "Frozen", "Velocity", "Forces"])

@@ -19,12 +19,14 @@ from app.ui.clock import HOVERING
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog
 from app.ui.files import load_any
+from app.ui.layout import Layout
 from app.ui.panels.hud import BEHIND
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
 from solver.gl.device import Device
 from support.editing import Robot, export_dialog, pattern, small_project
+from support.widgets import Widgets
 
 
 @pytest.fixture
@@ -297,6 +299,7 @@ def test_closing_a_message_does_not_paint(robot: Robot) -> None:
 
 @pytest.mark.parametrize("what", ["message", "dialog"])
 def test_a_double_click_on_what_goes_with_its_first_click_does_not_paint(robot: Robot, what: str) -> None:
+    robot.key("t")  # a push that stays where it is would do nothing
     if what == "message":
         robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
         robot.frame(count=3)
@@ -324,13 +327,13 @@ def test_the_ring_is_not_drawn_around_a_pointer_on_a_message(robot: Robot) -> No
     robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
     robot.frame(count=6)
     plain, rect = robot.pixels(), robot.editor.ui.covers[-1]
-    above = slice(int(rect.y) - 40, int(rect.y) - 2), slice(int(rect.x), int(rect.right))
-    robot.move(rect.x + 60, rect.y + 6)
+    below = slice(int(rect.bottom) + 2, int(rect.bottom) + 40), slice(int(rect.x), int(rect.right))
+    robot.move(rect.x + 60, rect.bottom - 6)
     robot.frame(count=6)
-    assert np.array_equal(robot.pixels()[above], plain[above])
-    robot.move(rect.x + 60, rect.y - 20)
+    assert np.array_equal(robot.pixels()[below], plain[below])
+    robot.move(rect.x + 60, rect.bottom + 20)
     robot.frame(count=6)
-    assert not np.array_equal(robot.pixels()[above], plain[above])
+    assert not np.array_equal(robot.pixels()[below], plain[below])
 
 
 def test_cancelling_an_export_does_not_paint(robot: Robot, tmp_path: Path) -> None:
@@ -529,19 +532,17 @@ def test_what_cannot_be_opened_asks_nothing_about_unsaved_work(robot: Robot, tmp
 
 
 @pytest.mark.parametrize("grid", [48, 96, 160, 1024])
-def test_the_grid_of_the_work_is_chosen_in_the_inspector(robot: Robot, grid: int) -> None:
-    robot.see()
-    session = robot.editor.session
+def test_the_grid_of_the_work_is_chosen_in_the_inspector(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, grid: int
+) -> None:
+    session, widgets = robot.editor.session, Widgets(robot, monkeypatch)
     robot.editor.state.sections |= {"quality": True, "view": False, "fluid": False}
     robot.frame(count=3)
     fluid = session.recipe.fluid.model_copy(update={"grid": grid})
     session.preview(fluid=fluid)
-    robot.frame(count=3)
-    rect = robot.editor.layout.inspector
-    assert rect is not None
-    row = robot.pixels()[round(rect.y) + 130 : round(rect.y) + 200, round(rect.x) :].astype(int)
-    pressed = np.array(robot.editor.ui.palette.pressed[:3]) * 255
-    assert (np.abs(row - pressed).max(axis=-1) < 3).sum() > 200
+    widgets.look()
+    rows, index = widgets.lists["##detail"]
+    assert str(grid) in rows[index]
 
 
 # Small windows ------------------------------------------------------------------------------------------------------
@@ -645,6 +646,71 @@ def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> N
     small.click(dialog.rect.right - (24 + 96 + 8 + 48) * scale, dialog.rect.bottom - 36 * scale)
     small.frame(count=2)
     assert not small.editor.dialogs.shown
+
+
+def test_names_come_at_once_and_what_they_do_to_a_pointer_that_rests(robot: Robot) -> None:
+    robot.see()
+    live(robot, 5)
+    before = robot.pixels().astype(int)
+    robot.frame(Move(24, 130))
+    robot.frame()
+
+    def lit(pixels: np.ndarray) -> int:
+        """Pixels of a tooltip, right of the strip."""
+        return int((np.abs(pixels - before)[100:220, 50:360].max(axis=-1) > 20).sum())
+
+    name = lit(robot.pixels())
+    assert name > 500
+    live(robot, 5)
+    assert lit(robot.pixels()) > 1.5 * name
+
+
+def test_names_stand_beside_the_tools_if_they_are_wanted_and_there_is_room(robot: Robot) -> None:
+    narrow = robot.editor.layout.canvas.width
+    robot.editor.preferences.names = True
+    robot.frame(count=2)
+    strip = robot.editor.layout.strip
+    assert strip is not None
+    assert robot.editor.layout.canvas.width == narrow - 94
+    robot.click(strip.right - 20, strip.y + 8 + 44 + 20)
+    assert robot.editor.state.tool_name == "curve", "the name is a part of the button"
+    for width in range(400, 1400, 50):
+        layout = Layout.of(width, 700, 1.0, True, 12, 4, names=True)
+        assert layout.tool == 40 or layout.canvas.width >= 360
+
+
+@pytest.mark.parametrize(
+    ("size", "scale"), [((1280, 800), 1.0), ((1280, 800), 2.0), ((800, 520), 1.0), ((3840, 2160), 2.0)]
+)
+def test_a_message_is_alone_in_a_corner_and_never_over_the_middle(
+    device: Device, tmp_path: Path, size: tuple[int, int], scale: float
+) -> None:
+    robot = Robot(device, small_project(tmp_path), size, scale=scale)
+    robot.editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
+    robot.editor.messages.say("Another one that was said later, and that is seen first.")
+    canvas = robot.editor.layout.canvas
+    for _ in range(2):
+        robot.frame(count=4)
+        middle = canvas.middle
+        assert not robot.editor.ui.is_covered(*middle)
+        (rect,) = [rect for rect in robot.editor.ui.covers if rect.y < middle[1]]
+        assert (rect.right, rect.y) == pytest.approx((canvas.right - 12 * scale, canvas.y + 12 * scale), abs=1)
+        robot.editor.messages.shown.pop()
+    robot.close()
+
+
+def test_enter_saves_where_unsaved_work_is_asked_about(robot: Robot, tmp_path: Path) -> None:
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
+    robot.drag((0.3, 0.6), (0.45, 0.6))
+    robot.rest()
+    robot.key("ctrl+q")
+    robot.frame(count=2)
+    robot.key("enter")
+    assert robot.editor.commands.closed
+    assert not robot.editor.workspace.is_dirty
+    assert not robot.editor.dialogs.shown
 
 
 def test_waking_lasts_longer_than_the_hover_delays(robot: Robot) -> None:

@@ -22,17 +22,20 @@ def test_the_newest_messages_stay_and_none_stands_twice() -> None:
     assert len(heard) == MOST + 3
 
 
-def test_the_next_message_that_goes_is_the_oldest() -> None:
+def test_each_message_is_seen_for_its_five_seconds_the_newest_first() -> None:
     messages = Messages(lambda: None)
     messages.warn("stays")
     assert messages.next_in is None
     messages.say("first")
     messages.elapse(2.0)
     messages.say("second")
-    assert messages.next_in == 3.0, "of the five seconds that each is shown"
+    assert messages.next_in == 5.0
+    messages.elapse(5.0)
+    assert [message.text for message in messages.shown] == ["stays", "first"]
+    assert messages.next_in == 3.0, "of the five seconds, two are over"
     messages.elapse(3.0)
-    assert [message.text for message in messages.shown] == ["stays", "second"]
-    assert messages.next_in == 2.0
+    assert [message.text for message in messages.shown] == ["stays"]
+    assert messages.next_in is None
 
 
 def test_files_of_late_are_newest_first_and_each_once(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -153,6 +154,34 @@ def close_minimised(desk: Desk) -> None:
         event.ClientMessage(window=window, client_type=protocols, data=(32, [close, X.CurrentTime, 0, 0, 0]))
     )
     screen.sync()
+
+
+def test_the_window_comes_back_as_it_was_left(desk: Desk, tmp_path: Path) -> None:
+    picture = tmp_path / "pattern.png"
+    write_picture(picture, pattern())
+    desk.open(picture)
+    desk.do("windowsize", desk.window, "900", "610", "windowmove", desk.window, "140", "70")
+    time.sleep(0.5)
+    desk.key("ctrl+l")
+    desk.key("Tab")
+    desk.key("bracketright")
+    desk.key("ctrl+q")
+    desk.until_gone()
+    desk.open(picture)
+    wanted = {"X": "140", "Y": "70", "WIDTH": "900", "HEIGHT": "610"}
+
+    def is_there() -> bool:
+        told = dict(line.split("=") for line in desk.do("getwindowgeometry", "--shell", desk.window).split())
+        return wanted.items() <= told.items()
+
+    desk.until(is_there, "the window to be where it was")
+    kept = json.loads((tmp_path / "config" / "fluidwarp" / "preferences.json").read_text())
+    assert (kept["theme"], kept["inspector"]) == ("light", False)
+    assert kept["brushes"]["push"]["radius"] == pytest.approx(0.15 * 1.15)
+    # The bar is light, and where the inspector was is the ground around the picture.
+    seen = desk.seen()
+    assert seen[75, 400].min() > 200
+    assert (seen[400, 1030] == 0xD2).all()
 
 
 def test_a_minimised_window_is_closed_at_once(desk: Desk, tmp_path: Path) -> None:

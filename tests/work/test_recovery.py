@@ -35,7 +35,7 @@ from app.work.recovery import Found, Journal, find
 from app.work.session import Session
 from killing import Painter, digest_of, digest_of_warp
 from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import Robot, pattern, small_project
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -642,6 +642,32 @@ def test_who_leaves_or_saves_is_offered_nothing(starter: Starter, tmp_path: Path
     robot.editor.commands.closed = True  # as after "Don't save"
     starter.kill()
     assert files_in(root) == []
+
+
+@pytest.mark.parametrize("comes_back", [False, True])
+def test_what_was_not_to_be_saved_is_offered_only_to_who_came_back_to_it(
+    starter: Starter, tmp_path: Path, root: Path, comes_back: bool
+) -> None:
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    robot = starter.start(tmp_path)
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.until(lambda: not robot.editor.recovery.is_busy)
+    assert files_in(root) != []
+    robot.drop(tmp_path / "other.png")
+    robot.frame(count=2)
+    asked = robot.editor.dialogs.shown[-1]
+    robot.click(asked.rect.x + 60, asked.rect.bottom - 36)  # Don't save
+    assert robot.editor.canvas.size == (100, 60)
+    if comes_back:
+        robot.key("ctrl+z")
+        robot.frame(count=2)
+        assert robot.editor.canvas.size != (100, 60)
+    robot.until(lambda: not robot.editor.recovery.is_busy)
+    starter.kill()
+    assert bool(files_in(root)) == comes_back
+    if comes_back:
+        assert found_in(root).work.strokes == 1
 
 
 @pytest.mark.usefixtures("before")

@@ -524,3 +524,53 @@ def test_the_recording_is_played_once_or_over_and_over_or_there_and_back(
     assert ticks[: len(expected)] == expected[: 3 * end]
     assert session.playing == (loops or returns)
     assert session.document.recipe.time.ping_pong == returns
+
+
+def test_a_stabilised_stroke_is_recorded_as_it_acts_and_ends_at_the_pen(session: Session) -> None:
+    press = Press(BrushSettings(0.12), False, session.extent, session.dt, string=0.15)
+    session.press(TOOL["push"], press, 0.3, 0.5)
+    for step in range(1, 11):
+        session.move(0.3 + 0.04 * step, 0.5 + 0.05 * (-1) ** step)
+        session.advance(1)
+    session.release()
+    (stroke,) = session.recipe.stroke
+    y = [sample[2] for sample in stroke.samples]
+    # The string is three times as long as the pen shakes, and turns it back by as much.
+    assert max(abs(here - 0.5) for here in y[:-6]) < 0.03
+    assert stroke.samples[-1][1:3] == (0.7, 0.55)
+    before = [sample for sample in stroke.samples if sample[1] < 0.6]
+    assert len(stroke.samples) - len(before) > 3, "the end comes at the speed of a straight stroke"
+    session.settle()
+    seen = session.replay.warp.read()
+    session.replay.checkpoints.clear()
+    session.seek(0)
+    session.settle()
+    session.seek(session.end)
+    session.settle()
+    assert np.array_equal(session.replay.warp.read(), seen)
+
+
+def test_a_push_that_stays_in_a_fluid_at_rest_is_no_edit(session: Session) -> None:
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    session.seek(2)
+    session.settle()
+    for place in ((0.3, 0.3), (0.6, 0.6)):
+        before, entries = session.recipe, session.document.history.entries
+        session.seek(0)
+        session.settle()
+        paint(session, "push", place, place)
+        session.settle()
+        assert (session.recipe, session.document.history.entries, session.tick) == (before, entries, 0)
+        assert session.last_place == place, "a straight stroke can begin there"
+
+
+def test_a_push_that_stays_holds_a_fluid_that_moves(session: Session) -> None:
+    session.change("thin", viscosity=0.001, drag=0.0)
+    paint(session, "push", (0.4, 0.5), (0.55, 0.5))
+    session.advance(2)
+    assert session.coasting
+    speed = session.replay.fluid.motion().largest_speed
+    paint(session, "push", (0.55, 0.5), (0.55, 0.5), ticks=6)
+    assert len(session.recipe.stroke) == 2
+    assert session.replay.fluid.motion().largest_speed < 0.9 * speed

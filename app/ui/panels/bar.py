@@ -9,47 +9,46 @@ from pathlib import Path
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.model.presets import FEELS
 from app.model.tools import BrushSettings, Tool
 from app.ui.actions import ACTIONS, Do
-from app.ui.editor_state import LARGEST, SMALLEST, EditorState
+from app.ui.editor_state import LIMITS, EditorState
 from app.ui.layout import Layout
-from app.ui.panels import feels
-from app.ui.units import PERCENT, Unit
-from app.ui.widgets import Ui, keys_shown
+from app.ui.panels import brushes, feels
+from app.ui.preferences import LONGEST_STRING, Preferences
+from app.ui.units import PERCENT, POINTS, Unit
+from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 
 MENU = (
-    "open", "recent", "import_map", "", "save", "save_as", "apply_to", "copy_recipe", "", "export", "", "preferences",
-    "shortcuts", "", "quit",
+    "open", "recent", "paste", "import_map", "", "save", "save_as", "apply_to", "", "copy_picture", "copy_recipe",
+    "export", "", "preferences", "shortcuts", "", "quit",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A slider for a part of the brush."""
+    """A slider for a part of the brush; `key` makes it less, `raises` more."""
 
     name: str
     label: str
     title: str
-    low: float
-    high: float
-    key: str
     more: str
+    key: str = ""
+    raises: str = ""
 
 
 SETTINGS = (
-    Setting("radius", "Size", "Size of the brush", SMALLEST, LARGEST, "[",
-            "] makes it larger. Or drag with the right button."),
-    Setting("hardness", "Hardness", "Hardness", 0.0, 1.0, "{",
-            "} makes it harder. A soft brush bends the picture gently."),
-    Setting("strength", "Strength", "Strength", 0.05, 1.0, ";",
-            "' makes it stronger. Full strength moves the picture with the pointer."),
-    Setting("stiffness", "Stiffness", "Stiffness", 0.01, 1.0, "",
+    Setting("radius", "Size", "Size of the brush", "Or drag with the right button.", "[", "]"),
+    Setting("hardness", "Hardness", "Hardness", "A soft brush bends the picture gently.", "{", "}"),
+    Setting("strength", "Strength", "Strength", "Full strength moves the picture with the pointer.", ";", "'"),
+    Setting("stiffness", "Stiffness", "Stiffness",
             "At 100 % a handle is led exactly. With less it gives way to the fluid and to the others."),
-    Setting("local", "Local", "Local", 0.0, 1.0, "",
+    Setting("local", "Local", "Local",
             "At 0 % the picture flows back beside the brush, as a fluid does. At 100 % only what is under it moves."),
 )  # fmt: skip
 DEFAULTS = BrushSettings()
+BRUSHES_WIDTH = 236  # points, of what the button for more about the brush opens
 RIGHT = 4 * 32 + 3 * 4 + 17 + 96 + 8  # points, of what is at the right end of the bar
 
 
@@ -58,26 +57,26 @@ def draw(
     layout: Layout,
     workspace: Workspace,
     state: EditorState,
-    recent: list[str],
+    likes: Preferences,
     open_file: Callable[[Path], None],
     do: Do,
 ) -> None:
     """The whole bar.
 
     Args:
-        recent: paths of what was opened lately.
-        open_file: opens one of them.
+        likes: has the paths of what was opened lately, and the person's own brushes.
+        open_file: opens one of those files.
     """
     with ui.panel("bar", layout.bar, (8, 8)):
         if ui.icon_button("menu", "menu", "Menu"):
             imgui.open_popup("main menu")
-        _menu(ui, layout.bar.height, recent, open_file, do)
+        _menu(ui, layout.bar.height, likes.recent, open_file, do)
         ui.divider()
         room = imgui.get_window_width() - ui.px(RIGHT)
         has_brush = state.tool.gesture is not None
         _title(ui, state.tool, room - ui.px(48) * has_brush)
         if has_brush:
-            _brush(ui, layout, workspace, state, room)
+            _brush(ui, layout, workspace, state, likes, room)
         _right(ui, layout, workspace, state, do)
 
 
@@ -99,8 +98,8 @@ def _title(ui: Ui, tool: Tool, room: float) -> None:
     imgui.end_group()
 
 
-def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, room: float) -> None:
-    """What can be set about the brush, up to `room`; for the rest there is a button."""
+def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, likes: Preferences, room: float) -> None:
+    """What can be set about the brush, up to `room`; for the rest, and for presets, there is a button."""
     across = 148 if imgui.get_window_width() > ui.px(1080) else 112
     settings = [setting for setting in SETTINGS if setting.name in state.tool.settings]
     parts: list[tuple[float, Callable[[float], None]]] = [
@@ -110,33 +109,47 @@ def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, roo
     if state.tool.directions:
         width = ui.segmented_width(state.tool.directions)
         parts.insert(0, (width, lambda width: _directions(ui, state, width)))
-    button, gap = ui.px(32), ui.px(16)
-    for number, (width, draw) in enumerate(parts):
+    button, gap = ui.px(8 + 32), ui.px(16)
+    while parts:
         imgui.same_line(0, gap)
-        last = number == len(parts) - 1
-        if imgui.get_cursor_pos_x() + width + (0 if last else ui.px(8) + button) > room:
-            _more(ui, [draw for _, draw in parts[number:]])
-            return
+        width, draw = parts[0]
+        if imgui.get_cursor_pos_x() + width + button > room:
+            break
         imgui.set_cursor_pos_y(ui.px(10))
         draw(across)
-        gap = ui.px(16 if number == 0 and len(parts) > len(settings) else 8)
-    if imgui.get_window_width() > ui.px(1180) and layout.inspector is None:
-        imgui.same_line(0, ui.px(16))
+        gap = ui.px(16 if state.tool.directions and len(parts) > len(settings) else 8)
+        del parts[0]
+    else:
+        imgui.same_line(0, ui.px(8))
+    _more(ui, layout, state, likes, [draw for _, draw in parts])
+    imgui.same_line(0, ui.px(16))
+    if layout.inspector is None and imgui.get_cursor_pos_x() + ui.segmented_width([f.name for f in FEELS]) <= room:
         imgui.set_cursor_pos_y(ui.px(10))
         feels.choose(ui, "bar feel", workspace.session, state)
 
 
-def _more(ui: Ui, parts: list[Callable[[float], None]]) -> None:
-    """A button for what the bar has no room for."""
+def _more(ui: Ui, layout: Layout, state: EditorState, likes: Preferences, parts: list[Callable[[float], None]]) -> None:
+    """A button for what the bar has no room for, the stabiliser and the brushes to choose from."""
     imgui.set_cursor_pos_y(ui.px(8))
-    if ui.icon_button("more", "sliders", "More about the brush"):
+    if ui.icon_button("more", "sliders", "More about the brush", more="Its stabiliser, and brushes to choose from."):
         imgui.open_popup("more of the brush")
-    low = imgui.get_item_rect_min()
-    imgui.set_next_window_pos(ImVec2(low.x, ui.px(48)))
+    low, display = imgui.get_item_rect_min(), imgui.get_io().display_size
+    left = max(min(low.x, display.x - ui.px(BRUSHES_WIDTH + 24 + 8)), 0.0)
+    imgui.set_next_window_pos(ImVec2(left, layout.bar.height))
+    imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(display.x, display.y - layout.bar.height - ui.px(8)))
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(12), ui.px(12)))
     if imgui.begin_popup("more of the brush"):
         for draw in parts:
-            draw(220)
+            draw(BRUSHES_WIDTH)
+        if state.tool_name != "handle":
+            slid = ui.slider(
+                "stabiliser", "Stabiliser", state.stabiliser, 0.0, LONGEST_STRING, POINTS, 0.0, width=BRUSHES_WIDTH,
+                title="Stabiliser",
+                more="The brush follows on a string so long, so that a hand that shakes draws smoothly. "
+                "It catches up where the pointer is let go.",
+            )  # fmt: skip
+            state.stabiliser = slid.value
+        brushes.draw(ui, state, likes, BRUSHES_WIDTH)
         imgui.end_popup()
     imgui.pop_style_var()
 
@@ -154,9 +167,11 @@ def _slider(ui: Ui, workspace: Workspace, state: EditorState, setting: Setting, 
     brush, is_size = state.brush, setting.name == "radius"
     value: float = getattr(brush, setting.name)
     unit = Unit(" px", 2 * max(workspace.canvas.size)) if is_size else PERCENT
+    low, high = LIMITS[setting.name]
+    raises = f"{ui.shown(setting.raises)}: more. " if ui.shown(setting.raises) else ""
     slid = ui.slider(
-        setting.name, setting.label, value, setting.low, setting.high, unit, getattr(DEFAULTS, setting.name),
-        logarithmic=is_size, width=width, title=setting.title, key=setting.key, more=setting.more,
+        setting.name, setting.label, value, low, high, unit, getattr(DEFAULTS, setting.name),
+        logarithmic=is_size, width=width, title=setting.title, key=setting.key, more=raises + setting.more,
     )  # fmt: skip
     if slid.changed:
         state.brush = replace(brush, **{setting.name: slid.value})
@@ -200,7 +215,7 @@ def _menu(ui: Ui, top: float, recent: list[str], open_file: Callable[[Path], Non
                 _recent(recent, open_file)
             else:
                 action = ACTIONS[name]
-                keys = keys_shown(action.key) + "   "
+                keys = ui.shown(action.key) + "   "
                 if imgui.menu_item(f"{action.label}    ", keys, False)[0]:
                     do(name)
         imgui.end_popup()

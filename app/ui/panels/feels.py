@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from app.model.presets import FEELS, Feel
 from app.ui.editor_state import EditorState
 from app.ui.widgets import Ui
@@ -18,5 +16,5 @@ def choose(ui: Ui, name: str, session: Session, state: EditorState, width: float
     if chosen != now:
         feel = FEELS[chosen]
         session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
-        state.brush = replace(state.brush, local=feel.local)
+        state.make_local(feel.local)
     return FEELS[now] if now >= 0 else None

@@ -12,13 +12,16 @@ from app.ui.numbers import Numbers
 from app.ui.panels.marks import BEHIND
 from app.ui.preferences import Preferences
 from app.ui.selecting import Selecting
-from app.ui.theme import packed
+from app.ui.theme import blend, packed
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.session import Session
 
 ZOOM, HINT = 160.0, 260.0  # points of the canvas's width that what lies on it needs
+LEGEND = ((-1, "0.1x"), (0, "1x"), (1, "10x"), (2, "100x"), (3, "1000x"))
+"""Decades of viscosity, and what they are called; their tints are those of canvas.frag."""
+THICK, THIN, GREY = (0.80, 0.30, 0.62, 1.0), (0.34, 0.71, 0.91, 1.0), (0.5, 0.5, 0.5, 1.0)
 
 
 def draw(
@@ -41,6 +44,8 @@ def draw(
         _how(ui, canvas, selecting.hint)
     elif preferences.hint and canvas.width > ui.px(HINT):
         _hint(ui, canvas, preferences)
+    if state.shows_viscosity and not state.before and canvas.width > ui.px(HINT):
+        _legend(ui, canvas, state.overlays["viscosity"].opacity)
     if state.statistics:
         _statistics(ui, canvas, session, numbers, clock)
     if session.is_behind and session.target - session.tick >= BEHIND:
@@ -73,6 +78,24 @@ def _zoom(ui: Ui, workspace: Workspace, do: Do) -> None:
             do("fit")
 
 
+def _legend(ui: Ui, canvas: Rect, opacity: float) -> None:
+    """The tints of viscosity, as times that of the fluid: beside the zoom, or above it."""
+    bottom = canvas.bottom - ui.px(12 if canvas.width > ui.px(HINT + ZOOM) else 54)
+    with ui.floating("legend", canvas.x + ui.px(12), bottom, (0, 1), 0.88, clicked=False):
+        for number, (decades, words) in enumerate(LEGEND):
+            if number:
+                imgui.same_line(0, ui.px(9))
+            corner, side = imgui.get_cursor_screen_pos(), ui.px(14)
+            tint = blend(GREY, THICK if decades > 0 else THIN, opacity * min(abs(decades) * 0.28, 0.75))
+            lines, low = imgui.get_window_draw_list(), corner + ImVec2(0, ui.px(3))
+            lines.add_rect_filled(low, low + ImVec2(side, side), packed(tint), ui.px(3))
+            lines.add_rect(low, low + ImVec2(side, side), packed(ui.palette.faint), ui.px(3))
+            imgui.dummy(ImVec2(side, ui.px(20)))
+            imgui.same_line(0, ui.px(4))
+            imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(1.5))
+            ui.text(words, size=13)
+
+
 def _how(ui: Ui, canvas: Rect, words: str) -> None:
     with ui.floating("how", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
         ui.text(f"  {words}  ", size=14)
@@ -90,7 +113,7 @@ def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:
         if canvas.width > ui.px(860):
             imgui.same_line(0, ui.px(8))
             imgui.set_cursor_pos_y(top + ui.px(4))
-            ui.dim("Drop your own picture here, or press Ctrl+O.", 14)
+            ui.dim(f"Drop your own picture here, or press {ui.shown('ctrl+o')}.", 14)
         imgui.same_line(0, ui.px(6))
         imgui.set_cursor_pos_y(top)
         if ui.icon_button("no hint", "close", size=24, icon_size=12):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from math import hypot, log10
 from pathlib import PurePath
 
+import moderngl
 import numpy as np
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
@@ -27,12 +28,14 @@ from app.ui.widgets import Slid, Ui
 from app.ui.workspace import Workspace
 from app.work.session import Session
 
-GRIDS = (128, 160, 192, 256, 384)
+DETAILS = {128: "coarse", 160: "rather coarse", 192: "medium", 256: "fine", 384: "very fine"}
+GRIDS = tuple(DETAILS)
 EDGES = ("clamp", "mirror", "wrap", "transparent", "black")
 SYMMETRIES: dict[Symmetry, str] = {
     "none": "Off", "left-right": "Left and right", "up-down": "Top and bottom", "both": "Both", "radial": "Radial",
 }  # fmt: skip
 WALLS = ("free-slip", "no-slip")
+ROW = 32  # points, of the history
 ABOUT_MASKS = {
     "invert": "What is thickest becomes what is thinnest, what is frozen thaws and the rest freezes.",
     "fill": "All of the picture.",
@@ -65,7 +68,7 @@ def draw(
             ("view", "Overlays", lambda: _view(ui, state), True),
             ("quality", "Picture and quality", lambda: _quality(ui, workspace, quality), False),
             ("masks", "Masks and motion", lambda: _masks(ui, workspace, state, do), False),
-            ("history", "History", lambda: _history(ui, session, state), True),
+            ("history", "History", lambda: _history(ui, workspace, state), True),
             ("numbers", "Statistics", lambda: _numbers(ui, session, state, clock, do), False),
         ):
             state.sections[name] = ui.section(label, state.sections.get(name, opened))
@@ -252,26 +255,32 @@ def _quality(ui: Ui, workspace: Workspace, quality: Quality) -> None:
     session = workspace.session
     width, height = workspace.canvas.size
     grid = session.recipe.fluid.grid
-    ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits; grid of {grid}")
+    ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits")
     automatic = quality.is_on
     # What saved work or a recipe is simulated on may be none of those that are offered.
-    grids = GRIDS if automatic else sorted({*GRIDS, grid})
+    grids = sorted({*GRIDS, grid})
+    labels = [f"Detail: automatic ({grid})" if automatic else "Detail: automatic"]
+    labels += [f"Detail: {DETAILS[cells]} ({cells})" if cells in DETAILS else f"Detail: {cells}" for cells in grids]
     index = 0 if automatic else 1 + grids.index(grid)
-    chosen = ui.segmented("grid", ["Auto", *(str(cells) for cells in grids)], index, -1)
-    more = "More is finer and slower. Auto is as many as this machine can paint on. What is seen is what is exported."
-    ui.tooltip("Cells along the longer side", more=more)
-    if chosen == 0 and not automatic:
+    imgui.set_next_item_width(-1)
+    changed, chosen = imgui.combo("##detail", index, labels)
+    more = (
+        "In brackets, cells along the picture's longer side. More are finer and slower; automatic is as many as this "
+        "machine can paint on. What is seen is what is exported."
+    )
+    ui.tooltip("How finely the flow is simulated", more=more)
+    if changed and chosen == 0:
         quality.turn_on()
-    elif chosen > 0 and chosen != index:
+    elif changed and chosen != index:
         session.set_grid(grids[chosen - 1], f"Grid of {grids[chosen - 1]}")
     if session.recipe.map is not None:
         ui.dim(f"Starts from the map {PurePath(session.recipe.map).name}")
         if ui.button("Start from the picture", width=-1, height=30):
             session.start_from_map(None)
     ui.dim("Beyond the edges of the picture")
-    labels = ("Its outermost pixels", "Mirrored", "Repeated", "Transparent", "Black")
+    beyond = ("Its outermost pixels", "Mirrored", "Repeated", "Transparent", "Black")
     imgui.set_next_item_width(-1)
-    changed, number = imgui.combo("##edges", EDGES.index(session.recipe.edges), list(labels))
+    changed, number = imgui.combo("##edges", EDGES.index(session.recipe.edges), list(beyond))
     if changed:
         session.edit("Edges of the picture", edges=EDGES[number])
 
@@ -330,40 +339,64 @@ def _brightness(ui: Ui, session: Session, state: EditorState) -> None:
         session.commit("Thickness by brightness")
 
 
-def _history(ui: Ui, session: Session, state: EditorState) -> None:
+def _history(ui: Ui, workspace: Workspace, state: EditorState) -> None:
+    """What has been done, each with what it led to and how long the recording was by then."""
+    session, thumbnails = workspace.session, workspace.canvas.thumbnails
     history, palette = session.document.history, ui.palette
     entries, present = history.entries, history.index
     # As much as is in sight without scrolling the inspector, the header of the section below included.
     room = imgui.get_content_region_avail().y - ui.px(60)
-    most = max(4, min(8, int(room / ui.px(26))))
-    height = min(len(entries), most) * ui.px(26) + ui.px(4)
+    most = max(4, min(8, int(room / ui.px(ROW))))
+    height = min(len(entries), most) * ui.px(ROW) + ui.px(4)
     imgui.begin_child("entries", ImVec2(0, height))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
     clipper = imgui.ListClipper()
-    clipper.begin(len(entries), ui.px(26))
+    clipper.begin(len(entries), ui.px(ROW))
     chosen: int | None = None
     while clipper.step():
         for number in range(clipper.display_start, clipper.display_end):
             corner = imgui.get_cursor_screen_pos()
-            if imgui.invisible_button(f"entry {number}", ImVec2(imgui.get_content_region_avail().x, ui.px(26))):
+            size = ImVec2(imgui.get_content_region_avail().x, ui.px(ROW))
+            if imgui.invisible_button(f"entry {number}", size):
                 chosen = number
+            entry = entries[number]
+            if when := thumbnails.when(entry.number):
+                ui.tooltip(entry.name, more=f"Done at {when:%H:%M}.")
             draw = imgui.get_window_draw_list()
             if imgui.is_item_hovered() or number == present:
                 low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
                 ground = palette.accent_soft if number == present else palette.hover
                 draw.add_rect_filled(low, high, packed(ground), ui.px(5))
             ink = palette.text if number <= present else palette.faint
+            if (texture := thumbnails.of(entry.number)) is not None:
+                _thumbnail(ui, texture, corner)
             imgui.push_font(ui.fonts.regular, 13.5)
-            draw.add_text(ImVec2(corner.x + ui.px(8), corner.y + ui.px(5)), packed(ink), entries[number].name)
+            y = corner.y + (size.y - imgui.get_font_size()) / 2
+            time = f"{entry.recipe.recorded * entry.recipe.fluid.dt:.1f} s"
+            right = corner.x + size.x - ui.px(8) - imgui.calc_text_size(time).x
+            draw.push_clip_rect(corner, ImVec2(right - ui.px(6), corner.y + size.y), True)
+            draw.add_text(ImVec2(corner.x + ui.px(50), y), packed(ink), entry.name)
+            draw.pop_clip_rect()
+            draw.add_text(ImVec2(right, y), packed(palette.dim if number <= present else palette.faint), time)
             imgui.pop_font()
     clipper.end()
     if state.history_seen != present:
         state.history_seen = present
-        imgui.set_scroll_y(max(present * ui.px(26) - height / 2, 0))
+        imgui.set_scroll_y(max(present * ui.px(ROW) - height / 2, 0))
     imgui.pop_style_var()
     imgui.end_child()
     if chosen is not None and chosen != present:
         session.go_to(chosen)
+
+
+def _thumbnail(ui: Ui, texture: moderngl.Texture, corner: ImVec2) -> None:
+    """A small picture at the left end of a row, as large as there is room for."""
+    (width, height), room = texture.size, (ui.px(40), ui.px(ROW - 4))
+    share = min(room[0] / width, room[1] / height)
+    low = corner + ImVec2(ui.px(4) + (room[0] - width * share) / 2, ui.px(2) + (room[1] - height * share) / 2)
+    high = low + ImVec2(width * share, height * share)
+    picture = imgui.ImTextureRef(texture.glo)
+    imgui.get_window_draw_list().add_image(picture, low, high, ImVec2(0, 1), ImVec2(1, 0))
 
 
 def _numbers(ui: Ui, session: Session, state: EditorState, clock: Clock, do: Do) -> None:

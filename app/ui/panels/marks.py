@@ -97,6 +97,11 @@ def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController
     half = reach * (core + 0.4542 * (1 - core))
     middle, count = ImVec2(x, y), max(32, min(int(reach), 96))
     soft = rgb("000000", 0.45)
+    if pointer.drag == "paint" and state.stabiliser:
+        pen = ImVec2(pointer.x, pointer.y)
+        lines.add_line(middle, pen, packed(soft), ui.px(2.6))
+        lines.add_line(middle, pen, packed(WHITE, 0.95), ui.px(1.0))
+        lines.add_circle_filled(pen, ui.px(2.6), packed(WHITE), 12)
     lines.add_circle(middle, reach, packed(soft, 0.5), count, ui.px(2.0))
     lines.add_circle(middle, reach, packed(WHITE, 0.55), count, ui.px(1.0))
     lines.add_circle(middle, half, packed(soft), count, ui.px(2.6))

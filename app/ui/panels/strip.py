@@ -15,7 +15,7 @@ GROUP_ENDS = ("handle", "select", "restore")
 
 def draw(ui: Ui, layout: Layout, state: EditorState) -> None:
     """One button for each tool."""
-    rect, columns = layout.strip, layout.columns
+    rect, columns, width = layout.strip, layout.columns, layout.tool
     if rect is None:
         return
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(BETWEEN), ui.px(BETWEEN)))
@@ -27,10 +27,13 @@ def draw(ui: Ui, layout: Layout, state: EditorState) -> None:
             more = tool.hint
             if tool.directions:
                 more += f". Alt: {tool.directions[1].lower()}."
-            if ui.icon_button(tool.name, tool.name, tool.label, tool.key, more, active, size=TOOL, icon_size=22):
+            if ui.icon_button(
+                tool.name, tool.name, tool.label, tool.key, more, active, size=TOOL, icon_size=22,
+                width=width if width > TOOL else 0.0,
+            ):  # fmt: skip
                 state.choose_tool(tool.name, state.opposite.get(tool.name, False))
             if tool.name in GROUP_ENDS and columns == 1:
-                corner, width = imgui.get_cursor_screen_pos(), ui.px(TOOL)
-                ui.rule(corner + ImVec2(ui.px(8), ui.px(3)), corner + ImVec2(width - ui.px(8), ui.px(4)))
-                imgui.dummy(ImVec2(width, ui.px(GROUP - BETWEEN)))
+                corner, across = imgui.get_cursor_screen_pos(), ui.px(width)
+                ui.rule(corner + ImVec2(ui.px(8), ui.px(3)), corner + ImVec2(across - ui.px(8), ui.px(4)))
+                imgui.dummy(ImVec2(across, ui.px(GROUP - BETWEEN)))
     imgui.pop_style_var()

@@ -1,0 +1,137 @@
+"""Brushes: each tool's own, those that are kept by a name, and the stabiliser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from math import hypot
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.model.presets import BRUSHES
+from app.ui.editor_state import EditorState, presets
+from app.ui.preferences import Preferences
+from solver.gl.device import Device
+from support.editing import Robot, small_project
+from support.widgets import Widgets
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
+    monkeypatch.setattr("platformdirs.user_config_path", lambda name: tmp_path / "kept")
+    preferences = Preferences(auto_quality=False, path=tmp_path / "kept" / "preferences.json")
+    robot = Robot(device, small_project(tmp_path), preferences=preferences)
+    yield robot
+    robot.close()
+
+
+@pytest.fixture
+def widgets(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Widgets:
+    return Widgets(robot, monkeypatch)
+
+
+def open_more(robot: Robot, widgets: Widgets) -> None:
+    """Press the button behind the last slider of the bar."""
+    widgets.look()
+    last = max((widgets.at[label] for label in ("Size", "Hardness", "Strength", "Local")), key=lambda rect: rect.right)
+    robot.click(last.right + 8 + 16, 24)
+    robot.frame(count=3)
+    assert robot.editor.ui.has_popup
+
+
+def test_each_tool_has_its_own_brush_and_is_left_with_it(robot: Robot) -> None:
+    state = robot.editor.state
+    for tool, radius, hardness in (("p", 0.2, 0.1), ("f", 0.05, 0.9), ("t", 0.3, 0.0)):
+        robot.key(tool)
+        state.brush = replace(state.brush, radius=radius, hardness=hardness, strength=0.5)
+    state.stabiliser = 35.0
+    robot.key("p")
+    assert (state.brush.radius, state.brush.hardness) == (0.2, 0.1)
+    robot.key("b")
+    assert state.brush.radius == 0.15
+    robot.editor.remember()
+    left = EditorState.recalled(Preferences.load())
+    assert (left.brush, left.brushes, left.stabiliser) == (state.brushes["push"], state.brushes, 35)
+
+
+def test_kept_brushes_that_cannot_be_are_made_so_that_they_can(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "kept" / "preferences.json"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(
+        """{"brushes": {"push": {"radius": 99, "hardness": -1, "strength": NaN, "no": 1}, "no tool": {}, "twirl": 3},
+        "presets": {"mine": {"radius": 1e300}}, "stabiliser": 1e9, "window": [1, "a"], "keys": {"open": "k", "x": [1]},
+        "sections": {"view": 1}}"""
+    )
+    kept = Preferences.load()
+    state = EditorState.recalled(kept)
+    assert (state.brush.radius, state.brush.hardness, state.brush.strength) == (0.5, 0, 1)
+    assert (kept.stabiliser, kept.window, kept.keys, kept.sections) == (200, [], {}, {})
+    assert presets(kept)[-1].radius == 0.15
+
+
+def test_brushes_are_kept_by_name_chosen_and_deleted(robot: Robot, widgets: Widgets) -> None:
+    state, likes = robot.editor.state, robot.editor.preferences
+    state.brush = replace(state.brush, radius=0.07, hardness=0.4, strength=0.6, local=0.3)
+    open_more(robot, widgets)
+    keep = widgets.at["Keep"]
+    robot.click(keep.x - 100, keep.middle[1])
+    robot.type("Mine")
+    robot.frame(count=2)
+    robot.click(*keep.middle)
+    robot.frame(count=2)
+    assert likes.presets == {"Mine": {"radius": 0.07, "hardness": 0.4, "strength": 0.6}}
+    assert Preferences.load().presets == likes.presets
+    # The rows stand above the field, 28 points and a gap of 8 each; the new one pushes the field down.
+    row = robot.editor.ui.px(28 + 8)
+    field = keep.middle[1] + row
+    first = field - row * (len(BRUSHES) + 1)
+    for number, preset in enumerate(BRUSHES):
+        robot.click(keep.x - 100, first + number * row)
+        now = (preset.radius, preset.hardness, preset.strength)
+        assert (state.brush.radius, state.brush.hardness, state.brush.strength) == now
+        assert state.brush.local == 0.3
+    robot.click(keep.x - 100, field - row)
+    assert state.brush.radius == 0.07
+    robot.click(keep.right - 14, field - row)
+    assert likes.presets == Preferences.load().presets == {}
+
+
+def test_the_stabiliser_is_as_long_on_the_screen_at_any_zoom(robot: Robot) -> None:
+    robot.editor.state.stabiliser = 40.0
+    for _ in range(2):
+        x, y = robot.at(0.5, 0.5)
+        robot.move(x - 100, y)
+        robot.press()
+        robot.move(x - 62, y + 8)
+        session = robot.editor.session
+        assert len(set(session.path)) == 1, "within the string nothing moves"
+        robot.move(x, y)
+        assert robot.editor.pointer.ring_at == pytest.approx((x - 40, y), abs=1.5)
+        robot.release()
+        stroke = session.recipe.stroke[-1]
+        assert robot.at(*stroke.samples[-1][1:3]) == pytest.approx((x, y), abs=0.1), "it catches up with the pen"
+        robot.rest()
+        robot.key("=")
+
+
+def test_a_hand_that_shakes_draws_a_calm_stroke(robot: Robot) -> None:
+    """The length of the path, of a straight line with noise of 6 points, with and without."""
+    dice, lengths = np.random.default_rng(5), []
+    noise = dice.uniform(-6, 6, (40, 2))
+    for stabiliser in (0.0, 60.0):
+        robot.editor.state.stabiliser = stabiliser
+        x, y = robot.at(0.2, 0.4)
+        robot.move(x, y)
+        robot.press()
+        for step, (dx, dy) in enumerate(noise, 1):
+            robot.move(x + 6 * step + dx, y + dy)
+        robot.release()
+        samples = robot.editor.session.recipe.stroke[-1].samples
+        places = [robot.at(*sample[1:3]) for sample in samples]
+        lengths.append(sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(places)))
+        robot.rest()
+    assert lengths[0] > 1.35 * 240
+    assert lengths[1] < 1.03 * 240

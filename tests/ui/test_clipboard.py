@@ -1,0 +1,104 @@
+"""Pictures from the system's clipboard and to it, on a virtual screen with another program."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.media import project as projects
+from app.media.pictures import read_picture, write_picture
+from app.ui import clipboard
+from solver.gl.device import Device
+from support.desk import Desk, needs_a_screen
+from support.editing import Robot, pattern, small_project
+
+FILLING = """
+import copykitten, numpy as np
+from PIL import Image
+pixels = np.asarray(Image.open({path!r}).convert("RGBA"))
+copykitten.copy_image(pixels.tobytes(), pixels.shape[1], pixels.shape[0], detach=True)
+"""
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    pytest.importorskip("copykitten")
+    desk = Desk(tmp_path)
+    yield desk
+    desk.close()
+
+
+def on_clipboard(desk: Desk) -> np.ndarray | None:
+    """The picture that another program gets, by the protocol of X alone; None if there is none."""
+    from Xlib import X, display
+
+    screen = display.Display(desk.env["DISPLAY"])
+    window = screen.screen().root.create_window(0, 0, 1, 1, 0, 0)
+    place = screen.intern_atom("FLUIDWARP_TEST")
+    window.convert_selection(screen.intern_atom("CLIPBOARD"), screen.intern_atom("image/png"), place, X.CurrentTime)
+    while screen.next_event().type != X.SelectionNotify:
+        pass
+    found = window.get_full_property(place, X.AnyPropertyType)
+    screen.close()
+    return np.asarray(Image.open(io.BytesIO(bytes(found.value))).convert("RGB")) if found else None
+
+
+@needs_a_screen
+def test_a_picture_is_pasted_warped_and_copied(desk: Desk, tmp_path: Path) -> None:
+    write_picture(tmp_path / "opened.png", pattern(60, 40))
+    write_picture(tmp_path / "other.png", pattern())
+    desk.open(tmp_path / "opened.png")
+    filling = FILLING.format(path=str(tmp_path / "other.png"))
+    subprocess.run([sys.executable, "-c", filling], env=desk.env, check=True)
+    desk.insist(lambda: desk.key("ctrl+v"), lambda: desk.title().startswith("pasted "), "the picture to be pasted")
+    desk.drag((400, 400), (520, 400))
+    desk.until(lambda: " * - " in desk.title(), "the push to be recorded")
+    desk.save(tmp_path / "work.fluidwarp")
+    work = projects.load(tmp_path / "work.fluidwarp")
+    assert np.array_equal(work.picture.pixels, pattern().pixels)
+    assert work.embedded
+    desk.key("ctrl+c")
+
+    def is_copied() -> bool:
+        found = on_clipboard(desk)
+        return found is not None and not np.array_equal(found, pattern().pixels)
+
+    desk.until(is_copied, "the picture to be on the clipboard")
+    command = [sys.executable, "-m", "app", "render", "work.fluidwarp", "-o", "rendered.png"]
+    subprocess.run(command, check=True, cwd=tmp_path, env=desk.env | {"PYTHONPATH": str(Path(__file__).parents[2])})
+    found = on_clipboard(desk)
+    assert found is not None
+    assert np.array_equal(found, read_picture(tmp_path / "rendered.png").pixels)
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
+    """An editor where copykitten is not installed."""
+    monkeypatch.setitem(sys.modules, "copykitten", None)
+    robot = Robot(device, small_project(tmp_path))
+    yield robot
+    robot.close()
+
+
+@pytest.mark.parametrize("chord", ["ctrl+c", "ctrl+v"])
+def test_without_copykitten_a_sentence_says_how_to_get_it(robot: Robot, chord: str) -> None:
+    robot.key(chord)
+    robot.frame()
+    (message,) = robot.editor.messages.shown
+    assert message.text == "Pictures on the clipboard need copykitten; get it by: pip install copykitten"
+    assert not robot.editor.exports.is_running
+
+
+def test_only_the_newest_pasted_pictures_are_kept(tmp_path: Path) -> None:
+    names = [clipboard.new_name().name for _ in range(clipboard.KEPT + 3)]
+    for name in (*names, "own.png"):
+        (tmp_path / name).touch()
+    clipboard.prune(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["own.png", *names[3:]]
