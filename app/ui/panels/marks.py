@@ -176,7 +176,7 @@ def _arrow_head(lines: imgui.ImDrawList, start: ImVec2, end: ImVec2, size: float
 def _forces(ui: Ui, view: Viewport, session: Session, overlay: Overlay, lines: imgui.ImDrawList) -> None:
     """Where strokes push, up to the playhead; older ones fainter."""
     for stroke in session.recipe.stroke[-60:]:
-        if stroke.first_tick > session.tick or stroke.tool not in ("push", "curve"):
+        if stroke.muted or stroke.first_tick > session.tick or stroke.tool not in ("push", "curve"):
             continue
         step = max(len(stroke.samples) // 40, 1)
         places = [sample[1:3] for sample in stroke.samples[::step]]
