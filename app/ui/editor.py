@@ -27,10 +27,11 @@ from app.ui.exporting import Exports
 from app.ui.files import Files
 from app.ui.imgui_backend import ImGuiBackend
 from app.ui.journals import Journals
+from app.ui.lanes import Lanes
 from app.ui.layout import NARROW, Layout
 from app.ui.messages import Messages
 from app.ui.numbers import Numbers
-from app.ui.panels import bar, hud, inspector, marks, strip, timebar
+from app.ui.panels import bar, hud, inspector, lanes, marks, strip, timebar
 from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
@@ -62,7 +63,8 @@ class Editor:
         journals: Path | None = None,
     ) -> None:
         self.preferences = likes = preferences or Preferences()
-        self.state = EditorState(inspector=likes.inspector, auto_quality=likes.auto_quality)
+        lanes = Lanes(shown=likes.lanes)
+        self.state = EditorState(inspector=likes.inspector, auto_quality=likes.auto_quality, lanes=lanes)
         self._device = device
         self.backend = ImGuiBackend(device)
         self.ui = Ui(theme.PALETTES[likes.theme], self.backend.fonts, likes.scale)
@@ -202,7 +204,8 @@ class Editor:
         state = self.state
         state.is_narrow = width < NARROW * self.ui.scale
         is_open = state.over_narrow if state.is_narrow else state.inspector
-        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), len(strip.GROUP_ENDS) + 1)
+        groups = len(strip.GROUP_ENDS) + 1
+        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, state.lanes.shown)
 
     def _handle(self, events: Sequence[Event]) -> None:
         for event in events:
@@ -274,6 +277,8 @@ class Editor:
         strip.draw(ui, layout, state)
         if layout.inspector is not None:
             inspector.draw(ui, layout.inspector, workspace, state, self.selecting, self.quality, self.clock, self.do)
+        if layout.lanes is not None:
+            lanes.draw(ui, layout.lanes, self.session, state, self.do)
         timebar.draw(ui, layout.timebar, self.session, state, self.do)
         bar.draw(ui, layout, workspace, state, likes.recent, self.files.open_work, self.do)
 

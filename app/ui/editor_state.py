@@ -10,6 +10,7 @@ from app.model.areas import Part
 from app.model.mask_edits import MaskName
 from app.model.strokes import Symmetry
 from app.model.tools import TOOL, BrushSettings, Tool
+from app.ui.lanes import Lanes
 
 MASK_OF: dict[str, MaskName] = {"freeze": "frozen", "thicken": "thickness"}
 SELECT_BY = {
@@ -71,6 +72,7 @@ class EditorState:
         selection: what is selected, the first part and what is added to it and taken away.
         selected_area: the same as it is shown, (h, w) uint8, 255 in it; None where there is none.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
+        lanes: the bars of the timeline.
         is_scaling: the amount of the warp is being dragged.
         symmetry, sectors: of the strokes that are painted.
         before: the picture is shown as it was, as long as a key is held.
@@ -98,6 +100,7 @@ class EditorState:
     selection: tuple[Part, ...] = ()
     selected_area: np.ndarray | None = None
     selected: str = ""
+    lanes: Lanes = field(default_factory=Lanes)
     is_scaling: bool = False
     symmetry: Symmetry = "none"
     sectors: int = 6
