@@ -30,6 +30,7 @@ class Drag:
         ticks: how far it has been dragged.
         moved: it is more than a click.
         adds: it is added to what is selected, or taken away.
+        shown: the ticks from and to which are shown meanwhile, though the recording may grow.
     """
 
     bar: Bar
@@ -37,6 +38,7 @@ class Drag:
     at: float
     x: float
     adds: bool
+    shown: tuple[float, float]
     ticks: int = 0
     moved: bool = False
 
@@ -83,8 +85,9 @@ class Lanes:
         if recipe.stroke is before.stroke and recipe.force is before.force:
             return
         self.selected = {which for which in self.selected if _alike(one_of(before, which), one_of(recipe, which))}
-        if self.drag is not None and self.drag.bar.which not in self.selected and not self.drag.adds:
-            self.drag = None
+        if self.drag is not None:
+            which = self.drag.bar.which
+            self.drag = self.drag if one_of(before, which) is one_of(recipe, which) else None
 
     def packed(self, recipe: Recipe, ticks: int, least: float) -> list[list[Bar]]:
         """The lanes, those of forces first; `least` ticks are taken by each bar."""
@@ -115,6 +118,8 @@ class Lanes:
 
     def span(self, end: int) -> tuple[float, float]:
         """The ticks from and to which are shown of a recording of so many."""
+        if self.drag is not None:
+            return self.drag.shown
         whole = max(end * (1 + ROOM), end + 6.0, CLOSEST)
         if self.view is None:
             return 0.0, whole
@@ -146,11 +151,11 @@ class Lanes:
         one = one_of(recipe, which)
         return None if one is None else (which, one)
 
-    def press(self, bar: Bar, part: Part, at: float, x: float, adds: bool) -> None:
-        """The pointer went down on a bar, at a tick and a place."""
+    def press(self, bar: Bar, part: Part, at: float, x: float, adds: bool, end: int) -> None:
+        """The pointer went down on a bar, at a tick and a place; `end`: ticks recorded."""
         if not adds and bar.which not in self.selected:
             self.selected = {bar.which}
-        self.drag = Drag(bar, part, at, x, adds)
+        self.drag = Drag(bar, part, at, x, adds, self.span(end))
 
     def release(self, session: Session) -> None:
         """The pointer went up: the bar stays where it is, or was only clicked."""

@@ -263,7 +263,7 @@ def _point(ui: Ui, session: Session, state: EditorState, tick_at: Callable[[floa
         adds = io.key_shift or io.key_ctrl
         if found is not None:
             state.selected = ""
-            lanes.press(*found, tick_at(mouse.x), mouse.x, adds)
+            lanes.press(*found, tick_at(mouse.x), mouse.x, adds, session.end)
         elif not adds:
             lanes.selected = set()
     elif imgui.is_item_active() and lanes.drag is not None:
