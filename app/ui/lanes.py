@@ -16,6 +16,7 @@ from app.work.session import Session
 Part = Literal["move", "start", "end"]
 ROOM = 0.06  # of the recording that is shown after its end, for bars that go there
 CLOSEST = 24  # ticks that are shown at least
+MOST_BLOCKS = 100  # of one stroke on the track
 
 
 @dataclass
@@ -104,8 +105,10 @@ class Lanes:
         if not _same(self._blocks[0], made_of):
             seen: dict[tuple[int, int, str], Block] = {}
             for stroke in recipe.stroke:
-                length = stroke.last_tick + 1 - stroke.first_tick
-                for time in range(min(stroke.repeat, 200)):
+                # Where it repeats so often that the track would be full of it, it is one block.
+                times, last = (1, stroke.end_tick) if stroke.repeat > MOST_BLOCKS else (stroke.repeat, stroke.last_tick)
+                length = last + 1 - stroke.first_tick
+                for time in range(times):
                     start = stroke.first_tick + time * stroke.every
                     block = Block(start, start + length, stroke.tool, stroke.muted)
                     at = int(start / pixel), int((start + length) / pixel), stroke.tool

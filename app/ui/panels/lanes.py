@@ -55,8 +55,10 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
         if rect.height > ui.px(LOW):
             _ruler(ui, session, x0, x1, (start, stop), across, tick_at)
-        _bars(ui, session, state, x0, x1, (start, stop), across, tick_at)
+        let_go = _bars(ui, session, state, x0, x1, (start, stop), across, tick_at)
         imgui.pop_style_var()
+    if let_go:
+        lanes.release(session)
 
 
 def _head(ui: Ui, session: Session, state: EditorState, do: Do) -> None:
@@ -158,7 +160,8 @@ def _bars(
     shown: tuple[float, float],
     across: Callable[[float], float],
     tick_at: Callable[[float], float],
-) -> None:
+) -> bool:
+    """The bars; True if the pointer has let go of them."""
     lanes = state.lanes
     width = x1 - x0
     least = ui.px(NARROWEST) * (shown[1] - shown[0]) / max(width, 1.0)
@@ -168,7 +171,7 @@ def _bars(
     room = imgui.get_content_region_avail().y
     height = max(len(packed_lanes) * row + ui.px(GAP), room)
     imgui.invisible_button("bars", ImVec2(max(x1 - corner.x + ui.px(6), 1.0), height))
-    _point(ui, session, state, tick_at)
+    let_go = _point(ui, session, state, tick_at)
     draw = imgui.get_window_draw_list()
     top = imgui.get_window_pos().y
     lanes.drawn.clear()
@@ -187,6 +190,7 @@ def _bars(
         low, high = ImVec2(now, top), ImVec2(now + ui.px(1.5), top + imgui.get_window_height())
         draw.add_rect_filled(low, high, packed(ui.palette.text))
     imgui.end_child()
+    return let_go
 
 
 def _bar(
@@ -254,10 +258,10 @@ def _repeats(
         draw.add_rect_filled(ImVec2(left, top), ImVec2(right, bottom), colour, ui.px(3))
 
 
-def _point(ui: Ui, session: Session, state: EditorState, tick_at: Callable[[float], float]) -> None:
-    """What the pointer does to the bars."""
+def _point(ui: Ui, session: Session, state: EditorState, tick_at: Callable[[float], float]) -> bool:
+    """What the pointer does to the bars; True if it has let go of them."""
     lanes, mouse, io = state.lanes, imgui.get_mouse_pos(), imgui.get_io()
-    hovered = imgui.is_item_hovered()
+    hovered, let_go = imgui.is_item_hovered(), imgui.is_item_deactivated()
     found = _under(ui, state, mouse.x, mouse.y) if hovered else None
     if imgui.is_item_activated():
         adds = io.key_shift or io.key_ctrl
@@ -270,14 +274,13 @@ def _point(ui: Ui, session: Session, state: EditorState, tick_at: Callable[[floa
         drag = lanes.drag
         drag.moved |= abs(mouse.x - drag.x) > ui.px(SHAKE)
         drag.ticks = _limited(state, session, round(tick_at(mouse.x) - drag.at))
-    elif imgui.is_item_deactivated():
-        lanes.release(session)
     elif found is not None:
         _tell(ui, session, found[0])
     if hovered and io.mouse_wheel and io.key_ctrl:
         lanes.zoom(session.end, tick_at(mouse.x), 0.8**io.mouse_wheel)
     elif hovered and (io.mouse_wheel_h or (io.mouse_wheel and io.key_shift)):
         lanes.pan(session.end, -0.1 * (io.mouse_wheel_h or io.mouse_wheel))
+    return let_go
 
 
 def _limited(state: EditorState, session: Session, ticks: int) -> int:

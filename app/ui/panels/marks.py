@@ -181,7 +181,7 @@ def _forces(ui: Ui, view: Viewport, session: Session, overlay: Overlay, lines: i
         step = max(len(stroke.samples) // 40, 1)
         places = [sample[1:3] for sample in stroke.samples[::step]]
         points: list[Any] = [ImVec2(*view.to_screen(*place)) for place in places]
-        active = stroke.last_tick >= session.tick - 1
+        active = stroke.end_tick >= session.tick - 1
         alpha = overlay.opacity * (1.0 if active else 0.6)
         lines.add_polyline(points, packed(BLACK, 0.5 * alpha), ui.px(4.5), 0)
         colour = (*ui.palette.accent[:3], alpha)
