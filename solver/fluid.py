@@ -236,7 +236,7 @@ class Fluid(Scheme):
         """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
         self._coefficients_of = None
         self._solid = None
-        self._is_flux_drawn = False
+        self._velocity_changed()  # what carries the fluid stands still in solid cells
 
     # -- on another grid of the picture ------------------------------------------------------------------------------
 

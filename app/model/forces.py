@@ -14,7 +14,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -45,11 +45,30 @@ class _Force(Timed):
 
     Attributes:
         name: what messages call it.
+        muted: it does nothing.
         strength: multiplies the field; see the kind for the unit.
     """
 
     name: str = ""
+    muted: bool = False
     strength: Strength = 1.0
+
+    def starts(self, dt: float) -> float:
+        """A tick before which it does nothing; infinite where it is muted."""
+        return math.inf if self.muted else _tick_before(self.starts_at, dt)
+
+    def agrees_until(self, other: _Force, dt: float) -> float:
+        """A tick before which both do the same; infinite where they do so for ever."""
+        if self == other or (self.muted and other.muted):
+            return math.inf
+        mine, theirs = self.during, other.during
+        if mine and theirs and mine[0] == theirs[0] and self.edited(during=theirs) == other:
+            return _tick_before(min(mine[1], theirs[1]), dt)
+        return min(self.starts(dt), other.starts(dt))
+
+    def edited(self, **keys: Any) -> Self:
+        """The force with other values of some keys, validated."""
+        return type(self).model_validate({name: getattr(self, name) for name in type(self).model_fields} | keys)
 
     def faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         """Acceleration (ny, nx, 2) float32 on left and upper faces, the walls' own faces zero; None if it has none.
@@ -363,7 +382,7 @@ class BuiltForce:
 
 
 def build(forces: Sequence[Force], grid: Grid, pictures: NamedPictures, duration: float) -> list[BuiltForce]:
-    """The recipe's forces on a grid.
+    """The recipe's forces on a grid, without those that are muted.
 
     Raises:
         UserError: naming the force by its index and name, and what is wrong with it.
@@ -371,6 +390,8 @@ def build(forces: Sequence[Force], grid: Grid, pictures: NamedPictures, duration
     built = []
     for number, force in enumerate(forces, 1):
         label = label_of("force", number, force.name)
+        if force.muted:
+            continue
         try:
             if remark := force.law.check(duration):
                 pictures.notice(f"{label} {remark}")
@@ -379,6 +400,11 @@ def build(forces: Sequence[Force], grid: Grid, pictures: NamedPictures, duration
         except (ValueError, UserError) as error:
             raise UserError(f"{label}: {error}") from None
     return built
+
+
+def _tick_before(seconds: float, dt: float) -> int:
+    """A tick that a time does not come before, however it was rounded."""
+    return max(math.floor(seconds / dt - 1e-6), 0)
 
 
 # Shapes of forces ---------------------------------------------------------------------------------------------------

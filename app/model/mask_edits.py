@@ -17,7 +17,7 @@ from pydantic import Field, TypeAdapter, model_validator
 from app.model.areas import Area, Part, Seen, as_it_was
 from app.model.sampling import FINEST, SOURCE, NamedPictures, PictureName, SmallPictures, intensity, strips, to_grid
 from app.model.schema import Model, Radius, Several
-from app.model.strokes import Stroke, Tick
+from app.model.strokes import BrushPath, Tick
 from solver.grid import Grid
 
 MaskName = Literal["frozen", "thickness"]
@@ -30,7 +30,7 @@ UNITS = {"frozen": (0, 255), "thickness": (24576, 8192)}
 Decades = Annotated[float, Field(ge=THINNEST, le=THICKEST)]
 
 
-class MaskStroke(Stroke):
+class MaskStroke(BrushPath):
     """A stroke of a mask's brush that takes no time.
 
     Its samples' ticks are those of the hand: it paints what it would have painted in so many ticks of the fluid, all

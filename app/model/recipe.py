@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise, zip_longest
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -21,6 +22,7 @@ MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
 
+Part = TypeVar("Part")
 Seconds = Annotated[float, Field(ge=0, le=100_000)]
 
 
@@ -280,6 +282,11 @@ class Recipe(Model):
         return self.ticks if acts or any(edit.tick for edit in self.mask) else 0
 
     @property
+    def pushes(self) -> bool:
+        """True if it has forces that are not muted."""
+        return any(not force.muted for force in self.force)
+
+    @property
     def leads(self) -> bool:
         """True if it has handles or pins."""
         return bool(self.handle or self.pin)
@@ -326,11 +333,16 @@ class Recipe(Model):
         if not self.is_set_up_as(other):
             return 0
         agreed: float = float("inf")
-        for mine, theirs in zip_longest(self.stroke, other.stroke):
-            if mine is not theirs and mine != theirs:
-                both = [stroke for stroke in (mine, theirs) if stroke is not None]
-                until = both[0].agrees_until(both[1]) if len(both) == 2 else both[0].first_tick
-                agreed = min(agreed, until)
+        for mine, theirs in _differing(self.stroke, other.stroke):
+            if mine is not None and theirs is not None:
+                agreed = min(agreed, mine.agrees_until(theirs))
+            else:
+                agreed = min([agreed, *(stroke.starts for stroke in (mine, theirs) if stroke is not None)])
+        for mine, theirs in _differing(self.force, other.force):
+            if mine is not None and theirs is not None:
+                agreed = min(agreed, mine.agrees_until(theirs, self.fluid.dt))
+            else:
+                agreed = min([agreed, *(force.starts(self.fluid.dt) for force in (mine, theirs) if force is not None)])
         renumbered = self.pin != other.pin
         for mine, theirs in zip_longest(self.handle, other.handle):
             if mine is not None and theirs is not None:
@@ -353,13 +365,27 @@ class Recipe(Model):
         return remaining(self.masks_at(tick), other.masks_at(tick)) is not None
 
     def is_set_up_as(self, other: Recipe) -> bool:
-        """True if both are the same simulation but for strokes, edits of masks, changes, handles and pins."""
+        """True if both are the same simulation but for strokes, forces, edits of masks, changes, handles and pins."""
         return self._set_up() == other._set_up()
 
     def _set_up(self) -> tuple[object, ...]:
         """What is in force from the first tick on."""
-        layers = self.viscosity, self.freeze, self.force
+        layers = self.viscosity, self.freeze, self.pushes
         return self.picture, self.map, self.mode, self.density, self.fluid, *layers
+
+
+def _differing(mine: tuple[Part, ...], theirs: tuple[Part, ...]) -> Iterator[tuple[Part | None, Part | None]]:
+    """The parts that are not the same, in pairs from where they first differ; what both end with is left out."""
+    if mine is theirs:
+        return
+    both, start, end = min(len(mine), len(theirs)), 0, 0
+    while start < both and (mine[start] is theirs[start] or mine[start] == theirs[start]):
+        start += 1
+    while end < both - start and (mine[-1 - end] is theirs[-1 - end] or mine[-1 - end] == theirs[-1 - end]):
+        end += 1
+    for one, other in zip_longest(mine[start : len(mine) - end], theirs[start : len(theirs) - end]):
+        if one is not other and one != other:
+            yield one, other
 
 
 def _inline(value: Any) -> Any:

@@ -66,7 +66,9 @@ def plain(model: BaseModel) -> dict[str, Any]:
     return dict(sorted(told.items(), key=lambda item: (_rank(item[1]), _HEADS.get(item[0], len(_HEADS)))))
 
 
-_HEADS = {"version": 0, "name": 1, "kind": 2, "tool": 3, "tick": 4}
+_HEADS = {
+    head: rank for rank, head in enumerate(("version", "name", "kind", "tool", "tick", "muted", "repeat", "every"))
+}
 
 
 def _plain_value(value: Any) -> Any:

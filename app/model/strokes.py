@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from math import cos, hypot, pi, sin
+from math import cos, hypot, inf, pi, sin
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
@@ -13,9 +13,11 @@ from app.model.schema import Fraction01, Model, Place, Several
 
 Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
 Symmetry = Literal["none", "left-right", "up-down", "both", "radial"]
-Tick = Annotated[int, Field(ge=0, le=10_000_000)]
 FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1 / 200 of such a cell
 SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
+LATEST = 10_000_000  # tick
+MOST_TIMES = 1000  # that a stroke repeats
+Tick = Annotated[int, Field(ge=0, le=LATEST)]
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
 
@@ -30,8 +32,8 @@ class Dab(NamedTuple):
     pressure: float
 
 
-class Stroke(Model):
-    """One stroke: a tool and the samples of the pointer, in order.
+class BrushPath(Model):
+    """The way of a tool: the samples of the pointer, in order.
 
     Between two samples the pointer moved at a constant speed, so that a stroke does not depend on how often the pointer
     was sampled: during tick n (the step from n to n + 1) the brush passes the path from time n - 1 to time n. A tool
@@ -85,7 +87,7 @@ class Stroke(Model):
         """All of its samples are at one place."""
         return all(sample[1:3] == self.samples[0][1:3] for sample in self.samples)
 
-    def with_sample(self, tick: int, x: float, y: float, pressure: float = 1.0) -> Stroke:
+    def with_sample(self, tick: int, x: float, y: float, pressure: float = 1.0) -> Self:
         """The stroke, one sample longer; the sample is trusted to be in order."""
         return self.model_copy(update={"samples": (*self.samples, (tick, x, y, pressure))})
 
@@ -115,7 +117,7 @@ class Stroke(Model):
 
             yield tuple(Dab(*place(p.x0, p.y0), *place(p.x1, p.y1), p.pressure) for p in dabs), a * d < b * c
 
-    def before(self, tick: int) -> Stroke | None:
+    def before(self, tick: int) -> Self | None:
         """What of it acts before a tick; None if nothing does. A curve is whole or not at all."""
         if self.last_tick < tick:
             return self
@@ -151,8 +153,25 @@ class Stroke(Model):
             return (Dab(x, y, x, y, pressure),)
         return tuple(Dab(a[1], a[2], b[1], b[2], (a[3] + b[3]) / 2) for a, b in pairwise(points))
 
-    def agrees_until(self, other: Stroke) -> int:
-        """The tick before which both strokes do the same; at least the earlier one's first."""
+    def moved(self, ticks: int) -> Self:
+        """The same so many ticks later, or earlier."""
+        return self.model_copy(update={"samples": tuple((tick + ticks, *rest) for tick, *rest in self.samples)})
+
+    def lasting(self, first: int, last: int) -> Self:
+        """The same from one tick to another: faster, or slower; of what was done in one tick, evenly."""
+        samples, span, count = self.samples, self.last_tick - self.first_tick, len(self.samples)
+        if not span and count == 1 and last > first:
+            samples, count = (*samples, samples[0]), 2
+        parts = [tick - self.first_tick for tick, *_ in samples] if span else list(range(count))
+        whole = span or max(count - 1, 1)
+        # To the nearest tick, in whole numbers.
+        ticks = (first + (2 * part * (last - first) + whole) // (2 * whole) for part in parts)
+        return self.model_copy(
+            update={"samples": tuple((tick, *rest) for tick, (_, *rest) in zip(ticks, samples, strict=True))}
+        )
+
+    def parts_from(self, other: BrushPath) -> int:
+        """The tick before which both pass the same; at least the earlier one's first."""
         start = min(self.first_tick, other.first_tick)
         if self._head() != other._head():
             return start
@@ -166,7 +185,7 @@ class Stroke(Model):
         # After its last common sample a stroke may end or go on: in the tick after it, they already differ.
         return start if together == 0 else self._turning_point(other, together)
 
-    def _turning_point(self, other: Stroke, together: int) -> int:
+    def _turning_point(self, other: BrushPath, together: int) -> int:
         last = self.samples[together - 1][0]
         following = [stroke.samples[together][0] for stroke in (self, other) if len(stroke.samples) > together]
         return last if last in following else last + 1
@@ -174,6 +193,96 @@ class Stroke(Model):
     def _head(self) -> tuple[object, ...]:
         brush = self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.local
         return *brush, self.symmetry, self.sectors
+
+
+class Act(NamedTuple):
+    """What a stroke does in a tick: the pieces of its path, and the tick that it is at by its own samples."""
+
+    stroke: Stroke
+    tick: int
+    dabs: tuple[Dab, ...]
+
+
+class Stroke(BrushPath):
+    """One stroke, in time.
+
+    Attributes:
+        muted: it does nothing.
+        repeat: how many times it acts in all.
+        every: ticks from the beginning of one time to that of the next, where it repeats.
+    """
+
+    muted: bool = False
+    repeat: Annotated[int, Field(ge=1, le=MOST_TIMES)] = 1
+    every: Tick = 0
+
+    @model_validator(mode="after")
+    def _repeats(self) -> Self:
+        if self.repeat > 1 and not self.every:
+            raise ValueError("a stroke that repeats needs 'every', the ticks from one beginning to the next")
+        if self.repeat == 1 and self.every:
+            raise ValueError("'every' is for a stroke that repeats; give 'repeat' too")
+        if self.end_tick > LATEST:
+            raise ValueError(f"it repeats beyond tick {LATEST}")
+        return self
+
+    @property
+    def starts(self) -> float:
+        """The first tick that it acts in; infinite where it is muted."""
+        return inf if self.muted else self.first_tick
+
+    @property
+    def end_tick(self) -> int:
+        """The last tick that it acts in, with all its repetitions."""
+        return self.last_tick + (self.repeat - 1) * self.every
+
+    def acts(self, tick: int) -> Iterator[Act]:
+        """What it does in a tick, once for each of its times that are under way; nothing where it is muted."""
+        if self.muted or not self.first_tick <= tick <= self.end_tick:
+            return
+        times = range(1)
+        if self.repeat > 1:
+            first = max(-((self.last_tick - tick) // self.every), 0)
+            times = range(first, min((tick - self.first_tick) // self.every + 1, self.repeat))
+        for number in times:
+            own = tick - number * self.every
+            if dabs := self.at(own):
+                yield Act(self, own, dabs)
+
+    def begins_at(self, tick: int) -> bool:
+        """True if one of its times begins with this tick."""
+        since = tick - self.first_tick
+        if self.muted or since < 0:
+            return False
+        return not since or (self.repeat > 1 and not since % self.every and since < self.repeat * self.every)
+
+    def repeated(self, times: int, every: int) -> Stroke:
+        """The same, so many times in all."""
+        return self.model_copy(update={"repeat": times, "every": every if times > 1 else 0})
+
+    def cut(self, tick: int) -> tuple[Stroke, ...]:
+        """What of it acts before a tick: the times that are whole by then, and of others as much as is."""
+        if self.repeat == 1:
+            before = self.before(tick)
+            return () if before is None else (before,)
+        whole = min(max((tick - 1 - self.last_tick) // self.every + 1, 0), self.repeat)
+        begun = min(max((tick - 1 - self.first_tick) // self.every + 1, 0), self.repeat)
+        once = self.repeated(1, 0)
+        parts = (once.moved(number * self.every).before(tick) for number in range(whole, begun))
+        kept = [self.repeated(whole, self.every)] if whole else []
+        return *kept, *(part for part in parts if part is not None)
+
+    def agrees_until(self, other: Stroke) -> float:
+        """The tick before which both strokes do the same; infinite where they do so for ever."""
+        if self.muted or other.muted:
+            return min(self.starts, other.starts)
+        same = self.samples == other.samples and self._head() == other._head()
+        agreed = inf if same else self.parts_from(other)
+        if (self.repeat, self.every) != (other.repeat, other.every):
+            times = min(self.repeat, other.repeat) if self.every == other.every else 1
+            nexts = (each.first_tick + times * each.every for each in (self, other) if each.repeat > times)
+            agreed = min([agreed, *nexts])
+        return agreed
 
 
 def _turns(symmetry: Symmetry, sectors: int) -> list[tuple[float, float, float, float]]:

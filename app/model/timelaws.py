@@ -219,7 +219,7 @@ class Timed(Model):
             _compiled(self.formula)
         return self
 
-    @cached_property
+    @property
     def law(self) -> Law:
         """The law these keys spell."""
         if self.during:
@@ -231,6 +231,40 @@ class Timed(Model):
         if self.feedback is not None:
             return Feedback(self.feedback)
         return Instants(self.at or (0.0,))
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """The seconds from its first instant or key to its last; None where a formula of the time says when it acts."""
+        if self.during:
+            return self.during
+        if self.formula is not None or self.feedback is not None:
+            return None
+        times = [time for time, _ in self.keys] if self.keys else self.at or (0.0,)
+        return min(times), max(times)
+
+    @property
+    def starts_at(self) -> float:
+        """The seconds before which it does nothing."""
+        if self.span is None or (self.keys and self.keys[0][1]):
+            return 0.0
+        return self.span[0]
+
+    def spanning(self, start: float, end: float) -> dict[str, Any]:
+        """The keys of the same law between two times; of a formula, none."""
+        if self.span is None:
+            return {}
+        first, last = self.span
+
+        def at(time: float) -> float:
+            # To a billionth of a second, so that moving it there and back leaves no digits behind.
+            part = (time - first) / (last - first) if last > first else 0.0
+            return round(start + part * (end - start), 9)
+
+        if self.during:
+            return {"during": (at(first), at(last))}
+        if self.keys:
+            return {"keys": tuple((at(time), value) for time, value in self.keys)}
+        return {"at": tuple(at(time) for time in self.at or (0.0,))}
 
 
 # --- the formula's language ---------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from app.model.handles import RecipeHandle
 from app.model.mask_edits import MaskStroke
-from app.model.strokes import Stroke, Symmetry
+from app.model.strokes import BrushPath, Stroke, Symmetry
 from app.model.strokes import Tool as StrokeTool
 from app.model.windows import FLOWING
 
@@ -116,7 +116,7 @@ class PulledString:
         self._brush = (px, py) if part == 1 else (x + (px - x) * part, y + (py - y) * part)
 
 
-Made = Stroke | RecipeHandle
+Made = Stroke | MaskStroke | RecipeHandle
 """What a gesture makes."""
 
 Gesture = Generator[Made | None, Touch | None, Made | None]
@@ -147,7 +147,7 @@ class Tool:
     settings: tuple[str, ...] = ("radius", "hardness", "strength")
 
 
-def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke:
+def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke | MaskStroke:
     brush = press.brush
     stroke = Stroke(
         tool=name,
@@ -162,7 +162,9 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> S
         local=brush.local if name == "push" else 0.0,
         samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )
-    return MaskStroke.model_validate({"kind": "stroke", **stroke.model_dump()}) if press.timeless else stroke
+    if not press.timeless:
+        return stroke
+    return MaskStroke.model_validate({"kind": "stroke", **stroke.model_dump(include=set(BrushPath.model_fields))})
 
 
 def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callable[[Press, Touch], Gesture]:
@@ -179,7 +181,7 @@ def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callabl
     return gesture
 
 
-def _follow(stroke: Stroke, press: Press) -> Gesture:
+def _follow(stroke: Stroke | MaskStroke, press: Press) -> Gesture:
     """The stroke follows the pointer; with Shift along the axis it set out on.
 
     A pointer that is faster than the fluid can be carried is followed along its path at that speed, also after it is
@@ -248,7 +250,7 @@ class _Path:
         return reached
 
 
-def _line(press: Press, stroke: Stroke, start: tuple[float, float]) -> Gesture:
+def _line(press: Press, stroke: Stroke | MaskStroke, start: tuple[float, float]) -> Gesture:
     """A straight stroke from where the last one ended to where was clicked, at an even speed."""
     tick, x, y, pressure = stroke.samples[0]
     length = hypot((x - start[0]) * press.extent[0], (y - start[1]) * press.extent[1])

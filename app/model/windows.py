@@ -13,7 +13,7 @@ from math import ceil, log
 from typing import NamedTuple, Self
 
 from app.model.recipe import FluidSettings, Recipe
-from app.model.strokes import FINEST_DETAIL, Dab, Stroke
+from app.model.strokes import FINEST_DETAIL, Act
 from solver.grid import SMALLEST_GRID, Grid
 
 CELLS = 192  # along a side of a window; its levels divide it by two down to three
@@ -53,7 +53,7 @@ def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
 
 def may_have_windows(recipe: Recipe) -> bool:
     """True if nothing in it acts on the whole picture from the start, as its forces and a density do."""
-    return not recipe.force and recipe.mode == "coordinates" and recipe.fluid.solver == "mac"
+    return not recipe.pushes and recipe.mode == "coordinates" and recipe.fluid.solver == "mac"
 
 
 class Window(NamedTuple):
@@ -75,14 +75,11 @@ class Window(NamedTuple):
         return Grid(*size, extent, (self.column * hx, self.row * hy), whole.picture)  # pyright: ignore[reportArgumentType]
 
     @classmethod
-    def of(
-        cls, strokes: Sequence[tuple[Stroke, tuple[Dab, ...]]], tick: int, now: Self | None, whole: Grid
-    ) -> Self | None:
-        """The window for the strokes that are at work in a tick.
+    def of(cls, acts: Sequence[Act], now: Self | None, whole: Grid) -> Self | None:
+        """The window for what strokes do in a tick.
 
         Args:
-            strokes: at least one, of `FLOWING` tools, and the pieces of their paths that are passed in it.
-            tick: to tell strokes that begin from those that go on.
+            acts: at least one, of `FLOWING` tools.
             now: the window until now, None if it is the whole picture.
             whole: the grid of the whole picture.
 
@@ -91,9 +88,9 @@ class Window(NamedTuple):
             wide movement has needed it. None if one of them wants the whole picture, or if no window with cells finer
             than those of `whole` has room for them.
         """
-        detail, finest = min(stroke.detail for stroke, _ in strokes), max(whole.size)
+        detail, finest = min(act.stroke.detail for act in acts), max(whole.size)
         ends, room = [], [1.0, 1.0, 0.0, 0.0]
-        for stroke, dabs in strokes:
+        for stroke, _, dabs in acts:
             for dab in dabs:
                 points = [_inside(place, whole.picture) for place in ((dab.x0, dab.y0), (dab.x1, dab.y1))]
                 ends = points
@@ -102,7 +99,7 @@ class Window(NamedTuple):
                         reach = ROOM * stroke.radius
                         room[axis] = min(room[axis], max(point[axis] - reach, 0.0))
                         room[2 + axis] = max(room[2 + axis], min(point[axis] + reach, whole.picture[axis]))
-        if now is not None and detail > now.detail and all(stroke.first_tick < tick for stroke, _ in strokes):
+        if now is not None and detail > now.detail and all(act.stroke.first_tick < act.tick for act in acts):
             detail = now.detail
         while detail > finest:
             lattice = _lattice(detail, whole.picture)

@@ -53,7 +53,7 @@ def _table() -> list[Action]:
     add("Edit", "copy_picture", "Copy the picture", "ctrl+c", lambda c: c.copy_picture())
     add("Edit", "paste", "Paste a picture", "ctrl+v", lambda c: c.files.paste())
     add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
-    add("Edit", "remove", "Remove the handle", "delete backspace", lambda c: c.remove_selected())
+    add("Edit", "remove", "Delete handle or bars", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "cancel", "Give up the stroke or selection", "escape", lambda c: c.cancel())
 
     for tool in TOOLS:
@@ -100,6 +100,12 @@ def _table() -> list[Action]:
     add("Time", "repeat", "Play once, in a loop, or there and back", "", lambda c: c.repeat())
     add("Time", "start", "To the start", "home", lambda c: c.workspace.session.seek(0))
     add("Time", "end", "To the end", "end", lambda c: c.workspace.session.seek(c.workspace.session.end))
+
+    add("Time", "lanes", "Strokes and forces as bars", "l", lambda c: c.toggle_lanes())
+    add("Time", "bars_earlier", "Bars a step earlier", "left", lambda c: c.nudge(-1), repeats=True)
+    add("Time", "bars_later", "Bars a step later", "right", lambda c: c.nudge(1), repeats=True)
+    add("Time", "bars_together", "Start together", "", lambda c: c.state.lanes.together(c.workspace.session))
+    add("Time", "bars_mute", "Mute the selected bars", "u", lambda c: c.mute_bars())
 
     add("Help", "shortcuts", "Keyboard shortcuts", "f1", lambda c: c.ask_shortcuts())
     return made

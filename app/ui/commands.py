@@ -62,6 +62,27 @@ class Commands:
         returns = session.recipe.time.ping_pong
         session.repeat(not session.loops and not returns, session.loops and not returns)
 
+    @property
+    def bars_selected(self) -> bool:
+        """Bars of the timeline are selected, and seen."""
+        return self.state.lanes.shown and bool(self.state.lanes.selected)
+
+    def toggle_lanes(self) -> None:
+        lanes = self.state.lanes
+        lanes.shown = self.preferences.lanes = not lanes.shown
+        lanes.selected, lanes.drag = set(), None
+        self.preferences.save()
+
+    def nudge(self, ticks: int) -> None:
+        """Move the selected bars."""
+        if self.bars_selected:
+            self.state.lanes.nudge(self.workspace.session, ticks)
+
+    def mute_bars(self) -> None:
+        """Mute the selected bars, or let them act again."""
+        if self.bars_selected:
+            self.state.lanes.mute(self.workspace.session)
+
     def toggle_inspector(self) -> None:
         state = self.state
         if state.is_narrow:
@@ -75,7 +96,10 @@ class Commands:
         self.workspace.session.device.timings.enabled = self.state.statistics
 
     def remove_selected(self) -> None:
-        """Take away the handle or the pin that is selected; what an area is selected for, off its mask."""
+        """Take away the bars or the handle that are selected; what an area is selected for, off its mask."""
+        if self.bars_selected:
+            self.state.lanes.remove(self.workspace.session)
+            return
         if self.state.tool_name == "select":
             self.selecting.fill(off=True)
             return
@@ -85,7 +109,9 @@ class Commands:
         self.state.selected = ""
 
     def cancel(self) -> None:
-        """Give up what is being drawn, or what is selected."""
+        """Give up what is being drawn or dragged, or what is selected."""
+        if not self.workspace.session.is_painting and self.state.lanes.shown and self.state.lanes.cancel():
+            return
         if self.state.tool_name == "select" and not self.workspace.session.is_painting:
             self.selecting.cancel()
         else:

@@ -31,7 +31,7 @@ from app.ui.keys import Keys
 from app.ui.layout import NARROW, Layout
 from app.ui.messages import Messages
 from app.ui.numbers import Numbers
-from app.ui.panels import bar, hud, inspector, marks, strip, timebar
+from app.ui.panels import bar, hud, inspector, lanes, marks, strip, timebar
 from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
@@ -220,7 +220,7 @@ class Editor:
         state.is_narrow = width < NARROW * self.ui.scale
         is_open = state.over_narrow if state.is_narrow else state.inspector
         names, groups = self.preferences.names, len(strip.GROUP_ENDS) + 1
-        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, names)
+        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, names, state.lanes.shown)
 
     def _handle(self, events: Sequence[Event]) -> None:
         for event in events:
@@ -296,6 +296,8 @@ class Editor:
         strip.draw(ui, layout, state)
         if layout.inspector is not None:
             inspector.draw(ui, layout.inspector, workspace, state, self.selecting, self.quality, self.clock, self.do)
+        if layout.lanes is not None:
+            lanes.draw(ui, layout.lanes, self.session, state, self.do)
         timebar.draw(ui, layout.timebar, self.session, state, self.do)
         bar.draw(ui, layout, workspace, state, likes, self.files.open_work, self.do)
 

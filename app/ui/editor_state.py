@@ -11,6 +11,7 @@ from app.model.mask_edits import MaskName
 from app.model.presets import BRUSHES, BrushPreset
 from app.model.strokes import Symmetry
 from app.model.tools import TOOL, BrushSettings, Tool
+from app.ui.lanes import Lanes
 from app.ui.preferences import Preferences
 
 MASK_OF: dict[str, MaskName] = {"freeze": "frozen", "thicken": "thickness"}
@@ -80,6 +81,7 @@ class EditorState:
         selection: what is selected, the first part and what is added to it and taken away.
         selected_area: the same as it is shown, (h, w) uint8, 255 in it; None where there is none.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
+        lanes: the bars of the timeline.
         is_scaling: the amount of the warp is being dragged.
         symmetry, sectors: of the strokes that are painted.
         before: the picture is shown as it was, as long as a key is held.
@@ -109,6 +111,7 @@ class EditorState:
     selection: tuple[Part, ...] = ()
     selected_area: np.ndarray | None = None
     selected: str = ""
+    lanes: Lanes = field(default_factory=Lanes)
     is_scaling: bool = False
     symmetry: Symmetry = "none"
     sectors: int = 6
@@ -120,7 +123,10 @@ class EditorState:
     @classmethod
     def recalled(cls, likes: Preferences) -> EditorState:
         """As it was left."""
-        state = cls(inspector=likes.inspector, auto_quality=likes.auto_quality, stabiliser=likes.stabiliser)
+        lanes = Lanes(shown=likes.lanes)
+        state = cls(
+            inspector=likes.inspector, auto_quality=likes.auto_quality, stabiliser=likes.stabiliser, lanes=lanes
+        )
         state.sections = dict(likes.sections)
         state.brushes = {name: _within(brush) for name, brush in likes.brushes.items() if name in TOOL}
         return state

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from app.ui.viewport import Rect
 
 BAR, STRIP, INSPECTOR, TIMEBAR = 48.0, 48.0, 272.0, 56.0
+LANES, MOST_LANES = 156.0, 0.5  # of the lanes, and the part that they take at most of the room above the timeline
 # In a window narrower than this the inspector would leave the picture too little; it comes when it is asked for.
 NARROW = 720.0
-LEAST = 120.0  # of the canvas's width beside the inspector; where there is less, the tools make room
+LEAST = 120.0  # of the canvas's width; where there is less, the tools make room
 NAMED, LEAST_NAMED = 134.0, 360.0  # of a tool's width with its name beside it, and of the canvas's then
 TOOL, BETWEEN, GROUP = 40.0, 4.0, 10.0  # heights in the strip: of a tool, between two, and more between two groups
 
@@ -26,13 +27,22 @@ class Layout:
     strip: Rect | None
     inspector: Rect | None
     timebar: Rect
+    lanes: Rect | None
     canvas: Rect
     columns: int
     tool: float
 
     @classmethod
     def of(
-        cls, width: float, height: float, scale: float, inspector: bool, tools: int, groups: int, names: bool = False
+        cls,
+        width: float,
+        height: float,
+        scale: float,
+        inspector: bool,
+        tools: int,
+        groups: int,
+        names: bool = False,
+        lanes: bool = False,
     ) -> Layout:
         """The layout of a window.
 
@@ -42,15 +52,18 @@ class Layout:
             inspector: it is open.
             tools, groups: how many tools there are, and groups of them.
             names: the tools' names stand beside their icons, if there is room.
+            lanes: they are folded open.
         """
         bar, time = BAR * scale, TIMEBAR * scale
         middle = max(height - bar - time, 1.0)
+        below = min(LANES * scale, MOST_LANES * middle) if lanes else 0.0
+        middle = max(middle - below, 1.0)
         columns = _columns(middle / scale, tools, groups)
         tool = NAMED if names else TOOL
         if width - (_strip(columns, tool) + INSPECTOR * inspector) * scale < LEAST_NAMED * scale:
             tool = TOOL
         strip = _strip(columns, tool) * scale
-        if inspector and width - strip - INSPECTOR * scale < LEAST * scale:
+        if width - strip - (INSPECTOR * scale if inspector else 0.0) < LEAST * scale:
             strip = 0.0
         side = min(INSPECTOR * scale, width - strip) if inspector else 0.0
         return cls(
@@ -60,6 +73,7 @@ class Layout:
             strip=Rect(0, bar, strip, middle) if strip else None,
             inspector=Rect(width - side, bar, side, middle) if side else None,
             timebar=Rect(0, height - time, width, time),
+            lanes=Rect(0, height - time - below, width, below) if below else None,
             canvas=Rect(strip, bar, max(width - strip - side, 1.0), middle),
         )
 

@@ -41,6 +41,7 @@ class Preferences:
     theme: str = "dark"
     scale: float = 1.0
     inspector: bool = True
+    lanes: bool = False
     auto_quality: bool = True
     embed: bool = True
     hint: bool = True

@@ -22,7 +22,7 @@ from app.model.mask_edits import ClearMask, MaskStroke, edited, remaining
 from app.model.masks import solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import FINEST, SmallPictures, channels
-from app.model.strokes import FINEST_DETAIL, Change, Dab, Stroke
+from app.model.strokes import FINEST_DETAIL, Act, BrushPath, Change, Dab
 from app.model.timelaws import Feedback, Law
 from app.model.timeline import Observation, Sentinel
 from app.model.windows import FLOWING, Window, may_have_windows
@@ -179,6 +179,9 @@ class Replay:
         """
         self._leave_passing()
         before, self.recipe = self.recipe, recipe
+        if recipe.force != before.force and recipe.is_set_up_as(before):
+            self._release_forces()
+            self.forces = self._loaded_forces()
         if not recipe.is_set_up_as(before):
             self._release_simulation()
             self.checkpoints.clear()
@@ -195,6 +198,11 @@ class Replay:
         else:
             self.handles.replace(self._handles_in_picture())
             self._edit_masks(before)
+
+    def check_forces(self, recipe: Recipe) -> None:
+        """Raise `UserError` if the forces of a recipe cannot be made here, and are not those at work."""
+        if recipe.force != self.recipe.force:
+            build(recipe.force, self.grid, self.pictures, recipe.duration)
 
     def checkpoint(self) -> None:
         """Keep this moment, so that going back to it costs nothing."""
@@ -329,14 +337,14 @@ class Replay:
             if change.tick == self.tick:
                 self._change(change)
         leads = any(led.is_in_force(self.tick, dt) for _, led in self.led)
-        at_work = [(stroke, dabs) for stroke in self.recipe.stroke if (dabs := stroke.at(self.tick))]
-        self._follow([(stroke, dabs) for stroke, dabs in at_work if stroke.tool in FLOWING], leads)
+        acts = [act for stroke in self.recipe.stroke for act in stroke.acts(self.tick)]
+        self._follow([act for act in acts if act.stroke.tool in FLOWING], leads)
         self._set_parameters(self.settings)
         painted = False
         self._leading.clear()
         with self.device.stage("brush"):
-            for stroke, dabs in at_work:
-                painted |= self._draw(stroke, dabs, dt, part)
+            for act in acts:
+                painted |= self._draw(act.stroke, act.tick, act.dabs, dt, part)
             if painted:
                 self._apply_masks()
             if leads:
@@ -369,13 +377,13 @@ class Replay:
             self._use_viscosity(settings.viscosity)
             self._apply_masks()
 
-    def _follow(self, at_work: list[tuple[Stroke, tuple[Dab, ...]]], leads: bool) -> None:
+    def _follow(self, acts: list[Act], leads: bool) -> None:
         """Let the flow be solved where the strokes of this tick want it; without any it stays where it is.
 
         Handles act on the whole picture.
         """
-        if (at_work or leads) and self._has_windows:
-            window = None if leads else Window.of(at_work, self.tick, self.window, self.grid)
+        if (acts or leads) and self._has_windows:
+            window = None if leads else Window.of(acts, self.window, self.grid)
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
@@ -434,14 +442,17 @@ class Replay:
                 self._motions.append((force.motion, impulse / dt))
         return pushes
 
-    def _draw(self, stroke: Stroke, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
-        """Let a stroke act, with its images; True if it painted on the masks."""
+    def _draw(self, stroke: BrushPath, tick: int, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
+        """Let a stroke act, with its images, at one of its own ticks; True if it painted on the masks."""
         painted = False
+        far = stroke.travelled(tick, self.grid.extent) / stroke.radius if stroke.tool == "push" else 0.0
         for image, mirrored in stroke.images(dabs, self.grid.extent):
-            painted |= self._draw_image(stroke, image, mirrored, dt, part)
+            painted |= self._draw_image(stroke, far, image, mirrored, dt, part)
         return painted
 
-    def _draw_image(self, stroke: Stroke, dabs: tuple[Dab, ...], mirrored: bool, dt: float, part: float) -> bool:
+    def _draw_image(
+        self, stroke: BrushPath, far: float, dabs: tuple[Dab, ...], mirrored: bool, dt: float, part: float
+    ) -> bool:
         reverse = stroke.reverse != (mirrored and stroke.tool == "twirl")
         strength = -stroke.strength if reverse else stroke.strength
         tips = [(self._tip(stroke, dab), strength * dab.pressure) for dab in dabs]
@@ -450,7 +461,7 @@ class Replay:
         pressed = sum(amount for _, amount in tips) / len(tips)
         match stroke.tool:
             case "push":
-                far, fluid = stroke.travelled(self.tick, self.grid.extent) / stroke.radius, self.settings
+                fluid = self.settings
                 on = coasting(whole, dt, fluid.drag, fluid.viscosity)
                 self._lead(Push(whole, dt, pressed, slip_factor(far, on), strain_limit(far, on), stroke.local))
             case "curve":
@@ -499,7 +510,7 @@ class Replay:
             for field, amount in self._motions:
                 self.fluid.add_local(field, amount)
 
-    def _paint(self, stroke: Stroke, tip: Tip, amount: float, dt: float) -> None:
+    def _paint(self, stroke: BrushPath, tip: Tip, amount: float, dt: float) -> None:
         match stroke.tool:
             case "thicken":
                 self.masks.thicken(tip, THICKENING * amount * dt)
@@ -512,7 +523,7 @@ class Replay:
             case "smooth":
                 self.masks.smooth(tip, abs(amount))
 
-    def _tip(self, stroke: Stroke, dab: Dab) -> Tip:
+    def _tip(self, stroke: BrushPath, dab: Dab) -> Tip:
         width, height = self.grid.extent
         start, end = (dab.x0 * width, dab.y0 * height), (dab.x1 * width, dab.y1 * height)
         return Tip(start, end, stroke.radius, stroke.hardness, near=stroke.detail > 0)
@@ -525,7 +536,7 @@ class Replay:
         for edit, first in left:
             if isinstance(edit, MaskStroke):
                 for hand in range(first, edit.last_tick + 1):
-                    self._draw(edit, edit.at(hand), self.recipe.fluid.dt, 1.0)
+                    self._draw(edit, hand, edit.at(hand), self.recipe.fluid.dt, 1.0)
             elif isinstance(edit, ClearMask):
                 self.masks.take_off(edit.of)
             else:
@@ -565,11 +576,20 @@ class Replay:
         self.handles = Handles(self.fluid, self.warp, self._handles_in_picture())
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
-        built = build(recipe.force, self.grid, self.pictures, recipe.duration)
-        self.forces = [LoadedForce.of(self.device, force) for force in built]
+        self.forces = self._loaded_forces()
         self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters(recipe.fluid)  # changes come with the tick
         self._edit_masks()
+
+    def _loaded_forces(self) -> list[LoadedForce]:
+        built = build(self.recipe.force, self.grid, self.pictures, self.recipe.duration)
+        return [LoadedForce.of(self.device, force) for force in built]
+
+    def _release_forces(self) -> None:
+        for force in self.forces:
+            for field in (force.faces, force.divergence, force.motion):
+                if field is not None:
+                    field.release()
 
     def _handles_in_picture(self) -> list[Handle]:
         made, extent = [], self.grid.extent
@@ -625,7 +645,7 @@ class Replay:
         return self._viscosity(base, whole)[np.ix_(row, column)]
 
     def _release_simulation(self) -> None:
-        fields = [field for force in self.forces for field in (force.faces, force.divergence, force.motion)]
+        self._release_forces()
         for thing in (
             self._on_whole,
             self._in_window,
@@ -634,7 +654,6 @@ class Replay:
             self.masks,
             self.density,
             self.handles,
-            *fields,
         ):
             if thing is not None:
                 thing.release()
@@ -680,12 +699,13 @@ class Replay:
             self._passing = None
 
     def _begins_here(self) -> bool:
-        events = (
-            *(stroke.first_tick for stroke in self.recipe.stroke),
-            *(change.tick for change in self.recipe.change),
-            *(led.first_tick(self.recipe.fluid.dt) for led in (*self.recipe.handle, *self.recipe.pin)),
+        recipe, tick = self.recipe, self.tick
+        led = (*recipe.handle, *recipe.pin)
+        return (
+            any(stroke.begins_at(tick) for stroke in recipe.stroke)
+            or any(change.tick == tick for change in recipe.change)
+            or any(one.first_tick(recipe.fluid.dt) == tick for one in led)
         )
-        return self.tick in events
 
 
 def _window(saved: np.ndarray) -> Window | None:

@@ -7,7 +7,7 @@ all move the playhead.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from math import ceil, hypot
 from typing import Any
@@ -17,6 +17,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.media.project import Project
+from app.model.bars import Changed, Which, with_changed
 from app.model.document import Document
 from app.model.handles import ARRIVED, MOST_HANDLES, RecipeHandle, RecipePin, is_inside, labelled
 from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
@@ -120,6 +121,7 @@ class Session:
         self._still = True
         self._backwards = False  # it is played from its end to its start
         self._coasted = 0
+        self._joined: Recipe | None = None  # the state that the next joined edit goes on from
 
     # -- what it is now ---------------------------------------------------------------------------------------------
 
@@ -189,7 +191,7 @@ class Session:
         """The strokes that are drawn already, and that the simulation has not come to the end of."""
         if self._target is not None or not (self.is_painting or self.coasting):
             return []
-        return [stroke for stroke in self._live.stroke if stroke.last_tick >= self.tick]
+        return [stroke for stroke in self._live.stroke if stroke.end_tick >= self.tick and not stroke.muted]
 
     # -- painting ---------------------------------------------------------------------------------------------------
 
@@ -275,7 +277,7 @@ class Session:
             if self._idles_at is not None:
                 self.seek(self._idles_at)
             return
-        if isinstance(made, Stroke):
+        if isinstance(made, (Stroke, MaskStroke)):
             self.last_place, last = path[-1], made.last_tick
         else:
             last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
@@ -522,7 +524,7 @@ class Session:
 
     def _finish(self) -> None:
         """Go on through what is waiting; the fluid comes to rest by itself if it ends with a stroke."""
-        if any(stroke.last_tick + 1 >= self.end for stroke in self._live.stroke):
+        if any(stroke.end_tick + 1 >= self.end and not stroke.muted for stroke in self._live.stroke):
             self._coast()
         else:
             self._send(self.end)
@@ -546,7 +548,7 @@ class Session:
         """A tick of the hand: the open stroke stays where the pointer is."""
         if self._gesture is not None:
             assert self._touch is not None
-            if not isinstance(self.made, Stroke) or self.made.last_tick < self._pen:
+            if not isinstance(self.made, (Stroke, MaskStroke)) or self.made.last_tick < self._pen:
                 self._touch = self._touch._replace(tick=self._pen)
                 self._hear(self._gesture.send(self._touch))
             self._pen += 1
@@ -686,6 +688,37 @@ class Session:
         self.preview(**parts)
         self.commit(name)
 
+    def edit_bars(
+        self, name: str, which: Collection[Which], changed: Changed, commit: bool = True, joined: bool = False
+    ) -> None:
+        """Put others in the place of strokes and forces, or nothing; what comes after them is made again.
+
+        Args:
+            commit: as an entry of the history; not while a slider is dragged.
+            joined: as the same entry as the edit before, if that was joined too: for a key that is pressed again.
+
+        Raises:
+            UserError: if it would take too long, or a force cannot be made.
+        """
+        self.release()
+        recipe = self._base.edited(**with_changed(self._base, which, changed))
+        self.replay.check_forces(recipe)
+        at_end, coasts = self.target >= self.end, self.coasting
+        self.coasting = False
+        self._use(recipe)
+        if at_end:
+            self._send(self.end)
+        self._went_back &= self.target < self.end
+        if not commit:
+            return
+        history = self.document.history
+        if joined and history.recipe is self._joined:
+            history.amend(recipe)
+        self.commit(name)
+        self._joined = history.recipe if joined else None
+        if coasts:
+            self._coast()
+
     def start_from_map(self, name: str | None) -> None:
         """Begin with a warp map instead of the picture as it is, or, None, as it is again; an entry of the history.
 
@@ -822,10 +855,9 @@ class Session:
 
     def _cut(self, tick: int) -> None:
         base = self._base
-        strokes = (stroke.before(tick) for stroke in base.stroke)
         handles = (handle.before(tick, self.dt) for handle in base.handle)
         cut = base.edited(
-            stroke=tuple(stroke for stroke in strokes if stroke is not None),
+            stroke=tuple(part for stroke in base.stroke for part in stroke.cut(tick)),
             handle=tuple(handle for handle in handles if handle is not None),
             pin=tuple(pin for pin in base.pin if pin.first_tick(self.dt) < tick),
             change=tuple(change for change in base.change if change.tick < tick),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from app.media.pictures import read_picture, write_picture
+from app.model.forces import VortexForce
 from app.model.picture import Picture
 from app.ui.events import Mods
 from solver.gl.device import Device
@@ -93,6 +94,30 @@ def selected(robot: Robot) -> None:
     robot.move(700, 20)
 
 
+def lanes(robot: Robot) -> None:
+    for tool, start, end in (
+        ("p", (0.3, 0.5), (0.4, 0.5)),
+        ("t", (0.6, 0.5), (0.6, 0.4)),
+        ("b", (0.5, 0.3), (0.5, 0.3)),
+    ):
+        robot.key(tool)
+        robot.drag(start, end, steps=14)
+        robot.rest()
+    session = robot.editor.session
+    whirl = VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1, name="Whirl", during=(0.5, 1.8))
+    session.edit("Forces", force=(whirl, whirl.edited(during=None, formula="t", name="")))
+    muted = {("stroke", 2): {"muted": True}, ("stroke", 1): {"repeat": 3, "every": 30}}
+    for which, keys in muted.items():
+        session.edit_bars("Bar", {which}, lambda one, keys=keys: one.model_copy(update=keys))
+    robot.rest()
+    session.seek(session.end // 2)
+    robot.key("l")
+    robot.rest()
+    rect = next(rect for bar, rect in robot.editor.state.lanes.drawn if bar.which == ("stroke", 1))
+    robot.click(*rect.middle)
+    robot.move(700, 20)
+
+
 def light_export(robot: Robot) -> None:
     robot.key("ctrl+l")
     export(robot)
@@ -111,7 +136,7 @@ def coarse(pixels: np.ndarray) -> np.ndarray:
     return squares.mean(axis=(1, 3))
 
 
-STATES = [start, warped, shortcuts, export, light, light_masks, selected, light_export, error]
+STATES = [start, warped, shortcuts, export, light, light_masks, selected, lanes, light_export, error]
 
 
 @pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)

@@ -18,7 +18,7 @@ from app.model.strokes import Symmetry
 from app.ui.actions import ACTIONS, Do
 from app.ui.clock import Clock
 from app.ui.editor_state import SELECT_BY, SMALLEST, EditorState
-from app.ui.panels import feels
+from app.ui.panels import feels, selected_bar
 from app.ui.quality import Quality
 from app.ui.selecting import Selecting
 from app.ui.theme import packed
@@ -63,6 +63,7 @@ def draw(
         for name, label, section, opened in (
             *_about_handles(ui, workspace, state, do),
             *_about_selection(ui, session, state, selecting, do),
+            *_about_bars(ui, session, state),
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("symmetry", "Symmetry", lambda: _symmetry(ui, state), False),
             ("view", "Overlays", lambda: _view(ui, state), True),
@@ -96,6 +97,13 @@ def _about_selection(
     if state.tool_name != "select":
         return []
     return [("selection", "Selection", lambda: _selection(ui, session, state, selecting, do), True)]
+
+
+def _about_bars(ui: Ui, session: Session, state: EditorState) -> list[tuple[str, str, Callable[[], None], bool]]:
+    """The section about the bars that are selected in the timeline."""
+    if not (state.lanes.shown and state.lanes.selected):
+        return []
+    return [("bar", "Selected in the timeline", lambda: selected_bar.draw(ui, session, state), True)]
 
 
 def _selection(ui: Ui, session: Session, state: EditorState, selecting: Selecting, do: Do) -> None:

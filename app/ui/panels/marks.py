@@ -181,12 +181,12 @@ def _arrow_head(lines: imgui.ImDrawList, start: ImVec2, end: ImVec2, size: float
 def _forces(ui: Ui, view: Viewport, session: Session, overlay: Overlay, lines: imgui.ImDrawList) -> None:
     """Where strokes push, up to the playhead; older ones fainter."""
     for stroke in session.recipe.stroke[-60:]:
-        if stroke.first_tick > session.tick or stroke.tool not in ("push", "curve"):
+        if stroke.muted or stroke.first_tick > session.tick or stroke.tool not in ("push", "curve"):
             continue
         step = max(len(stroke.samples) // 40, 1)
         places = [sample[1:3] for sample in stroke.samples[::step]]
         points: list[Any] = [ImVec2(*view.to_screen(*place)) for place in places]
-        active = stroke.last_tick >= session.tick - 1
+        active = stroke.end_tick >= session.tick - 1
         alpha = overlay.opacity * (1.0 if active else 0.6)
         lines.add_polyline(points, packed(BLACK, 0.5 * alpha), ui.px(4.5), 0)
         colour = (*ui.palette.accent[:3], alpha)

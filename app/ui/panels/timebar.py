@@ -23,6 +23,7 @@ KINDS: dict[str, Colour] = {
 }  # fmt: skip
 MASKS = rgb("0f86c9")
 HANDLES = rgb("4fc1a6")
+FORCES = rgb("a99be0")
 REPEATS = {  # how the recording is played: icon, name, and what a click makes of it
     "once": ("once", "Plays once", "Click to play it over and over."),
     "loop": ("loop", "Plays over and over", "Click to play it there and back again, in what is exported too."),
@@ -54,6 +55,10 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         icon, now, coming = REPEATS["returns" if returns else "loop" if session.loops else "once"]
         if ui.icon_button("repeat", icon, now, more=coming, active=icon != "once", enabled=some):
             do("repeat")
+        imgui.same_line(0, ui.px(2))
+        shown = state.lanes.shown
+        if ui.icon_button("lanes", "lanes", "Strokes and forces as bars", "l", "To move them in time.", active=shown):
+            do("lanes")
         imgui.same_line(0, ui.px(10))
         if imgui.get_window_width() > ui.px(560):
             _time(ui, session.target * session.dt, session.end * session.dt)
@@ -122,12 +127,12 @@ def _track(ui: Ui, session: Session, state: EditorState, width: float) -> None:
     now = across(session.target)
     played = blend(palette.raised, palette.accent, 0.16)
     draw.add_rect_filled(ImVec2(x0, top), ImVec2(now, bottom), packed(played), ui.px(4))
-    for stroke in session.recipe.stroke:
-        a, b = across(stroke.first_tick), across(stroke.last_tick + 1)
-        colour = KINDS.get(stroke.tool, MASKS)
-        faded = 1.0 if stroke.first_tick < min(session.tick, session.target) else 0.45
+    passed = min(session.tick, session.target)
+    for block in state.lanes.blocks(session.recipe, end / max(x1 - x0, 1.0)):
+        a, b = across(block.start), across(block.end)
+        faded = (1.0 if block.start < passed else 0.45) * (0.4 if block.muted else 1.0)
         low, high = ImVec2(a, top + ui.px(3)), ImVec2(max(b - ui.px(1), a + ui.px(2)), bottom - ui.px(3))
-        draw.add_rect_filled(low, high, packed(colour, faded), ui.px(2))
+        draw.add_rect_filled(low, high, packed(KINDS.get(block.tool, MASKS), faded), ui.px(2))
     _handles(ui, session, state, across, top, bottom, draw)
     for change in session.recipe.change:
         x = across(change.tick)

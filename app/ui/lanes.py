@@ -1,0 +1,257 @@
+"""The bars of the timeline: which are selected, what is dragged, and where they lie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from app.model.bars import Bar, Which, bar_of, bars, lanes, moved, named, one_of, stretched
+from app.model.forces import Force
+from app.model.recipe import Recipe
+from app.model.strokes import Stroke
+from app.ui.viewport import Rect
+from app.work.session import Session
+
+Part = Literal["move", "start", "end"]
+ROOM = 0.06  # of the recording that is shown after its end, for bars that go there
+CLOSEST = 24  # ticks that are shown at least
+MOST_BLOCKS = 100  # of one stroke on the track
+
+
+@dataclass
+class Drag:
+    """A bar in hand.
+
+    Attributes:
+        bar: as it was taken.
+        part: what of it was taken.
+        at: the tick where.
+        x: the pointer's place then, in points.
+        ticks: how far it has been dragged.
+        moved: it is more than a click.
+        adds: it is added to what is selected, or taken away.
+        shown: the ticks from and to which are shown meanwhile, though the recording may grow.
+    """
+
+    bar: Bar
+    part: Part
+    at: float
+    x: float
+    adds: bool
+    shown: tuple[float, float]
+    ticks: int = 0
+    moved: bool = False
+
+
+class Block(NamedTuple):
+    """Strokes on the track: ticks from and to, the tool of the first, and whether they are muted."""
+
+    start: float
+    end: float
+    tool: str
+    muted: bool
+
+
+@dataclass
+class Lanes:
+    """What of the bars the window remembers.
+
+    Attributes:
+        shown: the lanes are folded open.
+        selected: the bars that the next edit is about.
+        drag: the bar in hand.
+        drawn: the bars that are seen, and where, as of the last frame.
+        view: ticks from and to which are shown; None shows all.
+    """
+
+    shown: bool = False
+    selected: set[Which] = field(default_factory=set)
+    drag: Drag | None = None
+    drawn: list[tuple[Bar, Rect]] = field(default_factory=list)
+    view: tuple[float, float] | None = None
+    _packed: tuple[tuple[object, ...], list[list[Bar]]] = field(default=((), []), init=False)
+    _blocks: tuple[tuple[object, ...], list[Block]] = field(default=((), []), init=False)
+    _of: tuple[Recipe | None, Session | None] = field(default=(None, None), init=False)
+
+    def look(self, session: Session) -> None:
+        """Let go of what has gone: bars that are no more, or are something else by now."""
+        recipe, (before, of) = session.recipe, self._of
+        if recipe is before and session is of:
+            return
+        self._of = recipe, session
+        if session is not of or before is None:
+            self.selected, self.drag, self.view = set(), None, None
+            return
+        if recipe.stroke is before.stroke and recipe.force is before.force:
+            return
+        self.selected = {which for which in self.selected if _alike(one_of(before, which), one_of(recipe, which))}
+        if self.drag is not None:
+            which = self.drag.bar.which
+            self.drag = self.drag if one_of(before, which) is one_of(recipe, which) else None
+
+    def packed(self, recipe: Recipe, ticks: int, least: float) -> list[list[Bar]]:
+        """The lanes, those of forces first; `least` ticks are taken by each bar."""
+        made_of = recipe.stroke, recipe.force, ticks, round(least, 6)
+        if not _same(self._packed[0], made_of):
+            all_, least = bars(recipe), made_of[3]
+            kinds = ([bar for bar in all_ if bar.which[0] == kind] for kind in ("force", "stroke"))
+            self._packed = made_of, [lane for several in kinds for lane in lanes(several, least)]
+        return self._packed[1]
+
+    def blocks(self, recipe: Recipe, pixel: float) -> list[Block]:
+        """The strokes as they are seen on the track, where a pixel is so many ticks: many lie in the same one."""
+        made_of = recipe.stroke, round(pixel, 3)
+        if not _same(self._blocks[0], made_of):
+            seen: dict[tuple[int, int, str], Block] = {}
+            for stroke in recipe.stroke:
+                # Where it repeats so often that the track would be full of it, it is one block.
+                times, last = (1, stroke.end_tick) if stroke.repeat > MOST_BLOCKS else (stroke.repeat, stroke.last_tick)
+                length = last + 1 - stroke.first_tick
+                for time in range(times):
+                    start = stroke.first_tick + time * stroke.every
+                    block = Block(start, start + length, stroke.tool, stroke.muted)
+                    at = int(start / pixel), int((start + length) / pixel), stroke.tool
+                    if at not in seen or seen[at].muted:
+                        seen[at] = block
+            self._blocks = made_of, list(seen.values())
+        return self._blocks[1]
+
+    # -- what is shown ----------------------------------------------------------------------------------------------
+
+    def span(self, end: int) -> tuple[float, float]:
+        """The ticks from and to which are shown of a recording of so many."""
+        if self.drag is not None:
+            return self.drag.shown
+        whole = max(end * (1 + ROOM), end + 6.0, CLOSEST)
+        if self.view is None:
+            return 0.0, whole
+        length = min(self.view[1] - self.view[0], whole)
+        start = min(max(self.view[0], 0.0), whole - length)
+        return start, start + length
+
+    def zoom(self, end: int, at: float, factor: float) -> None:
+        """Show so many times as much of time, with a tick staying where it is."""
+        start, stop = self.span(end)
+        whole = Lanes().span(end)[1]
+        length = min(max((stop - start) * factor, CLOSEST), whole)
+        start = at - (at - start) * length / (stop - start)
+        self.view = None if length >= whole else (start, start + length)
+
+    def pan(self, end: int, part: float) -> None:
+        """Show what comes later, by a part of what is shown."""
+        if self.view is not None:
+            start, stop = self.span(end)
+            self.view = start + part * (stop - start), stop + part * (stop - start)
+
+    # -- what is selected -------------------------------------------------------------------------------------------
+
+    def only(self, recipe: Recipe) -> tuple[Which, Stroke | Force] | None:
+        """The one bar that is selected, and what it is of; None if there are none or several."""
+        if len(self.selected) != 1:
+            return None
+        which = next(iter(self.selected))
+        one = one_of(recipe, which)
+        return None if one is None else (which, one)
+
+    def press(self, bar: Bar, part: Part, at: float, x: float, adds: bool, end: int) -> None:
+        """The pointer went down on a bar, at a tick and a place; `end`: ticks recorded."""
+        if not adds and bar.which not in self.selected:
+            self.selected = {bar.which}
+        self.drag = Drag(bar, part, at, x, adds, self.span(end))
+
+    def release(self, session: Session) -> None:
+        """The pointer went up: the bar stays where it is, or was only clicked."""
+        drag, self.drag = self.drag, None
+        if drag is None:
+            return
+        which = drag.bar.which
+        if not drag.moved:
+            self.selected = self.selected ^ {which} if drag.adds else {which}
+        elif drag.ticks and drag.bar.is_free:
+            self.selected |= {which}
+            edited = self.selected if drag.part == "move" else {which}
+            dt = session.dt
+            verb = "Move" if drag.part == "move" else "Stretch"
+            session.edit_bars(named(verb, edited), edited, lambda one: self.dragged(one, drag, dt))
+
+    def dragged(self, one: Stroke | Force, drag: Drag, dt: float) -> Stroke | Force:
+        """What becomes of a stroke or a force that is dragged so."""
+        if drag.part == "move":
+            return moved(one, drag.ticks, dt)
+        start, end = drag.bar.start, drag.bar.end
+        if drag.part == "start":
+            return stretched(one, min(start + drag.ticks, end - 1), end, dt)
+        return stretched(one, start, max(end + drag.ticks, start + 1), dt)
+
+    def earliest(self, session: Session) -> float:
+        """The tick at which the first of the selected bars begins."""
+        recipe = session.recipe
+        ones = ((which, one_of(recipe, which)) for which in self.selected)
+        return min(bar_of(one, which, session.end, session.dt).start for which, one in ones if one is not None)
+
+    # -- edits ------------------------------------------------------------------------------------------------------
+
+    def _edit(self, session: Session, verb: str, changed: Callable[[Stroke | Force], Stroke | Force | None]) -> None:
+        if self.selected:
+            session.edit_bars(named(verb, self.selected), self.selected, changed)
+
+    def nudge(self, session: Session, ticks: int) -> None:
+        """Move what is selected by ticks; one edit, however often it is done in a row."""
+        if self.selected and not self.drag:
+            ticks = max(ticks, -int(self.earliest(session)))
+            name, dt = named("Move", self.selected), session.dt
+            session.edit_bars(name, self.selected, lambda one: moved(one, ticks, dt), joined=True)
+
+    def together(self, session: Session) -> None:
+        """Let what is selected begin with the first of it."""
+        if len(self.selected) > 1:
+            first, dt = self.earliest(session), session.dt
+
+            def changed(one: Stroke | Force) -> Stroke | Force:
+                return moved(one, round(first - bar_of(one, ("stroke", 0), session.end, dt).start), dt)
+
+            session.edit_bars("Start together", self.selected, changed)
+
+    def is_muted(self, session: Session) -> bool:
+        """All that is selected is muted."""
+        ones = [one_of(session.recipe, which) for which in self.selected]
+        return bool(ones) and all(one is None or one.muted for one in ones)
+
+    def mute(self, session: Session) -> None:
+        """Let what is selected do nothing; if that is so already, let it act again."""
+        muted = not self.is_muted(session)
+
+        def changed(one: Stroke | Force) -> Stroke | Force:
+            return one.model_copy(update={"muted": muted})
+
+        self._edit(session, "Mute" if muted else "Unmute", changed)
+
+    def remove(self, session: Session) -> None:
+        """Take what is selected away."""
+        self._edit(session, "Delete", lambda one: None)
+        self.selected = set()
+
+    def cancel(self) -> bool:
+        """Give up the drag, or else what is selected; True if there was something."""
+        had = self.drag is not None or bool(self.selected)
+        if self.drag is None:
+            self.selected = set()
+        self.drag = None
+        return had
+
+
+def _same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
+    """The same things, lists not compared item by item."""
+    return len(one) == len(other) and all(
+        a is b or (not isinstance(a, tuple) and a == b) for a, b in zip(one, other, strict=True)
+    )
+
+
+def _alike(one: Stroke | Force | None, other: Stroke | Force | None) -> bool:
+    """They may be the same stroke or force, before an edit and after it."""
+    if one is None or other is None:
+        return False
+    if isinstance(one, Stroke) and isinstance(other, Stroke):
+        return one.tool == other.tool and one.samples[0][1:] == other.samples[0][1:]
+    return type(one) is type(other)

@@ -1,0 +1,322 @@
+"""The lanes above the timeline: strokes and forces as bars, to be moved, stretched, muted and taken away."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from math import ceil, floor
+
+from imgui_bundle import imgui
+from imgui_bundle.imgui import ImVec2
+
+from app.model.bars import Bar, bar_of, one_of
+from app.model.forces import Force
+from app.model.strokes import Stroke
+from app.ui import icons
+from app.ui.actions import ACTIONS, Do
+from app.ui.editor_state import EditorState
+from app.ui.lanes import Part
+from app.ui.panels.timebar import FORCES, KINDS, MASKS
+from app.ui.theme import packed, rgb
+from app.ui.viewport import Rect
+from app.ui.widgets import Ui
+from app.work.session import Session
+
+ROW, GAP = 20.0, 3.0
+HEAD, RULER = 30.0, 18.0
+LOW = 100.0  # points of height up to which there is no ruler
+GRIP = 6.0  # points at a bar's ends by which it is stretched
+NARROWEST = 9.0  # points of a bar
+SHAKE = 3.0  # points that the pointer may move and is not dragging yet
+INK = rgb("1a1a1a")
+ICONS = {"thin": "thicken", "thaw": "freeze", "vortex": "twirl", "source": "bloat", "sink": "pinch"}
+STEPS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600)  # seconds between two numbers
+
+
+def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> None:
+    """What is selected and what can be done with it, the seconds, and the bars."""
+    lanes = state.lanes
+    lanes.look(session)
+    if session.is_painting:
+        lanes.selected = set()
+    with ui.panel("lanes", rect, (12, 4), imgui.WindowFlags_.no_scroll_with_mouse):
+        ui.rule(ImVec2(rect.x, rect.y), ImVec2(rect.right, rect.y + ui.px(1)))
+        _head(ui, session, state, do)
+        bar = imgui.get_style().scrollbar_size
+        x0, x1 = rect.x + ui.px(12), rect.right - ui.px(14) - bar
+        start, stop = lanes.span(session.end)
+
+        def across(tick: float) -> float:
+            return x0 + (x1 - x0) * (tick - start) / (stop - start)
+
+        def tick_at(x: float) -> float:
+            return start + (stop - start) * (x - x0) / (x1 - x0)
+
+        imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
+        if rect.height > ui.px(LOW):
+            _ruler(ui, session, x0, x1, (start, stop), across, tick_at)
+        let_go = _bars(ui, session, state, x0, x1, (start, stop), across, tick_at)
+        imgui.pop_style_var()
+    if let_go:
+        lanes.release(session)
+
+
+def _head(ui: Ui, session: Session, state: EditorState, do: Do) -> None:
+    lanes = state.lanes
+    corner, inside = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    some = bool(lanes.selected)
+    muted = lanes.is_muted(session)
+    buttons = (
+        ("bars_together", "together", "They begin with the first of them.", len(lanes.selected) > 1, False),
+        ("bars_mute", "mute", "It stays, and does nothing.", some, muted),
+        ("remove", "trash", "", some, False),
+    )
+    size, between = 24.0, 4.0
+    left = inside - ui.px(len(buttons) * (size + between))
+    _words(ui, _told(session, state), corner, left)
+    for number, (name, icon, more, enabled, active) in enumerate(buttons):
+        imgui.set_cursor_screen_pos(ImVec2(corner.x + left + ui.px(between + number * (size + between)), corner.y))
+        action = ACTIONS[name]
+        title = "Delete" if name == "remove" else "Let them act again" if active else action.label
+        if ui.icon_button(name, icon, title, action.key, more, active, enabled, size, 16):
+            do(name)
+    imgui.set_cursor_screen_pos(corner + ImVec2(0, ui.px(HEAD - 4)))
+
+
+def _words(ui: Ui, words: str, corner: ImVec2, room: float) -> None:
+    draw = imgui.get_window_draw_list()
+    imgui.push_font(ui.fonts.regular, 13.5)
+    draw.push_clip_rect(corner, corner + ImVec2(room, ui.px(HEAD)), True)
+    draw.add_text(corner + ImVec2(0, ui.px(4)), packed(ui.palette.dim), words)
+    draw.pop_clip_rect()
+    imgui.pop_font()
+
+
+def _told(session: Session, state: EditorState) -> str:
+    recipe, lanes = session.recipe, state.lanes
+    if only := lanes.only(recipe):
+        which, one = only
+        return f"{name_of(one)}: {when(session, bar_of(one, which, session.end, session.dt))}"
+    if lanes.selected:
+        return f"{len(lanes.selected)} selected"
+    counts = [(len(recipe.stroke), "stroke"), (len(recipe.force), "force")]
+    told = [f"{count} {noun}{'s' if count != 1 else ''}" for count, noun in counts if count]
+    return ", ".join(told) or "Strokes become bars here: move them, stretch them, repeat them."
+
+
+def name_of(one: Stroke | Force) -> str:
+    """What a person calls it."""
+    if isinstance(one, Stroke):
+        return one.tool.capitalize()
+    return one.name or f"{one.kind.capitalize()} force"
+
+
+def when(session: Session, bar: Bar) -> str:
+    """When a bar begins and how long it lasts, in words."""
+    if not bar.is_free:
+        return "by a formula of the time"
+    dt = session.dt
+    return f"from {bar.start * dt:.2f} s, for {(bar.end - bar.start) * dt:.2f} s"
+
+
+def _ruler(
+    ui: Ui,
+    session: Session,
+    x0: float,
+    x1: float,
+    shown: tuple[float, float],
+    across: Callable[[float], float],
+    tick_at: Callable[[float], float],
+) -> None:
+    """Seconds, and the playhead, which follows the pointer that is pressed here."""
+    corner, height, dt = imgui.get_cursor_screen_pos(), ui.px(RULER), session.dt
+    imgui.invisible_button("ruler", ImVec2(max(x1 - corner.x, 1.0), height))
+    if imgui.is_item_active() and session.end:
+        tick = round(min(max(tick_at(imgui.get_mouse_pos().x), 0), session.end))
+        if tick != session.target:
+            session.seek(tick)
+    elif imgui.is_item_hovered():
+        ui.tooltip("The recording", more="Drag to go through it. The wheel with Ctrl shows less of it, or more.")
+    draw, palette = imgui.get_window_draw_list(), ui.palette
+    per_second = (x1 - x0) / (shown[1] - shown[0]) / dt
+    step = next((step for step in STEPS if step * per_second >= ui.px(56)), STEPS[-1])
+    imgui.push_font(ui.fonts.regular, 11.5)
+    for number in range(ceil(shown[0] * dt / step - 1e-6), floor(shown[1] * dt / step + 1e-6) + 1):
+        x = across(number * step / dt)
+        words = f"{number * step:g} s"
+        ui.rule(ImVec2(x, corner.y + height - ui.px(5)), ImVec2(x + ui.px(1), corner.y + height))
+        if x + imgui.calc_text_size(words).x + ui.px(4) < x1 + ui.px(14):
+            draw.add_text(ImVec2(x + ui.px(3), corner.y), packed(palette.faint), words)
+    imgui.pop_font()
+    ui.rule(ImVec2(corner.x, corner.y + height - ui.px(1)), ImVec2(x1, corner.y + height))
+
+
+def _bars(
+    ui: Ui,
+    session: Session,
+    state: EditorState,
+    x0: float,
+    x1: float,
+    shown: tuple[float, float],
+    across: Callable[[float], float],
+    tick_at: Callable[[float], float],
+) -> bool:
+    """The bars; True if the pointer has let go of them."""
+    lanes = state.lanes
+    width = x1 - x0
+    least = ui.px(NARROWEST) * (shown[1] - shown[0]) / max(width, 1.0)
+    packed_lanes = lanes.packed(session.recipe, session.end, least)
+    imgui.begin_child("rows", ImVec2(0, 0), 0, imgui.WindowFlags_.no_background)
+    corner, row = imgui.get_cursor_screen_pos(), ui.px(ROW + GAP)
+    room = imgui.get_content_region_avail().y
+    height = max(len(packed_lanes) * row + ui.px(GAP), room)
+    imgui.invisible_button("bars", ImVec2(max(x1 - corner.x + ui.px(6), 1.0), height))
+    let_go = _point(ui, session, state, tick_at)
+    draw = imgui.get_window_draw_list()
+    top = imgui.get_window_pos().y
+    lanes.drawn.clear()
+    first = max(floor((top - corner.y) / row), 0)
+    last = ceil((top + imgui.get_window_height() - corner.y) / row)
+    for number in range(first, min(last, len(packed_lanes))):
+        lane = packed_lanes[number]
+        y = corner.y + ui.px(GAP) + number * row
+        at = max(bisect_right(lane, shown[0], key=lambda bar: bar.start) - 1, 0)
+        for bar in lane[at:]:
+            if bar.start > shown[1]:
+                break
+            _bar(ui, session, state, bar, y, across, (x0, x1))
+    now = across(session.target)
+    if x0 <= now <= x1 and session.end:
+        low, high = ImVec2(now, top), ImVec2(now + ui.px(1.5), top + imgui.get_window_height())
+        draw.add_rect_filled(low, high, packed(ui.palette.text))
+    imgui.end_child()
+    return let_go
+
+
+def _bar(
+    ui: Ui,
+    session: Session,
+    state: EditorState,
+    bar: Bar,
+    y: float,
+    across: Callable[[float], float],
+    ends: tuple[float, float],
+) -> None:
+    lanes, draw, palette = state.lanes, imgui.get_window_draw_list(), ui.palette
+    one = one_of(session.recipe, bar.which)
+    if one is None:
+        return
+    drag = lanes.drag
+    if drag is not None and drag.moved:
+        taken = lanes.selected if drag.part == "move" else ()
+        if bar.which == drag.bar.which or bar.which in taken:
+            bar = bar_of(lanes.dragged(one, drag, session.dt), bar.which, session.end, session.dt)
+    left, right = across(bar.start), across(bar.end)
+    right = max(right - ui.px(1), left + ui.px(NARROWEST - 2))
+    low, high = ImVec2(left, y), ImVec2(right, y + ui.px(ROW))
+    lanes.drawn.append((bar, Rect(left, y, right - left, ui.px(ROW))))
+    kind = one.tool if isinstance(one, Stroke) else one.kind
+    colour = KINDS.get(kind, MASKS) if isinstance(one, Stroke) else FORCES
+    faint = 0.28 if bar.muted else 1.0
+    if bar.every:
+        _repeats(ui, bar, y, packed(colour, 0.45 * faint), across, ends)
+    draw.add_rect_filled(low, high, packed(colour, faint), ui.px(4))
+    if bar.which in lanes.selected:
+        draw.add_rect(low, high, packed(palette.text), ui.px(4), ui.px(2))
+    if right - left < ui.px(26):
+        return
+    ink = packed(palette.text if bar.muted else INK, 0.6 if bar.muted else 0.9)
+    icon = "mute" if bar.muted else ICONS.get(kind, kind)
+    icon = icon if icon in icons.PATHS else "force"
+    x = max(left, ends[0]) + ui.px(6)
+    draw.push_clip_rect(low, ImVec2(high.x - ui.px(4), high.y), True)
+    icons.draw(draw, icon, x, y + ui.px(3.5), ui.px(13), ink, 2.0)
+    if right - left > ui.px(60):
+        imgui.push_font(ui.fonts.regular, 12.5)
+        draw.add_text(ImVec2(x + ui.px(18), y + ui.px(3)), ink, name_of(one))
+        imgui.pop_font()
+    draw.pop_clip_rect()
+
+
+def _repeats(
+    ui: Ui, bar: Bar, y: float, colour: int, across: Callable[[float], float], ends: tuple[float, float]
+) -> None:
+    """The repetitions of a bar that are seen; one long bar where they lie too close to be told apart."""
+    draw, length = imgui.get_window_draw_list(), bar.end - bar.start
+    spacing = across(bar.every) - across(0)
+    top, bottom = y + ui.px(3), y + ui.px(ROW - 3)
+    if spacing < ui.px(4):
+        low, high = ImVec2(max(across(bar.end), ends[0]), top), ImVec2(min(across(bar.stops), ends[1]), bottom)
+        draw.add_rect_filled(low, high, colour, ui.px(3))
+        return
+    times = round((bar.stops - bar.end) / bar.every)
+    first = max(floor((ends[0] - across(bar.end)) / spacing), 1)
+    last = min(ceil((ends[1] - across(bar.start)) / spacing), times)
+    for time in range(first, last + 1):
+        left, right = across(bar.start + time * bar.every), across(bar.start + time * bar.every + length)
+        right = max(right - ui.px(1), left + ui.px(3))
+        draw.add_rect_filled(ImVec2(left, top), ImVec2(right, bottom), colour, ui.px(3))
+
+
+def _point(ui: Ui, session: Session, state: EditorState, tick_at: Callable[[float], float]) -> bool:
+    """What the pointer does to the bars; True if it has let go of them."""
+    lanes, mouse, io = state.lanes, imgui.get_mouse_pos(), imgui.get_io()
+    hovered, let_go = imgui.is_item_hovered(), imgui.is_item_deactivated()
+    found = _under(ui, state, mouse.x, mouse.y) if hovered else None
+    if imgui.is_item_activated():
+        adds = io.key_shift or io.key_ctrl
+        if found is not None:
+            state.selected = ""
+            lanes.press(*found, tick_at(mouse.x), mouse.x, adds, session.end)
+        elif not adds:
+            lanes.selected = set()
+    elif imgui.is_item_active() and lanes.drag is not None:
+        drag = lanes.drag
+        drag.moved |= abs(mouse.x - drag.x) > ui.px(SHAKE)
+        drag.ticks = _limited(state, session, round(tick_at(mouse.x) - drag.at))
+    elif found is not None:
+        _tell(ui, session, found[0])
+    if hovered and io.mouse_wheel and io.key_ctrl:
+        lanes.zoom(session.end, tick_at(mouse.x), 0.8**io.mouse_wheel)
+    elif hovered and (io.mouse_wheel_h or (io.mouse_wheel and io.key_shift)):
+        lanes.pan(session.end, -0.1 * (io.mouse_wheel_h or io.mouse_wheel))
+    return let_go
+
+
+def _limited(state: EditorState, session: Session, ticks: int) -> int:
+    """So many ticks, but nothing goes before the beginning, nor is stretched to nothing."""
+    drag = state.lanes.drag
+    assert drag is not None
+    if not drag.bar.is_free:
+        return 0
+    if drag.part == "move":
+        return max(ticks, -int(state.lanes.earliest(session)))
+    length = int(drag.bar.end - drag.bar.start)
+    return max(min(ticks, length - 1), -int(drag.bar.start)) if drag.part == "start" else max(ticks, 1 - length)
+
+
+def _under(ui: Ui, state: EditorState, x: float, y: float) -> tuple[Bar, Part] | None:
+    """The bar under the pointer, and which part of it."""
+    for bar, rect in state.lanes.drawn:
+        if rect.y <= y <= rect.bottom and rect.x - ui.px(1) <= x <= rect.right + ui.px(2):
+            grip = min(ui.px(GRIP), rect.width / 4)
+            if not bar.is_free:
+                return bar, "move"
+            if x > rect.right - grip:
+                return bar, "end"
+            return bar, "start" if x < rect.x + grip and rect.width > 2 * ui.px(GRIP) else "move"
+    return None
+
+
+def _tell(ui: Ui, session: Session, bar: Bar) -> None:
+    one = one_of(session.recipe, bar.which)
+    if one is None:
+        return
+    told = when(session, bar)
+    more = [f"{told[0].upper()}{told[1:]}."]
+    if isinstance(one, Stroke) and one.repeat > 1:
+        more.append(f"{one.repeat} times, every {one.every * session.dt:.2f} s.")
+    if bar.muted:
+        more.append("Muted: it does nothing.")
+    more.append("Drag to move it, its ends to stretch it." if bar.is_free else "It acts all the time.")
+    ui.tooltip(name_of(one), more=" ".join(more))

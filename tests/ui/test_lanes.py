@@ -1,0 +1,321 @@
+"""The lanes: strokes and forces as bars, used with pointer and keys."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.model.bars import Which
+from app.model.forces import VortexForce
+from app.model.recipe import Recipe
+from app.model.strokes import Stroke
+from app.ui.events import Mods
+from app.ui.lanes import Lanes
+from app.ui.viewport import Rect
+from solver.gl.device import Device
+from support.editing import Robot, small_project
+from support.widgets import Widgets
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    robot = Robot(device, small_project(tmp_path))
+    yield robot
+    robot.close()
+
+
+@pytest.fixture
+def painted(robot: Robot) -> Robot:
+    """Two strokes, and the lanes open."""
+    robot.drag((0.3, 0.5), (0.4, 0.5), steps=6)
+    robot.rest()
+    robot.drag((0.6, 0.5), (0.6, 0.4), steps=6)
+    robot.rest()
+    robot.key("l")
+    robot.frame(count=2)
+    return robot
+
+
+def lanes(robot: Robot) -> Lanes:
+    return robot.editor.state.lanes
+
+
+def recipe(robot: Robot) -> Recipe:
+    return robot.editor.session.recipe
+
+
+def names(robot: Robot) -> list[str]:
+    return [entry.name for entry in robot.editor.session.document.history.entries]
+
+
+def place(robot: Robot, number: int, kind: str = "stroke") -> Rect:
+    return next(rect for bar, rect in lanes(robot).drawn if bar.which == (kind, number))
+
+
+def drag(robot: Robot, number: int, by: float, part: float = 0.5, kind: str = "stroke", drop: bool = True) -> None:
+    """Drag a bar by so many points, taken hold of at a part of its width."""
+    rect = place(robot, number, kind)
+    x, y = rect.x + part * rect.width, rect.y + rect.height / 2
+    robot.move(x, y)
+    robot.press()
+    for step in range(1, 5):
+        robot.move(x + by * step / 4, y)
+    if drop:
+        robot.release()
+        robot.frame()
+
+
+def points_a_tick(robot: Robot) -> float:
+    start, stop = lanes(robot).span(robot.editor.session.end)
+    rect = robot.editor.layout.lanes
+    assert rect is not None
+    return (rect.width - 40) / (stop - start)
+
+
+def test_a_bar_is_moved_by_dragging_it_and_escape_gives_that_up(painted: Robot) -> None:
+    before, end = recipe(painted), painted.editor.session.end
+    ticks = [stroke.first_tick for stroke in before.stroke]
+    by = 90.0
+    drag(painted, 1, by)
+    painted.rest()
+    moved = recipe(painted).stroke[1].first_tick - ticks[1]
+    assert moved == pytest.approx(by / points_a_tick(painted), rel=0.2)
+    assert recipe(painted).stroke[0] == before.stroke[0]
+    assert names(painted)[-1] == "Move stroke"
+    assert painted.editor.session.end == end + moved
+    painted.key("ctrl+z")
+    assert recipe(painted) == before
+    painted.frame(count=2)
+    drag(painted, 1, by, drop=False)
+    painted.key("escape")
+    painted.release()
+    painted.frame()
+    assert recipe(painted) == before
+    assert lanes(painted).drag is None
+    drag(painted, 0, -1000.0)
+    assert recipe(painted).stroke[0].first_tick == 0  # and not before the beginning
+
+
+def test_a_bar_is_stretched_at_its_ends(painted: Robot) -> None:
+    before = recipe(painted).stroke[1]
+    drag(painted, 1, 60.0, part=0.99)
+    longer = recipe(painted).stroke[1]
+    assert longer.first_tick == before.first_tick
+    assert longer.last_tick > before.last_tick
+    assert len(longer.samples) == len(before.samples)
+    assert names(painted)[-1] == "Stretch stroke"
+    painted.rest()
+    drag(painted, 1, -40.0, part=0.01)
+    earlier = recipe(painted).stroke[1]
+    assert earlier.last_tick == longer.last_tick
+    assert earlier.first_tick < longer.first_tick
+    painted.rest()
+    drag(painted, 1, -4000.0, part=0.99)
+    assert recipe(painted).stroke[1].last_tick == recipe(painted).stroke[1].first_tick
+
+
+def test_bars_that_are_selected_start_together_and_are_muted_and_deleted(painted: Robot) -> None:
+    before = recipe(painted)
+    first, second = (place(painted, number).middle for number in (0, 1))
+    painted.click(*first)
+    assert lanes(painted).selected == {("stroke", 0)}
+    painted.mods = Mods(shift=True)
+    painted.click(*second)
+    painted.mods = Mods()
+    assert lanes(painted).selected == {("stroke", 0), ("stroke", 1)}
+    painted.editor.do("bars_together")
+    assert {stroke.first_tick for stroke in recipe(painted).stroke} == {before.stroke[0].first_tick}
+    painted.key("u")
+    assert all(stroke.muted for stroke in recipe(painted).stroke)
+    painted.rest()
+    assert np.abs(painted.warp()).max() == 0
+    painted.key("u")
+    assert not any(stroke.muted for stroke in recipe(painted).stroke)
+    painted.key("delete")
+    assert recipe(painted).stroke == ()
+    assert names(painted)[3:] == ["Start together", "Mute strokes", "Unmute strokes", "Delete strokes"]
+    for _ in range(4):
+        painted.key("ctrl+z")
+    assert recipe(painted) == before
+
+
+def test_arrows_move_what_is_selected_by_a_tick(painted: Robot) -> None:
+    before = recipe(painted)
+    painted.key("right")
+    assert recipe(painted) == before  # nothing is selected
+    painted.click(*place(painted, 1).middle)
+    for key in ("right", "right", "right", "left"):
+        painted.key(key)
+    assert recipe(painted).stroke[1] == before.stroke[1].moved(2)
+    assert names(painted)[3:] == ["Move stroke"]
+
+
+def test_a_press_beside_the_bars_lets_go_of_them_and_delete_then_does_nothing_to_them(painted: Robot) -> None:
+    before = recipe(painted)
+    painted.click(*place(painted, 0).middle)
+    rect = painted.editor.layout.lanes
+    assert rect is not None
+    painted.click(rect.x + rect.width / 2, rect.bottom - 8)
+    assert lanes(painted).selected == set()
+    painted.click(*place(painted, 0).middle)
+    painted.drag((0.2, 0.2), (0.25, 0.2), steps=3)
+    assert lanes(painted).selected == set()
+    painted.key("delete")
+    assert recipe(painted).stroke[:2] == before.stroke
+    painted.click(*place(painted, 0).middle)
+    painted.key("escape")
+    assert lanes(painted).selected == set()
+
+
+def test_the_fields_of_a_bar_set_when_how_long_how_strong_and_how_often(
+    painted: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    painted.key("h")  # which has no strength of its own
+    widgets = Widgets(painted, monkeypatch)
+    before, dt = recipe(painted).stroke[1], painted.editor.session.dt
+    painted.click(*place(painted, 1).middle)
+    for label, text in (("Start", "1"), ("Duration", "0.5"), ("Strength", "50"), ("Times", "3"), ("Every", "1.5")):
+        widgets.type(label, text)
+        painted.rest()
+    stroke = recipe(painted).stroke[1]
+    assert (stroke.first_tick, stroke.last_tick + 1) == (round(1 / dt), round(1.5 / dt))
+    assert (stroke.strength, stroke.repeat, stroke.every) == (0.5, 3, round(1.5 / dt))
+    assert [sample[1:] for sample in stroke.samples] == [sample[1:] for sample in before.samples]
+    told = ["Move stroke", "Stretch stroke", "Strength of a stroke", "Repeat stroke", "Repeat stroke"]
+    assert names(painted)[3:] == told
+    assert painted.editor.session.end > stroke.end_tick
+
+
+def test_forces_are_bars_too(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    vortex = VortexForce(kind="vortex", point=(0.5, 0.5), strength=2.0, during=(0.5, 1.0))
+    robot.editor.session.edit("Forces", force=(vortex, vortex.edited(during=None, formula="sin(t)")), duration=2.0)
+    robot.rest()
+    robot.key("l")
+    robot.frame(count=2)
+    drag(robot, 0, 120.0, kind="force")
+    moved = recipe(robot).force[0].during
+    assert moved is not None
+    assert moved[0] > 0.6
+    assert moved[1] - moved[0] == pytest.approx(0.5)
+    drag(robot, 1, 120.0, kind="force")  # a formula of the time stays where it is
+    assert names(robot)[1:] == ["Forces", "Move force"]
+    robot.click(*place(robot, 0, "force").middle)
+    robot.key("h")
+    widgets = Widgets(robot, monkeypatch)
+    widgets.type("Strength", "-1.5")
+    widgets.type("Start", "0.25")
+    widgets.type("Duration", "1")
+    force = recipe(robot).force[0]
+    assert force.strength == -1.5
+    assert force.during == pytest.approx((0.25, 1.25))
+    robot.key("u")
+    assert recipe(robot).force[0].muted
+    robot.key("delete")
+    assert len(recipe(robot).force) == 1
+    for _ in range(6):
+        robot.key("ctrl+z")
+    assert recipe(robot).force[0] == vortex
+
+
+def many(count: int) -> tuple[Stroke, ...]:
+    dice = random.Random(1)
+    made = []
+    for number in range(count):
+        x, y = dice.random(), dice.random()
+        samples = ((5 * number, x, y, 1.0), (5 * number + dice.randrange(40), x, y, 1.0))
+        made.append(Stroke(tool="freeze" if number % 2 else "restore", radius=0.01, samples=samples))
+    return tuple(made)
+
+
+def test_of_two_thousand_strokes_only_what_is_seen_is_drawn(robot: Robot) -> None:
+    robot.editor.session.edit("Strokes", stroke=many(2000), duration=170.0)
+    robot.editor.session.seek(0)
+    robot.key("l")
+    robot.frame(count=2)
+    rect = robot.editor.layout.lanes
+    assert rect is not None
+    assert 0 < len(lanes(robot).drawn) < rect.width / 9 * (rect.height / 23)
+    assert all(rect.y - 23 < place.y < rect.bottom for _, place in lanes(robot).drawn)
+    packed = lanes(robot).packed(recipe(robot), robot.editor.session.end, 1.0)
+    assert packed is lanes(robot).packed(recipe(robot), robot.editor.session.end, 1.0)
+    blocks = lanes(robot).blocks(recipe(robot), robot.editor.session.end / 800)
+    assert len(blocks) <= 2 * 3 * 800
+    robot.editor.session.edit("None", stroke=())
+    robot.frame()
+    assert lanes(robot).drawn == []
+
+
+def test_the_wheel_with_ctrl_shows_less_of_time_and_all_of_it_again(painted: Robot) -> None:
+    x, y = place(painted, 1).middle
+    wide = place(painted, 1).width
+    painted.move(x, y)
+    painted.mods = Mods(ctrl=True)
+    painted.hold("ctrl", True)
+    for _ in range(3):
+        painted.wheel(1)
+    painted.frame(count=2)
+    assert place(painted, 1).width > 1.5 * wide
+    assert place(painted, 1).x < x < place(painted, 1).right
+    for _ in range(12):
+        painted.wheel(-1)
+    painted.frame(count=2)
+    assert lanes(painted).view is None
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (800, 520), (400, 260)])
+@pytest.mark.parametrize("inspector", [True, False])
+def test_the_lanes_lie_between_the_picture_and_the_timeline(
+    device: Device, tmp_path: Path, size: tuple[int, int], inspector: bool
+) -> None:
+    robot = Robot(device, small_project(tmp_path), size)
+    robot.editor.state.inspector = inspector
+    robot.key("l")
+    robot.frame(count=2)
+    layout = robot.editor.layout
+    assert layout.lanes is not None
+    assert layout.canvas.bottom == layout.lanes.y
+    assert layout.canvas.width >= 120
+    assert layout.lanes.bottom == pytest.approx(layout.timebar.y)
+    assert layout.canvas.height >= 0.499 * (layout.timebar.y - layout.canvas.y)
+    robot.key("l")
+    robot.frame()
+    assert robot.editor.layout.lanes is None
+    robot.close()
+
+
+def test_whatever_is_done_to_bars_with_pointer_and_keys_is_undone(painted: Robot) -> None:
+    dice, session = random.Random(4), painted.editor.session
+    begun = recipe(painted)
+    for _ in range(60):
+        drawn = lanes(painted).drawn
+        what = dice.choice(["drag", "drag", "stretch", "click", "shift", "key", "key", "undo", "escape"])
+        if what in ("drag", "stretch", "click", "shift") and drawn:
+            bar, rect = dice.choice(drawn)
+            which: Which = bar.which
+            painted.mods = Mods(shift=what == "shift")
+            if what in ("drag", "stretch"):
+                by = dice.uniform(-150, 150)
+                drag(painted, which[1], by, 0.5 if what == "drag" else dice.choice([0.02, 0.98]), which[0])
+            else:
+                painted.click(*rect.middle)
+            painted.mods = Mods()
+        elif what == "key":
+            painted.key(dice.choice(["left", "right", "u", "delete"]))
+        elif what == "undo":
+            painted.key("ctrl+z")
+        elif what == "escape":
+            painted.key("escape")
+        painted.frame()
+        if not recipe(painted).stroke:
+            painted.key("ctrl+z")
+            painted.frame()
+        state = recipe(painted)
+        assert session.document.recipe == state
+        assert Recipe.parse(state.text()) == state
+    while session.document.history.index > 2:
+        painted.key("ctrl+z")
+    assert recipe(painted) == begun
