@@ -64,6 +64,7 @@ def _table() -> list[Action]:
         add("Edit", name, label, key, lambda c, n=name, label=label: c.workspace.change(label, **{n: True}))
     add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
     add("Edit", "remove", "Remove the handle", "delete backspace", lambda c: c.remove_selected())
+    add("Edit", "fit_handles", "Fit the handles", "shift+g", lambda c: c.fits.start())
     add("Edit", "cancel", "Give up the stroke or selection", "escape", lambda c: c.cancel())
 
     for tool in TOOLS:
