@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -23,8 +22,7 @@ from solver.gl.device import Device
 EVALUATIONS = 32  # replays on the coarse grid
 A_FINE_ONE = 8  # of them for each on the recipe's own
 COARSE_GRID, COARSE_PICTURE, COARSE_DT = 64, 512, 1 / 30
-ALONE = 12  # pairs up to which each handle has values of its own: with more, those of a group have the same
-GROUPS = 6  # as many are searched with what the coarse grid is played
+ALONE = 12  # pairs up to which each handle has values of its own: with more, all have the same
 LEAST_DET = 0.2  # of the map, anywhere
 # What is searched, from and to: radii in longer sides, stiffnesses, durations in parts of the recipe's, viscosities.
 RANGES = (0.06, 0.5), (0.05, 1.0), (0.3, 0.9), (3e-4, 0.3)
@@ -110,7 +108,7 @@ def fitted(
 
     By COBYQA (Ragonneau and Zhang), a trust-region method without derivatives for bounds and constraints: on a coarse
     grid first with all handles alike, then the radius of each, then the duration of each; and with all alike again on
-    the recipe's own. Of many handles those that lie and go together form a group, which has one radius and duration.
+    the recipe's own. Many handles stay alike: for so many replays that is found better.
     Handles of an earlier fit are replaced. A budget ends it and no clock, so that the same is found again. If
     `progress` says to stop, the best so far is checked on the recipe's own grid and returned.
 
@@ -118,23 +116,26 @@ def fitted(
         folder: where the names of the recipe's other pictures start from.
         pairs: None are those of the recipe's own handles, which are replaced; those that stay become pins.
         evaluations: replays on the coarse grid.
-        local: of the handles that are made for pairs, see `RecipeHandle`; None is 0 of points and 1 of curves.
+        local: of all handles; None is 1 where there are curves, 0 of points, and the recipe's own keep theirs.
 
     Raises:
         UserError: if no pair lies in the picture, or there are too many.
         Cancelled: if it is stopped before anything has been found.
     """
-    search = _Search(device, _aimed(device, recipe, picture, folder, pairs, local), picture, folder, progress)
+    aim = _aimed(device, recipe, picture, folder, pairs)
+    if local is not None:
+        aim = replace(aim, handles=tuple(each.model_copy(update={"local": local}) for each in aim.handles))
+    search = _Search(device, aim, picture, folder, progress)
     fine = max(evaluations // A_FINE_ONE, 1)
     progress.total = evaluations + fine
     point, stopped = search.start, False
-    alike, apart = np.zeros(len(search.numbers), int), search.groups()
-    all_kinds = _directions(alike, range(4))
-    parts = (all_kinds, 0.25, 3), (_directions(apart, [RADII]), 0.15, 2), (_directions(apart, [DURATIONS]), 0.15, 1)
+    count = len(search.numbers)
+    alike, each = _directions(count), np.eye(3 * count + 1)
+    parts = (alike, 0.25, 3), (each[:, :count], 0.15, 2), (each[:, 2 * count : -1], 0.15, 1)
     try:
-        for directions, reach, share in parts:
+        for directions, reach, share in parts if count <= ALONE else [(alike, 0.25, 1)]:
             point = search.run(search.coarse, point, directions, reach, (evaluations - progress.done) // share)
-        point = search.run(search.fine, point, all_kinds, 0.05, fine)
+        point = search.run(search.fine, point, alike, 0.05, fine)
     except Cancelled:
         if search.best is None:
             raise
@@ -151,16 +152,14 @@ class _Aim:
     handles: tuple[RecipeHandle, ...]
 
 
-def _aimed(
-    device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None, local: float | None
-) -> _Aim:
+def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None) -> _Aim:
     """What is fitted to given pairs, or, None, to those of the recipe's own handles."""
     if pairs is not None:
         base = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each)))
-        # What is local carries a curve's points between its handles along: a fluid flows back there.
-        made = tuple(RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if curve else 0.0) for curve in pairs.curves)
-        if local is not None:
-            made = tuple(each.model_copy(update={"local": local}) for each in made)
+        # What is local carries a curve's points between its handles along: a fluid flows back there. And all do, since
+        # those that push as a fluid does halt where what is local has pressed the picture together.
+        one = RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if any(pairs.curves) else 0.0)
+        made = (one,) * len(pairs.places)
         return _Aim(base, Pairs(np.round(pairs.places, DECIMALS), pairs.curves), made)
     led, places, pins = [], [], list(recipe.pin)
     extent = np.array([picture.width, picture.height]) / max(picture.width, picture.height)
@@ -195,18 +194,10 @@ def _starts(device: Device, recipe: Recipe, picture: Picture, folder: Path) -> l
     return starts
 
 
-RADII, STIFFNESSES, DURATIONS, VISCOSITY = range(4)
-
-
-def _directions(groups: np.ndarray, kinds: Sequence[int]) -> np.ndarray:
-    """The directions in which values of these kinds change that the handles (n,) of a group share, (3 n + 1, m)."""
-    found = []
-    for kind in kinds:
-        for group in np.unique(groups) if kind != VISCOSITY else [0]:
-            direction = np.zeros((4, len(groups)))
-            direction[kind] = groups == group if kind != VISCOSITY else 1.0
-            found.append(direction.ravel()[: 3 * len(groups) + 1])
-    return np.stack(found, axis=1)
+def _directions(count: int) -> np.ndarray:
+    """The directions in which all handles change alike, (3 count + 1, 4): radii, stiffnesses, durations, viscosity."""
+    kinds = np.repeat(np.arange(4), [count, count, count, 1])
+    return (kinds[:, None] == np.arange(4)).astype(float)
 
 
 @dataclass(frozen=True)
@@ -247,19 +238,6 @@ class _Search:
         self.high = listed(np.maximum(least, widest), high[0], high[1], max(high[2], own))
         first = listed(np.maximum(1.5 * ways, 0.25), 1.0, 0.8, own)
         self.start = np.clip((first - self.low) / np.maximum(self.high - self.low, 1e-9), 0, 1)
-
-    def groups(self) -> np.ndarray:
-        """Of each handle the group that shares its radius and its duration: alone, or with those that go along."""
-        if len(self.numbers) <= ALONE:
-            return np.arange(len(self.numbers))
-        # As far apart as can be: each next one is the farthest from all before it (Gonzalez, 1985).
-        ways = (self.pairs[self.numbers] * self.extent).reshape(-1, 4)
-        nearest, group = np.full(len(ways), np.inf), np.zeros(len(ways), int)
-        for number in range(GROUPS):
-            far = np.linalg.norm(ways - ways[nearest.argmax()], axis=1)
-            group[far < nearest] = number
-            nearest = np.minimum(nearest, far)
-        return group
 
     def run(self, stage: _Stage, origin: np.ndarray, groups: np.ndarray, reach: float, budget: int) -> np.ndarray:
         """The best point found from `origin` along `groups`, as far as `reach` at first, with so many replays."""
