@@ -147,14 +147,21 @@ def test_the_fitted_recipes_lead_the_points_of_their_files() -> None:
 def test_handles_at_work_are_shown_where_they_are_and_shall_be(studio: Studio) -> None:
     recipe = load("handles-tree")
     short = {"duration": 0.4, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
-    seen: list[np.ndarray] = []
-    studio.play("handles-tree", watch=lambda replay, frame: seen.append(at_work(frame, replay)), **short)
-    first, last = seen[0].astype(int), seen[-1].astype(int)
-    scale = gallery.WIDE, len(first)
-    far = max(recipe.handle, key=lambda handle: np.hypot(*np.subtract(handle.to or handle.at, handle.at)))
-    for frame, place in ((first, far.at), (last, far.to)):
-        x, y = np.multiply(place or (0, 0), scale).astype(int)
-        assert np.abs(frame[y - 1 : y + 2, x - 1 : x + 2] - gallery.FORCE).max() < 60
+    seen, places = list[np.ndarray](), list[np.ndarray]()
+
+    def watch(replay: Replay, frame: np.ndarray) -> None:
+        seen.append(at_work(frame, replay))
+        places.append(replay.handles.places[len(recipe.pin) :] / replay.grid.extent)
+
+    studio.play("handles-tree", watch=watch, **short)
+    ways = [np.hypot(*np.subtract(handle.to or handle.at, handle.at)) for handle in recipe.handle]
+    far, scale = int(np.argmax(ways)), (gallery.WIDE, len(seen[0]))
+    assert np.abs(places[-1][far] - places[0][far]).max() * gallery.WIDE > 10
+    for frame, place in ((seen[0], places[0][far]), (seen[-1], places[-1][far])):
+        x, y = (place * scale).astype(int)
+        assert np.abs(frame[y - 1 : y + 2, x - 1 : x + 2].astype(int) - gallery.FORCE).max() < 60
+    x, y = np.multiply(recipe.handle[far].to or (0, 0), scale).astype(int)
+    assert np.abs(seen[0][y, x - 7 : x + 8].astype(int) - gallery.INK).max(axis=-1).min() < 60, "a ring"
     studio.there_and_back("a.webp", seen[:3])
     with Image.open(studio.folder / "a.webp") as image:
         assert (image.size, getattr(image, "n_frames", 1)) == (scale, 4)
