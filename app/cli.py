@@ -310,16 +310,21 @@ def fit(
     recipe: Annotated[
         str, typer.Argument(metavar="RECIPE", help="A recipe (.toml), or the name of one that comes with fluidwarp.")
     ],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="The recipe to write.")],
     pairs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Where points are and where they should be: a CSV of x0,y0,x1,y1 in pixels, a .tps of two specimens, "
-            "or two .pts or .tps, by --pairs twice.",
+            help="Where points are and where they should be: a CSV of x0,y0,x1,y1 in pixels, with a column curve for "
+            "polylines, a .tps of two specimens, or two .pts or .tps, by --pairs twice. Without it and --masks: the "
+            "recipe's own handles.",
             readable=False,
         ),
-    ],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="The recipe to write.")],
+    ] = None,
+    masks: Annotated[
+        tuple[Path, Path] | None,
+        typer.Option(metavar="FROM TO", help="Two masks: the outline of what is white in FROM goes to that in TO."),
+    ] = None,
     arrived: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write where the points arrive: .csv, .pts or .tps.")
     ] = None,
@@ -329,6 +334,10 @@ def fit(
     evaluations: Annotated[
         int, typer.Option(min=1, max=100_000, help="Replays on a coarse grid that may be made.")
     ] = 32,
+    local: Annotated[
+        float | None,
+        typer.Option(min=0, max=1, help="From 0, a fluid's push, to 1, what is under a point alone: 1 of curves."),
+    ] = None,
     time_limit: Annotated[
         float | None, typer.Option(min=0, help="Seconds after which the best so far is taken.")
     ] = None,
@@ -344,7 +353,7 @@ def fit(
     from app.work.fit_job import FitJob
     from solver.gl.device import Device
 
-    job = FitJob(recipe, tuple(pairs), output, arrived, image, evaluations, max_pixels)
+    job = FitJob(recipe, tuple(pairs or ()), masks, output, arrived, image, evaluations, local, max_pixels)
     job.check()
     until = None if time_limit is None else monotonic() + time_limit
     with on_terminal(output.name, None, at_once=None) as progress, Device.headless() as device:

@@ -18,6 +18,7 @@ from app.media.files import make_folder
 from app.media.pictures import read_picture, write_picture
 from app.media.recipes import read_recipe
 from app.model.forces import CurveForce, GradientForce, PointForce
+from app.model.handles import RecipeHandle
 from app.model.masks import solid
 from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
@@ -32,6 +33,7 @@ from solver.warp.distortion import MapStatistics
 
 FPS = 30
 LINGER = 24  # frames that the last one stands still
+WIDE, EVERY, STILL = 440, 4, 15  # of animations of handles: pixels, ticks a frame, frames that the ends stand still
 COMPARED = 512  # pixels along the longer side, in which displacements are told
 
 PAPER, INK, FORCE = (250, 249, 246), (38, 38, 44), (214, 40, 40)
@@ -81,9 +83,10 @@ class Studio:
         name: str,
         stills: Iterable[float] = (),
         save_as: str | None = None,
+        watch: Callable[[Replay, np.ndarray], object] = lambda replay, frame: None,
         **parts: object,
     ) -> Played:
-        """Play the recipe `name`, changed by `parts`, and write its result and animation."""
+        """Play the recipe `name`, changed by `parts`, and write its result and animation; `watch` sees every frame."""
         recipe = load(name).edited(**parts)
         source = source_of(recipe)
         ticks = {round(time / recipe.fluid.dt): time for time in stills}
@@ -95,6 +98,7 @@ class Studio:
             nonlocal frame
             frame = self._frame(replay, source)
             write(frame)
+            watch(replay, frame)
             if replay.tick in ticks:
                 kept[ticks[replay.tick]] = frame
 
@@ -143,6 +147,15 @@ class Studio:
             return (np.clip(replay.density.get()[..., :3], 0, 1) * 255 + 0.5).astype(np.uint8)
         how = Sampling(edges=replay.recipe.edges, samples=replay.recipe.output.samples)
         return self.sampler.apply(replay.warp, source, how=how)
+
+    def there_and_back(self, name: str, frames: list[np.ndarray]) -> None:
+        """Write a small animation that stands still at both ends, and goes on without one."""
+        lasting = [1] * (2 * len(frames) - 2)
+        lasting[0] = lasting[len(frames) - 1] = STILL
+        path = self.folder / name
+        with animation_writer(path, FPS / 2, quality=60, durations=lasting, cancel=self.progress.cancel) as write:
+            for frame in (*frames, *frames[-2:0:-1]):
+                write(frame)
 
     def sheet(self, name: str, title: str, panels: list[tuple[str, np.ndarray]], height: int = PANEL) -> None:
         """Write a contact sheet: panels of one height side by side, with their captions."""
@@ -263,33 +276,18 @@ def guide_viscosity(studio: Studio) -> Numbers:
 
 
 def handles_smile(studio: Studio) -> Numbers:
-    """A smile by handles, beside the thin-plate spline of the same points."""
-    played = studio.play("handles-smile")
-    height, width = played.source.shape[:2]
-    mine, theirs = played.displacement.astype(np.float64), spline_of(played.recipe, (width, height))
-    other = studio.sampler.apply(
-        GivenMap(studio.device, theirs.astype(np.float32)), played.source, how=Sampling(edges=played.recipe.edges)
-    )
-    ours, splines = (stretch_and_det(displacement) for displacement in (mine, theirs))
-    studio.sheet(
-        "handles-smile",
-        "A smile by handles, and by a thin-plate spline",
-        [
-            ("a  source; handles and pins", led(played.source, played.recipe)),
-            ("b  handles", marked(played.result, ours[1])),
-            ("c  thin-plate spline; folds in red", marked(other, splines[1])),
-        ],
-    )
-    return {
-        key: value
-        for name, (stretch, det) in (("handles", ours), ("spline", splines))
-        for key, value in {
-            f"{name}: stretch, mean": f"{stretch.mean():.3f}",
-            f"{name}: 99th percentile": f"{np.percentile(stretch, 99):.2f}",
-            f"{name}: least det": f"{det.min():.2f}",
-            f"{name}: folds": f"{(det <= 0).sum()}",
-        }.items()
-    }
+    """A smile by handles."""
+    return _beside_spline(studio, "handles-smile", "A smile by handles, and by a thin-plate spline")
+
+
+def handles_tree(studio: Studio) -> Numbers:
+    """Trees bent along curves."""
+    return _beside_spline(studio, "handles-tree", "Trees bent along curves, and by a thin-plate spline")
+
+
+def handles_logo(studio: Studio) -> Numbers:
+    """A logo fitted to an outline, and the handles at work on it, for the README."""
+    return _beside_spline(studio, "handles-logo", "A logo fitted to a heart, and by a thin-plate spline")
 
 
 FIGURES: dict[str, Callable[[Studio], Numbers]] = {
@@ -301,7 +299,10 @@ FIGURES: dict[str, Callable[[Studio], Numbers]] = {
     "guide-forces": guide_forces,
     "guide-viscosity": guide_viscosity,
     "handles-smile": handles_smile,
+    "handles-tree": handles_tree,
+    "handles-logo": handles_logo,
 }
+HANDLES = ("handles-smile", "handles-tree", "handles-logo")
 RECIPES = (
     "figure-1",
     "figure-1",
@@ -311,9 +312,47 @@ RECIPES = (
     "figure-5-freeze",
     "figure-6",
     "figure-6-freeze",
-    "handles-smile",
+    *HANDLES,
 )
 GUIDE = ("guide-forces", "guide-viscosity")
+
+
+def _beside_spline(studio: Studio, name: str, title: str) -> Numbers:
+    """Points moved by handles, and by the thin-plate spline of the same points."""
+    frames: list[np.ndarray] = []
+
+    def watch(replay: Replay, frame: np.ndarray) -> None:
+        if replay.tick % EVERY == 0:
+            frames.append(at_work(frame, replay))
+
+    played = studio.play(name, watch=watch)
+    studio.there_and_back(f"{name}.webp", frames)
+    height, width = played.source.shape[:2]
+    mine, theirs = played.displacement.astype(np.float64), spline_of(played.recipe, (width, height))
+    other = studio.sampler.apply(
+        GivenMap(studio.device, theirs.astype(np.float32)), played.source, how=Sampling(edges=played.recipe.edges)
+    )
+    ours, splines = ((*stretch_and_det(each), beyond(each)) for each in (mine, theirs))
+    studio.sheet(
+        name,
+        title,
+        [
+            ("a  source; handles and pins", led(played.source, played.recipe)),
+            ("b  handles", marked(played.result, ours[1])),
+            ("c  thin-plate spline; folds in red", marked(other, splines[1])),
+        ],
+    )
+    return {
+        key: value
+        for name, (stretch, det, outside) in (("handles", ours), ("spline", splines))
+        for key, value in {
+            f"{name}: stretch, mean": f"{stretch.mean():.3f}",
+            f"{name}: 99th percentile": f"{np.percentile(stretch, 99):.2f}",
+            f"{name}: least det": f"{det.min():.2f}",
+            f"{name}: folds": f"{(det <= 0).sum()}",
+            f"{name}: from beyond the edge": f"{outside:.1%}",
+        }.items()
+    }
 
 
 def _panels(recipe: Recipe) -> int:
@@ -457,8 +496,17 @@ def stretch_and_det(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     h = 1 / max(displacement.shape[:2])
     slopes = [np.gradient(displacement, h, axis=axis) for axis in (1, 0)]
     jacobian = np.stack(slopes, axis=-1) + np.eye(2)
-    stretch = np.linalg.svd(jacobian, compute_uv=False)
-    return np.maximum(stretch[..., 0], 1 / np.maximum(stretch[..., 1], 1e-3)), np.linalg.det(jacobian)
+    # The singular values of a 2 x 2 matrix: the sum of their squares is that of its entries, their product the det.
+    squares, det = (jacobian**2).sum(axis=(-2, -1)), np.linalg.det(jacobian)
+    largest = np.sqrt((squares + np.sqrt(np.maximum(squares**2 - 4 * det**2, 0))) / 2)
+    return np.maximum(largest, 1 / np.maximum(abs(det) / np.maximum(largest, 1e-12), 1e-3)), det
+
+
+def beyond(displacement: np.ndarray) -> float:
+    """The part of the pixels that look up what is outside the picture, by more than half a pixel."""
+    height, width = displacement.shape[:2]
+    y, x = np.mgrid[:height, :width] + 0.5 + np.moveaxis(displacement[..., ::-1], -1, 0) * max(height, width)
+    return float(((x < -0.5) | (x > width + 0.5) | (y < -0.5) | (y > height + 0.5)).mean())
 
 
 # What is shown ------------------------------------------------------------------------------------------------------
@@ -506,10 +554,25 @@ def led(pixels: np.ndarray, recipe: Recipe) -> np.ndarray:
     for handle in recipe.handle:
         start, end = np.array(handle.at) * size, np.array(handle.goal or handle.at) * size
         far = max(float(np.hypot(*(end - start))), 1e-9)
-        _arrow(pen, (start + end) / 2, (end - start) / far, far)
+        _arrow(pen, (start + end) / 2, (end - start) / far, far, max(width, height) * finer / 16)
     for pin in recipe.pin:
         pen.circle([*(np.array(pin.at) * size)], 4 * finer, outline=FORCE, width=2 * finer)
     return np.asarray(image.resize((width, height), Image.Resampling.BOX))
+
+
+def at_work(pixels: np.ndarray, replay: Replay) -> np.ndarray:
+    """A frame, `WIDE` pixels wide, with handles as dots on their ways to rings, and pins as rings with a dot."""
+    finer, height = 3, round(WIDE * len(pixels) / len(pixels[0]))
+    image = Image.fromarray(pixels).resize((WIDE * finer, height * finer), Image.Resampling.BICUBIC)
+    pen, extent = ImageDraw.Draw(image), np.array(replay.grid.extent)
+    for (_, each), place in zip(replay.led, replay.handles.places, strict=True):
+        goal = np.array(getattr(each, "goal", None) or each.at) * image.size
+        now = place / extent * image.size
+        pen.line([*now, *goal], INK, finer)
+        pen.circle([*goal], 5 * finer, outline=INK, width=finer)
+        pen.circle([*now], 5 * finer, PAPER)
+        pen.circle([*now], 3.5 * finer, FORCE if isinstance(each, RecipeHandle) else INK)
+    return np.asarray(image.reduce(finer))
 
 
 def marked(pixels: np.ndarray, det: np.ndarray) -> np.ndarray:
@@ -517,12 +580,15 @@ def marked(pixels: np.ndarray, det: np.ndarray) -> np.ndarray:
     return np.where((det <= 0)[..., None], np.array(FORCE, np.uint8), pixels)
 
 
-def _arrow(pen: ImageDraw.ImageDraw, middle: np.ndarray, way: np.ndarray, length: float) -> None:
+def _arrow(
+    pen: ImageDraw.ImageDraw, middle: np.ndarray, way: np.ndarray, length: float, stout: float = float("inf")
+) -> None:
+    """An arrow, as wide as one of a length of `stout` at most."""
     across = np.array([-way[1], way[0]])
-    tail, tip = middle - way * length / 2, middle + way * length / 2
-    neck = tip - way * 0.38 * length
-    pen.line([*tail, *neck], FORCE, max(2, round(0.11 * length)))
-    pen.polygon([*tip, *(neck + across * 0.2 * length), *(neck - across * 0.2 * length)], FORCE)
+    tail, tip, size = middle - way * length / 2, middle + way * length / 2, min(length, stout)
+    neck = tip - way * 0.38 * size
+    pen.line([*tail, *neck], FORCE, max(2, round(0.11 * size)))
+    pen.polygon([*tip, *(neck + across * 0.2 * size), *(neck - across * 0.2 * size)], FORCE)
 
 
 def shades(viscosity: np.ndarray, like: np.ndarray) -> np.ndarray:

@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy import ndimage
 
 from app import gallery
 from app.errors import UserError
-from app.gallery import Studio, arrows, contact_sheet, light, load, shades, sharpness, spline_warp
+from app.gallery import Studio, arrows, at_work, contact_sheet, light, load, shades, sharpness, source_of, spline_warp
 from app.media.auxiliary import Pictures
+from app.media.landmarks import read_pairs
+from app.media.outlines import read_outlines
 from app.media.pictures import read_picture
 from app.model.picture import Picture
 from app.progress import Progress
@@ -74,7 +77,7 @@ def test_what_is_played_ends_as_the_still_and_as_a_replay(studio: Studio) -> Non
     replay.release()
 
 
-@pytest.mark.parametrize("name", sorted({*gallery.RECIPES, *gallery.GUIDE} - {"handles-smile"}))
+@pytest.mark.parametrize("name", sorted({*gallery.RECIPES, *gallery.GUIDE} - {*gallery.HANDLES}))
 def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str) -> None:
     from app.model.forces import build
 
@@ -128,6 +131,41 @@ def test_the_spline_of_a_recipe_looks_its_handles_up_where_they_go() -> None:
         x, y = (getattr(each, "to", None) or each.at)[0] * 600, (getattr(each, "to", None) or each.at)[1] * 600
         near = ndimage.map_coordinates(displacement[..., 0], [[y - 0.5], [x - 0.5]], order=3)
         assert near[0] == pytest.approx(each.at[0] - x / 600, abs=1e-4)
+
+
+def test_the_fitted_recipes_lead_the_points_of_their_files() -> None:
+    folder = gallery.recipes_folder()
+    for name, read in (
+        ("handles-tree", lambda size: read_pairs([folder / "handles-tree.csv"], size).places * size),
+        ("handles-logo", lambda size: read_outlines(folder / "logo-disc.png", folder / "logo-heart.png", size)[0]),
+    ):
+        recipe = load(name)
+        height, width = source_of(recipe).shape[:2]
+        led = np.array([(handle.at, handle.to) for handle in recipe.handle]) * (width, height)
+        np.testing.assert_allclose(led, read((width, height)), atol=1e-3)
+
+
+def test_handles_at_work_are_shown_where_they_are_and_shall_be(studio: Studio) -> None:
+    recipe = load("handles-tree")
+    short = {"duration": 0.4, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
+    seen, places = list[np.ndarray](), list[np.ndarray]()
+
+    def watch(replay: Replay, frame: np.ndarray) -> None:
+        seen.append(at_work(frame, replay))
+        places.append(replay.handles.places[len(recipe.pin) :] / replay.grid.extent)
+
+    studio.play("handles-tree", watch=watch, **short)
+    ways = [np.hypot(*np.subtract(handle.to or handle.at, handle.at)) for handle in recipe.handle]
+    far, scale = int(np.argmax(ways)), (gallery.WIDE, len(seen[0]))
+    assert np.abs(places[-1][far] - places[0][far]).max() * gallery.WIDE > 10
+    for frame, place in ((seen[0], places[0][far]), (seen[-1], places[-1][far])):
+        x, y = (place * scale).astype(int)
+        assert np.abs(frame[y - 1 : y + 2, x - 1 : x + 2].astype(int) - gallery.FORCE).max() < 60
+    x, y = np.multiply(recipe.handle[far].to or (0, 0), scale).astype(int)
+    assert np.abs(seen[0][y, x - 7 : x + 8].astype(int) - gallery.INK).max(axis=-1).min() < 60, "a ring"
+    studio.there_and_back("a.webp", seen[:3])
+    with Image.open(studio.folder / "a.webp") as image:
+        assert (image.size, getattr(image, "n_frames", 1)) == (scale, 4)
 
 
 def test_folds_are_found_and_marked() -> None:

@@ -1,4 +1,4 @@
-"""Point correspondences in files of other programs: CSV, .pts of face databases (300-W), .tps of tpsDig."""
+"""Correspondences in files of other programs: CSV, .pts of face databases (300-W), .tps of tpsDig."""
 
 from __future__ import annotations
 
@@ -7,38 +7,64 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from app.errors import UserError
 from app.media.files import replacing
 from app.media.inputs import read_input
+from app.media.outlines import SPACING, paired
 
 MOST_BYTES = 4 * 2**20
 FARTHEST = 1e6  # pixels: nobody's landmark lies beyond
 ENDINGS = (".csv", ".pts", ".tps")
+
+COLUMNS = "x0", "y0", "x1", "y1"
+CURVE = "curve"  # the column of a CSV file that names the curve a place is on
 
 Lines = Iterator[tuple[int, str]]
 Size = tuple[int, int]
 """(width, height) of the picture in pixels."""
 
 
-def read_pairs(paths: Sequence[Path], size: Size) -> np.ndarray:
+class Pairs(NamedTuple):
+    """Places that correspond.
+
+    Attributes:
+        places: (n, 2, 2), of each where it is and where it should be, as fractions of the picture's width and height.
+        curves: the curve that each lies on, in the order in which it is gone along; "" of points by themselves.
+    """
+
+    places: np.ndarray
+    curves: tuple[str, ...]
+
+    @classmethod
+    def points(cls, places: np.ndarray) -> Pairs:
+        """Points by themselves, (n, 2, 2)."""
+        return cls(places, ("",) * len(places))
+
+
+def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
     """The correspondences in a CSV file, a .tps file of two specimens, or two files of one set of landmarks each.
 
     CSV has x0, y0, x1, y1 in pixels from the picture's top-left corner, y down; .pts counts pixels from 1, as is the
-    custom, so that (1, 1) is the middle of the first; .tps counts y from the picture's lower edge.
-
-    Returns:
-        (n, 2, 2): of each pair where it is and where it should be, as fractions of width and height.
+    custom, so that (1, 1) is the middle of the first; .tps counts y from the picture's lower edge. With a header, CSV
+    may have a column `curve`: places of one name are the corners of a polyline and of the one it should become, which
+    need not have as many (x0 and y0, or x1 and y1, may be empty), and both are divided evenly along their lengths.
 
     Raises:
         UserError: naming the file and the line, or if they are not two sets of as many landmarks.
     """
+    told = " and ".join(str(path) for path in paths)
+    if len(paths) == 1 and check_ending(paths[0]) == ".csv":
+        pixels, curves = _read_csv(paths[0], _lines(paths[0]), SPACING * max(size))
+        if not len(pixels):
+            raise UserError(f"{told} has no pairs")
+        return Pairs(pixels / size, curves)
     sets: list[np.ndarray] = []
     for path in paths:
         sets += _read(path, size)
-    told = " and ".join(str(path) for path in paths)
     if len(sets) != 2:
         found = f"{len(sets)} sets of landmarks" if len(sets) != 1 else "one set of landmarks"
         raise UserError(f"{told} has {found}; pairs need two, where the points are and where they should be")
@@ -46,19 +72,23 @@ def read_pairs(paths: Sequence[Path], size: Size) -> np.ndarray:
         raise UserError(f"{told}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}")
     if not len(sets[0]):
         raise UserError(f"{told} has no pairs")
-    return np.stack(sets, axis=1) / size
+    return Pairs.points(np.stack(sets, axis=1) / size)
 
 
-def write_pairs(path: Path, pairs: np.ndarray, size: Size) -> None:
+def write_pairs(path: Path, pairs: Pairs, size: Size) -> None:
     """Write correspondences as `read_pairs` gives them; .pts has one set only, and gets where the points should be.
+
+    Only CSV knows curves; in the others their points are points.
 
     Raises:
         UserError: if it cannot be written, or the ending is none of `ENDINGS`.
     """
-    pixels = pairs * size
+    pixels = pairs.places * size
     match check_ending(path):
         case ".csv":
-            lines = ["x0,y0,x1,y1", *(",".join(map(_shown, pair)) for pair in pixels.reshape(-1, 4))]
+            lines = [",".join(COLUMNS), *(",".join(map(_shown, pair)) for pair in pixels.reshape(-1, 4))]
+            if any(pairs.curves):
+                lines = [f"{curve},{line}" for curve, line in zip((CURVE, *pairs.curves), lines, strict=True)]
         case ".pts":
             rows = (f"{_shown(x)} {_shown(y)}" for x, y in pixels[:, 1] + 0.5)
             lines = ["version: 1", f"n_points: {len(pixels)}", "{", *rows, "}"]
@@ -84,31 +114,55 @@ def _shown(number: float) -> str:
 
 def _read(path: Path, size: Size) -> list[np.ndarray]:
     """The sets of landmarks (n, 2) in a file, in pixels from the top-left corner."""
-    ending = check_ending(path)
+    match check_ending(path):
+        case ".csv":
+            found, _ = _read_csv(path, _lines(path), SPACING * max(size))
+            return [found[:, 0], found[:, 1]]
+        case ".pts":
+            return [_read_pts(path, _lines(path)) - 0.5]
+        case _:
+            return [points * (1, -1) + (0, size[1]) for points in _read_tps(path, _lines(path))]
+
+
+def _lines(path: Path) -> Lines:
+    """The numbered lines of a file that say something."""
     try:
         text = read_input(path, "file of pairs", MOST_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UserError(f"Cannot read {path}: it is not text, or not saved as UTF-8.") from None
     lines = ((number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
-    filled = ((number, line) for number, line in lines if line and not line.startswith("#"))
-    match ending:
-        case ".csv":
-            return _read_csv(path, filled)
-        case ".pts":
-            return [_read_pts(path, filled) - 0.5]
-        case _:
-            return [points * (1, -1) + (0, size[1]) for points in _read_tps(path, filled)]
+    return ((number, line) for number, line in lines if line and not line.startswith("#"))
 
 
-def _read_csv(path: Path, lines: Lines) -> list[np.ndarray]:
-    rows: list[list[float]] = []
+def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Pairs (n, 2, 2) in pixels and the curve of each, whose points are so many pixels apart at most."""
+    columns, groups = list(COLUMNS), dict[tuple[str, int], tuple[list[list[float]], list[list[float]]]]()
     for first, (number, line) in enumerate(lines):
         words = re.split(r"\s*[,;\t]\s*", line)
         if first == 0 and not any(map(_is_number, words)):
-            continue  # the header
-        rows.append(_numbers(path, number, line, words, 4, "x0,y0,x1,y1"))
-    found = np.reshape(rows, (-1, 4))
-    return [found[:, :2], found[:, 2:]]
+            if CURVE in (named := [word.lower() for word in words]):
+                if sorted(named) != sorted((CURVE, *COLUMNS)):
+                    raise _bad(path, number, f"expected the columns {CURVE},{','.join(COLUMNS)}, and not {line[:40]!r}")
+                columns = named
+            continue
+        wanted = ",".join(columns)
+        if len(words) != len(columns):
+            raise _bad(path, number, f"expected {wanted}, and not {line[:40]!r}")
+        row = dict(zip(columns, words, strict=True))
+        curve = row.get(CURVE, "")
+        sides = [[row[name] for name in side] for side in (COLUMNS[:2], COLUMNS[2:])]
+        for side, places in zip(sides, groups.setdefault((curve, 0 if curve else number), ([], [])), strict=True):
+            if any(side) or not curve:
+                places.append(_numbers(path, number, line, side, 2, wanted))
+    pairs, curves = [np.zeros((0, 2, 2))], []
+    for (curve, _), (here, there) in groups.items():
+        try:
+            found = paired(np.array(here), np.array(there), spacing) if curve else np.array([[*here, *there]])
+        except ValueError as error:
+            raise UserError(f"{path}: the curve {curve[:40]!r} {error}") from None
+        pairs.append(found)
+        curves += [curve] * len(found)
+    return np.concatenate(pairs), tuple(curves)
 
 
 def _read_pts(path: Path, lines: Lines) -> np.ndarray:

@@ -14,6 +14,7 @@ from app.ui.dialogs import Dialogs, Preferring
 from app.ui.editor_state import EditorState
 from app.ui.exporting import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
+from app.ui.fitting import Fits
 from app.ui.keys import Keys
 from app.ui.messages import Messages
 from app.ui.pointer import PointerController
@@ -38,6 +39,7 @@ class Commands:
     files: Files
     chooser: FileChooser
     exports: Exports
+    fits: Fits
     dialogs: Dialogs
     messages: Messages
     preferences: Preferences

@@ -25,6 +25,7 @@ from app.ui.editor_state import EditorState
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Text, Wheel
 from app.ui.exporting import Exports
 from app.ui.files import Files
+from app.ui.fitting import Fits
 from app.ui.imgui_backend import ImGuiBackend
 from app.ui.journals import Journals
 from app.ui.keys import Keys
@@ -43,6 +44,8 @@ from app.ui.workspace import Workspace
 from app.work.recovery import Found
 from app.work.session import Session
 from solver.gl.device import Device
+
+BELOW = 64.0  # points that what is told of a fit lies below what is told of an export
 
 
 class Editor:
@@ -78,7 +81,8 @@ class Editor:
         self.workspace = Workspace(device, self.journals, Viewport(self.layout.canvas, (1, 1)))
         self.files = Files(self.workspace, self.chooser, self.dialogs, self.messages, likes, self.open)
         self.exports = Exports(self.messages)
-        self.quality = Quality(self.workspace, self.state, self.files, self.exports, self.messages)
+        self.fits = Fits(self.workspace, self.messages)
+        self.quality = Quality(self.workspace, self.state, self.files, self.exports, self.fits, self.messages)
         self.recovery = Recovery(self.journals, self.dialogs, self.messages, self.files.restore)
         self.selecting = Selecting(self.workspace, self.state, self.messages)
         self.pointer = PointerController(
@@ -91,8 +95,8 @@ class Editor:
             lambda: self._key("space", "space"),
         )
         self.commands = Commands(
-            self.workspace, self.state, self.pointer, self.files, self.chooser, self.exports, self.dialogs,
-            self.messages, likes, self.selecting, self.keys,
+            self.workspace, self.state, self.pointer, self.files, self.chooser, self.exports, self.fits,
+            self.dialogs, self.messages, likes, self.selecting, self.keys,
         )  # fmt: skip
         self._styled: tuple[object, ...] = ()
         self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken
@@ -130,6 +134,7 @@ class Editor:
     def release(self) -> None:
         """Free everything."""
         self.exports.cancel()
+        self.fits.give_up()
         self.files.give_up_loading()
         self.remember()
         self.recovery.later()
@@ -198,7 +203,8 @@ class Editor:
         if self.clock.hovering:
             return PACE
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
-        elsewhere = self.exports.is_running or self.chooser.is_waiting or self.files.is_loading or self.recovery.is_busy
+        working = self.exports.is_running or self.fits.is_running
+        elsewhere = working or self.chooser.is_waiting or self.files.is_loading or self.recovery.is_busy
         if elsewhere or self.dialogs.is_busy or self.selecting.is_busy:
             return 0.1
         return min(self.messages.next_in or 60.0, 60.0)
@@ -307,6 +313,7 @@ class Editor:
             self.messages.say(self.session.notice)
             self.session.notice = None
         self.exports.draw(self.ui, self.layout.canvas)
+        self.fits.draw(self.ui, self.layout.canvas, BELOW if self.exports.is_running else 0.0)
         self.files.draw(self.ui, self.layout.canvas)
         self.messages.draw(self.ui, self.layout.canvas)
         self.files.poll()

@@ -516,23 +516,29 @@ class Exports:
                     self.messages.say(notice)
                 self.messages.done(f"Exported {process.job.target.name} to {process.job.target.parent}")
             return
-        with ui.floating("exporting", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
-            imgui.begin_group()
-            state = f": {process.state}" if process.state else ""
-            width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
-            imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
-            doing = "Copying" if self._copied is not None else "Exporting"
-            ui.text(f"{doing} {process.job.target.stem if self._copied else process.job.target.name}{state}", size=14)
-            imgui.pop_text_wrap_pos()
-            corner = imgui.get_cursor_screen_pos()
-            lines = imgui.get_window_draw_list()
-            high = ImVec2(corner.x + width, corner.y + ui.px(5))
-            lines.add_rect_filled(corner, high, packed(ui.palette.pressed), ui.px(3))
-            part = ImVec2(corner.x + max(width * process.part, ui.px(5)), high.y)
-            lines.add_rect_filled(corner, part, packed(ui.palette.accent), ui.px(3))
-            imgui.dummy(ImVec2(width, ui.px(8)))
-            imgui.end_group()
-            imgui.same_line(0, ui.px(16))
-            if ui.button("Cancel##export", height=30):
-                self.cancel()
-                self.messages.say("Cancelled; nothing half-written is left.")
+        state = f": {process.state}" if process.state else ""
+        copied = self._copied is not None
+        words = f"Copying {process.job.target.stem}" if copied else f"Exporting {process.job.target.name}"
+        if under_way(ui, "exporting", canvas, 0.0, words + state, process.part, "Cancel"):
+            self.cancel()
+            self.messages.say("Cancelled; nothing half-written is left.")
+
+
+def under_way(ui: Ui, name: str, canvas: Rect, down: float, words: str, part: float, button: str) -> bool:
+    """What is being done and how much of it, so many points below the canvas's edge; True if the button is pressed."""
+    with ui.floating(name, canvas.x + canvas.width / 2, canvas.y + ui.px(16 + down), (0.5, 0)):
+        imgui.begin_group()
+        width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
+        imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
+        ui.text(words, size=14)
+        imgui.pop_text_wrap_pos()
+        corner = imgui.get_cursor_screen_pos()
+        lines = imgui.get_window_draw_list()
+        high = ImVec2(corner.x + width, corner.y + ui.px(5))
+        lines.add_rect_filled(corner, high, packed(ui.palette.pressed), ui.px(3))
+        done = ImVec2(corner.x + max(width * part, ui.px(5)), high.y)
+        lines.add_rect_filled(corner, done, packed(ui.palette.accent), ui.px(3))
+        imgui.dummy(ImVec2(width, ui.px(8)))
+        imgui.end_group()
+        imgui.same_line(0, ui.px(16))
+        return ui.button(f"{button}##{name}", height=30)

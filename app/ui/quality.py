@@ -11,6 +11,7 @@ from app.ui.canvas import MOVING
 from app.ui.editor_state import EditorState
 from app.ui.exporting import Exports
 from app.ui.files import Files, fresh_recipe, settings_of
+from app.ui.fitting import Fits
 from app.ui.messages import Messages
 from app.ui.workspace import Workspace
 from app.work.recovery import Found
@@ -71,7 +72,7 @@ class Quality:
     prepared while nothing moves, and takes the place of this one when it is where this one is.
 
     Attributes:
-        files, exports: what is read and written has the machine first.
+        files, exports, fits: what is read, written and searched has the machine first.
         speed: of this machine, once it has been measured.
         grid: that painting has been well on.
     """
@@ -80,6 +81,7 @@ class Quality:
     state: EditorState
     files: Files
     exports: Exports
+    fits: Fits
     messages: Messages
     speed: Speed | None = None
     grid: int | None = None
@@ -206,7 +208,8 @@ class Quality:
     @property
     def is_preparing(self) -> bool:
         """Another grid is wanted, and there is time for it."""
-        busy = self.workspace.session.is_moving or self.files.is_loading or self.exports.is_running
+        elsewhere = self.files.is_loading or self.exports.is_running or self.fits.is_running
+        busy = self.workspace.session.is_moving or elsewhere
         return self._wanted is not None and self.is_on and not busy
 
     def _judge(self, dt: float) -> None:

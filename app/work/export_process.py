@@ -1,37 +1,46 @@
-"""An export in a process of its own, with a GL of its own: the same replay as the command line's."""
+"""An export or a fit in a process of its own, with a GL of its own: the same replay as the command line's."""
 
 from __future__ import annotations
 
 import queue
 import threading
 
+from app.work.fit_job import Fit
 from app.work.jobs import Job
-from app.work.worker import Heard, Outcome, Part, Worker
+from app.work.worker import Heard, Outcome, Part, Work, Worker
 
 
-class ExportProcess:
-    """A job that is being done elsewhere.
+class WorkProcess:
+    """A piece of work that is being done elsewhere.
+
+    Args:
+        work: what is done.
+        died: what is said if its process dies.
 
     Attributes:
-        job: what is done.
         part: how much of it is done, 0-1.
         state: what is being done beside the work itself, as "writing"; or "".
         is_done: it has ended, well or not.
         error: why it failed, as a sentence; "" if it did not.
-        notices: what the person should hear of it, once it has ended well.
+        outcome: how it went, once it has ended by itself.
     """
 
-    def __init__(self, job: Job) -> None:
-        self.job = job
+    def __init__(self, work: Work, died: str) -> None:
         self.part = 0.0
         self.state = ""
         self.is_done = False
         self.error = ""
-        self.notices: tuple[str, ...] = ()
+        self.outcome = Outcome("")
+        self._died = died
         self._inbox: queue.SimpleQueue[tuple[Worker, Heard]] = queue.SimpleQueue()
         self._worker = Worker(self._inbox)
         # A picture is more than a pipe holds: the window would wait until the other is awake.
-        threading.Thread(target=self._worker.begin, args=(job,), daemon=True).start()
+        threading.Thread(target=self._worker.begin, args=(work,), daemon=True).start()
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What the person should hear of it, once it has ended well."""
+        return self.outcome.notices
 
     def poll(self) -> None:
         """Hear how far it is."""
@@ -40,13 +49,32 @@ class ExportProcess:
                 case Part(done, state):
                     self.part, self.state = done, state
                 case Outcome() as outcome:
-                    self.is_done, self.error, self.notices = True, outcome.in_window, outcome.notices
+                    self.is_done, self.error, self.outcome = True, outcome.in_window, outcome
                 case None:
-                    self.is_done = True
-                    self.error = f"The export of {self.job.target.name} stopped unexpectedly; try a smaller size."
+                    self.is_done, self.error = True, self._died
         if self.is_done:
             self._worker.end()
 
     def stop(self) -> None:
         """End it; nothing of it is left."""
         self._worker.end()
+
+
+class ExportProcess(WorkProcess):
+    """A job that is being done elsewhere."""
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        super().__init__(job, f"The export of {job.target.name} stopped unexpectedly; try a smaller size.")
+
+
+class FitProcess(WorkProcess):
+    """A fit that is being made elsewhere."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit = fit
+        super().__init__(fit, "The fit stopped unexpectedly, perhaps for want of memory.")
+
+    def finish(self) -> None:
+        """Let it end with the best that it has."""
+        threading.Thread(target=self._worker.finish, daemon=True).start()

@@ -1,21 +1,48 @@
-"""`fluidwarp fit`: a recipe, a picture and files of pairs made into the file of a fitted recipe."""
+"""A fit, as the window and `fluidwarp fit` ask for it: of a recipe's own handles, or of pairs in files."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from app.errors import UserError
 from app.media.files import check_kept, replacing, writable
-from app.media.landmarks import check_ending, read_pairs, write_pairs
+from app.media.landmarks import Pairs, check_ending, read_pairs, write_pairs
 from app.media.opening import Opened, check_picture
+from app.media.outlines import read_outlines
 from app.media.project import picture_names
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
-from app.work.fitting import Fitted, fitted
+from app.work.fitting import EVALUATIONS, Fitted, fitted
 from app.work.tasks import opened
 from solver.gl.device import Device
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What is fitted, in itself: see `fitted`. Stopped, it ends with the best so far."""
+
+    recipe: Recipe
+    picture: Picture
+    folder: Path
+    pairs: Pairs | None = None
+    evaluations: int = EVALUATIONS
+    local: float | None = None
+
+    @property
+    def label(self) -> str:
+        """What the user calls it."""
+        return "the fit"
+
+    def perform(self, device: Device, progress: Progress) -> Fitted:
+        """Do it. Raises `UserError`, and `Cancelled` if nothing has been found yet."""
+        check_picture(self.picture)
+        how = self.evaluations, self.local
+        return fitted(device, self.recipe, self.picture, self.folder, self.pairs, progress, *how)
 
 
 @dataclass(frozen=True)
@@ -25,19 +52,22 @@ class FitJob:
     Attributes:
         recipe: a file, or the name of one that comes with fluidwarp.
         pairs: files of pairs; see `read_pairs`.
+        masks: two masks, whose outlines are pairs too; without these and without `pairs`, the recipe's own handles are.
         output: the recipe that is written.
         arrived: where the points arrive, if that is written.
         image: the picture, instead of the recipe's own.
-        evaluations: see `fitted`.
+        evaluations, local: see `fitted`.
         max_pixels: larger pictures are refused.
     """
 
     recipe: str
     pairs: tuple[Path, ...]
+    masks: tuple[Path, Path] | None
     output: Path
     arrived: Path | None
     image: Path | None
     evaluations: int
+    local: float | None
     max_pixels: int
 
     def check(self) -> None:
@@ -46,7 +76,7 @@ class FitJob:
             raise UserError(f"{self.output}: a fitted recipe is a file that ends with .toml")
         for path in filter(None, (self.output, self.arrived)):
             writable(path)
-            for source in (*self.pairs, *filter(None, [self.image])):
+            for source in (*self.pairs, *(self.masks or ()), *filter(None, [self.image])):
                 check_kept(source, path)
         if self.arrived is not None:
             check_ending(self.arrived)
@@ -56,16 +86,28 @@ class FitJob:
         progress.enter("reading")
         found = opened(self.recipe, self.max_pixels)
         picture = found.source(self.image, self.max_pixels).picture
-        check_picture(picture)
         size = picture.width, picture.height
-        recipe = self._placed(found)
-        pairs = read_pairs(self.pairs, size)
-        done = fitted(device, recipe, picture, found.folder, pairs, progress, self.evaluations)
+        pairs, notices = self._pairs(size)
+        fit = Fit(self._placed(found), picture, found.folder, pairs, self.evaluations, self.local)
+        done = fit.perform(device, progress)
         with replacing(self.output) as temporary:
             temporary.write_text(done.trial.recipe.text(), encoding="utf-8")
         if self.arrived is not None:
             write_pairs(self.arrived, done.pairs, size)
-        return done
+        return replace(done, notices=(*notices, *done.notices))
+
+    def _pairs(self, size: tuple[int, int]) -> tuple[Pairs | None, list[str]]:
+        """All that is in files, None if nothing is; and what should be heard of it."""
+        given, notices = [], list[str]()
+        if self.pairs:
+            given.append(read_pairs(self.pairs, size))
+        if self.masks:
+            outline, notices = read_outlines(*self.masks, size)
+            given.append(Pairs(outline / size, ("outline",) * len(outline)))
+        if not given:
+            return None, notices
+        places = np.concatenate([pairs.places for pairs in given])
+        return Pairs(places, sum((pairs.curves for pairs in given), ())), notices
 
     def _placed(self, found: Opened) -> Recipe:
         """The recipe with its picture named from where it is written."""

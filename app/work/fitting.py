@@ -10,7 +10,8 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media.auxiliary import Pictures
-from app.model.handles import ARRIVED, LARGEST_LEAD, MOST_HANDLES, RecipeHandle, objections
+from app.media.landmarks import Pairs
+from app.model.handles import ARRIVED, LARGEST_LEAD, MOST_HANDLES, RecipeHandle, RecipePin, labelled, objections
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
@@ -25,6 +26,8 @@ ALONE = 12  # pairs up to which each handle has values of its own: with more, al
 LEAST_DET = 0.2  # of the map, anywhere
 # What is searched, from and to: radii in longer sides, stiffnesses, durations in parts of the recipe's, viscosities.
 RANGES = (0.06, 0.5), (0.05, 1.0), (0.3, 0.9), (3e-4, 0.3)
+DURATION = 1.0, 2.0  # seconds, from and to, for a recipe's own handles: a hand leads one after the other
+DECIMALS = 8  # of places: those in a file of pairs are no more exact, and the same are to give the same
 NAME = "pair"  # and a number: what a fitted handle is called
 HALVINGS = 4  # of the way, where nothing else keeps it from folding
 MOST_NOTICES = 12
@@ -69,14 +72,14 @@ class Fitted:
 
     Attributes:
         trial: the best, on the recipe's own grid.
-        pairs: where each point is and where it arrives, (n, 2, 2) in fractions; those without a handle are left out.
+        pairs: where each point is and where it arrives; those without a handle are left out.
         errors: how far all are from where they should be, in pixels; NaN of those without a handle.
         stopped: the search was ended before its budget.
         notices: what the user should hear of.
     """
 
     trial: Trial
-    pairs: np.ndarray
+    pairs: Pairs
     errors: np.ndarray
     stopped: bool
     notices: tuple[str, ...]
@@ -96,40 +99,43 @@ def fitted(
     recipe: Recipe,
     picture: Picture,
     folder: Path,
-    pairs: np.ndarray,
+    pairs: Pairs | None,
     progress: Progress,
     evaluations: int = EVALUATIONS,
+    local: float | None = None,
 ) -> Fitted:
     """The recipe with a handle for each pair, its values searched for the least work that reaches them without a fold.
 
     By COBYQA (Ragonneau and Zhang), a trust-region method without derivatives for bounds and constraints: on a coarse
     grid first with all handles alike, then the radius of each, then the duration of each; and with all alike again on
-    the recipe's own. Handles of an earlier fit are replaced. A budget ends it and no clock, so that the same is found
-    again. If `progress` says to stop, the best so far is checked on the recipe's own grid and returned.
+    the recipe's own. Many handles stay alike: for so many replays that is found better.
+    Handles of an earlier fit are replaced. A budget ends it and no clock, so that the same is found again. If
+    `progress` says to stop, the best so far is checked on the recipe's own grid and returned.
 
     Args:
         folder: where the names of the recipe's other pictures start from.
-        pairs: (n, 2, 2), of each where it is and where it should be, in fractions of the picture.
+        pairs: None are those of the recipe's own handles, which are replaced; those that stay become pins.
         evaluations: replays on the coarse grid.
+        local: of all handles; None is 1 where there are curves, 0 of points, and the recipe's own keep theirs.
 
     Raises:
         UserError: if no pair lies in the picture, or there are too many.
         Cancelled: if it is stopped before anything has been found.
     """
-    search = _Search(device, recipe, picture, folder, pairs, progress)
+    aim = _aimed(device, recipe, picture, folder, pairs)
+    if local is not None:
+        aim = replace(aim, handles=tuple(each.model_copy(update={"local": local}) for each in aim.handles))
+    search = _Search(device, aim, picture, folder, progress)
     fine = max(evaluations // A_FINE_ONE, 1)
     progress.total = evaluations + fine
+    point, stopped = search.start, False
     count = len(search.numbers)
-    each, point, stopped = np.eye(3 * count + 1), search.start, False
-    parts = [
-        (_groups(count), 0.25, 3 if count <= ALONE else 1),
-        (each[:, :count], 0.15, 2),
-        (each[:, 2 * count : -1], 0.15, 1),
-    ]
+    alike, each = _directions(count), np.eye(3 * count + 1)
+    parts = (alike, 0.25, 3), (each[:, :count], 0.15, 2), (each[:, 2 * count : -1], 0.15, 1)
     try:
-        for groups, reach, share in parts[: 3 if count <= ALONE else 1]:
-            point = search.run(search.coarse, point, groups, reach, (evaluations - progress.done) // share)
-        point = search.run(search.fine, point, _groups(count), 0.05, fine)
+        for directions, reach, share in parts if count <= ALONE else [(alike, 0.25, 1)]:
+            point = search.run(search.coarse, point, directions, reach, (evaluations - progress.done) // share)
+        point = search.run(search.fine, point, alike, 0.05, fine)
     except Cancelled:
         if search.best is None:
             raise
@@ -137,7 +143,58 @@ def fitted(
     return search.ended(point, stopped)
 
 
-def _groups(count: int) -> np.ndarray:
+@dataclass(frozen=True)
+class _Aim:
+    """What is fitted: a recipe without its handles, and what becomes of each pair, but for what is searched."""
+
+    recipe: Recipe
+    pairs: Pairs
+    handles: tuple[RecipeHandle, ...]
+
+
+def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None) -> _Aim:
+    """What is fitted to given pairs, or, None, to those of the recipe's own handles."""
+    if pairs is not None:
+        base = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each)))
+        # What is local carries a curve's points between its handles along: a fluid flows back there. And all do, since
+        # those that push as a fluid does halt where what is local has pressed the picture together.
+        one = RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if any(pairs.curves) else 0.0)
+        made = (one,) * len(pairs.places)
+        return _Aim(base, Pairs(np.round(pairs.places, DECIMALS), pairs.curves), made)
+    led, places, pins = [], [], list(recipe.pin)
+    extent = np.array([picture.width, picture.height]) / max(picture.width, picture.height)
+    for handle, start in zip(recipe.handle, _starts(device, recipe, picture, folder), strict=True):
+        end = np.round(handle.goal or start, DECIMALS)
+        if np.hypot(*((end - handle.at) * extent)) > ARRIVED:
+            led.append(handle)
+            places.append((np.round(handle.at, DECIMALS), end))
+        else:
+            pins.append(RecipePin(name=handle.name, at=handle.at, radius=handle.radius, stiffness=handle.stiffness))
+    if not led:
+        raise UserError("no handle of the recipe leads anywhere; give --pairs, or [[handle]]s with a place to go to")
+    base = recipe.edited(handle=(), pin=tuple(pins))
+    if not (base.stroke or base.change or base.mask or base.force):  # which have their times
+        base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
+    return _Aim(base, Pairs.points(np.array(places)), tuple(led))
+
+
+def _starts(device: Device, recipe: Recipe, picture: Picture, folder: Path) -> list[np.ndarray]:
+    """Where the points of a recipe's handles are when those begin that only stay: (2,) each, in fractions."""
+    starts = [np.array(handle.at) for handle in recipe.handle]
+    ticks = [handle.first_tick(recipe.fluid.dt) for handle in recipe.handle if handle.goal is None]
+    if not ticks:
+        return starts
+    replay = Replay(device, recipe, Pictures(picture, folder), budget=0)
+    replay.seek(min(max(ticks) + 1, recipe.ticks))
+    labels = [label for label, _ in labelled(recipe.handle, ())]
+    for (label, _), start in zip(replay.led, replay.handles.starts, strict=True):
+        if label in labels and not np.isnan(start[0]):
+            starts[labels.index(label)] = start / replay.grid.extent
+    replay.release()
+    return starts
+
+
+def _directions(count: int) -> np.ndarray:
     """The directions in which all handles change alike, (3 count + 1, 4): radii, stiffnesses, durations, viscosity."""
     kinds = np.repeat(np.arange(4), [count, count, count, 1])
     return (kinds[:, None] == np.arange(4)).astype(float)
@@ -154,14 +211,13 @@ class _Stage:
 class _Search:
     """Points of the unit cube made into recipes, played and ranked."""
 
-    def __init__(
-        self, device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: np.ndarray, progress: Progress
-    ) -> None:
-        self.device, self.pairs, self.progress = device, pairs, progress
+    def __init__(self, device: Device, aim: _Aim, picture: Picture, folder: Path, progress: Progress) -> None:
+        self.device, self.aim, self.progress = device, aim, progress
+        pairs, base = aim.pairs.places, aim.recipe
+        self.pairs = pairs
         self.longer = max(picture.width, picture.height)
         self.extent = np.array([picture.width, picture.height]) / self.longer
         self.notices: list[str] = []
-        base = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each)))
         self.numbers = self._usable(base)
         self.fine = _Stage(base, Pictures(picture, folder))
         self.hopeful = self._reachable()
@@ -171,7 +227,7 @@ class _Search:
         self.best: tuple[np.ndarray, Trial, _Stage] | None = None
         ways = np.hypot(*((pairs[:, 1] - pairs[:, 0]) * self.extent).T)[self.numbers]
         least = np.clip(1.01 * ways / LARGEST_LEAD, RANGES[0][0], 1.0)
-        own = max(recipe.fluid.viscosity, 1e-6)
+        own = max(base.fluid.viscosity, 1e-6)
 
         def listed(radii: np.ndarray, stiffness: float, duration: float, mu: float) -> np.ndarray:
             return np.log([*radii, *[stiffness] * len(ways), *[duration] * len(ways), mu])
@@ -232,10 +288,11 @@ class _Search:
         errors = np.hypot(*((trial.arrived - self.pairs[:, 1]) * self.extent).T) * self.longer
         for number in self.numbers:
             if not errors[number] <= ARRIVED * self.longer:
-                self.notices.append(f"{NAME} {number + 1} ends {errors[number]:.3g} pixels from where it should be")
+                self.notices.append(f"{self._label(number)} ends {errors[number]:.3g} pixels from where it should be")
         said = objections(trial.recipe.handle, trial.recipe.pin, (self.extent[0], self.extent[1]))
         self.notices += list(islice(said, MOST_NOTICES))
-        pairs = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
+        arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
+        pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
         return Fitted(trial, pairs, errors, stopped, tuple(self.notices))
 
     def _tried(self, stage: _Stage, point: np.ndarray) -> Trial:
@@ -255,16 +312,18 @@ class _Search:
         for row, number in enumerate(self.numbers):
             at, end = self.pairs[number]
             to = at + part * (np.clip(end, 0, 1) - at)
-            handles.append(
-                RecipeHandle(
-                    name=f"{NAME} {number + 1}",
-                    at=(float(at[0]), float(at[1])),
-                    to=(float(to[0]), float(to[1])),
-                    radius=values[row],
-                    stiffness=min(values[count + row], 1.0),
-                    duration=_rounded(values[2 * count + row] * base.duration),
-                )
-            )
+            values_of = {
+                "at": (float(at[0]), float(at[1])),
+                "name": f"{NAME} {number + 1}",
+                "to": (float(to[0]), float(to[1])),
+                "keys": None,
+                "start": 0.0,
+                "end": None,
+                "radius": values[row],
+                "stiffness": min(values[count + row], 1.0),
+                "duration": _rounded(values[2 * count + row] * base.duration),
+            }
+            handles.append(self.aim.handles[number].model_copy(update=values_of))
         fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
         return base.edited(handle=(*base.handle, *handles), fluid=fluid)
 
@@ -278,23 +337,27 @@ class _Search:
                 work += _strain(replay) * recipe.fluid.dt
             found = replay.warp.statistics()
             arrived = np.full((len(self.pairs), 2), np.nan)
-            for (_, led), place in zip(replay.led, replay.handles.places, strict=True):
-                if isinstance(led, RecipeHandle) and (number := _is_fitted(led)):
-                    arrived[number - 1] = place / self.extent
+            # Handles come after pins, and those of the fit last.
+            arrived[self.numbers] = replay.handles.places[-len(self.numbers) :] / self.extent
         finally:
             replay.release()
         ends = np.clip(self.pairs[self.hopeful, 1], 0, 1)
         residuals = np.hypot(*((arrived[self.hopeful] - ends) * self.extent).T)
         return Trial(recipe, arrived, residuals, work, found.det_min, found.folds)
 
+    def _label(self, number: int) -> str:
+        """What messages call a pair."""
+        curve = self.aim.pairs.curves[number]
+        return f"{NAME} {number + 1}" + (f' of the curve "{curve[:40]}"' if curve else "")
+
     def _usable(self, base: Recipe) -> np.ndarray:
         """The numbers of the pairs that get a handle; of the others it is noted why not."""
         inside = np.abs(self.pairs - 0.5).max(axis=2) <= 0.5
-        for number, (here, there) in enumerate(inside, 1):
+        for number, (here, there) in enumerate(inside):
             if not here:
-                self.notices.append(f"{NAME} {number} is left out: its point is outside the picture")
+                self.notices.append(f"{self._label(number)} is left out: its point is outside the picture")
             elif not there:
-                self.notices.append(f"{NAME} {number} goes only to the picture's edge: its place is outside it")
+                self.notices.append(f"{self._label(number)} goes only to the picture's edge: its place is outside it")
         numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin)
         if not len(numbers):
             raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
@@ -320,9 +383,11 @@ class _Search:
             (x0, y0), (x1, y1) = ends.tolist()
             frozen = [name for name, (x, y) in (("point", ends[0]), ("place", ends[1])) if solid[y, x]]
             if frozen:
-                self.notices.append(f"{NAME} {number + 1} cannot be met: its {frozen[0]} is frozen")
+                self.notices.append(f"{self._label(number)} cannot be met: its {frozen[0]} is frozen")
             elif part[y0, x0] != part[y1, x1]:
-                self.notices.append(f"{NAME} {number + 1} cannot be met: what is frozen parts its point from its place")
+                self.notices.append(
+                    f"{self._label(number)} cannot be met: what is frozen parts its point from its place"
+                )
             else:
                 hopeful.append(number)
         return np.array(hopeful, int)
@@ -337,8 +402,10 @@ def _coarse(recipe: Recipe) -> Recipe:
 
 
 def _strain(replay: Replay) -> float:
-    """The root mean square of grad u at this moment."""
-    velocity, (hx, hy) = replay.fluid.velocity_at_centres().astype(np.float64), replay.fluid.grid.spacing
+    """The root mean square of grad u at this moment, of what carries the picture."""
+    faces, (hx, hy) = replay.fluid.carrier().get().astype(np.float64), replay.fluid.grid.spacing
+    faces = np.pad(faces, ((0, 1), (0, 1), (0, 0)))  # the far walls
+    velocity = np.stack([faces[:-1, :-1, 0] + faces[:-1, 1:, 0], faces[:-1, :-1, 1] + faces[1:, :-1, 1]], axis=-1) / 2
     slopes = np.gradient(velocity, hx, axis=1), np.gradient(velocity, hy, axis=0)
     return float(np.sqrt(sum((slope**2).sum(axis=-1).mean() for slope in slopes)))
 

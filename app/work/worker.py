@@ -15,8 +15,10 @@ from dataclasses import dataclass
 from functools import cache
 
 from app.errors import Cancelled, UserError
+from app.model.recipe import Recipe
 from app.progress import GRACE, INTERRUPTED, Progress, abandon, interruptible
 from app.work.export import run
+from app.work.fit_job import Fit
 from app.work.jobs import Job
 from app.work.tasks import Piece
 from solver.gl.device import Device
@@ -26,7 +28,11 @@ ATTEMPTS = 3  # at a picture whose worker dies: it may have been another's fault
 DIED = "its process died each time, perhaps for want of memory; use fewer --jobs or a smaller --size"
 LOOK = 0.1  # seconds between two looks at the wish to stop
 
-Work = Piece | Job
+Work = Piece | Job | Fit
+
+
+class Finish:
+    """What is said to a worker that is to end its piece of work with the best that it has, as only a fit can."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +44,8 @@ class Outcome:
         error: why it failed, as a sentence; "" if it went well.
         in_window: the same for someone who gave no command.
         notices: what the user should hear of.
-        verdict: which stop condition ended the simulation and when; "" if none.
+        verdict: which stop condition ended the simulation and when, or how well a fit went; "" if neither.
+        recipe: that has been fitted.
     """
 
     label: str
@@ -46,6 +53,7 @@ class Outcome:
     in_window: str = ""
     notices: tuple[str, ...] = ()
     verdict: str = ""
+    recipe: Recipe | None = None
 
 
 @dataclass(frozen=True)
@@ -68,14 +76,19 @@ def own_device() -> Device:
 
 def perform(work: Work, progress: Progress) -> Outcome:
     """Do it here, on the device that is kept for the next one. Raises nothing but `Cancelled`."""
-    label = work.label
+    label, what = work.label, "The fit" if isinstance(work, Fit) else "The export"
     try:
+        if isinstance(work, Fit):
+            found = work.perform(own_device(), progress)
+            return Outcome(label, notices=found.notices, verdict=found.told, recipe=found.trial.recipe)
         if isinstance(work, Piece):
             report = work.perform(own_device, progress)
         else:
             work.check()
             report = run(own_device(), work, progress)
     except Cancelled:
+        if isinstance(work, Fit):  # that was to end before it had found anything
+            return Outcome(label)
         raise
     except UserError as error:
         return Outcome(label, str(error), error.in_window)
@@ -83,7 +96,7 @@ def perform(work: Work, progress: Progress) -> Outcome:
         little = "there is not enough memory for it"
         return Outcome(label, f"{little}; use fewer --jobs or a smaller --size", f"{little}; choose a smaller size")
     except Exception as error:
-        return Outcome(label, f"{type(error).__name__}: {in_a_line(error)}", f"The export failed: {in_a_line(error)}")
+        return Outcome(label, f"{type(error).__name__}: {in_a_line(error)}", f"{what} failed: {in_a_line(error)}")
     return Outcome(label, notices=report.notices, verdict=report.verdict or "")
 
 
@@ -110,15 +123,23 @@ class Worker:
                 stdout=subprocess.PIPE,
                 env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
+        self._speaking = threading.Lock()
         threading.Thread(target=self._listen, args=(inbox,), daemon=True).start()
 
     def begin(self, work: Work) -> None:
         """Give it a piece of work; it has none. Waits until the process has taken it."""
-        tasks = self._process.stdin
-        assert tasks is not None
-        with suppress(OSError, ValueError):  # it has died, as the inbox will tell
-            pickle.dump(work, tasks)
-            tasks.flush()
+        self._tell(work)
+
+    def finish(self) -> None:
+        """Let it end its fit with the best that it has. Waits until the process has heard it."""
+        self._tell(Finish())
+
+    def _tell(self, word: Work | Finish) -> None:
+        said = self._process.stdin
+        assert said is not None
+        with self._speaking, suppress(OSError, ValueError):  # it has died, as the inbox will tell
+            pickle.dump(word, said)
+            said.flush()
 
     def end(self) -> None:
         """End it in the middle of whatever it does, with nothing half-written left."""
@@ -161,16 +182,16 @@ def serve(do: Callable[[Work, Progress], Outcome] = perform) -> None:
     """Do the work that comes by standard input, until its end or SIGTERM comes, in the middle of some if need be."""
     said = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # nothing else may get among what is said
-    waiting: queue.SimpleQueue[Work] = queue.SimpleQueue()
+    waiting, finish = queue.SimpleQueue[Work](), threading.Event()
 
     def say(word: Heard) -> None:
         pickle.dump(word, said)
         said.flush()
 
     with interruptible(_end_now) as cancel, suppress(Cancelled, KeyboardInterrupt, BrokenPipeError):
-        threading.Thread(target=_take, args=(waiting,), daemon=True).start()
+        threading.Thread(target=_take, args=(waiting, finish), daemon=True).start()
         while True:
-            say(do(waiting.get(), _told(say, cancel)))
+            say(do(waiting.get(), _told(say, lambda: cancel() or finish.is_set())))
     _end_now()
 
 
@@ -191,12 +212,17 @@ def _told(say: Callable[[Heard], None], cancel: Callable[[], bool]) -> Progress:
     return Progress(None, report, cancel, tell)
 
 
-def _take(waiting: queue.SimpleQueue[Work]) -> None:
+def _take(waiting: queue.SimpleQueue[Work], finish: threading.Event) -> None:
     while True:
         try:
-            waiting.put(pickle.load(sys.stdin.buffer))
+            word = pickle.load(sys.stdin.buffer)
         except Exception:  # its end, or something that is no work
             _end_now()
+        if isinstance(word, Finish):
+            finish.set()
+        else:
+            finish.clear()
+            waiting.put(word)
 
 
 def _end_now() -> None:

@@ -23,8 +23,8 @@ Places = list[tuple[float, float]]
 class Sheet:
     """A picture drawn in its own units, with soft layers and gradients."""
 
-    def __init__(self) -> None:
-        self.image = Image.new("RGB", (WIDTH * FINER, HEIGHT * FINER))
+    def __init__(self, width: int = WIDTH, height: int = HEIGHT) -> None:
+        self.image = Image.new("RGB", (width * FINER, height * FINER))
         self.pen = ImageDraw.Draw(self.image)
 
     def box(self, left: float, top: float, right: float, bottom: float, fill: Colour, radius: float = 0) -> None:
@@ -73,7 +73,8 @@ class Sheet:
         self.soft(ring, fill, opacity, size * 0.10)
 
     def finished(self) -> Image.Image:
-        return self.image.resize((WIDTH, HEIGHT), Image.Resampling.BOX)
+        width, height = self.image.size
+        return self.image.resize((width // FINER, height // FINER), Image.Resampling.BOX)
 
 
 def draw() -> Image.Image:

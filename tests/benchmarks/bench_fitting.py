@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from app.media.auxiliary import Pictures
+from app.media.landmarks import Pairs
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
@@ -44,7 +45,7 @@ def main() -> None:
         for seed in range(FIRST, FIRST + arguments.cases):
             points, targets, _ = arrangement(seed, arguments.pairs, 0)
             pairs, began = np.stack([points, targets], axis=1), time.process_time()
-            found = fitted(device, Recipe(), picture, Path(), pairs, Progress(), arguments.evaluations)
+            found = fitted(device, Recipe(), picture, Path(), Pairs.points(pairs), Progress(), arguments.evaluations)
             spent = time.process_time() - began
             recipe = Recipe.parse(found.trial.recipe.text())
             replay = Replay(device, recipe, Pictures(picture), budget=0)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from app.errors import UserError
-from app.media.landmarks import read_pairs, write_pairs
+from app.media.landmarks import Pairs, read_pairs, write_pairs
 
 SIZE = 200, 100
 PAIRS = np.array([[[0.25, 0.5], [0.3, 0.4]], [[0.1, 0.9], [0.1, 0.85]], [[1 / 3, 2 / 3], [0.4, 0.7]]])
+POINTS = Pairs.points(PAIRS)
 
 CSV = "x0,y0,x1,y1\n50,50,60,40\n# a remark\n20;90;20;85\n\n66.66666667\t66.66666667\t80\t70\n"
 FROM_PTS = "version: 1\nn_points: 3\n{\n50.5 50.5\n20.5 90.5\n67.16666667 67.16666667\n}\n"
@@ -29,25 +30,82 @@ def test_the_same_pairs_are_read_from_every_format(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(text.encode())
     for given in (["pairs.csv"], ["from.pts", "to.pts"], ["both.TPS"]):
         found = read_pairs([tmp_path / name for name in given], SIZE)
-        np.testing.assert_allclose(found, PAIRS, atol=1e-10, err_msg=str(given))
+        np.testing.assert_allclose(found.places, PAIRS, atol=1e-10, err_msg=str(given))
+        assert found.curves == POINTS.curves
 
 
 @pytest.mark.parametrize("name", ["out.csv", "out.tps"])
 def test_pairs_come_back_as_they_were_written(tmp_path: Path, name: str) -> None:
-    write_pairs(tmp_path / name, PAIRS, SIZE)
-    np.testing.assert_allclose(read_pairs([tmp_path / name], SIZE), PAIRS, atol=1e-9)
+    write_pairs(tmp_path / name, POINTS, SIZE)
+    np.testing.assert_allclose(read_pairs([tmp_path / name], SIZE).places, PAIRS, atol=1e-9)
 
 
 def test_a_pts_file_gets_where_the_points_should_be(tmp_path: Path) -> None:
-    write_pairs(tmp_path / "to.pts", PAIRS, SIZE)
+    write_pairs(tmp_path / "to.pts", POINTS, SIZE)
     words = (tmp_path / "to.pts").read_text().split()
     assert words[:5] == ["version:", "1", "n_points:", "3", "{"]
     assert words[5:] == ["60.5", "40.5", "20.5", "85.5", "80.5", "70.5", "}"]
 
 
+# A bar of three corners that becomes a straight one of four, and a point by itself before it.
+CURVE = """Curve,X0,Y0,X1,Y1
+,50,50,60,40
+stem,20,20,100,80
+stem,20,60,110,80
+stem,60,60,,
+stem,,,120,80
+stem,,,180,80
+"""
+
+
+def test_both_sides_of_a_curve_are_divided_evenly_along_their_lengths(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(CURVE)
+    found = read_pairs([tmp_path / "a.csv"], SIZE)
+    assert found.curves == ("", *["stem"] * 6)  # 80 pixels, and 16 of them are the most between two points
+    np.testing.assert_allclose(found.places[0] * SIZE, [[50, 50], [60, 40]])
+    bent = [(20, 20), (20, 36), (20, 52), (28, 60), (44, 60), (60, 60)]
+    np.testing.assert_allclose(found.places[1:, 0] * SIZE, bent)
+    np.testing.assert_allclose(found.places[1:, 1] * SIZE, [(100 + 16 * k, 80) for k in range(6)])
+
+
+def test_a_closed_curve_has_its_first_place_once(tmp_path: Path) -> None:
+    square, far = [(20, 20), (60, 20), (60, 60), (20, 60), (20, 20)], 30
+    rows = "".join(f"box,{x},{y},{x + far},{y}\n" for x, y in square)
+    (tmp_path / "a.csv").write_text(f"curve,x0,y0,x1,y1\n{rows}")
+    found = read_pairs([tmp_path / "a.csv"], SIZE).places * SIZE
+    assert len(found) == 10
+    np.testing.assert_allclose(found[:4, 0], [(20, 20), (36, 20), (52, 20), (60, 28)])
+    np.testing.assert_allclose(found[-1, 0], (20, 36))
+    np.testing.assert_allclose(found[:, 1] - found[:, 0], [(far, 0)] * 10, atol=1e-12)
+
+
+def test_curves_come_back_as_they_were_written(tmp_path: Path) -> None:
+    curve = Pairs(np.linspace(0, 0.4, 6)[:, None, None] + [[0.1, 0.2], [0.2, 0.3]], ("",) + ("stem",) * 5)
+    write_pairs(tmp_path / "out.csv", curve, SIZE)
+    assert (tmp_path / "out.csv").read_text().splitlines()[:3] == [
+        "curve,x0,y0,x1,y1",
+        ",20,20,40,30",
+        "stem,36,28,56,38",
+    ]
+    found = read_pairs([tmp_path / "out.csv"], SIZE)
+    assert found.curves[:2] == curve.curves[:2]
+    np.testing.assert_allclose(found.places[[0, 1, -1]], curve.places[[0, 1, -1]], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
+        ("a.csv", "curve,x0,y0\na,1,2\n", "line 1: expected the columns curve,x0,y0,x1,y1"),
+        ("a.csv", "curve,x0,y0,x1,y1\n,1,2,,\n", "line 2: expected curve,x0,y0,x1,y1, and not ',1,2,,'"),
+        ("a.csv", "curve,x0,y0,x1,y1\na,1,2,3,\n", "line 2: expected curve,x0,y0,x1,y1"),
+        ("a.csv", "curve,x0,y0,x1,y1\na,1,2,3,4\n", "the curve 'a' needs two different places on both sides"),
+        ("a.csv", "curve,x0,y0,x1,y1\na,1,2,,\na,2,3,,\n", "the curve 'a' needs two different places"),
+        ("a.csv", "curve,x0,y0,x1,y1\na,1,2,3,4\na,5,5,3,4\n", "the curve 'a' needs two different places"),
+        (
+            "a.csv",
+            "curve,x0,y0,x1,y1\na,1,2,3,4\na,5,5,6,4\na,1,2,9,9\n",
+            "the curve 'a' is closed on one side only",
+        ),
         ("a.csv", "1,2,3,4\n1,2,3\n", "line 2: expected x0,y0,x1,y1, and not '1,2,3'"),
         ("a.csv", "1,2,3,4\n1,2,3,x\n", "line 2: expected"),
         ("a.csv", "x0,y0,x1,y1\nx0,y0,x1,y1\n", "line 2: expected"),

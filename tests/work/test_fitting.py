@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import Cancelled, UserError
 from app.media.auxiliary import Pictures
-from app.media.landmarks import read_pairs, write_pairs
+from app.media.landmarks import Pairs, read_pairs, write_pairs
 from app.media.pictures import write_picture
 from app.media.recipes import read_recipe
 from app.model.picture import Picture
@@ -25,12 +25,16 @@ from support.leading import distortion
 PICTURE = Picture(np.zeros((48, 64, 3), np.uint8))
 EXTENT = np.array([1.0, 0.75])
 RECIPE = "duration = 0.4\n[fluid]\ngrid = 32\ndt = 0.04\nviscosity = 0.03\n[[pin]]\nat = [0.8, 0.8]\nradius = 0.2\n"
+FREE = RECIPE.partition("[[pin]]")[0].replace("duration = 0.4", "duration = 0.8")
 PAIRS = np.array([[[0.3, 0.4], [0.36, 0.43]], [[0.6, 0.5], [0.6, 0.44]]])
 WALL = '[[freeze]]\nkind = "path"\npoints = [[0.5, 0.0], [0.5, 1.0]]\nhardness = 1.0\n'
 
 
-def fit(device: Device, pairs: np.ndarray, evaluations: int = 8, recipe: str = RECIPE, **hearing: object) -> Fitted:
+def fit(
+    device: Device, pairs: np.ndarray | Pairs | None, evaluations: int = 8, recipe: str = RECIPE, **hearing: object
+) -> Fitted:
     progress = Progress(**hearing)  # pyright: ignore[reportArgumentType]
+    pairs = Pairs.points(pairs) if isinstance(pairs, np.ndarray) else pairs
     return fitted(device, Recipe.parse(recipe), PICTURE, Path(), pairs, progress, evaluations)
 
 
@@ -50,7 +54,7 @@ def test_the_written_recipe_brings_the_points_there_with_less_work_and_no_fold(d
     recipe = Recipe.parse(found.trial.recipe.text())
     places, displacement, folds = arrived(device, recipe, PAIRS[:, 0])
     assert np.hypot(*((places - PAIRS[:, 1]) * EXTENT).T).max() * 64 < 0.1
-    np.testing.assert_allclose(found.pairs[:, 1], places, atol=0.02 / 64)
+    np.testing.assert_allclose(found.pairs.places[:, 1], places, atol=0.02 / 64)
     assert found.errors.max() < 0.1
     assert folds == 0
     assert distortion(displacement).least > 0
@@ -98,6 +102,70 @@ def test_pairs_that_nobody_can_lead_are_refused(device: Device):
         fit(device, np.repeat(PAIRS[:1], 70, axis=0))
 
 
+HANDLES = """[[handle]]
+at = [0.3, 0.4]
+keys = [[0.1, 0.3, 0.4], [0.3, 0.36, 0.43]]
+start = 0.1
+[[handle]]
+name = "nose"
+at = [0.6, 0.5]
+to = [0.6, 0.44]
+duration = 0.2
+local = 0.5
+[[handle]]
+at = [0.2, 0.8]
+keys = []
+"""
+
+
+def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_those_that_stay_are_pins(device: Device):
+    found = fit(device, None, 3, RECIPE + HANDLES)
+    np.testing.assert_allclose(found.pairs.places[:, 0], PAIRS[:, 0])
+    recipe = found.trial.recipe
+    assert [handle.name for handle in recipe.handle] == ["pair 1", "pair 2"]
+    assert [(handle.at, handle.to, handle.local) for handle in recipe.handle] == [
+        ((0.3, 0.4), (0.36, 0.43), 0.0),
+        ((0.6, 0.5), (0.6, 0.44), 0.5),
+    ]
+    assert [pin.at for pin in recipe.pin] == [(0.8, 0.8), (0.2, 0.8)]
+    assert recipe.duration == 1.0
+    assert found.errors.max() < 0.2
+    with pytest.raises(UserError, match="no handle of the recipe leads anywhere"):
+        fit(device, None)
+
+
+def test_what_was_pinned_after_it_had_been_moved_is_led_to_where_it_was_pinned(device: Device):
+    late = "[[handle]]\nat = [0.3, 0.42]\nkeys = []\nstart = 0.35\n"
+    handle = "[[handle]]\nat = [0.3, 0.4]\nto = [0.4, 0.4]\nduration = 0.25\n"
+    found = fit(device, None, 1, RECIPE + handle + late)
+    assert len(found.pairs.places) == 2
+    until_then = Recipe.parse(RECIPE.replace("duration = 0.4", "duration = 0.36") + handle)
+    moved, _, _ = arrived(device, until_then, np.array([[0.3, 0.42]]))
+    assert found.trial.recipe.handle[1].to == pytest.approx(moved[0], abs=1e-5)
+
+
+def test_the_points_of_a_curve_arrive_and_are_told_by_its_name(device: Device):
+    along = np.linspace(0, 1, 5)[:, None]
+    line, wall = np.hstack([0.3 + 0 * along, 0.2 + 0.6 * along]), np.array([[[0.5, 0.5], [0.6, 0.5]]])
+    bent = line + np.hstack([0.08 * np.sin(np.pi * along), 0 * along])
+    pairs = Pairs(np.concatenate([np.stack([line, bent], axis=1), wall]), (*["stem"] * 5, ""))
+    freeze = '[[freeze]]\nkind = "path"\npoints = [[0.3, 0.75], [0.3, 0.85]]\nradius = 0.02\nhardness = 1.0\n'
+    found = fit(device, pairs, 4, FREE)
+    assert found.errors.max() < 0.2
+    assert found.pairs.curves == pairs.curves
+    found = fit(device, pairs, 1, FREE + freeze)
+    assert any('pair 5 of the curve "stem" cannot be met' in notice for notice in found.notices), found.notices
+
+
+def test_many_pairs_arrive_with_values_in_common(device: Device):
+    x, y = np.meshgrid(np.linspace(0.2, 0.8, 5), np.linspace(0.25, 0.75, 3))
+    places = np.stack([x.ravel(), y.ravel()], axis=-1)
+    moved = places + 0.03 * np.sin(2 * np.pi * places[:, ::-1])
+    found = fit(device, np.stack([places, moved], axis=1), 20, FREE)
+    assert found.errors.max() < 0.2
+    assert len({(handle.radius, handle.duration) for handle in found.trial.recipe.handle}) == 1
+
+
 def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device):
     heard: list[int] = []
     found = fit(device, PAIRS, 40, report=lambda done, total: heard.append(done), cancel=lambda: max(heard) >= 3)
@@ -112,7 +180,7 @@ def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device
 def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp: Run, tmp_path: Path):
     write_picture(tmp_path / "a.png", PICTURE)
     (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE)
-    write_pairs(tmp_path / "p.csv", PAIRS, (64, 48))
+    write_pairs(tmp_path / "p.csv", Pairs.points(PAIRS), (64, 48))
     (tmp_path / "out").mkdir()
     words = ["fit", "r.toml", "--pairs", "p.csv", "-o", "out/f.toml", "--arrived", "out/a.tps", "--evaluations", "3"]
     done = fluidwarp(tmp_path, *words)
@@ -121,8 +189,39 @@ def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp:
     recipe = read_recipe(tmp_path / "out" / "f.toml")
     assert recipe.picture == "../a.png"
     there = read_pairs([tmp_path / "out" / "a.tps"], (64, 48))
-    np.testing.assert_allclose(there, PAIRS, atol=0.1 / 64)
+    np.testing.assert_allclose(there.places, PAIRS, atol=0.1 / 64)
     assert fluidwarp(tmp_path, "render", "out/f.toml", "-o", "out/f.png").returncode == 0
+
+
+def test_outlines_of_masks_are_fitted_and_written_as_a_curve(fluidwarp: Run, tmp_path: Path):
+    x, y = np.meshgrid(np.arange(64) + 0.5, np.arange(48) + 0.5)
+    for name, inside in (
+        ("disc", (x - 32) ** 2 + (y - 24) ** 2 < 121),
+        ("oval", ((x - 32) / 13) ** 2 + ((y - 24) / 9) ** 2 < 1),
+    ):
+        write_picture(tmp_path / f"{name}.png", Picture(np.asarray(255 * inside, np.uint8)[..., None]))
+    write_picture(tmp_path / "a.png", PICTURE)
+    (tmp_path / "r.toml").write_text('picture = "a.png"\n' + FREE)
+    words = [
+        "fit",
+        "r.toml",
+        "--masks",
+        "disc.png",
+        "oval.png",
+        "-o",
+        "f.toml",
+        "--arrived",
+        "a.csv",
+        "--evaluations",
+        "6",
+    ]
+    done = fluidwarp(tmp_path, *words)
+    assert done.returncode == 0, done.stderr
+    assert "f.toml: 14 pairs, mean error" in done.stderr
+    there = read_pairs([tmp_path / "a.csv"], (64, 48))
+    assert set(there.curves) == {"outline"}
+    end = there.places[:, 1] * (64, 48)
+    np.testing.assert_allclose(((end[:, 0] - 32) / 13) ** 2 + ((end[:, 1] - 24) / 9) ** 2, 1, atol=0.1)
 
 
 @pytest.mark.parametrize(
@@ -131,6 +230,8 @@ def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp:
         (["--pairs", "p.csv", "-o", "f.png"], "f.png: a fitted recipe is a file that ends with .toml"),
         (["--pairs", "p.csv", "-o", "p.csv"], "ends with .toml"),
         (["--pairs", "none.csv", "-o", "f.toml"], "there is no such file"),
+        (["-o", "f.toml"], "no handle of the recipe leads anywhere; give --pairs"),
+        (["--masks", "a.png", "a.png", "-o", "f.toml"], "a.png has no outline: nothing of it is brighter than grey"),
         (["--pairs", "bad.csv", "-o", "f.toml"], "bad.csv, line 2: expected x0,y0,x1,y1"),
         (["--pairs", "p.csv", "-o", "f.toml", "--arrived", "f.txt"], "end with .csv, .pts, .tps"),
         (["--pairs", "p.csv", "-o", "f.toml", "--time-limit", "0"], "cancelled; nothing half-written is left"),

@@ -183,6 +183,11 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
     away = sum(held.is_away(session.extent) for held in session.held)
     ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all" + (f", {away} not there yet" if away else ""))
+    with ui.enabled(any(handle.goal for handle in recipe.handle)):
+        if ui.button("Fit##handles", width=-1, height=30):
+            do("fit_handles")
+        more = "Searches how far and how fast each reaches; may take a minute."
+        ui.tooltip("Let all go at once, with the least work", ACTIONS["fit_handles"].key, more)
 
 
 def _whereabouts(workspace: Workspace, label: str) -> str:

@@ -1,0 +1,104 @@
+"""Fitting from the window: the handles' values are searched in a process of its own, and become one edit."""
+
+from __future__ import annotations
+
+from math import inf
+
+from app.model.recipe import Recipe
+from app.ui.exporting import under_way
+from app.ui.messages import Messages
+from app.ui.viewport import Rect
+from app.ui.widgets import Ui
+from app.ui.workspace import Workspace
+from app.work.export_process import FitProcess
+from app.work.fit_job import Fit
+from app.work.fitting import EVALUATIONS
+from app.work.session import Session
+
+TOLD = 2  # notices, beside how it went: no more messages are shown at a time
+
+
+class Fits:
+    """The fit that is under way, if any: `fluidwarp fit` of the work's own handles.
+
+    Attributes:
+        evaluations: see `fitted`.
+    """
+
+    def __init__(self, workspace: Workspace, messages: Messages) -> None:
+        self._workspace, self._messages = workspace, messages
+        self.evaluations = EVALUATIONS
+        self._process: FitProcess | None = None
+        self._session: Session | None = None  # whose handles are fitted
+        self._stopping = False
+
+    @property
+    def is_running(self) -> bool:
+        return self._process is not None
+
+    def start(self) -> None:
+        """Begin to fit the handles of the work that is open, as it is at its end."""
+        if self.is_running:
+            return
+        session = self._workspace.session
+        if not any(handle.goal for handle in session.recipe.handle):
+            self._messages.say("There is nothing to fit yet: drag a point to where it should go, with Handle.")
+            return
+        session.seek(session.end)
+        self._session, self._stopping = session, False
+        project = session.project
+        fit = Fit(session.recipe, project.picture, project.folder, evaluations=self.evaluations)
+        self._process = FitProcess(fit)
+
+    def finish(self) -> None:
+        """Let it end with the best so far."""
+        if self._process is not None:
+            self._process.finish()
+            self._stopping = True
+
+    def give_up(self) -> None:
+        """Stop it; nothing comes of it."""
+        if self._process is not None:
+            self._process.stop()
+            self._process = None
+
+    def draw(self, ui: Ui, canvas: Rect, down: float) -> None:
+        """How far it is and how near it comes, so many points below the canvas's edge; with a button to stop it."""
+        if (process := self._process) is None:
+            return
+        process.poll()
+        if not self._is_still_of_use(process.fit.recipe):
+            self.give_up()
+            self._messages.say("The fit has been given up: what it was of has been changed.")
+        elif process.is_done:
+            self._process = None
+            self._take(process)
+        else:
+            state = "checking the best" if self._stopping else process.state or "getting ready"
+            if under_way(ui, "fitting", canvas, down, f"Fitting: {state}", process.part, "Stop") and not self._stopping:
+                self.finish()
+
+    def _is_still_of_use(self, recipe: Recipe) -> bool:
+        """The work goes on being simulated as it was when the fit began, if perhaps on another grid."""
+        session = self._workspace.session
+        if session is not self._session:
+            return False
+        now = session.recipe
+        return now is recipe or (
+            now.duration == recipe.duration and now.on_grid(recipe.fluid.grid).agrees_until(recipe) == inf
+        )
+
+    def _take(self, process: FitProcess) -> None:
+        """Make what has been found an edit, and play it."""
+        made, session = process.outcome.recipe, self._session
+        if process.error:
+            self._messages.warn(process.error)
+        elif made is None or session is None:
+            self._messages.say("The fit has been stopped before it had found anything.")
+        else:
+            fluid = session.recipe.fluid.model_copy(update={"viscosity": made.fluid.viscosity})
+            session.edit("Fit", handle=made.handle, pin=made.pin, duration=made.duration, fluid=fluid)
+            session.seek(session.end)
+            for notice in process.notices[:TOLD]:
+                self._messages.say(f"{notice[:1].upper()}{notice[1:]}.")
+            self._messages.done(f"Fitted: {process.outcome.verdict}.")

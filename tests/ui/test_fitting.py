@@ -1,0 +1,126 @@
+"""Fit in the window: what it makes of handles, that it can be stopped and undone, and that it is the command line's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.media import project as projects
+from app.media.landmarks import Pairs, write_pairs
+from app.media.recipes import read_recipe
+from app.model.handles import ARRIVED
+from app.model.recipe import Recipe
+from solver.gl.device import Device
+from support.editing import Robot, command_line, small_project
+from support.widgets import Widgets
+
+MOVES = ((0.4, 0.5), (0.45, 0.47)), ((0.7, 0.4), (0.7, 0.45))
+
+
+@pytest.fixture
+def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
+    """With two handles that have been dragged one after the other."""
+    robot = Robot(device, small_project(tmp_path, grid=32))
+    robot.key("g")
+    for start, end in MOVES:
+        robot.drag(start, end, steps=6)
+        robot.rest()
+    robot.editor.fits.evaluations = 2
+    yield robot
+    robot.close()
+
+
+def names(robot: Robot) -> list[str]:
+    return [entry.name for entry in robot.editor.session.document.history.entries]
+
+
+def wait(robot: Robot) -> None:
+    robot.until(lambda: not robot.editor.fits.is_running)
+    robot.rest()
+
+
+def test_a_fit_is_one_edit_that_leads_all_at_once_and_is_played(robot: Robot) -> None:
+    session, led = robot.editor.session, robot.warp()
+    before = session.recipe
+    robot.key("shift+g")
+    assert robot.editor.fits.is_running
+    wait(robot)
+    assert names(robot) == ["Open", "Handle", "Handle", "Fit"]
+    assert [handle.start for handle in session.recipe.handle] == [0, 0]
+    assert [handle.at for handle in session.recipe.handle] == [handle.at for handle in before.handle]
+    assert [handle.to for handle in session.recipe.handle] == [handle.goal for handle in before.handle]
+    assert session.tick == session.end
+    assert not any(held.is_away(session.extent) for held in session.held)
+    assert robot.editor.messages.shown[-1].text.startswith("Fitted: 2 pairs, mean error 0.")
+    robot.key("ctrl+z")
+    robot.rest()
+    assert session.recipe == before
+    assert np.array_equal(robot.warp(), led)
+
+
+def test_the_command_line_gives_the_same_from_the_handles_and_from_a_file_of_the_same_pairs(
+    robot: Robot, tmp_path: Path
+) -> None:
+    session = robot.editor.session
+    recipe, project = session.recipe, session.project
+    projects.save(replace(project, recipe=recipe), tmp_path / "w.fluidwarp")
+    size = project.picture.width, project.picture.height
+    pairs = Pairs.points(np.array([[handle.at, handle.goal] for handle in recipe.handle]))
+    write_pairs(tmp_path / "p.csv", pairs, size)
+    robot.editor.do("fit_handles")
+    wait(robot)
+    made = session.recipe
+    bare = replace(project, recipe=recipe.edited(handle=(), duration=made.duration))
+    projects.save(bare, tmp_path / "bare.fluidwarp")
+    for words in (["w.fluidwarp"], ["bare.fluidwarp", "--pairs", str(tmp_path / "p.csv")]):
+        target = tmp_path / "f.toml"
+        command_line("fit", str(tmp_path / words[0]), *words[1:], "-o", str(target), "--evaluations", "2")
+        assert read_recipe(target).text() == made.edited(picture=None).text()
+
+
+def test_stopped_it_keeps_the_best_so_far(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot.editor.fits.evaluations = 100_000
+    widgets = Widgets(robot, monkeypatch)
+    widgets.click("Fit")
+    process = robot.editor.fits._process
+    assert process is not None
+    robot.until(lambda: process.state.startswith("best so far"))
+    widgets.click("Stop")
+    wait(robot)
+    assert names(robot)[-1] == "Fit"
+    assert 0 < process.part < 1
+    assert all(np.hypot(*np.subtract(held.now, held.target)) < 4 * ARRIVED for held in robot.editor.session.held)
+
+
+def test_what_has_been_changed_meanwhile_is_kept_and_the_fit_given_up(robot: Robot) -> None:
+    robot.editor.fits.evaluations = 100_000
+    robot.key("shift+g")
+    robot.editor.session.edit("Half", amount=0.5)
+    robot.frame(count=2)
+    assert robot.editor.fits.is_running  # it is the same simulation
+    robot.key("ctrl+z")
+    robot.key("ctrl+z")
+    robot.frame(count=2)
+    assert not robot.editor.fits.is_running
+    assert "given up" in robot.editor.messages.shown[-1].text
+    assert names(robot) == ["Open", "Handle", "Handle", "Half"]
+
+
+def test_without_a_handle_that_leads_anywhere_there_is_nothing_to_fit(robot: Robot) -> None:
+    robot.editor.session.edit("None", handle=())
+    robot.key("shift+g")
+    assert not robot.editor.fits.is_running
+    assert "nothing to fit" in robot.editor.messages.shown[-1].text
+
+
+def test_what_cannot_be_fitted_is_told(robot: Robot) -> None:
+    far = Recipe.model_validate({"handle": ({"at": (1.5, 0.5), "to": (0.5, 0.5)},)}).handle
+    robot.editor.session.edit("Outside", handle=far)
+    robot.key("shift+g")
+    wait(robot)
+    assert "no pair has its point in the picture" in robot.editor.messages.shown[-1].text
+    assert names(robot)[-1] == "Outside"
