@@ -34,6 +34,7 @@ class Unit:
 
 PLAIN = Unit()
 PERCENT = Unit("%", 100)
+DEGREES = Unit("\N{DEGREE SIGN}")
 SECONDS = Unit(" s", digits=".2f")
 PER_SECOND = Unit(" / s", digits=".2f")
 TIMES = Unit(" x", digits=".3g")
