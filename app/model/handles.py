@@ -15,7 +15,7 @@ from app.model.schema import Fraction01, Model, Place, Several, label_of
 from solver.limits import LARGEST_LEAD, LONGEST_LINE
 
 MOST_HANDLES = 64  # with the pins
-MOST_LINES = 16  # of them; of each up to 31 points are led
+MOST_LINES = 16  # of them; of each up to 41 points are led
 ARRIVED = 0.001  # longer sides: half a pixel of 512
 # Radii that two places are apart at which they are the same; how many times farther apart, or nearer, neighbours may be
 # led.

@@ -15,9 +15,10 @@ from solver.limits import LARGEST_LEAD, LONGEST_LINE, check_type, numbers, place
 
 SAME_TIME = 1e-6  # steps between two times that are the same but for their rounding
 SAME = 1e-9  # and points
-APART = (
-    1 / 6
-)  # radii between the points of a line that are led: half as far as a push (H2) turns round beside its middle
+# What is led as a whole has so many times as wide a push (H2), which turns round as far beside its middle as a stroke's
+# of the handle's radius, 1 / sqrt(7) of it: what lies between its points goes along.
+WIDER = 1.6
+APART = 1 / 8  # radii between the points of a line that are led
 RING = 1 / 4  # radii between a point that is turned or scaled and what tells how it is
 MOST_TURNED, LEAST_SCALE, MOST_SCALE = 720.0, 0.1, 10.0  # degrees, and times as large
 
@@ -137,8 +138,18 @@ class Handle:
 
     @cached_property
     def reach(self) -> float:
-        """Its brush's radius, or what its line needs."""
+        """Its radius, or what its line needs."""
         return max(self.radius, self._longest / LONGEST_LINE)
+
+    @property
+    def is_whole(self) -> bool:
+        """True if it leads more than a point."""
+        return bool(self.points) or self.rotate is not None or self.scale is not None
+
+    @property
+    def push_radius(self) -> float:
+        """How far the push of each of its points reaches."""
+        return self.reach * (WIDER if self.is_whole else 1.0)
 
     @cached_property
     def stations(self) -> np.ndarray:
@@ -196,7 +207,7 @@ class Shape:
             led, goals = _at(line, at), _at(_line(handle.goals, handle.closed), at) if handle.goals else None
         else:
             led = np.array([handle.at])
-            if handle.rotate is not None or handle.scale is not None:
+            if handle.is_whole:
                 angles, around = np.arange(6) * np.pi / 3, 1
                 ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
                 led = np.concatenate([led, led + RING * handle.radius * ring])

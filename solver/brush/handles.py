@@ -22,10 +22,7 @@ from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
-# How far a push (H2) reaches, in radii of its handle: so it turns round as far beside its middle as a stroke's push of
-# that radius does, 1 / sqrt(7) of it. A narrower one flows back between handles that go side by side.
-WIDER = 1.6
-# Of that, what a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
+# Radii that a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
 # step of the map follows a strain of 1/2.
 FARTHEST_STEP = 0.07
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
@@ -129,11 +126,11 @@ class Handles:
         before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
         self._rows = _runs(self._counts)
         self._at = np.concatenate([np.zeros((0, 2)), *(shape.led for shape in self._shapes)])
-        radii, self._local, stiffness = (
+        self._radii, self._local, stiffness = (
             np.repeat([getattr(handle, name) for handle in handles], self._counts)
-            for name in ("reach", "local", "stiffness")
+            for name in ("push_radius", "local", "stiffness")
         )
-        self._radii, self._soft = WIDER * radii, 1 / stiffness - 1 + RIDGE
+        self._soft = 1 / stiffness - 1 + RIDGE
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
 
     # -- a step -----------------------------------------------------------------------------------------------------
@@ -210,7 +207,7 @@ class Handles:
         viscosity = self._probed(lead, fluid.faces())[lead.pushed, 3]
         shader = fluid.device.pass_("brush/carry.frag")
         for place, radius, motion, here in zip(*_brushes(lead), lead.local, viscosity, strict=True):
-            tip = Tip(place, place, radius / WIDER)
+            tip = Tip(place, place, radius)
             self._motion.clear(0.0, 0.0, 0.0, here)
             inputs = tip.inputs(grid) | {"brush_velocity": tuple(motion.tolist()), "viscosity": fluid.viscosity}
             inputs |= {"motion": self._motion, "slip": self._one}
@@ -325,7 +322,7 @@ class Handles:
             shape, here = self._shapes[number], self._places[self._rows[number]]
             now, then = (shape.wanted(self._starts[self._rows[number]], at, dt) for at in (time, time + dt))
             step = slower[each, None] * (then - now + back * (now - here))
-            most, far = FARTHEST_STEP * WIDER * shape.handle.reach, float(np.hypot(*step.T).max())
+            most, far = FARTHEST_STEP * shape.handle.reach, float(np.hypot(*step.T).max())
             part = min(1.0, most / max(far, 1e-30))
             wanted[each] = step * part / dt
             areas = [0.0] if shape.around is None else [area(places[shape.around :]) for places in (here, now, then)]
@@ -392,7 +389,7 @@ class Handles:
         push = np.zeros((len(places), len(pushed), 2, 2))
         local = np.zeros_like(push)
         for mirror, shift in _images(self._fluid.grid):
-            r = (places[:, None] - (mirror * pushed + shift)) / radii[:, None]  # of the push
+            r = (places[:, None] - (mirror * pushed + shift)) / radii[:, None]
             q = np.hypot(r[..., 0], r[..., 1])
             far = np.maximum(1 - q, 0.0)[..., None, None]
             across = np.stack([-r[..., 1], r[..., 0]], axis=-1)
@@ -401,7 +398,7 @@ class Handles:
             push += (far**5 * (1 + 5 * q[..., None, None]) * np.eye(2) - 30 * far**4 * outer) * mirror
             if mirror.sum() >= 0:  # carry.frag takes images beyond one wall, and off the component across it
                 sign = np.ones(2) if mirror.sum() > 0 else np.minimum(mirror, 0.0)
-                local += (np.maximum(1 - (WIDER * q) ** 2, 0.0) ** 3)[..., None, None] * np.diag(sign)
+                local += (np.maximum(1 - q**2, 0.0) ** 3)[..., None, None] * np.diag(sign)
         return push, local
 
     def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:

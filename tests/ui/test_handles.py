@@ -119,8 +119,8 @@ def test_a_handle_is_turned_in_the_inspector_and_arrives(robot: Robot) -> None:
     assert session.end * session.dt >= session.recipe.handle[0].last
     assert session.replay.handles.away.max() < ARRIVED
     ring = session.replay.handles.shapes[0]
-    arm = ring[1] - ring[0]
-    assert np.degrees(np.arctan2(arm[1], arm[0])) == pytest.approx(40, abs=1)
+    arms = (ring[1:] - ring[0]) @ [1, 1j] * np.exp(-1j * np.arange(6) * np.pi / 3)
+    assert np.degrees(np.angle(arms.sum())) == pytest.approx(40, abs=1)
 
 
 def test_a_handle_is_picked_again_and_led_on(robot: Robot) -> None:

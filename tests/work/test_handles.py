@@ -274,13 +274,13 @@ def test_a_script_gives_the_bytes_of_a_recipe(device: Device):
     replay.seek(40)
     fluid = Fluid(device, replay.grid, FluidParams(drag=2.0))
     fluid.set_viscosity(0.03)
-    warp, corners = WarpMap(device, replay.grid, replay.warp.size), np.multiply(line, EXTENT)
+    warp, corners = WarpMap(device, replay.grid, replay.warp.size), [(x, 0.75 * y) for x, y in line]
     leading = Handles(
         fluid,
         warp,
         [
             Handle((0.7, 0.6 * 0.75), (0.6, 0.6 * 0.75), duration=0.4, rotate=30.0, scale=1.2),
-            Handle(replay.handles.handles[1].at, (0.45, 0.45 * 0.75), duration=0.4, points=corners, closed=True),
+            Handle(replay.handles.handles[1].at, (0.45, 0.45 * 0.75), duration=0.4, points=tuple(corners), closed=True),
         ],
     )
     for _ in range(40):
