@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from solver.brush.brush import Brush
-    from solver.brush.handles import Handle, Handles
+    from solver.brush.handle import Handle
+    from solver.brush.handles import Handles
     from solver.brush.masks import Masks
     from solver.brush.tip import Tip
     from solver.fluid import Fluid
@@ -45,7 +46,8 @@ __all__ = [
 # Loaded when first asked for: a recipe needs `solver.grid` and must not bring all of GL along.
 _MODULES = {
     "brush.brush": ("Brush",),
-    "brush.handles": ("Handle", "Handles"),
+    "brush.handle": ("Handle",),
+    "brush.handles": ("Handles",),
     "brush.masks": ("Masks",),
     "brush.tip": ("Tip",),
     "fluid": ("Fluid",),

@@ -15,6 +15,8 @@ LONGEST_STEP = 1e4
 LARGEST_VISCOSITY = 1e6
 # Radii that a handle leads its point: farther, a push draws what it leads out into threads finer than the map.
 LARGEST_LEAD = 2.0
+# Radii that a line is long which is led as a whole: the radius of a longer one is larger.
+LONGEST_LINE = 5.0
 
 
 def check_type(what: str, value: object, kind: Any = Real) -> None:

@@ -1,20 +1,21 @@
-"""The handles and pins of a recipe: points of the picture that are led somewhere, or stay where they are."""
+"""The handles and pins of a recipe: points and lines of the picture that are led somewhere, or stay where they are."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise, takewhile
-from math import ceil, floor, hypot, inf
-from typing import Annotated, ClassVar, Self
+from math import ceil, cos, floor, inf, radians, sin
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from app.model.sampling import Point
 from app.model.schema import Fraction01, Model, Place, Several, label_of
-from solver.limits import LARGEST_LEAD
+from solver.limits import LARGEST_LEAD, LONGEST_LINE
 
 MOST_HANDLES = 64  # with the pins
+MOST_LINES = 16  # of them; of each up to 41 points are led
 ARRIVED = 0.001  # longer sides: half a pixel of 512
 # Radii that two places are apart at which they are the same; how many times farther apart, or nearer, neighbours may be
 # led.
@@ -23,8 +24,18 @@ SAME, MOST_STRETCH = 0.05, 4.0
 SAME_TIME = 1e-6  # ticks between two times that are the same but for their rounding
 
 Time = Annotated[float, Field(ge=0, le=1_000_000)]
+Line = Annotated[Several[Point], Field(max_length=500)]
 Key = tuple[Time, Place, Place]
 """(seconds, x, y): when a handle shall be where, as fractions of the picture's width and height."""
+
+
+def _middle(line: Any) -> Point | None:
+    """The mean of the corners of a line, if it is one."""
+    try:
+        across, down = np.asarray(line, np.float64).T
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return (float(across.mean()), float(down.mean())) if len(across) else None
 
 
 class _Led(Model):
@@ -32,7 +43,10 @@ class _Led(Model):
 
     Attributes:
         name: what messages call it.
-        at: the place in the picture of what is led or held, as fractions of width and height.
+        at: the place in the picture of what is led or held, as fractions of width and height; of a line by default the
+            mean of its corners.
+        points: the corners of a line that is led or held as a whole, likewise.
+        closed: the line ends where it begins.
         radius: how far it reaches, in longer sides.
         start, end: seconds from and until which it is in force; without an end, for ever.
         stiffness: 1 holds exactly; less gives way to the fluid and to others.
@@ -40,16 +54,38 @@ class _Led(Model):
 
     name: str = ""
     at: Point
+    points: Line = ()
+    closed: bool = False
     radius: Annotated[float, Field(ge=0.001, le=1)] = 0.25
     start: Time = 0.0
     end: Time | None = None
     stiffness: Annotated[float, Field(ge=0.001, le=1)] = 1.0
 
+    @model_validator(mode="before")
+    @classmethod
+    def _in_the_middle(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        found = {key: _middle(data[line]) for key, line in (("at", "points"), ("to", "goals")) if line in data}
+        return {key: place for key, place in found.items() if place is not None} | data
+
     @model_validator(mode="after")
     def _forwards(self) -> Self:
         if self.end is not None and self.end < self.start:
             raise ValueError(f"'end' ({self.end:g}) is before 'start' ({self.start:g})")
+        if self.points and len(set(self.points)) < 2 + self.closed:
+            raise ValueError(f"'points' must be {'three' if self.closed else 'two'} different places or more")
         return self
+
+    @property
+    def corners(self) -> tuple[Point, ...]:
+        """The places in the picture that it holds: of its line, or its own."""
+        return self.points or (self.at,)
+
+    @property
+    def takes_hold(self) -> bool:
+        """True if some of it is in the picture."""
+        return any(is_inside(place) for place in self.corners)
 
     def is_in_force(self, tick: int, dt: float) -> bool:
         """True if it leads or holds in a tick, as `Handles.lead` has it."""
@@ -70,6 +106,9 @@ class RecipeHandle(_Led):
         keys: when it shall be where after that, at an even speed from one to the next; the way of the editor's hand.
             Without `to` they must be given, and may be none: a handle that nobody has led yet.
         local: from 0, which pushes as a fluid does, to 1, which moves what is under it alone.
+        goals: where the corners of its line shall be, as many; without, they keep their places about `at`.
+        rotate, scale: degrees that it is turned about `at` in that time, clockwise, and times that it is made as large.
+            A point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1.
     """
 
     kind: ClassVar = "handle"
@@ -77,11 +116,18 @@ class RecipeHandle(_Led):
     duration: Time = 1.0
     keys: Several[Key] | None = None
     local: Fraction01 = 0.0
+    goals: Line = ()
+    rotate: Annotated[float, Field(ge=-720, le=720)] | None = None
+    scale: Annotated[float, Field(ge=0.1, le=10)] | None = None
 
     @model_validator(mode="after")
     def _led_somewhere(self) -> Self:
-        if self.to is None and self.keys is None:
+        if self.to is None and self.keys is None and not self.turns:
             raise ValueError("'to' is missing")
+        if self.goals and len(self.goals) != len(self.points):
+            raise ValueError(f"'points' has {len(self.points)} places and 'goals' {len(self.goals)}; give as many")
+        if self.goals and self.turns:
+            raise ValueError("give either 'goals', or 'rotate' and 'scale'")
         times = [self.ready, *(key[0] for key in self.keys or ())]
         if any(later < earlier for earlier, later in pairwise(times)):
             raise ValueError("the times of 'keys' must not go backwards, nor begin before its other way has ended")
@@ -93,9 +139,15 @@ class RecipeHandle(_Led):
         return self.start if self.to is None else self.start + self.duration
 
     @property
+    def turns(self) -> bool:
+        """True if it is told how it is turned or scaled."""
+        return self.rotate is not None or self.scale is not None
+
+    @property
     def last(self) -> float:
         """The seconds from which on it only stays."""
-        return self.keys[-1][0] if self.keys else self.ready
+        last = self.keys[-1][0] if self.keys else self.ready
+        return max(last, self.start + self.duration) if self.turns else last
 
     @property
     def goal(self) -> Point | None:
@@ -156,44 +208,76 @@ def objections(
     handles: Sequence[RecipeHandle], pins: Sequence[RecipePin], extent: tuple[float, float]
 ) -> Iterator[str]:
     """What of them cannot be met, each by number; what can be is done all the same."""
-    led = labelled(handles, pins)
-    for label, one in led:
-        if not is_inside(one.at):
-            yield f"{label} takes hold of nothing: {_shown(one.at)} is outside the picture"
-        elif not is_inside(end := _end(one)):
-            yield f"{label} goes only to the picture's edge: {_shown(end)} is outside the picture"
-        elif (far := hypot(*_between(end, one.at, extent)) / one.radius) > LARGEST_LEAD:
-            yield f"{label} goes only {LARGEST_LEAD:g} of the {far:.3g} radii to its goal; give it a larger radius"
-    inside = [(label, one) for label, one in led if is_inside(one.at)]
-    for (label, one), (other_label, other) in combinations(inside, 2):
-        if max(one.start, other.start) < min(one.end or inf, other.end or inf):
-            near = min(one.radius, other.radius)
-            before, after = _between(one.at, other.at, extent), _between(_end(one), _end(other), extent)
-            far, far_after = hypot(*before), hypot(*after)
-            if far < SAME * near and hypot(*(after - before)) > SAME * near:
-                yield f"{label} and {other_label} hold the same place and are led apart"
-            elif far < near and far_after > MOST_STRETCH * far:
-                yield f"{label} and {other_label} are led {far_after / far:.3g} times as far apart as they lie"
-            elif far >= SAME * near and far_after * MOST_STRETCH < min(far, near):
-                yield f"{label} and {other_label} are led to nearly the same place"
-            elif far >= SAME * near and _nearest(before, after) * MOST_STRETCH < min(far, near):
-                yield f"{label} and {other_label} cross each other's way"
+    led = [_Way(label, one, extent) for label, one in labelled(handles, pins)]
+    for way in led:
+        outside, beyond = (((places < 0) | (places > extent)).any(axis=1) for places in (way.before, way.after))
+        if outside.all():
+            yield f"{way.label} takes hold of nothing: {_shown(way.led.at)} is outside the picture"
+            continue
+        if outside.any():
+            yield f"{way.label} reaches out of the picture: what is outside is not led"
+        if (ends := way.after[beyond & ~outside]).size:
+            yield f"{way.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
+        elif (far := _lengths(way.after - way.before).max() / way.reach) > LARGEST_LEAD:
+            yield f"{way.label} goes only {LARGEST_LEAD:g} of the {far:.3g} radii to its goal; give it a larger radius"
+        if way.led.closed and _area(way.before) * _area(way.after) < 0:
+            yield f"{way.label} is led inside out"
+    for one, other in combinations([way for way in led if way.led.takes_hold], 2):
+        if max(one.led.start, other.led.start) < min(one.until, other.until):
+            near = min(one.reach, other.reach)
+            before, after = (
+                mine[:, None] - theirs for mine, theirs in ((one.before, other.before), (one.after, other.after))
+            )
+            far, far_after = _lengths(before), _lengths(after)
+            apart = far >= SAME * near
+            stretched = np.where(apart & (far < near), far_after / np.maximum(far, 1e-30), 0.0).max()
+            both, close = f"{one.label} and {other.label}", np.minimum(far, near)
+            if (~apart & (_lengths(after - before) > SAME * near)).any():
+                yield f"{both} hold the same place and are led apart"
+            elif stretched > MOST_STRETCH:
+                yield f"{both} are led {stretched:.3g} times as far apart as they lie"
+            elif (apart & (far_after * MOST_STRETCH < close)).any():
+                yield f"{both} are led to nearly the same place"
+            elif (apart & (_nearest(before, after) * MOST_STRETCH < close)).any():
+                yield f"{both} cross each other's way"
 
 
-def _end(led: RecipeHandle | RecipePin) -> Point:
-    return (led.goal if isinstance(led, RecipeHandle) else None) or led.at
+class _Way:
+    """Where a handle or a pin leads its corners: before and after, (n, 2) in longer sides."""
+
+    def __init__(self, label: str, led: RecipeHandle | RecipePin, extent: Point) -> None:
+        self.label, self.led, self.until = label, led, inf if led.end is None else led.end
+        self.before = self.after = np.multiply(led.corners, extent)
+        lines = [self.before]
+        if isinstance(led, RecipeHandle):
+            at, goal = np.multiply(led.at, extent), np.multiply(led.goal or led.at, extent)
+            if led.goals and led.to:
+                lines.append(np.multiply(led.goals, extent))
+                self.after = lines[1] + goal - np.multiply(led.to, extent)
+            else:
+                angle, scale = radians(led.rotate or 0.0), led.scale or 1.0
+                turn = np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
+                self.after = goal + scale * (self.before - at) @ turn
+        rounds = ([*line, line[0]] if led.closed else line for line in lines)
+        self.reach = max(led.radius, max(_lengths(np.diff(line, axis=0)).sum() for line in rounds) / LONGEST_LINE)
 
 
-def _between(one: Point, other: Point, extent: tuple[float, float]) -> np.ndarray:
-    return np.subtract(one, other) * extent
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    return np.hypot(vectors[..., 0], vectors[..., 1])
 
 
-def _nearest(before: np.ndarray, after: np.ndarray) -> float:
+def _area(line: np.ndarray) -> float:
+    """The area within a closed line, positive clockwise."""
+    x, y = line.T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def _nearest(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """How near two come that go straight, at the same time."""
     change = after - before
-    part = -float(before @ change) / max(float(change @ change), 1e-30)
-    return float(np.hypot(*(before + min(max(part, 0.0), 1.0) * change)))
+    part = -(before * change).sum(axis=-1) / np.maximum((change**2).sum(axis=-1), 1e-30)
+    return _lengths(before + np.clip(part, 0.0, 1.0)[..., None] * change)
 
 
-def _shown(point: Point) -> str:
+def _shown(point: Sequence[float] | np.ndarray) -> str:
     return f"({point[0]:g}, {point[1]:g})"

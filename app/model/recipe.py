@@ -11,13 +11,13 @@ from pydantic import Field, ValidationError, model_validator
 from app.errors import UserError
 from app.model import toml
 from app.model.forces import Force
-from app.model.handles import MOST_HANDLES, RecipeHandle, RecipePin, is_inside
+from app.model.handles import MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin
 from app.model.mask_edits import MaskEdit, remaining
 from app.model.masks import FreezeLayer, ViscosityLayer
 from app.model.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
 from app.model.strokes import Change, Stroke
 
-VERSION = 4
+VERSION = 5
 MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
@@ -156,7 +156,8 @@ class Recipe(Model):
 
     Attributes:
         version: of this format. In version 1 strokes had no `detail`, in version 2 there were no handles, in version 3
-            masks were only painted in time; one that is older becomes one of this version when it is read.
+            masks were only painted in time, in version 4 handles were points that nobody turned; one that is older
+            becomes one of this version when it is read.
         name: a title.
         picture: the source, relative to the recipe's own folder.
         map: a warp map to begin with instead of the picture as it is, in any format of `app.media.maps`.
@@ -169,7 +170,7 @@ class Recipe(Model):
         handle, pin: in force all at once.
     """
 
-    version: Literal[4] = VERSION
+    version: Literal[5] = VERSION
     name: str = ""
     picture: FileName | None = None
     map: FileName | None = None
@@ -211,6 +212,8 @@ class Recipe(Model):
             raise ValueError(
                 f"there are {len(self.handle) + len(self.pin)} handles and pins; at most {MOST_HANDLES} work"
             )
+        if (lines := sum(bool(led.points) for led in (*self.handle, *self.pin))) > MOST_LINES:
+            raise ValueError(f"there are {lines} lines that are led or held; at most {MOST_LINES} work")
         if self.stop.handles_within is not None and not self.handle:
             raise ValueError("'stop.handles_within' waits for handles, and there is no [[handle]]")
         for key, things in (("change", self.change), ("mask", self.mask)):
@@ -346,7 +349,7 @@ class Recipe(Model):
         renumbered = self.pin != other.pin
         for mine, theirs in zip_longest(self.handle, other.handle):
             if mine is not None and theirs is not None:
-                renumbered |= is_inside(mine.at) != is_inside(theirs.at)  # those behind it
+                renumbered |= mine.takes_hold != theirs.takes_hold  # those behind it
             if mine is not None and theirs is not None and mine != theirs and not renumbered:
                 agreed = min(agreed, mine.agrees_until(theirs, self.fluid.dt))
             elif mine != theirs or renumbered:

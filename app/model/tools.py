@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, hypot
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from app.model.handles import RecipeHandle
 from app.model.mask_edits import MaskStroke
+from app.model.sampling import Point
 from app.model.strokes import BrushPath, Stroke, Symmetry
 from app.model.strokes import Tool as StrokeTool
 from app.model.windows import FLOWING
 
 FASTEST = 2.0  # longer sides per second that a brush can follow
 LINE_SPEED = 0.8  # longer sides per second at which a stroke is drawn that was only clicked
+DRAWN = 0.004  # longer sides between places of a path that is drawn
+MOST_CORNERS = 200  # of a line that is drawn
+CLOSED = 0.1  # of its length: a line that ends as near to where it began is closed
 
 
 class Touch(NamedTuple):
@@ -52,6 +57,7 @@ class Press:
         slack: how far the pointer may shake, in longer sides, and is not moved yet.
         string: by how long a string the pen pulls the brush, in longer sides; see `PulledString`.
         at: the place in the original of what was pressed on.
+        under: the places in the original of what is seen at places.
         symmetry, sectors: of strokes.
         held: the handle that was taken hold of, and `rests`, where it is led.
         timeless: what is painted on masks takes no time.
@@ -66,6 +72,7 @@ class Press:
     slack: float = 0.0
     string: float = 0.0
     at: tuple[float, float] = (0.0, 0.0)
+    under: Callable[[list[Point]], list[Point]] = list
     held: RecipeHandle | None = None
     rests: tuple[float, float] | None = None
     timeless: bool = False
@@ -268,30 +275,45 @@ def _line(press: Press, stroke: Stroke | MaskStroke, start: tuple[float, float])
 
 def _curve(press: Press, first: Touch) -> Gesture:
     """A path is drawn while nothing happens; on release the fluid is blown along it."""
-    touches, last = [first], first
-    while (touch := (yield None)) is not None:
-        before, last = touches[-1], touch
-        if hypot((touch.x - before.x) * press.extent[0], (touch.y - before.y) * press.extent[1]) > 0.004:
-            touches.append(touch)
+    touches = yield from _drawn(press, first)
     if len(touches) < 2:
         return None
     points = touches[::-1] if press.opposite else touches
-    return _stroke(press, "curve", False, *(point._replace(tick=last.tick) for point in points))
+    return _stroke(press, "curve", False, *(point._replace(tick=touches[-1].tick) for point in points))
+
+
+def _drawn(press: Press, first: Touch) -> Generator[None, Touch | None, list[Touch]]:
+    """A path that is drawn while nothing happens; the last of its touches has the tick in which it was let go."""
+    touches, tick = [first], first.tick
+    while (touch := (yield None)) is not None:
+        tick = touch.tick
+        if _apart(press, touches[-1], touch) > DRAWN:
+            touches.append(touch)
+    return [*touches[:-1], touches[-1]._replace(tick=tick)]
+
+
+def _apart(press: Press, one: Touch, other: Touch) -> float:
+    """How far two touches are apart, in longer sides."""
+    return hypot((one.x - other.x) * press.extent[0], (one.y - other.y) * press.extent[1])
 
 
 def _lead(press: Press, first: Touch) -> Gesture:
-    """What was pressed on goes where the pointer does and stays there; if that does not move, it is pinned."""
-    brush, start = press.brush, (first.x, first.y)
+    """What was pressed on goes where the pointer does and stays there; if that does not move, it is pinned.
+
+    With Shift a line is drawn, which is pinned as a whole.
+    """
+    start = first.x, first.y
     handle, rests = press.held, press.rests or start
+    if handle is None and first.shift:
+        touches = yield from _drawn(press, first)
+        if len(touches) < 2:
+            return None
+        length = sum(_apart(press, one, other) for one, other in pairwise(touches))
+        corners = [(touch.x, touch.y) for touch in touches[:: ceil(len(touches) / MOST_CORNERS)]]
+        closed = len(corners) > 2 and _apart(press, touches[0], touches[-1]) < CLOSED * length
+        return _held(press, touches[-1].tick, points=tuple(press.under(corners)), closed=closed)
     if handle is None:
-        handle = RecipeHandle(
-            at=press.at,
-            keys=(),
-            radius=brush.radius,
-            start=first.tick * press.dt,
-            stiffness=brush.stiffness,
-            local=brush.local,
-        )
+        handle = _held(press, first.tick, at=press.at)
     place, moved = rests, False
     while (touch := (yield handle)) is not None:
         x, y = rests[0] + touch.x - start[0], rests[1] + touch.y - start[1]
@@ -302,6 +324,13 @@ def _lead(press: Press, first: Touch) -> Gesture:
     return handle
 
 
+def _held(press: Press, tick: int, **what: Any) -> RecipeHandle:
+    """A handle that holds what was taken from a tick on, and has been led nowhere."""
+    brush = press.brush
+    parts = {"keys": (), "radius": brush.radius, "stiffness": brush.stiffness, "local": brush.local}
+    return RecipeHandle.model_validate({"start": tick * press.dt, **parts, **what})
+
+
 TOOLS = (
     Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
          settings=("radius", "hardness", "strength", "local")),
@@ -309,7 +338,9 @@ TOOLS = (
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
     Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),
     Tool(
-        "handle", "Handle", "g", "Drag a point to where it should go; click to pin it where it is", _lead,
+        "handle", "Handle", "g",
+        "Drag a point to where it should go; click to pin it; with Shift draw a line to hold",
+        _lead,
         settings=("radius", "stiffness", "local"),
     ),
     Tool(

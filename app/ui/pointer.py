@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import exp, hypot
 
 from app.model.handles import RecipeHandle, labelled
+from app.model.sampling import Point
 from app.model.tools import Press
 from app.ui.clock import TWICE
 from app.ui.dialogs import Dialogs
@@ -91,8 +93,10 @@ class PointerController:
         view = self.workspace.view
 
         def far(held: Held) -> float:
-            places = (view.to_screen(*place) for place in (held.target, held.now))
-            return min(hypot(x - self.x, y - self.y) for x, y in places)
+            places = [view.to_screen(*place) for place in (held.target, held.now)]
+            line = [view.to_screen(*place) for place in held.line]
+            pieces = [*((place, place) for place in places), *pairwise(line)]
+            return min(_distance((self.x, self.y), *piece) for piece in pieces)
 
         held = min(self.workspace.session.held, key=far, default=None)
         return held if held is not None and far(held) <= self.ui.px(GRIP) else None
@@ -228,7 +232,11 @@ class PointerController:
     def _release(self) -> None:
         drag, self.drag = self.drag, None
         if drag == "paint":
-            self.workspace.session.release()
+            session = self.workspace.session
+            held = len(session.recipe.handle)
+            session.release()
+            if len(session.recipe.handle) > held:  # a line, of which nothing was there before it was drawn
+                self.state.selected = labelled(session.recipe.handle, ())[-1][0]
         elif drag == "select":
             self.selecting.release()
         elif drag == "zoom" and not self._moved:
@@ -269,3 +277,12 @@ class PointerController:
         if self.drag == "hold" or self.hovered is not None:
             return "hand"
         return "none" if self.shows_ring else "arrow"
+
+
+def _distance(place: Point, start: Point, end: Point) -> float:
+    """How far a place is from a straight piece of a line."""
+    along = end[0] - start[0], end[1] - start[1]
+    from_start = place[0] - start[0], place[1] - start[1]
+    part = (from_start[0] * along[0] + from_start[1] * along[1]) / max(along[0] ** 2 + along[1] ** 2, 1e-12)
+    part = min(max(part, 0.0), 1.0)
+    return hypot(from_start[0] - part * along[0], from_start[1] - part * along[1])

@@ -35,6 +35,7 @@ class Unit:
 PLAIN = Unit()
 POINTS = Unit(" px")  # of the screen
 PERCENT = Unit("%", 100)
+DEGREES = Unit("\N{DEGREE SIGN}")
 SECONDS = Unit(" s", digits=".2f")
 PER_SECOND = Unit(" / s", digits=".2f")
 TIMES = Unit(" x", digits=".3g")

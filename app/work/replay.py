@@ -17,7 +17,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.forces import BuiltForce, build
-from app.model.handles import RecipeHandle, RecipePin, is_inside, labelled, objections
+from app.model.handles import RecipeHandle, RecipePin, labelled, objections
 from app.model.mask_edits import ClearMask, MaskStroke, edited, remaining
 from app.model.masks import solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
@@ -28,7 +28,8 @@ from app.model.timeline import Observation, Sentinel
 from app.model.windows import FLOWING, Window, may_have_windows
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from solver.brush.brush import Brush, Motion
-from solver.brush.handles import Handle, Handles
+from solver.brush.handle import Handle
+from solver.brush.handles import Handles
 from solver.brush.masks import Masks
 from solver.brush.push import Push, coasting, gain_compensation, slip_factor, strain_limit
 from solver.brush.tip import Tip
@@ -285,9 +286,7 @@ class Replay:
     def led(self) -> list[tuple[str, RecipeHandle | RecipePin]]:
         """The recipe's pins and handles that take hold of something, with what messages call them; pins come first."""
         led = labelled(self.recipe.handle, self.recipe.pin)
-        return sorted(
-            (each for each in led if is_inside(each[1].at)), key=lambda each: isinstance(each[1], RecipeHandle)
-        )
+        return sorted((each for each in led if each[1].takes_hold), key=lambda each: isinstance(each[1], RecipeHandle))
 
     def unmet(self, within: float) -> Iterator[str]:
         """Which handles are farther than `within` from where they are led at this moment, and how far."""
@@ -596,11 +595,15 @@ class Replay:
         for _, led in self.led:
             at = led.at[0] * extent[0], led.at[1] * extent[1]
             end = inf if led.end is None else led.end
-            way: dict[str, Any] = {}
+            way: dict[str, Any] = {
+                "points": np.multiply(led.points, extent) if led.points else (),
+                "closed": led.closed,
+            }
             if isinstance(led, RecipeHandle):
-                way = {"duration": led.duration, "local": led.local}
+                way |= {"duration": led.duration, "local": led.local, "rotate": led.rotate, "scale": led.scale}
                 way |= {"to": led.to and self._in_longer_sides(led.to)}
                 way |= {"keys": tuple((time, *self._in_longer_sides((x, y))) for time, x, y in led.keys or ())}
+                way |= {"goals": np.multiply(led.goals, extent) if led.goals else ()}
             made.append(Handle(at, radius=led.radius, start=led.start, end=end, stiffness=led.stiffness, **way))
         return made
 

@@ -19,7 +19,7 @@ from app.media.auxiliary import Pictures
 from app.media.project import Project
 from app.model.bars import Changed, Which, with_changed
 from app.model.document import Document
-from app.model.handles import ARRIVED, MOST_HANDLES, RecipeHandle, RecipePin, is_inside, labelled
+from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin, is_inside, labelled
 from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.recipe import Recipe
 from app.model.sampling import Point
@@ -47,6 +47,7 @@ class Held:
         led: as the recipe has it.
         label: what messages call it.
         start, now, target: where it was when it began, is, and shall be.
+        line: where the points of its line are, the first again at the end of a closed one; none of a point.
     """
 
     led: RecipeHandle | RecipePin
@@ -54,6 +55,7 @@ class Held:
     start: Point
     now: Point
     target: Point
+    line: tuple[Point, ...] = ()
 
     def is_away(self, extent: Point) -> bool:
         """True if it is not where it is led."""
@@ -221,7 +223,8 @@ class Session:
         self.release()
         self._taken = None
         if tool.name == "handle" and held is None:
-            press = replace(press, at=self._under(x, y))
+            self._check_room(line=shift)
+            press = replace(press, at=self._under(x, y), under=self._original)
         stands, came_from = not self.is_moving, self.target
         self.playing = False
         self._pen = self._go_on()
@@ -320,7 +323,9 @@ class Session:
 
     def _label(self, made: Made) -> str:
         if isinstance(made, RecipeHandle):
-            return "Lead on" if self._taken is not None else "Handle" if made.keys else "Pin"
+            if self._taken is not None:
+                return "Lead on"
+            return "Line" if made.points else "Handle" if made.keys else "Pin"
         stroke = made
         if self._tool is None:
             return stroke.tool.capitalize()
@@ -343,25 +348,35 @@ class Session:
             found, extent = [], replay.grid.extent
             if any(led.is_in_force(tick, dt) for _, led in replay.led):
                 handles = replay.handles
-                for (label, led), handle, now, start in zip(
-                    replay.led, handles.handles, handles.places, handles.starts, strict=True
+                shapes = handles.shapes
+                for (label, led), handle, shape, now, start in zip(
+                    replay.led, handles.handles, shapes, handles.middles(shapes), handles.starts, strict=True
                 ):
                     if led.is_in_force(tick, dt):
                         start = now if np.isnan(start[0]) else start
                         target = handle.wanted(start, max(replay.time, handle.ready), dt) if handle.goal else start
                         places = ((float(x), float(y)) for x, y in (start / extent, now / extent, target / extent))
-                        found.append(Held(led, label, *places))
+                        line = [(float(x), float(y)) for x, y in shape / extent] if led.points else []
+                        found.append(Held(led, label, *places, line=(*line, *line[: led.closed])))
             self._held = seen, found
         return self._held[1]
 
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:
-        """Set something about the handle or pin that messages call so, from its start on.
+        """Set something about the handle or pin that messages call so, from its start on, and let it arrive.
 
         `commit`: as an entry of the history; not while a slider is dragged.
         """
-        self.preview(**self._with_led(label, lambda led: (led.model_copy(update=settings),)))
+        parts = self._with_led(label, lambda led: (led.model_copy(update=settings),))
+        last = max((handle.last for handle in parts["handle"] if handle.turns), default=0.0)
+        if lasts := last > self._live.duration:
+            parts["duration"] = (ceil(last / self.dt) + 1) * self.dt
+        self.preview(**parts)
+        if lasts:
+            self._send(self.end)
         if commit:
             self.commit(name)
+            if self.is_behind and self.target == self.end:
+                self._coast()
 
     def let_go(self, label: str) -> None:
         """Take a handle or a pin away, as if it had never been."""
@@ -382,14 +397,22 @@ class Session:
 
     def _under(self, x: float, y: float) -> Point:
         """The place in the original of what is seen at a place."""
-        extent = self.extent
-        moved = self.replay.warp.at(np.multiply([(x, y)], extent))[0] / extent
-        at = round(float(x + moved[0]), 6), round(float(y + moved[1]), 6)
+        (at,) = self._original([(x, y)])
         if not is_inside((x, y)) or not is_inside(at):
             raise UserError("There is nothing of the picture here to take hold of.")
-        if len(self._base.handle) + len(self._base.pin) >= MOST_HANDLES:
-            raise UserError(f"There are {MOST_HANDLES} handles and pins already; remove one to set another.")
         return at
+
+    def _original(self, seen: list[Point]) -> list[Point]:
+        """The places in the original of what is seen at places."""
+        moved = np.array(seen) + self.replay.warp.at(np.multiply(seen, self.extent)) / self.extent
+        return [(round(float(x), 6), round(float(y), 6)) for x, y in moved]
+
+    def _check_room(self, line: bool) -> None:
+        led = (*self._base.handle, *self._base.pin)
+        if len(led) >= MOST_HANDLES:
+            raise UserError(f"There are {MOST_HANDLES} handles and pins already; remove one to set another.")
+        if line and sum(bool(each.points) for each in led) >= MOST_LINES:
+            raise UserError(f"There are {MOST_LINES} lines already; remove one to set another.")
 
     def _take(self, led: RecipeHandle | RecipePin) -> RecipeHandle | None:
         """Take a handle in hand; a pin becomes one, for good if it is led."""

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.brush.tip import FARTHEST, Point, Tip
+from solver.brush.brush import Brush
+from solver.brush.handle import Handle, Shape, area, spun
+from solver.brush.tip import Point, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
 from solver.grid import Grid
-from solver.limits import LARGEST_LEAD, check_step, check_type, numbers
+from solver.limits import check_step, check_type
 from solver.scheme import Scheme
 from solver.state import State
 from solver.warp.inverse import ForwardMap
@@ -24,7 +25,6 @@ RATE = 8.0  # 1 / s: at which what is left of a way is gone
 # Radii that a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
 # step of the map follows a strain of 1/2.
 FARTHEST_STEP = 0.07
-SAME_TIME = 1e-6  # steps between two times that are the same but for their rounding
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
@@ -38,116 +38,54 @@ STRETCHING, TORN = 8.0, 12.0
 PLACES = 256  # along the longer side of the picture where that is looked at, or as many as there are cells
 RINGS = (1 / 64, 1 / 32, 1 / 16)  # radii of rings of `AROUND` places around its middle, likewise: what two handles that
 AROUND = 16  # nearly meet lead apart is less than that far across
+CORE = 0.5  # of the radius of what turns or swells, where it does so evenly
 # Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
 FOUND, LOST = 1e-7, 1e-4
 MOST_ROUNDS = 8
 
 
-@dataclass(frozen=True)
-class Handle:
-    """A point of the picture on its way; longer sides and seconds, y down.
+class Ring(NamedTuple):
+    """Points around one that is turned or scaled, of what is listed.
 
     Attributes:
-        at: the place in the original of what is led.
-        to: where to; None if it stays where it is at its start, as a pin does.
-        radius: how far its brush reaches.
-        start: when it begins.
-        duration: of the path, which begins and ends softly.
-        end: when it lets go; until then it stays where it has arrived.
-        stiffness: 1 is led exactly; with less it gives way to the fluid and to the others.
-        local: the part of its motion, 0-1, that carries what is under it alone; see `Push`.
-        keys: times and places (t, x, y), in order and none before its first way has ended: where it is led after that,
-            at an even speed from one to the next.
-
-    Raises:
-        ValueError: if a number is not finite (but for `end`) or out of its range.
+        centre: the number of the point.
+        rows: those of the ring.
+        arms: from the point to them, (n, 2).
+        tip: the brush that turns and swells what is under it.
     """
 
-    at: Point
-    to: Point | None = None
-    radius: float = 0.25
-    start: float = 0.0
-    duration: float = 1.0
-    end: float = math.inf
-    stiffness: float = 1.0
-    local: float = 0.0
-    keys: tuple[tuple[float, float, float], ...] = ()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "at", numbers("a handle's place", self.at, 2))
-        if self.to is not None:
-            object.__setattr__(self, "to", numbers("where a handle goes", self.to, 2))
-        check_type("a handle's keys", self.keys, Iterable)
-        object.__setattr__(self, "keys", tuple(numbers("a handle's key", key, 3) for key in self.keys))
-        for number in (self.radius, self.start, self.duration, self.end, self.stiffness, self.local):
-            check_type("a number of a handle", number)
-        places = (*self.at, *(self.to or ()), *(side for key in self.keys for side in key[1:]))
-        if not all(abs(place) <= FARTHEST for place in places):
-            raise ValueError(f"a handle from {self.at} to {self.to} is off the picture by more than {FARTHEST:g} sides")
-        if not 1e-6 <= self.radius <= 1:
-            raise ValueError(f"a handle of radius {self.radius} was given; it must be from 1e-06 to 1")
-        if not (0 <= self.start < math.inf and 0 <= self.duration < math.inf and self.start <= self.end):
-            raise ValueError("a handle's start and duration must be finite and not negative, and its end not before")
-        if not 0.001 <= self.stiffness <= 1:
-            raise ValueError(f"a handle of stiffness {self.stiffness} was given; it must be from 0.001 to 1")
-        if not 0 <= self.local <= 1:
-            raise ValueError("the local part of a handle must be from 0 to 1")
-        times = [self.ready, *(key[0] for key in self.keys), math.inf]
-        if not all(earlier <= later for earlier, later in pairwise(times)):
-            raise ValueError("the times of a handle's keys must not go backwards, nor begin before its way has ended")
+    centre: int
+    rows: slice
+    arms: np.ndarray
+    tip: Tip
 
     @property
-    def ready(self) -> float:
-        """When it has gone its first way, and its keys may begin."""
-        return self.start if self.to is None else self.start + self.duration
-
-    @property
-    def goal(self) -> Point | None:
-        """Where it is led in the end; None if it stays where it is at its start."""
-        return self.keys[-1][1:] if self.keys else self.to
-
-    def wanted(self, start: np.ndarray, time: float, dt: float) -> np.ndarray:
-        """Where it shall be at a time, (2,), if it was at `start` when it began; `dt` says how exact the time is."""
-
-        def within(place: Sequence[float]) -> np.ndarray:
-            way = np.subtract(place, start)
-            return way * min(1.0, LARGEST_LEAD * self.radius / max(float(np.hypot(*way)), 1e-30))
-
-        if not self.keys or time < self.ready:
-            return start if self.to is None else start + self.passed(time) * within(self.to)
-        stations = [(self.ready, *(start if self.to is None else self.to)), *self.keys]
-        number = max(number for number, (since, *_) in enumerate(stations) if since <= time + SAME_TIME * dt)
-        (since, *here), (until, *there) = stations[number], stations[min(number + 1, len(stations) - 1)]
-        if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
-            return start + within(here)
-        part = (time - since) / (until - since)
-        return start + (1 - part) * within(here) + part * within(there)
-
-    def passed(self, time: float) -> float:
-        """The part of its way, 0-1, that it shall have gone at a time."""
-        if time >= self.start + self.duration:
-            return 1.0
-        if time <= self.start:  # also where it goes its way at once
-            return 0.0
-        part = (time - self.start) / self.duration
-        return part * part * (3 - 2 * part)
+    def length(self) -> float:
+        """Of its arms in the mean."""
+        return float(np.hypot(*self.arms.T).mean())
 
 
 class Lead(NamedTuple):
-    """What the active handles do in a step, found before it.
+    """What the points of active handles do in a step, found before it.
 
     Attributes:
-        active: their numbers.
-        places, radii: of their brushes, (n, 2) and (n,).
-        influence: how the push of each moves each, (n, n, 2, 2): see `_influences`.
-        wanted: how the fluid shall move at them, (n, 2), longer sides / s.
-        local: what of their motion carries the picture and not the fluid, (n, 2).
+        places, radii: of all of them, (n, 2) and (n,).
+        pushed: the numbers of those that are pushed, p of them.
+        rings: r of them.
+        loops: which of them are closed lines.
+        influence: what the pushes and the turns of rings do to the pushed and to rings, (2 p + r, 2 p + r).
+        soft: what of their will they give up, (2 p + r,): see (H3).
+        wanted: how the fluid shall move at them all, (n, 2), longer sides / s.
+        local: what of their motion carries the picture and not the fluid, (p, 2).
     """
 
-    active: np.ndarray
     places: np.ndarray
     radii: np.ndarray
+    pushed: np.ndarray
+    rings: list[Ring]
+    loops: list[slice]
     influence: np.ndarray
+    soft: np.ndarray
     wanted: np.ndarray
     local: np.ndarray
 
@@ -168,11 +106,13 @@ class Handles:
         check_type("what handles look at", warp, WarpMap)
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
-        self._one = fluid.device.field((1, 1), 1, "slip of handles")
+        self._one = fluid.device.field((1, 1), 1, "a factor of handles")
         self._one.clear(1.0)
         self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
-        # Where those that have begun are, and were then; NaN for the others.
+        self._brush = Brush(fluid.device)
+        # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
+        self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
         self.replace(handles)
 
@@ -182,10 +122,16 @@ class Handles:
         for handle in handles:
             check_type("a handle", handle, Handle)
         self.handles = tuple(handles)
-        self._at = np.array([handle.at for handle in handles], np.float64).reshape(-1, 2)
-        self._radii = np.array([handle.radius for handle in handles])
-        self._local = np.array([handle.local for handle in handles])
-        self._places, self._starts = (self._fitted(kept) for kept in (self._places, self._starts))
+        self._shapes = [Shape.of(handle, self._warp.extent) for handle in handles]
+        before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
+        self._rows = _runs(self._counts)
+        self._at = np.concatenate([np.zeros((0, 2)), *(shape.led for shape in self._shapes)])
+        self._radii, self._local, stiffness = (
+            np.repeat([getattr(handle, name) for handle in handles], self._counts)
+            for name in ("push_radius", "local", "stiffness")
+        )
+        self._soft = 1 / stiffness - 1 + RIDGE
+        self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -204,23 +150,45 @@ class Handles:
         """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
         if not check_step(dt) > 0:
             raise ValueError("to lead a handle takes some time")
-        active = [handle.start <= time + dt / 2 < handle.end for handle in self.handles]
-        self._places = self._located()
         begun = np.array([handle.start <= time + dt / 2 for handle in self.handles], bool)
-        if (new := begun & np.isnan(self._starts[:, 0])).any():
+        in_force = begun & np.array([time + dt / 2 < handle.end for handle in self.handles], bool)
+        self._places = self._located()
+        if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
             self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
-        numbers = np.flatnonzero(active)
-        places, radii, share = self._places[numbers], self._radii[numbers], self._local[numbers]
-        slower = self._slower(numbers)
-        self._calm(places, radii, 1 - slower)
-        wanted = self._wanted_velocities(numbers, slower, time, dt)
-        push, local = self._influences(places, radii)
+        active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
+        rows = _runs(self._counts[in_force])  # of each in what is listed
+        places, radii = self._places[listed], self._radii[listed]
+        slower = self._slower(listed)
+        for each in rows:
+            slower[each] = slower[each].min()  # what is led as a whole goes as slowly as the slowest of it
+        wanted, growths = self._wanted(active, rows, slower, time, dt)
+        rings, loops, is_pushed = list[Ring](), list[slice](), np.ones(len(listed), bool)
+        for number, each, growth in zip(active, rows, growths, strict=True):
+            shape, local = self._shapes[number], self._shapes[number].handle.local
+            if shape.is_ring:
+                around = slice(each.start + 1, each.stop)
+                tip = _tip(places[each.start], shape.handle.radius)
+                rings.append(Ring(each.start, around, places[around] - places[each.start], tip))
+                is_pushed[around] = False
+                self._brush.expand(self._fluid, tip, growth)
+            elif shape.around is not None:
+                loops.append(each)
+                middle = places[each].mean(axis=0)
+                tip = _tip(middle, float(np.hypot(*(places[each] - middle).T).max()) / CORE)
+                self._brush.expand(self._fluid, tip, (1 - local) * growth)
+        pushed = np.flatnonzero(is_pushed)
+        share = self._local[listed][pushed]
+        self._calm(places[pushed], radii[pushed], 1 - slower[pushed])
+        push, local = self._influences(places, places[pushed], radii[pushed])
         # What is local is shared out first: the fluid would else do all of it, going on by itself.
         both = (1 - share[:, None, None]) * push + share[:, None, None] * local
-        carried = share[:, None] * self._solved(numbers, both, wanted)
+        soft = np.repeat(self._soft[listed][pushed], 2)
+        carried = share[:, None] * _solved(_matrix(both[pushed]), wanted[pushed].ravel(), soft).reshape(-1, 2)
         wanted = wanted - np.einsum("ijab,jb->ia", local, carried)
-        lead = self._lead = Lead(numbers, places, radii, push, wanted, carried)
+        soft = np.concatenate([soft, self._soft[listed][[ring.centre for ring in rings]]])
+        influence = _with_rings(places, pushed, push, rings)
+        lead = self._lead = Lead(places, radii, pushed, rings, loops, influence, soft, wanted, carried)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -236,7 +204,8 @@ class Handles:
         fluid, grid, lead = self._fluid, self._fluid.grid, self._lead
         if lead is None or not lead.local.any():
             return
-        viscosity, shader = self._probed(lead, fluid.faces())[:, 3], fluid.device.pass_("brush/carry.frag")
+        viscosity = self._probed(lead, fluid.faces())[lead.pushed, 3]
+        shader = fluid.device.pass_("brush/carry.frag")
         for place, radius, motion, here in zip(*_brushes(lead), lead.local, viscosity, strict=True):
             tip = Tip(place, place, radius)
             self._motion.clear(0.0, 0.0, 0.0, here)
@@ -247,31 +216,44 @@ class Handles:
     # -- what it looks at -------------------------------------------------------------------------------------------
 
     @property
-    def places(self) -> np.ndarray:
-        """Where they are now, (n, 2) in longer sides, or will begin; looking changes nothing."""
+    def shapes(self) -> list[np.ndarray]:
+        """Where the points of each are now, (k, 2) in longer sides, or will begin; looking changes nothing."""
         found, waiting = self._located(), np.isnan(self._starts[:, 0])
         if waiting.any():
             found[waiting] = self._at[waiting] + self._forward.at(self._at[waiting])
-        return found
+        return [found[rows] for rows in self._rows]
+
+    @property
+    def places(self) -> np.ndarray:
+        """Where they are now, (n, 2) in longer sides, or will begin; looking changes nothing."""
+        return self.middles(self.shapes)
 
     @property
     def starts(self) -> np.ndarray:
         """Where they were when they began, (n, 2) in longer sides; NaN where they have not."""
-        return self._starts.copy()
+        return self.middles([self._starts[rows] for rows in self._rows])
+
+    def middles(self, shapes: list[np.ndarray]) -> np.ndarray:
+        """Where they are, (n, 2), with their points at these places; as `shapes`."""
+        middles = [shape.middle(places) for shape, places in zip(self._shapes, shapes, strict=True)]
+        return np.array(middles).reshape(-1, 2)
 
     @property
     def away(self) -> np.ndarray:
-        """How far each is from where it shall be in the end, (n,) in longer sides; 0 of pins that have not begun."""
-        places = self.places
-        starts = np.where(np.isnan(self._starts), places, self._starts)
-        ends = [handle.goal or start for handle, start in zip(self.handles, starts, strict=True)]
-        return np.hypot(*(places - np.reshape(ends, (-1, 2))).T)
+        """How far what is led by each is from where it shall be in the end, (n,) in longer sides, by the point that is
+        farthest; 0 of pins that have not begun.
+        """
+        found = np.zeros(len(self.handles))
+        for number, (shape, now, rows) in enumerate(zip(self._shapes, self.shapes, self._rows, strict=True)):
+            starts = now if np.isnan(self._starts[rows]).any() else self._starts[rows]
+            found[number] = shape.away(now, starts)
+        return found
 
     # -- its state --------------------------------------------------------------------------------------------------
 
     def save(self) -> State:
         """A copy of this moment."""
-        return State({}, {"places": self._places.copy(), "starts": self._starts.copy()})
+        return State({}, {"places": self._places.copy(), "starts": self._starts.copy(), "counts": self._counts.copy()})
 
     def restore(self, state: State) -> None:
         """Go back to a moment, perhaps with other handles than then among those that had not begun.
@@ -279,24 +261,30 @@ class Handles:
         Raises:
             ValueError: if it is of none.
         """
+        counts = state.values.get("counts")
+        if counts is None or counts.dtype != self._counts.dtype or counts.ndim != 1 or (counts < 1).any():
+            raise ValueError("the state of handles is missing")
         for name in ("places", "starts"):
             kept = state.values.get(name)
-            if kept is None or kept.dtype != np.float64 or kept.ndim != 2 or kept.shape[1] != 2:
+            if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), 2):
                 raise ValueError("the state of handles is missing")
-        self._places, self._starts = (self._fitted(state.values[name]) for name in ("places", "starts"))
+        self._places, self._starts = (self._fitted(state.values[name], counts) for name in ("places", "starts"))
         self._lead = None
 
     def release(self) -> None:
         """Free the textures."""
-        for field in (self._stream, self._one, self._motion, self._forward):
-            field.release()
+        for thing in (self._stream, self._one, self._motion, self._forward, self._brush):
+            thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
 
-    def _fitted(self, kept: np.ndarray) -> np.ndarray:
-        rows = np.full((len(self.handles), 2), np.nan)
-        count = min(len(rows), len(kept))
-        rows[:count] = kept[:count]
+    def _fitted(self, kept: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        """What was kept of handles with so many points, for those of now; one that has others has not begun yet."""
+        rows = np.full((self._counts.sum(), 2), np.nan)
+        parts = np.split(kept, np.cumsum(counts))
+        for here, part in zip(self._rows, parts, strict=False):
+            if here.stop - here.start == len(part):
+                rows[here] = part
         return rows
 
     def _located(self) -> np.ndarray:
@@ -325,20 +313,27 @@ class Handles:
         places[begun] = best
         return places
 
-    def _wanted_velocities(self, numbers: np.ndarray, slower: np.ndarray, time: float, dt: float) -> np.ndarray:
-        """How the handles of these numbers shall move in this step, longer sides / s."""
-        wanted = np.zeros((len(numbers), 2))
-        for row, number in enumerate(numbers):
-            handle, start, place = self.handles[number], self._starts[number], self._places[number]
-            now, then = handle.wanted(start, time, dt), handle.wanted(start, time + dt, dt)
-            back = now - place
-            most = FARTHEST_STEP * handle.radius
-            step = slower[row] * (then - now - math.expm1(-RATE * dt) * back)
-            wanted[row] = step * min(1.0, most / max(float(np.hypot(*step)), 1e-30)) / dt
-        return wanted
+    def _wanted(
+        self, active: list[int], rows: list[slice], slower: np.ndarray, time: float, dt: float
+    ) -> tuple[np.ndarray, list[float]]:
+        """How the points of these handles shall move in this step, longer sides / s, and areas within grow, 1 / s."""
+        wanted, growths, back = np.zeros((len(slower), 2)), [], -math.expm1(-RATE * dt)
+        for number, each in zip(active, rows, strict=True):
+            shape, here = self._shapes[number], self._places[self._rows[number]]
+            now, then = (shape.wanted(self._starts[self._rows[number]], at, dt) for at in (time, time + dt))
+            step = slower[each, None] * (then - now + back * (now - here))
+            most, far = FARTHEST_STEP * shape.handle.reach, float(np.hypot(*step.T).max())
+            part = min(1.0, most / max(far, 1e-30))
+            wanted[each] = step * part / dt
+            areas = [0.0] if shape.around is None else [area(places[shape.around :]) for places in (here, now, then)]
+            growth = 0.0
+            if min(areas) > 0 or max(areas) < 0:
+                growth = math.log(areas[2] / areas[1]) + back * math.log(areas[1] / areas[0])
+            growths.append(float(slower[each.start]) * part * growth / dt)
+        return wanted, growths
 
     def _slower(self, numbers: np.ndarray) -> np.ndarray:
-        """The part of its speed, 0-1, that the map around each of these handles still allows."""
+        """The part of its speed, 0-1, that the map around each of these points still allows."""
         if not len(numbers):
             return np.zeros(0)
         extent, radii = np.array(self._warp.extent), self._radii[numbers]
@@ -350,19 +345,29 @@ class Handles:
         close = self._places[numbers, None, None] + rings * radii[:, None, None, None]
         near = _distorted(self._warp, np.clip(close, 0.0, extent)).reshape(len(numbers), -1, 3)
         least, most = near[..., 0].min(axis=1), near[..., 1].max(axis=1)
-        area = near[..., 2].min(axis=1)
+        triangle = near[..., 2].min(axis=1)
         low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
         high = np.ceil((self._places[numbers] + radii[:, None]) / extent * count).astype(int)
         for row, ((left, top), (right, bottom)) in enumerate(zip(low, high, strict=True)):
             box = over[top : max(bottom, top + 1), left : max(right, left + 1)]
             least[row] = min(least[row], box[..., 0].min())
             most[row] = max(most[row], box[..., 1].max())
-            area[row] = min(area[row], box[..., 2].min())
-        local = self._local[numbers]
+            triangle[row] = min(triangle[row], box[..., 2].min())
+        grown = self._grown()
+        least, triangle, local = least * grown, triangle * grown, self._local[numbers]
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
         bears = _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
-        return bears * _smoothstep((area - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
+        return bears * _smoothstep((triangle - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
+
+    def _grown(self) -> float:
+        """How many times as large as in the original the area is that has grown most within a closed line."""
+        grown = [1.0]
+        for shape, rows in zip(self._shapes, self._rows, strict=True):
+            if shape.around is not None and not np.isnan(self._places[rows]).any():
+                now, before = (area(places[shape.around :]) for places in (self._places[rows], shape.led))
+                grown.append(now / before if before else 1.0)
+        return max(grown)
 
     # -- what they do to the fluid ----------------------------------------------------------------------------------
 
@@ -379,12 +384,12 @@ class Handles:
         )
         handles.release()
 
-    def _influences(self, places: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How the push and the local brush of each handle move each: velocities (i, a) for forces (j, b)."""
-        push = np.zeros((len(places), len(places), 2, 2))
+    def _influences(self, places: np.ndarray, pushed: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How the push and the local brush of each that is pushed move each: velocities (i, a) for forces (j, b)."""
+        push = np.zeros((len(places), len(pushed), 2, 2))
         local = np.zeros_like(push)
         for mirror, shift in _images(self._fluid.grid):
-            r = (places[:, None] - (mirror * places + shift)) / radii[:, None]
+            r = (places[:, None] - (mirror * pushed + shift)) / radii[:, None]
             q = np.hypot(r[..., 0], r[..., 1])
             far = np.maximum(1 - q, 0.0)[..., None, None]
             across = np.stack([-r[..., 1], r[..., 0]], axis=-1)
@@ -395,14 +400,6 @@ class Handles:
                 sign = np.ones(2) if mirror.sum() > 0 else np.minimum(mirror, 0.0)
                 local += (np.maximum(1 - q**2, 0.0) ** 3)[..., None, None] * np.diag(sign)
         return push, local
-
-    def _solved(self, numbers: np.ndarray, influence: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        """The forces that together make the wanted velocities, as far as the ridge and stiffness let them: (H3)."""
-        count = 2 * len(wanted)
-        matrix = influence.transpose(0, 2, 1, 3).reshape(count, count)
-        soft = [1 / self.handles[number].stiffness - 1 + RIDGE for number in numbers for _ in (0, 1)]
-        dual = np.linalg.solve(matrix @ matrix.T + np.diag(soft), wanted.reshape(count))
-        return (matrix.T @ dual).reshape(-1, 2)
 
     def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
         """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
@@ -423,21 +420,42 @@ class Handles:
         found.release()
         return values
 
+    def _spin(self, ring: Ring, speed: float, faces: Field, found: np.ndarray, **attenuated: Any) -> None:
+        """Add a turn of a ring to a velocity on MAC faces."""
+        fluid = self._fluid
+        masks: dict[str, Any] = {}
+        if attenuated:
+            self._one.clear(float(found[2]))
+            masks = {"viscosity": fluid.viscosity, "obstruction": self._one}
+        self._motion.clear(0.0, 0.0, 0.0, float(found[3]))
+        twirl, region = fluid.device.pass_("brush/twirl.frag", **attenuated), ring.tip.region(fluid.grid)
+        inputs: dict[str, Any] = ring.tip.inputs(fluid.grid) | {"rate": speed / ring.length, "gain": 1.0}
+        twirl(faces, add=True, region=region, motion=self._motion, **inputs, **masks)
+        self._one.clear(1.0)
+
     def _give(self, lead: Lead, faces: Field, **attenuated: Any) -> None:
         """Add to a velocity on MAC faces what the active handles lack of the wanted one."""
-        if not len(lead.active):
+        if not len(lead.places):
             return
         fluid, grid = self._fluid, self._fluid.grid
         found = self._probed(lead, faces)
-        lacking = self._solved(lead.active, lead.influence, lead.wanted - found[:, :2])
+        lacks = lead.wanted - found[:, :2]
+        for loop in lead.loops:  # the fluid swells by itself: see `_swell`
+            arms = lead.places[loop] - lead.places[loop].mean(axis=0)
+            lacks[loop] -= (lacks[loop] * arms).sum() / max((arms**2).sum(), 1e-30) * arms
+        told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
+        strengths, count = _solved(lead.influence, told, lead.soft), 2 * len(lead.pushed)
+        lacking, spins = strengths[:count].reshape(-1, 2), strengths[count:]
         masks: dict[str, Any] = {}
         if attenuated:
-            lacking *= found[:, 2:3]
+            lacking *= found[lead.pushed, 2:3]
             masks["viscosity"] = fluid.viscosity
+        for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
+            self._spin(ring, spin, faces, found[ring.centre], **attenuated)
         draw, size = fluid.device.pass_("brush/handle_stream.frag", **attenuated), self._stream.size
         self._stream.clear()
         for mirror, shift in _images(grid):
-            for (x, y), radius, force, here in zip(*_brushes(lead), lacking, found[:, 3], strict=True):
+            for (x, y), radius, force, here in zip(*_brushes(lead), lacking, found[lead.pushed, 3], strict=True):
                 place = float(mirror[0] * x + shift[0]), float(mirror[1] * y + shift[1])
                 x0, y0, width, height = region = Tip(place, place, radius).region(grid)
                 if x0 >= size[0] or y0 >= size[1] or x0 + width <= 0 or y0 + height <= 0:
@@ -451,9 +469,44 @@ class Handles:
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 
+def _solved(influence: np.ndarray, wanted: np.ndarray, soft: np.ndarray) -> np.ndarray:
+    """The forces that together make what is wanted, as far as the ridge and stiffness let them: (H3)."""
+    return influence.T @ np.linalg.solve(influence @ influence.T + np.diag(soft), wanted)
+
+
+def _matrix(influence: np.ndarray) -> np.ndarray:
+    """Velocities (i, a) for forces (j, b) as a matrix."""
+    return influence.transpose(0, 2, 1, 3).reshape(2 * influence.shape[0], -1)
+
+
+def _spins(motion: np.ndarray, rings: list[Ring]) -> np.ndarray:
+    """How fast rings turn where their points, and those within, move so: longer sides / s at their arms' ends."""
+    return np.array([spun(motion[ring.rows] - motion[ring.centre], ring.arms) for ring in rings])
+
+
+def _with_rings(places: np.ndarray, pushed: np.ndarray, push: np.ndarray, rings: list[Ring]) -> np.ndarray:
+    """The matrix of what pushes do to what is pushed, with what they do to rings, and turns of rings to all."""
+    columns = [push[:, number, :, axis] for number in range(len(pushed)) for axis in (0, 1)]
+    columns += [_turned(places, ring) for ring in rings]
+    return np.stack([np.concatenate([each[pushed].ravel(), _spins(each, rings)]) for each in columns], axis=-1)
+
+
+def _turned(places: np.ndarray, ring: Ring) -> np.ndarray:
+    """The motion at places, (n, 2), where a ring turns by 1 longer side / s at its arms' ends."""
+    r = places - ring.tip.end
+    q = np.clip((np.hypot(*r.T) / ring.tip.radius - CORE) / (1 - CORE), 0.0, 1.0)
+    return ((1 - q**2) ** 3 / ring.length)[:, None] * np.stack([-r[:, 1], r[:, 0]], axis=-1)
+
+
+def _tip(place: np.ndarray, radius: float) -> Tip:
+    """A brush that is hard as far as its core."""
+    at = float(place[0]), float(place[1])
+    return Tip(at, at, radius, CORE / 0.9)
+
+
 def _brushes(lead: Lead) -> tuple[list[Point], list[float]]:
-    """Places and radii of the active handles."""
-    return [(x, y) for x, y in lead.places.tolist()], lead.radii.tolist()
+    """Places and radii of what is pushed."""
+    return [(x, y) for x, y in lead.places[lead.pushed].tolist()], lead.radii[lead.pushed].tolist()
 
 
 def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
@@ -463,11 +516,13 @@ def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
     where it is folded.
     """
     listed, found = points.reshape(-1, 2), np.zeros((*points.shape[:-1], 3))
+    texel = np.divide(warp.extent, warp.size)
     found[..., 0] = warp.determinants(listed).reshape(points.shape[:-1])
-    moved, texel = warp.at(listed).astype(np.float64), np.divide(warp.extent, warp.size)
-    original = points + moved.reshape(points.shape)
+    original = points + warp.at(listed).astype(np.float64).reshape(points.shape)
+    corner = np.minimum(listed, warp.extent - texel)  # so that no triangle leaves the picture
+    moved = warp.at(corner).astype(np.float64)
     right, below = (
-        np.eye(2)[axis] + (warp.at(listed + texel * np.eye(2)[axis]) - moved) / texel[axis] for axis in (0, 1)
+        np.eye(2)[axis] + (warp.at(corner + texel * np.eye(2)[axis]) - moved) / texel[axis] for axis in (0, 1)
     )
     found[..., 2] = (right[:, 0] * below[:, 1] - right[:, 1] * below[:, 0]).reshape(points.shape[:-1])
     for axis in (1, 2):
@@ -476,6 +531,11 @@ def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
         after = [slice(None), slice(1, None)] if axis == 1 else [slice(None), slice(None), slice(1, None)]
         found[(*after, ..., 1)] = np.maximum(found[(*after, ..., 1)], ratio)
     return found
+
+
+def _runs(counts: np.ndarray) -> list[slice]:
+    """Where each lies in a list of so many of each."""
+    return [slice(first, last) for first, last in pairwise([0, *np.cumsum(counts).tolist()])]
 
 
 def _smoothstep(part: np.ndarray) -> np.ndarray:

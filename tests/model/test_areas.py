@@ -218,7 +218,7 @@ def test_the_pictures_brightness_takes_its_own_place_and_no_others() -> None:
 
 def test_recipes_say_areas_and_wrong_ones_are_a_sentence() -> None:
     text = (
-        'version = 4\n[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1.0\n'
+        'version = 5\n[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1.0\n'
         'segment = {color = "#102030", at = [0.5, 0.5]}\n'
         'then = [{window = {box = [0.1, 0.1, 0.3, 0.3]}}, {combine = "subtract", segment = {above = 0.5}}]\n'
     )

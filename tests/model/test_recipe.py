@@ -102,16 +102,16 @@ def test_round_trip_loses_nothing():
 
 
 def test_defaults_are_not_written():
-    assert Recipe().text() == "version = 4\n"
+    assert Recipe().text() == "version = 5\n"
     assert Recipe.parse("") == Recipe()
 
 
 def test_what_older_versions_said_is_said_in_this_one():
     old = Recipe.parse('version = 1\npicture = "a.png"\n[[stroke]]\ntool = "push"\nsamples = [[0, 0.1, 0.2, 1.0]]\n')
     assert old.stroke[0].detail == 0
-    assert old.text().startswith("version = 4\n")
-    for version in (1, 2, 3):
-        assert Recipe.parse(old.text().replace("version = 4", f"version = {version}")) == old
+    assert old.text().startswith("version = 5\n")
+    for version in (1, 2, 3, 4):
+        assert Recipe.parse(old.text().replace("version = 5", f"version = {version}")) == old
     fine = old.edited(stroke=(old.stroke[0].model_copy(update={"detail": 1400}),))
     assert Recipe.parse(fine.text()) == fine
     assert fine.agrees_until(old) == 0

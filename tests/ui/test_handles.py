@@ -79,6 +79,51 @@ def test_a_click_pins_a_point(robot: Robot) -> None:
     assert robot.editor.session.held[0].now == pytest.approx((0.5, 0.5), abs=3e-3)
 
 
+def test_a_line_is_drawn_with_shift_and_dragged_as_one(robot: Robot) -> None:
+    robot.mods = Mods(shift=True)
+    robot.drag((0.3, 0.5), (0.5, 0.5), steps=12)
+    robot.mods = Mods()
+    robot.rest()
+    session = robot.editor.session
+    assert robot.editor.state.selected == "handle[1]"
+    (line,) = session.recipe.handle
+    assert not line.closed
+    assert line.points[0] == pytest.approx((0.3, 0.5), abs=3e-3)
+    assert line.points[-1] == pytest.approx((0.5, 0.5), abs=1e-2)
+    drag(robot, (0.33, 0.5), (0.36, 0.55))  # by any place of it
+    assert names(robot) == ["Open", "Line", "Lead on"]
+    (held,) = session.held
+    assert not held.is_away(session.extent)
+    ends = np.array([held.line[0], held.line[-1]]) - [line.points[0], line.points[-1]]
+    assert ends == pytest.approx(np.tile([0.03, 0.05], (2, 1)), abs=6e-3)
+
+
+def test_a_circle_is_closed(robot: Robot) -> None:
+    robot.mods = Mods(shift=True)
+    places = [(0.5 + 0.1 * np.cos(angle), 0.5 + 0.1 * np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 25)]
+    robot.move(*robot.at(*places[0]))
+    robot.press()
+    for place in places[1:]:
+        robot.move(*robot.at(*place))
+    robot.release()
+    robot.mods = Mods()
+    robot.rest()
+    assert robot.editor.session.recipe.handle[0].closed
+
+
+def test_a_handle_is_turned_in_the_inspector_and_arrives(robot: Robot) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    session = robot.editor.session
+    session.edit_held("Turn of a handle", "handle[1]", rotate=40.0)
+    robot.rest()
+    assert names(robot) == ["Open", "Handle", "Turn of a handle"]
+    assert session.end * session.dt >= session.recipe.handle[0].last
+    assert session.replay.handles.away.max() < ARRIVED
+    ring = session.replay.handles.shapes[0]
+    arms = (ring[1:] - ring[0]) @ [1, 1j] * np.exp(-1j * np.arange(6) * np.pi / 3)
+    assert np.degrees(np.angle(arms.sum())) == pytest.approx(40, abs=1)
+
+
 def test_a_handle_is_picked_again_and_led_on(robot: Robot) -> None:
     drag(robot, (0.4, 0.5), (0.45, 0.5))
     drag(robot, (0.45, 0.5), (0.45, 0.56))
@@ -207,6 +252,12 @@ def test_the_window_a_file_the_journal_and_the_command_line_give_the_same_bytes(
     drag(robot, (0.3, 0.7), (0.35, 0.75))
     robot.key("g")
     drag(robot, (0.45, 0.47), (0.43, 0.42))
+    robot.mods = Mods(shift=True)
+    robot.drag((0.2, 0.2), (0.3, 0.25), steps=8)
+    robot.mods = Mods()
+    robot.rest()
+    session.edit_held("Turn of a handle", "handle[3]", rotate=30.0)
+    robot.rest()
     seen = robot.warp()
     project = projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "w.fluidwarp")
     loaded = projects.load(tmp_path / "w.fluidwarp")

@@ -14,7 +14,7 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
 from app.work.replay import Replay
-from solver import Device, Fluid, Grid, Handle, Handles, WarpMap
+from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
 from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
 
 BLACK = np.zeros((96, 128, 3), np.uint8)
@@ -63,6 +63,78 @@ def test_what_contradicts_itself_folds_nothing(points: Any, targets: Any, pins: 
         assert found.det > 0
         assert np.isfinite(found.displacement).all()
         assert found.pins < 0.5
+
+
+def led_alone(device: Device, *handles: Handle, ticks: int = 50, cells: int = 64) -> tuple[Handles, WarpMap]:
+    """Handles, and the map, after some ticks of Putty; both are left to the device."""
+    grid = Grid(cells, cells)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid, (256, 256))
+    fluid.set_viscosity(0.3)
+    leading = Handles(fluid, warp, handles)
+    for _ in range(ticks):
+        leading.advance(DT)
+    return leading, warp
+
+
+def jacobian(warp: WarpMap, place: Any) -> np.ndarray:
+    """Of the forward map where it leads to a place: what has become of the original there."""
+    steps = 0.01 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+    moved = warp.at(np.array(place) + steps).astype(float) + steps
+    return np.linalg.inv(np.stack([moved[0] - moved[1], moved[2] - moved[3]], axis=-1) / 0.02)
+
+
+@pytest.mark.parametrize(
+    ("rotate", "scale", "local"),
+    [(40.0, None, 0.0), (None, 1.5, 0.0), (-30.0, 0.7, 0.0), (0.0, None, 0.0), (40.0, 1.3, 1.0)],
+)
+def test_a_point_is_turned_and_scaled(rotate: float | None, scale: float | None, local: float, device: Device):
+    """Beside one that goes by, which would turn it by the way."""
+    led, warp = led_alone(
+        device,
+        Handle((0.4, 0.5), (0.45, 0.45), rotate=rotate, scale=scale, duration=0.5, local=local),
+        Handle((0.7, 0.7), (0.75, 0.6), duration=0.5),
+    )
+    assert led.away.max() * PIXELS < 0.5
+    found = jacobian(warp, led.places[0])
+    turned = np.degrees(np.arctan2(found[1, 0] - found[0, 1], found[0, 0] + found[1, 1]))
+    assert turned == pytest.approx(rotate or 0.0, abs=5)
+    assert np.linalg.det(found) ** 0.5 == pytest.approx(scale or 1.0, rel=0.06)
+    assert warp.statistics().folds == 0
+
+
+def test_a_map_that_nobody_moved_bears_a_handle_at_its_edges(device: Device):
+    """Whatever its texels: no look leaves the picture."""
+    led, _ = led_alone(device, *(Handle((x, y), radius=0.05) for x in (0.01, 0.99) for y in (0.01, 0.99)), ticks=1)
+    assert (led._slower(np.arange(4)) == 1).all()
+
+
+def test_a_line_is_moved_as_one_and_turned(device: Device):
+    line = ((0.35, 0.5), (0.55, 0.5))
+    led, warp = led_alone(device, Handle((0.45, 0.5), (0.5, 0.45), rotate=30.0, duration=0.5, points=line))
+    assert led.away[0] * PIXELS < 0.5
+    along, angle = np.linspace(-0.1, 0.1, 21), np.radians(30)
+    there = np.array([0.5, 0.45]) + along[:, None] * [np.cos(angle), np.sin(angle)]
+    found = there + warp.at(there)  # all along the line
+    assert np.abs(found - np.stack([0.45 + along, np.full(21, 0.5)], axis=-1)).max() * PIXELS < 1.5
+    assert warp.statistics().folds == 0
+
+
+def test_an_outline_goes_into_another_form_and_size(device: Device):
+    square = ((0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6))
+    goals = ((0.4, 0.4), (0.7, 0.38), (0.68, 0.62), (0.4, 0.66))
+    led, warp = led_alone(device, Handle((0.5, 0.5), points=square, goals=goals, closed=True, duration=0.8), ticks=60)
+    assert led.away[0] * PIXELS < 0.5
+    middles = np.array([np.add(a, b) / 2 for a, b in zip(goals, (*goals[1:], goals[0]), strict=True)])
+    wanted = np.array([np.add(a, b) / 2 for a, b in zip(square, (*square[1:], square[0]), strict=True)])
+    assert np.abs(middles + warp.at(middles) - wanted).max() * PIXELS < 2
+    assert warp.statistics().folds == 0
+
+
+def test_what_of_a_line_is_outside_is_not_led(device: Device):
+    led, _ = led_alone(device, Handle((0.1, 0.5), (0.15, 0.55), duration=0.5, points=((-0.2, 0.5), (0.3, 0.5))))
+    (shape,) = led.shapes
+    assert shape.min() > 0.02
+    assert led.away[0] * PIXELS < 0.5
 
 
 def test_what_is_local_moves_nothing_beside_it(device: Device):
@@ -128,8 +200,11 @@ def test_no_fold_waits_for_a_remap_of_what_has_long_halted(device: Device):
         thing.release()
 
 
-HANDLES = [led_to([0.3, 0.4], [0.4, 0.5]), led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=0.5, stiffness=0.8)]
-PINS = [{"at": [0.5, 0.2]}]
+HANDLES = [
+    led_to([0.3, 0.4], [0.4, 0.5], rotate=20.0),
+    led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=0.5, stiffness=0.8),
+]
+PINS = [{"points": [[0.4, 0.2], [0.6, 0.2]]}]
 
 
 def test_every_way_to_a_tick_gives_the_same_bytes(device: Device):
@@ -177,6 +252,45 @@ def test_a_handle_that_comes_into_the_picture_gives_the_same_as_one_that_was_the
         each.release()
 
 
+def test_a_handle_that_is_turned_later_gives_the_same_as_one_that_was(device: Device):
+    """It leads more points than it did, so that those of the others lie elsewhere."""
+    late, early = led_to([0.7, 0.6], [0.6, 0.7], start=0.3), led_to([0.3, 0.4], [0.4, 0.5])
+    replay = replay_of(device, handle=[late, early])
+    straight = replay_of(device, handle=[late | {"rotate": 30.0}, early])
+    replay.seek(30)
+    replay.use(straight.recipe)
+    straight.seek(30)
+    assert np.array_equal(replay.warp.read(), straight.warp.read())
+    for each in (replay, straight):
+        each.release()
+
+
+def test_a_script_gives_the_bytes_of_a_recipe(device: Device):
+    line = [[0.3, 0.4], [0.5, 0.4], [0.5, 0.6]]
+    handles = [
+        led_to([0.7, 0.6], [0.6, 0.6], rotate=30.0, scale=1.2),
+        {"points": line, "to": [0.45, 0.45], "duration": 0.4, "closed": True},
+    ]
+    replay = replay_of(device, handle=handles)
+    replay.seek(40)
+    fluid = Fluid(device, replay.grid, FluidParams(drag=2.0))
+    fluid.set_viscosity(0.03)
+    warp, corners = WarpMap(device, replay.grid, replay.warp.size), [(x, 0.75 * y) for x, y in line]
+    leading = Handles(
+        fluid,
+        warp,
+        [
+            Handle((0.7, 0.6 * 0.75), (0.6, 0.6 * 0.75), duration=0.4, rotate=30.0, scale=1.2),
+            Handle(replay.handles.handles[1].at, (0.45, 0.45 * 0.75), duration=0.4, points=tuple(corners), closed=True),
+        ],
+    )
+    for _ in range(40):
+        leading.advance(1 / 60)
+    assert np.array_equal(warp.read(), replay.warp.read())
+    for thing in (replay, leading, warp, fluid):
+        thing.release()
+
+
 def test_a_local_handle_moves_nothing_before_it_begins_once_the_playhead_has_gone_back(device: Device):
     replay = replay_of(device, handle=[led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=1.0)])
     replay.seek(20)
@@ -214,6 +328,31 @@ def test_what_is_not_reached_is_told_by_number(device: Device):
     replay.release()
 
 
+def test_what_walls_part_from_its_goal_is_told_and_folds_nothing(device: Device):
+    """The handle is in a ring of what is frozen, and one tells of it outside."""
+    angles = np.linspace(0, 2 * np.pi, 49)
+    ring = np.stack([0.4 + 0.12 * np.cos(angles), 0.5 + 0.16 * np.sin(angles)], axis=-1)
+    wall = {"kind": "path", "points": ring.tolist(), "radius": 0.04, "hardness": 1.0}
+    replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5], radius=0.1)], freeze=[wall], duration=1.0)
+    replay.seek(60)
+    (said,) = replay.unmet(ARRIVED)
+    assert said.startswith("handle[1] is 0.")
+    found = replay.warp.statistics()
+    assert found.folds == 0
+    assert found.det_min > 0
+    replay.release()
+
+
+def test_what_lies_outside_or_goes_there_is_led_as_far_as_the_edge(device: Device):
+    handles = [led_to([1.2, 0.5], [0.5, 0.5]), led_to([0.2, 0.2], [0.2, -0.5], radius=0.3)]
+    replay = replay_of(device, handle=handles, duration=1.0)
+    replay.seek(60)
+    assert [label for label, _ in replay.led] == ["handle[2]"]
+    assert replay.handles.places[0][1] < 0.03
+    assert replay.warp.statistics().folds == 0
+    replay.release()
+
+
 def test_what_cannot_be_met_is_objected_to():
     handles = [
         led_to([1.2, 0.5], [0.5, 0.5]),
@@ -224,14 +363,23 @@ def test_what_cannot_be_met_is_objected_to():
         led_to([0.8, 0.801], [0.7, 0.8]),
         led_to([0.1, 0.8], [0.1, 0.75]) | {"radius": 0.05},
         led_to([0.12, 0.8], [0.2, 0.82]) | {"radius": 0.05},
+        {"points": [[-0.1, 0.3], [0.1, 0.3]], "to": [0.1, 0.35]},
+        {"points": [[0.9, 0.1], [0.95, 0.1], [0.95, 0.15]], "closed": True}
+        | {"goals": [[0.95, 0.1], [0.9, 0.1], [0.9, 0.15]]},
+        {"points": [[0.4, 0.05], [0.6, 0.05]], "to": [0.5, 0.05], "rotate": 180.0},
+        led_to([0.55, 0.05], [0.55, 0.05]),
     ]
     recipe = Recipe.model_validate(frozen({"handle": handles}))
     assert list(objections(recipe.handle, recipe.pin, EXTENT)) == [
         "handle[1] takes hold of nothing: (1.2, 0.5) is outside the picture",
         "handle[2] goes only to the picture's edge: (0.2, -0.5) is outside the picture",
+        "handle[9] reaches out of the picture: what is outside is not led",
+        "handle[10] is led inside out",
+        "handle[2] and handle[9] are led 5.1 times as far apart as they lie",
         "handle[3] and handle[4] cross each other's way",
         "handle[5] and handle[6] hold the same place and are led apart",
         "handle[7] and handle[8] are led 5.65 times as far apart as they lie",
+        "handle[11] and handle[12] cross each other's way",
     ]
 
 
@@ -252,6 +400,21 @@ def test_an_arrangement_without_contradiction_is_not_objected_to():
         ("[[pin]]\nat = [0.5, 0.5]\nstart = 2.0\nend = 1.0", "pin[1]: 'end' (1) is before 'start' (2)"),
         ("[stop]\nhandles_within = 0.001", "'stop.handles_within' waits for handles, and there is no [[handle]]"),
         ("[[pin]]\nat = [0.5, 0.5]\n" * 65, "there are 65 handles and pins; at most 64 work"),
+        ("[[pin]]\npoints = [[0.5, 0.5], [0.6, 0.5]]\n" * 17, "there are 17 lines that are led or held"),
+        ("[[pin]]\npoints = [[0.5, 0.5], [0.5, 0.5]]", "pin[1]: 'points' must be two different places or more"),
+        ("[[pin]]\npoints = [[0.5, 0.5], [0.6]]", "pin[1]:"),
+        ("[[pin]]\npoints = 3", "pin[1]:"),
+        ("[[pin]]\nclosed = true", "pin[1]: 'at' is missing"),
+        ("[[pin]]\nat = [0.5, 0.5]\nrotate = 3.0", "pin[1]: unknown key 'rotate'"),
+        ("[[handle]]\nat = [0.5, 0.5]\nscale = 0.0", "handle[1]: 'scale' must be at least 0.1, not 0.0"),
+        (
+            "[[handle]]\npoints = [[0.5, 0.5], [0.6, 0.5]]\ngoals = [[0.5, 0.5]]",
+            "handle[1]: 'points' has 2 places and 'goals' 1; give as many",
+        ),
+        (
+            "[[handle]]\npoints = [[0.5, 0.5], [0.6, 0.5]]\ngoals = [[0.5, 0.5], [0.6, 0.6]]\nrotate = 3.0",
+            "handle[1]: give either 'goals', or 'rotate' and 'scale'",
+        ),
     ],
 )
 def test_a_wrong_handle_is_told_in_one_sentence(text: str, said: str):
@@ -262,7 +425,10 @@ def test_a_wrong_handle_is_told_in_one_sentence(text: str, said: str):
 
 def test_a_handle_of_no_number_is_refused():
     wrong = {"at": (np.nan, 0.5)}, {"radius": 0.0}, {"start": np.inf}, {"stiffness": 0.0}, {"local": 2.0}
-    for each in wrong:
+    line = {"points": ((0.4, 0.5), (0.6, 0.5))}
+    lines = line | {"closed": True}, line | {"goals": ((0.5, 0.5),)}, {"points": ((0.5, 0.5),)}
+    turns = {"rotate": np.nan}, {"rotate": 1e6}, {"scale": 0.0}, {"scale": np.inf}
+    for each in (*wrong, *lines, *turns, line | {"goals": line["points"], "scale": 2.0}):
         parts: dict[str, Any] = {"at": (0.5, 0.5)} | each
-        with pytest.raises(ValueError, match="handle"):
+        with pytest.raises(ValueError, match=r"handle|line"):
             Handle(**parts)

@@ -22,7 +22,7 @@ from app.ui.panels import feels, selected_bar
 from app.ui.quality import Quality
 from app.ui.selecting import Selecting
 from app.ui.theme import packed
-from app.ui.units import PER_SECOND, PERCENT, THREE_DIGITS, TIMES, Unit
+from app.ui.units import DEGREES, PER_SECOND, PERCENT, THREE_DIGITS, TIMES, Unit
 from app.ui.viewport import Rect
 from app.ui.widgets import Slid, Ui
 from app.ui.workspace import Workspace
@@ -154,7 +154,8 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     label, recipe = state.selected, session.recipe
     if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
         ui.wrapped(
-            "Drag a point of the picture to where it should go, or click to pin it. Click one to select it.",
+            "Drag a point of the picture to where it should go, or click to pin it. With Shift draw a line, which is "
+            "dragged as one. Click one to select it.",
             ui.palette.dim,
             13,
         )
@@ -178,6 +179,17 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
                 title="Local", more="At 0 % the picture flows back beside it. At 100 % only what is under it moves.",
             )  # fmt: skip
             _set_held(session, label, f"Flow of a {led.kind}", slid, local=slid.value)
+            if not led.goals:
+                slid = ui.slider(
+                    "held rotate", "Rotate", led.rotate or 0.0, -180.0, 180.0, DEGREES, 0.0,
+                    title="Rotate", more="Clockwise. It turns from its start on.",
+                )  # fmt: skip
+                _set_held(session, label, f"Turn of a {led.kind}", slid, rotate=slid.value)
+                slid = ui.slider(
+                    "held scale", "Scale", led.scale or 1.0, 0.25, 4.0, PERCENT, 1.0, logarithmic=True,
+                    title="Scale", more="It grows or shrinks from its start on.",
+                )  # fmt: skip
+                _set_held(session, label, f"Size of a {led.kind}", slid, scale=slid.value)
         if ui.button("Remove", width=-1, height=30):
             do("remove")
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")

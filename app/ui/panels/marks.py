@@ -128,6 +128,10 @@ def _handles(
             reach = held.led.radius * view.longer
             lines.add_circle(target, reach, packed(BLACK, 0.3), max(32, min(int(reach), 96)), ui.px(2.0))
             lines.add_circle(target, reach, packed(ink, 0.6), max(32, min(int(reach), 96)), ui.px(1.0))
+        line: list[Any] = [ImVec2(*view.to_screen(*place)) for place in held.line]
+        if line:
+            lines.add_polyline(line, packed(BLACK, 0.45 * alpha), ui.px(4.6), 0)
+            lines.add_polyline(line, packed(ink, 0.8 * alpha), ui.px(2.2), 0)
         if hypot(target.x - start.x, target.y - start.y) > ui.px(8):
             for colour, width in ((packed(BLACK, 0.45 * alpha), 3.6), (packed(ink, 0.8 * alpha), 1.6)):
                 lines.add_line(start, target, colour, ui.px(width))

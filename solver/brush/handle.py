@@ -1,0 +1,295 @@
+"""A handle or a pin: what of the picture shall be where at which time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from solver.brush.tip import FARTHEST, Point
+from solver.limits import LARGEST_LEAD, LONGEST_LINE, check_type, numbers, places
+
+SAME_TIME = 1e-6  # steps between two times that are the same but for their rounding
+SAME = 1e-9  # and points
+# What is led as a whole has so many times as wide a push (H2), which turns round as far beside its middle as a stroke's
+# of the handle's radius, 1 / sqrt(7) of it: what lies between its points goes along.
+WIDER = 1.6
+APART = 1 / 8  # radii between the points of a line that are led
+RING = 1 / 4  # radii between a point that is turned or scaled and what tells how it is
+MOST_TURNED, LEAST_SCALE, MOST_SCALE = 720.0, 0.1, 10.0  # degrees, and times as large
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A point of the picture on its way, or a line of points; longer sides and seconds, y down.
+
+    Attributes:
+        at: the place in the original of what is led; of a line, what is told of it as a whole is about this place.
+        to: where to; None if it stays where it is at its start, as a pin does.
+        radius: how far its brush reaches; of a line at least that of which it is `LONGEST_LINE` long.
+        start: when it begins.
+        duration: of the path, which begins and ends softly.
+        end: when it lets go; until then it stays where it has arrived.
+        stiffness: 1 is led exactly; with less it gives way to the fluid and to the others.
+        local: the part of its motion, 0-1, that carries what is under it alone; see `Push`.
+        keys: times and places (t, x, y), in order and none before its first way has ended: where it is led after that,
+            at an even speed from one to the next.
+        points: the corners of a line that is led as a whole, in the original; what of it is outside is not led.
+        closed: the line ends where it begins.
+        goals: where the corners shall be, as many; without, they keep their places about `at`.
+        rotate, scale: degrees that it is turned about `at` on its way, clockwise, and times that it is made as large. A
+            point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1.
+
+    Raises:
+        ValueError: if a number is not finite (but for `end`) or out of its range.
+    """
+
+    at: Point
+    to: Point | None = None
+    radius: float = 0.25
+    start: float = 0.0
+    duration: float = 1.0
+    end: float = math.inf
+    stiffness: float = 1.0
+    local: float = 0.0
+    keys: tuple[tuple[float, float, float], ...] = ()
+    points: tuple[Point, ...] = ()
+    closed: bool = False
+    goals: tuple[Point, ...] = ()
+    rotate: float | None = None
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", numbers("a handle's place", self.at, 2))
+        if self.to is not None:
+            object.__setattr__(self, "to", numbers("where a handle goes", self.to, 2))
+        check_type("a handle's keys", self.keys, Iterable)
+        object.__setattr__(self, "keys", tuple(numbers("a handle's key", key, 3) for key in self.keys))
+        for number in (self.radius, self.start, self.duration, self.end, self.stiffness, self.local):
+            check_type("a number of a handle", number)
+        self._check_line()
+        stations = (self.at, *((self.to,) if self.to else ()), *(key[1:] for key in self.keys))
+        if not all(abs(side) <= FARTHEST for place in (*stations, *self.points, *self.goals) for side in place):
+            raise ValueError(f"a handle from {self.at} to {self.to} is off the picture by more than {FARTHEST:g} sides")
+        if not 1e-6 <= self.radius <= 1:
+            raise ValueError(f"a handle of radius {self.radius} was given; it must be from 1e-06 to 1")
+        if not (0 <= self.start < math.inf and 0 <= self.duration < math.inf and self.start <= self.end):
+            raise ValueError("a handle's start and duration must be finite and not negative, and its end not before")
+        if not 0.001 <= self.stiffness <= 1:
+            raise ValueError(f"a handle of stiffness {self.stiffness} was given; it must be from 0.001 to 1")
+        if not 0 <= self.local <= 1:
+            raise ValueError("the local part of a handle must be from 0 to 1")
+        times = [self.ready, *(key[0] for key in self.keys), math.inf]
+        if not all(earlier <= later for earlier, later in pairwise(times)):
+            raise ValueError("the times of a handle's keys must not go backwards, nor begin before its way has ended")
+
+    def _check_line(self) -> None:
+        for name in ("points", "goals"):
+            line = getattr(self, name)
+            check_type("a line of a handle", line, Sequence | np.ndarray)
+            object.__setattr__(self, name, tuple(map(tuple, places(line).tolist())) if len(line) else ())
+        if self.points and len(set(self.points)) < 2 + self.closed:
+            raise ValueError(f"a line of a handle has {2 + self.closed} different points or more")
+        if self.goals and len(self.goals) != len(self.points):
+            raise ValueError(f"a line of {len(self.points)} points has {len(self.goals)} goals; as many are wanted")
+        if self.goals and (self.rotate is not None or self.scale is not None):
+            raise ValueError("a line that has goals is not turned or scaled besides")
+        if self.goals and self.to is None:
+            object.__setattr__(self, "to", tuple(np.mean(self.goals, axis=0).tolist()))
+        for number in (self.rotate or 0.0, self.scale or 1.0):
+            check_type("a number of a handle", number)
+        if not abs(self.rotate or 0.0) <= MOST_TURNED:
+            raise ValueError(f"a handle that is turned by {self.rotate} was given; at most {MOST_TURNED:g} are wanted")
+        if self.scale is not None and not LEAST_SCALE <= self.scale <= MOST_SCALE:
+            raise ValueError(
+                f"a handle's scale of {self.scale} was given; it must be from {LEAST_SCALE} to {MOST_SCALE:g}"
+            )
+
+    @property
+    def ready(self) -> float:
+        """When it has gone its first way, and its keys may begin."""
+        return self.start if self.to is None else self.start + self.duration
+
+    @property
+    def goal(self) -> Point | None:
+        """Where it is led in the end; None if it stays where it is at its start."""
+        return self.keys[-1][1:] if self.keys else self.to
+
+    def wanted(self, start: np.ndarray, time: float, dt: float) -> np.ndarray:
+        """Where it shall be at a time, (2,), if it was at `start` when it began; `dt` says how exact the time is."""
+
+        def within(place: Sequence[float]) -> np.ndarray:
+            way = np.subtract(place, start)
+            return way * min(1.0, LARGEST_LEAD * self.reach / max(float(np.hypot(*way)), 1e-30))
+
+        if not self.keys or time < self.ready:
+            return start if self.to is None else start + self.passed(time) * within(self.to)
+        stations = [(self.ready, *(start if self.to is None else self.to)), *self.keys]
+        number = max(number for number, (since, *_) in enumerate(stations) if since <= time + SAME_TIME * dt)
+        (since, *here), (until, *there) = stations[number], stations[min(number + 1, len(stations) - 1)]
+        if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
+            return start + within(here)
+        part = (time - since) / (until - since)
+        return start + (1 - part) * within(here) + part * within(there)
+
+    @cached_property
+    def reach(self) -> float:
+        """Its radius, or what its line needs."""
+        return max(self.radius, self._longest / LONGEST_LINE)
+
+    @property
+    def is_whole(self) -> bool:
+        """True if it leads more than a point."""
+        return bool(self.points) or self.rotate is not None or self.scale is not None
+
+    @property
+    def push_radius(self) -> float:
+        """How far the push of each of its points reaches."""
+        return self.reach * (WIDER if self.is_whole else 1.0)
+
+    @cached_property
+    def stations(self) -> np.ndarray:
+        """Where along its line the points lie that are led: evenly, as numbers of corners."""
+        line = _line(self.points, self.closed)
+        count = max(math.ceil(self._longest / (APART * self.reach) - SAME), 2 + self.closed) + (not self.closed)
+        lengths = _lengths(line)
+        at = np.linspace(0.0, lengths[-1], count, endpoint=not self.closed)
+        return np.interp(at, lengths, np.arange(len(line)))
+
+    @property
+    def _longest(self) -> float:
+        """The length of its line, at its start or in the end."""
+        lines = (_line(each, self.closed) for each in (self.points, self.goals) if each)
+        return max((float(_lengths(line)[-1]) for line in lines), default=0.0)
+
+    def passed(self, time: float) -> float:
+        """The part of its way, 0-1, that it shall have gone at a time."""
+        if time >= self.start + self.duration:
+            return 1.0
+        if time <= self.start:  # also where it goes its way at once
+            return 0.0
+        part = (time - self.start) / self.duration
+        return part * part * (3 - 2 * part)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What of a picture a handle leads: points that go its way together.
+
+    A point by itself; points all along a line; or a point that is turned or scaled with a ring of six around it, which
+    tell how it is and are not pushed.
+
+    Attributes:
+        handle: whose it is.
+        led: their places in the original, (n, 2).
+        goals: where they shall be, likewise; None if the handle has no goals.
+        around: the first of those that lie around an area; None if they are no closed line and no ring.
+        extent: the sides of the picture, which lines do not leave.
+    """
+
+    handle: Handle
+    led: np.ndarray
+    goals: np.ndarray | None
+    around: int | None
+    extent: Point
+
+    @classmethod
+    def of(cls, handle: Handle, extent: Point) -> Shape:
+        """What a handle leads of a picture with these sides."""
+        goals, around = None, None
+        if handle.points:
+            line = _line(handle.points, handle.closed)
+            at, around = handle.stations, 0 if handle.closed else None
+            led, goals = _at(line, at), _at(_line(handle.goals, handle.closed), at) if handle.goals else None
+        else:
+            led = np.array([handle.at])
+            if handle.is_whole:
+                angles, around = np.arange(6) * np.pi / 3, 1
+                ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+                led = np.concatenate([led, led + RING * handle.radius * ring])
+        inside = ((led >= 0) & (led <= extent)).all(axis=1)
+        if len(led) > 1 and inside.any():
+            led, goals = led[inside], goals if goals is None else goals[inside]
+        return cls(handle, led, goals, around if len(led) >= 3 + (around or 0) else None, extent)
+
+    @property
+    def is_ring(self) -> bool:
+        """True if all but the first of its points are a ring."""
+        return len(self.led) > 1 and not self.handle.points
+
+    def middle(self, places: np.ndarray) -> np.ndarray:
+        """Where `at` of the handle is while its points are at these places, (2,)."""
+        if self.is_ring:
+            return places[0]
+        return places.mean(axis=0) + (self.handle.at - self.led.mean(axis=0))
+
+    def wanted(self, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
+        """Where its points shall be at a time, (n, 2), if they were at `starts` when it began; see `Handle.wanted`."""
+        handle, middle = self.handle, self.middle(starts)
+        there = handle.wanted(middle, time, dt)
+        if len(starts) == 1:
+            return there[None]
+        way = self._about(there, starts, handle.passed(time)) - starts
+        far = np.hypot(*way.T)[:, None]
+        return starts + way * np.minimum(1.0, LARGEST_LEAD * handle.reach / np.maximum(far, 1e-30))
+
+    def ends(self, starts: np.ndarray) -> np.ndarray:
+        """Where its points shall be in the end, (n, 2)."""
+        goal = self.handle.goal
+        return self._about(self.middle(starts) if goal is None else np.array(goal), starts, 1.0)
+
+    def away(self, places: np.ndarray, starts: np.ndarray) -> float:
+        """How far what is farthest of it is from where it shall be; of a ring, by how far it is turned and scaled."""
+        ends = self.ends(starts)
+        left = places - ends
+        if self.is_ring:
+            arms = places[1:] - places[0]
+            grown = math.sqrt(abs(area(places[1:]) / (area(ends[1:]) or 1.0)))
+            turned, scaled = spun(left[1:] - left[0], arms), abs(grown - 1) * float(np.hypot(*arms.T).mean())
+            return float(np.hypot(*left[0]) + math.hypot(turned, scaled))
+        return float(np.hypot(*left.T).max())
+
+    def _about(self, there: np.ndarray, starts: np.ndarray, part: float) -> np.ndarray:
+        """Its points with the handle at a place, and a part of its turn made."""
+        if len(starts) == 1:
+            return there[None]
+        return np.clip(self._laid(there, starts, part), 0.0, self.extent)
+
+    def _laid(self, there: np.ndarray, starts: np.ndarray, part: float) -> np.ndarray:
+        handle, from_middle = self.handle, starts - self.middle(starts)
+        if self.goals is not None:
+            assert handle.to is not None
+            return there + (1 - part) * from_middle + part * (self.goals - handle.to)
+        angle, scale = math.radians(handle.rotate or 0.0) * part, (handle.scale or 1.0) ** part
+        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        return there + scale * from_middle @ turn
+
+
+def spun(motion: np.ndarray, arms: np.ndarray) -> float:
+    """How far the ends of arms (n, 2) move with the turn that their motion is in the mean."""
+    turn = np.stack([-arms[:, 1], arms[:, 0]], axis=-1)
+    return float((motion * turn).sum() / max(float((arms**2).sum()), 1e-30) * np.hypot(*arms.T).mean())
+
+
+def area(loop: np.ndarray) -> float:
+    """The area within a closed line of places (n, 2), positive clockwise."""
+    x, y = (loop - loop.mean(axis=0)).T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def _line(corners: Sequence[Point], closed: bool) -> np.ndarray:
+    return np.array([*corners, corners[0]] if closed else corners)
+
+
+def _lengths(line: np.ndarray) -> np.ndarray:
+    """How far along a line its corners lie."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+
+
+def _at(line: np.ndarray, stations: np.ndarray) -> np.ndarray:
+    """The places on a line at numbers of corners, which may lie between two."""
+    return np.stack([np.interp(stations, np.arange(len(line)), side) for side in line.T], axis=-1)
