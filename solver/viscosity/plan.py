@@ -103,7 +103,7 @@ def plan_for(least: float, largest: float, cells: int, is_one: bool, is_sharp: b
     rigid = is_sharp and varies
     count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
-    tolerance = share * (TOLERANCE_STIFF if varies else TOLERANCE)
+    tolerance = TOLERANCE_STIFF if varies else share * TOLERANCE
     if largest <= stiff:
         return Plan("cg", count, tolerance)
     return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid)
