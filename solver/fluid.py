@@ -116,8 +116,7 @@ class Fluid(Scheme):
         with self.device.stage("diffuse"):
             w3 = self._viscosity_solver.solve()
         if self.measuring:
-            self._viscosity_solver.unpack(w3, self.velocity.write)
-            left = self._viscosity_solver.residual_norm(self.velocity.write)
+            left = self._viscosity_solver.residual_norm(w3)
             self.residuals = replace(self.residuals, viscous_residual=left)
         return w3
 

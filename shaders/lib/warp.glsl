@@ -7,7 +7,7 @@
 // top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
 // bottom, longer sides.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
-// that are carried less and less before that, 1, 2 and 4 or their sum: see weight.
+// that are carried less and less before that, 1, 2 and 4 or their sum, and FADED: see weight.
 #include "lib/displacement.glsl"
 uniform sampler2D u_submap;
 uniform sampler2D u_accumulated;
@@ -47,7 +47,6 @@ vec3 in_window(vec4 window, vec2 x) {
 // zero on a border is zero there too, continuously (Kantorovich and Krylov). w is 0 where the map is held and 1 from a cell
 // of the submap on, or FADED texels: equation (S7).
 #ifdef WEIGHED
-const float FADED = 31.0;
 float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
     slope = vec2(0.0);
     if ((WEIGHED & level) == 0) return 1.0;
@@ -56,7 +55,7 @@ float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
     vec4 far = max(127.0 - 255.0 * vec4(texture(u_held, at.xy).r, texture(u_held, at.zy).r,
                                         texture(u_held, at.xw).r, texture(u_held, at.zw).r), 0.0);
     vec2 cell = window.zw / vec2(textureSize(submap, 0)) * size / u_picture, along = mix(far.xz, far.yw, f.x);
-    float over = clamp(max(cell.x, cell.y), 1.0, FADED), part = clamp(mix(along.x, along.y, f.y) / over, 0.0, 1.0);
+    float over = clamp(max(cell.x, cell.y), 1.0, float(FADED)), part = clamp(mix(along.x, along.y, f.y) / over, 0.0, 1.0);
     slope = 2.0 * (1.0 - part) / over * vec2(mix(far.y - far.x, far.w - far.z, f.y), along.y - along.x);
     return part * (2.0 - part);
 }

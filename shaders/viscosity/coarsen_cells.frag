@@ -1,7 +1,8 @@
 // Coarsen: K of e_xx and e_yy on the next coarser level, S' K S / 16 (equation V4). A fine row counts 3/4 to the coarse
 // row it lies in and 1/4 to the nearest other one; where one of the two does not move, and is glided along, the other
 // counts whole. Of e_yy that holds for the columns.
-// u_xx0 ... u_yy2: of the finer level, as in stress.frag, on the finest u_xx0 only, with u_aspect; u_open: of the coarse one.
+// u_xx0 ... u_yy2: of the finer level, as in stress.frag, on the finest u_xx0 only, with u_aspect; u_open: of the coarse one;
+// u_alone: see restrict.frag.
 // reads: 64
 #include "viscosity/openness.glsl"
 #include "viscosity/sides.glsl"
@@ -13,6 +14,7 @@ uniform sampler2D u_yy0;
 uniform sampler2D u_yy1;
 uniform sampler2D u_yy2;
 uniform float u_aspect; // K of e_yy over K of e_xx
+uniform vec2 u_alone;
 layout(location = 0) out vec4 out_xx0;
 layout(location = 1) out vec4 out_xx1;
 layout(location = 2) out vec4 out_xx2;
@@ -73,7 +75,7 @@ vec2 coarse(int row, int apart) {
             if (abs(away) <= FARTHEST)
                 total += weight(row, place) * weight(row + apart, other) * k[6 * abs(away) + 1 + 2 * row + place + min(away, 0)];
         }
-    return total / 16.0;
+    return total * u_alone.x * u_alone.y / 16.0;
 }
 
 vec4 coarse(int apart, bool turned) {

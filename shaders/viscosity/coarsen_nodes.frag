@@ -1,10 +1,12 @@
 // Coarsen: K of the nodes on the next coarser level, S' K S / 16 (equation V4), S linear both ways: weights 1/2 1 1/2.
-// u_node0 ... u_node4: of the finer level, as in stress.frag, on the finest u_node0 only; u_open: of the coarse one.
+// u_node0 ... u_node4: of the finer level, as in stress.frag, on the finest u_node0 only; u_open: of the coarse one;
+// u_alone: see restrict.frag.
 // A coupling is the sum over the pairs of fine nodes around its two coarse ones, either way round.
 // reads: 78
 #include "viscosity/openness.glsl"
 #include "viscosity/sides.glsl"
 #include "viscosity/fine_level.glsl"
+uniform vec2 u_alone;
 uniform sampler2D u_node0;
 uniform sampler2D u_node1;
 uniform sampler2D u_node2;
@@ -77,9 +79,10 @@ void main() {
     n2 *= here * vec4(here.zw, below.xy);
     n3 *= here * vec4(here.w, right.z, below.y, corner.x);
     n4 *= here * vec4(left.w, here.z, before.y, below.x);
-    out_node0 = n0 / 16.0;
-    out_node1 = n1 / 16.0;
-    out_node2 = n2 / 16.0;
-    out_node3 = n3 / 16.0;
-    out_node4 = n4 / 16.0;
+    float part = u_alone.x * u_alone.y / 16.0;
+    out_node0 = part * n0;
+    out_node1 = part * n1;
+    out_node2 = part * n2;
+    out_node3 = part * n3;
+    out_node4 = part * n4;
 }

@@ -3,10 +3,13 @@
 // with UNIFORM box.glsl.
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a fixed neighbour.
+// u_alone: 2 where the finer grid is a single column (x) or row (y), which has no other to be joined to: it is coarsened
+// along itself only, and counts as two; else 1.
 // With START a second pair of outputs, the first damped Jacobi sweep on it from rest: u_weight D^-1 times it.
 // reads: 29
 uniform sampler2D u_u;
 uniform sampler2D u_v;
+uniform vec2 u_alone;
 #include "viscosity/operator.glsl"
 #ifdef START
 uniform float u_weight;
@@ -37,7 +40,7 @@ vec4 gather(sampler2D f, vec2 p, vec2 step_along, vec2 step_across, bool is_v, v
     vec4 alone_after = (1.0 - vec4(here.zw, after.xy)) * glides(rows + 1.0, count, no_slip);
     vec4 sum = (0.25 + 0.75 * alone_before) * vec4(a.zw, b.zw) + (0.75 + 0.25 * alone_before) * vec4(b.xy, c.xy)
              + (0.75 + 0.25 * alone_after) * vec4(b.zw, c.zw) + (0.25 + 0.75 * alone_after) * vec4(c.xy, d.xy);
-    return 0.25 * here * sum;
+    return 0.25 * u_alone.x * u_alone.y * here * sum;
 }
 
 void main() {

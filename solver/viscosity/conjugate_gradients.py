@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, isfinite
+from math import inf, isfinite, sqrt
 from typing import Any
 
 from solver.gl.device import Device
@@ -54,11 +54,12 @@ class ConjugateGradients:
     ) -> PackedFaces:
         """The solution, from about the best first guess in the plane of `v_star` and the last step's `change`.
 
-        `change` becomes what this step has made of `v_star`. Ends when less than the part `tolerance`^2 of the energy
-        is left, or after so many iterations at most. What is left is the rest of the geometric series of what
+        `change` becomes what this step has made of `v_star`. Ends when less than the part `tolerance`^2 is left, see
+        README.md, or after so many iterations at most. The energy left is the rest of the geometric series of what
         iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r;
-        if it is known to leave no more than the part `cycle_leaves` of the energy, the first may be the last without
-        A z and its products: what the guess v* + d lacks is r . A^-1 r, no more than r . r, as A is no less than 1.
+        if it is known to leave no more than the part `cycle_leaves` of the energy of any error, the first may be the
+        last without A z and its products: what the guess v* + d lacks is r . A^-1 r, no more than r . r, as A is no
+        less than 1.
         """
         before: dict[str, Any] = {"parts": (1.0, 1.0), **v_star.inputs(), **change.read.inputs("change_")}
         self._guess(before, rhs)
@@ -84,14 +85,15 @@ class ConjugateGradients:
             is_first = not self.iterations
             self.iterations += 1
             z = precondition(self._r.read)
-            rz, z_az, z_ap = self._apply_operator(z, is_first)
-            alpha, beta, curvature = cg_coefficients(rz, z_az, z_ap, curvature)
+            if not is_first:
+                before = {**v_star.inputs(), **self._x.read.inputs("x_"), **self._p.read.inputs("p_"), "beta": 0.0}
+            rz, z_az, z_ap, xx = self._apply_operator(z, before, is_first)
+            alpha, before["beta"], curvature = cg_coefficients(rz, z_az, z_ap, curvature)
             gained = alpha**2 * curvature
             found += gained
             left = max(gained, _series(gained, gained_before))
-            if not is_first:
-                before = {**v_star.inputs(), **self._x.read.inputs("x_"), **self._p.read.inputs("p_"), "beta": beta}
-            if not alpha or self.iterations == most or left <= tolerance**2 * found:
+            size = found if cycle_leaves < inf else sqrt(max(found * xx, 0.0))
+            if not alpha or self.iterations == most or left <= tolerance**2 * size:
                 # What has been spoiled may be no number.
                 return self._finish(change, before, z if alpha else self._r.read, alpha)
             gained_before = gained
@@ -104,19 +106,19 @@ class ConjugateGradients:
         targets = *self._r.read.fields, self._guess_products, self._more_products
         draw(targets, region=(x, y, width + 1, height + 1), **guess, **rhs.inputs("rhs_"), **self.level.operator)
 
-    def _apply_operator(self, z: PackedFaces, first: bool) -> tuple[float, float, float]:
-        """A z, and r . z, z . A z, z . A p, at first 0."""
+    def _apply_operator(self, z: PackedFaces, before: dict[str, Any], first: bool) -> list[float]:
+        """A z, and r . z, z . A z, z . A p (at first 0) and x . x (of one viscosity 0); x is that `before`."""
         draw = self.device.pass_("viscosity/apply_operator.frag", **_first(first), **self.level.defines)
         draw(
             (*self._az.fields, self._products),
             region=self.level.region,
-            **z.inputs(),
+            **before,
+            **z.inputs("z_"),
             **self._r.read.inputs("r_"),
             **({} if first else self._ap.read.inputs("ap_")),
             **self.level.operator,
         )
-        rz, z_az, z_ap, _ = self._sum(self._products).tolist()
-        return rz, z_az, z_ap
+        return self._sum(self._products).tolist()
 
     def _update(self, before: dict[str, Any], z: PackedFaces, alpha: float, first: bool) -> None:
         """p = z + beta p, A p likewise, x + alpha p, r - alpha A p; x and p are those `before`."""

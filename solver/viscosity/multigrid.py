@@ -194,12 +194,10 @@ class Multigrid:
             self.direct_solve(rhs)
             return
         coarser = self.levels[level.depth + 1]
+        begun = self._restrict(rhs, coarser, start=coarser is self._alone)
         if coarser is self._alone:
-            begun = self._restrict(rhs, coarser)
             self.smooth(coarser, coarser.rhs, self.weights(coarser)[begun:])
         else:
-            restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
-            restrict(coarser.rhs.fields, region=coarser.region, **rhs.inputs(), **coarser.bounds)
             self.sawtooth(coarser, coarser.rhs)
         prolong = self.device.pass_("viscosity/prolong.frag", ALONE=1, **level.defines)
         prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **level.bounds)
@@ -217,7 +215,7 @@ class Multigrid:
             moved = rigid.correct(free, faces, add=True)
             self.residual(level, faces, rhs, free)
             averaged = rigid.average(free, moved)
-        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser))
+        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser, start=True))
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"ALONE": 1} if rigid else {}))
         prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
                 **level.bounds)  # fmt: skip
@@ -294,22 +292,16 @@ class Multigrid:
         level.faces.swap()
         return 1
 
-    def _restrict(self, residual: PackedFaces, coarser: Level) -> int:
-        """The residual as rhs of the coarser level, and the first sweep on it if it has any; how many were made."""
-        if coarser is self.direct_level:
-            restrict = self.device.pass_("viscosity/restrict.frag", **coarser.defines)
-            restrict(coarser.rhs.fields, region=coarser.region, **residual.inputs(), **coarser.bounds)
-            return 0
-        restrict = self.device.pass_("viscosity/restrict.frag", START=1, **coarser.defines)
-        restrict(
-            coarser.rhs.fields + coarser.faces.write.fields,
-            region=coarser.region,
-            weight=self.weights(coarser)[0],
-            **residual.inputs(),
-            **coarser.operator,
-        )
-        coarser.faces.swap()
-        return 1
+    def _restrict(self, residual: PackedFaces, coarser: Level, start: bool) -> int:
+        """The residual as rhs of the coarser level, to `start` with a first sweep on it if it has any; how many."""
+        start = start and coarser is not self.direct_level
+        restrict = self.device.pass_("viscosity/restrict.frag", **({"START": 1} if start else {}), **coarser.defines)
+        inputs = {"weight": self.weights(coarser)[0], **coarser.operator} if start else coarser.bounds
+        targets = coarser.rhs.fields + (coarser.faces.write.fields if start else ())
+        restrict(targets, region=coarser.region, alone=coarser.alone, **residual.inputs(), **inputs)
+        if start:
+            coarser.faces.swap()
+        return int(start)
 
     def release(self) -> None:
         """Free the textures."""

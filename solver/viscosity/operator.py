@@ -138,6 +138,8 @@ class Level:
         self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
         # Without solids, what walls leave of a grid whose last column or row is only half in it, at least a channel.
         self.box = max(finest[0] >> depth, 1), max(finest[1] >> depth, 1)
+        # 2 where the finer level is a single column or row, which is coarsened along itself only, else 1.
+        self.alone = tuple(2.0 if depth and side >> depth == 0 else 1.0 for side in finest)
         # What passes read: the operator, what stress.frag multiplies with, open faces, and where the fluid sticks.
         self.operator: dict[str, Any] = {}
         self.stencil: dict[str, Any] = {}
@@ -172,7 +174,7 @@ class Level:
         packed, region = self.packed, self._around(box)
         if is_open_new:
             self.device.pass_("viscosity/coarsen_open.frag")(
-                packed["open"], region=self.region, open=finer.packed["open"]
+                packed["open"], region=self.region, open=finer.packed["open"], alone=self.alone
             )
         inputs: dict[str, Any] = {**finer.packed, "open": packed["open"]}
         slip = defines = self._take_walls(no_slip)
@@ -185,7 +187,7 @@ class Level:
             read = {name: inputs[name] for name in wanted if name in inputs}
             if not finer.depth:
                 read["most"] = most * 2.0 * self.shear[1] ** 2 if kind == "cells" else most
-            draw([packed[name] for name in names], region=region, **read, **self.walls)
+            draw([packed[name] for name in names], region=region, alone=self.alone, **read, **self.walls)
         draw = self.device.pass_("viscosity/inverse_diagonal.frag")
         read: dict[str, Any] = {name: packed[name] for name in ("xx0", "yy0", "node0", "node1", "node2", "open")}
         draw((packed["inverse_u"], packed["inverse_v"]), region=region, shear=self.shear, **read)

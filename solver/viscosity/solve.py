@@ -146,12 +146,11 @@ class Viscosity:
         for field in self.state():
             field.clear()
 
-    def residual_norm(self, after: Field) -> float:
-        """|v* - A v| / |v*| for a velocity v on MAC faces; waits for the GPU."""
+    def residual_norm(self, solution: PackedFaces) -> float:
+        """|v* - A v| / |v*| of what `solve` gave, or of any other packed faces; waits for the GPU."""
         finest, rhs = self.multigrid.finest, self._right_hand_side()
         left = finest.faces.write
-        self._pack(after, finest.faces.read)
-        self.multigrid.residual(finest, finest.faces.read, rhs, left)
+        self.multigrid.residual(finest, solution, rhs, left)
         wanted, found = (
             math.sqrt(sum(float((field.get().astype(np.float64) ** 2).sum()) for field in pair.fields))
             for pair in (rhs, left)

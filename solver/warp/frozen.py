@@ -16,7 +16,7 @@ from solver.gl.tiled import SavedTiles, TiledField
 # Texels: a place in a frozen pixel may lie nearest to the next texel, and what is looked up there is interpolated from
 # two more to each side.
 INNER, REACH = 1, 3
-FADED = 31  # texels along an axis in which the distance is told; `lib/warp.glsl` has it too
+FADED = 31  # texels along an axis in which the distance is told
 BLOCK = 64  # texels along a block that is drawn or not
 
 Draw = Callable[[Field, list[Region], Field, tuple[int, int], Field], None]

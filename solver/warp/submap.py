@@ -8,6 +8,7 @@ from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
 from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.grid import Grid
+from solver.warp.frozen import FADED
 
 STEEPEST = 1.0  # largest |grad S| that the cubic carries well
 NAMES = ("submap", "window"), ("second", "second_window"), ("third", "third_window")  # of levels, in shaders
@@ -87,7 +88,7 @@ def window_of(grid: Grid) -> tuple[float, float, float, float]:
 def defines_of(levels: list[Level]) -> dict[str, object]:
     """The defines of `lib/warp.glsl` for levels, the uppermost first."""
     weighed = sum(1 << k for k, level in enumerate(levels) if level.is_weighed)
-    counts = {"LEVELS": len(levels) if len(levels) > 1 else 0, "WEIGHED": weighed}
+    counts = {"LEVELS": len(levels) if len(levels) > 1 else 0, "WEIGHED": weighed, "FADED": FADED if weighed else 0}
     return {name: count for name, count in counts.items() if count}
 
 

@@ -179,6 +179,20 @@ def check_viscous_step(device: Device, seed: int) -> dict[str, float]:
     return {"error": left, "doing nothing": nothing, "iterations": iterations}
 
 
+def check_viscous_step_in_a_channel(device: Device, seed: int) -> dict[str, float]:
+    """A grid many times as long as it is wide, as viscous as may be: near the direct solution."""
+    rng = np.random.default_rng(seed)
+    kind, length, width = str(rng.choice(list(CLASSES))), int(rng.integers(200, 1100)), int(rng.integers(8, 17))
+    size = (length, width) if rng.random() < 0.5 else (width, length)
+    contrast, softest = float(rng.choice([1e2, 1e5])), float(10 ** rng.uniform(0, 3))
+    case = Case.random(kind, size, contrast, softest, rng, plain=False)
+    found, iterations = case.solved(device)
+    left = error(found, case.exact())
+    told = f"seed {seed}: {kind}, {case.viscosity.shape}, {case.walls.slip}, contrast {contrast:g}, kappa {softest:g}"
+    assert left < ERROR[contrast], f"{told}: {left:.4f} in {iterations}"
+    return {"error": left, "iterations": iterations}
+
+
 def check_uniform_viscous_step(device: Device, seed: int) -> dict[str, float]:
     """One viscosity, noise or smooth, on any grid with cells of any aspect between any walls: within a hundredth."""
     rng = np.random.default_rng(seed)
