@@ -204,7 +204,7 @@ class Fluid(Scheme):
         """
         if self.local.is_empty:
             return self._begin_own_trace(dt)
-        tracing = self._trace.begin(self.carrier(), dt, self.grid, self.params.walls)
+        tracing = self._trace.begin(self.carrier(), dt, self.grid, self.params.walls, in_parts=True)
         self._trace.forget()  # it is not the fluid's own
         return tracing
 
@@ -289,8 +289,8 @@ class Fluid(Scheme):
         return self._flux
 
     @property
-    def has_solids(self) -> bool:
-        return bool(self._look_at_solids().any())
+    def closed(self) -> np.ndarray:
+        return self._look_at_solids()
 
     def velocity_at_centres(self) -> np.ndarray:
         u, v = self.u, self.v

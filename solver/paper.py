@@ -149,8 +149,8 @@ class PaperFluid(Scheme):
         return self._carrier
 
     @property
-    def has_solids(self) -> bool:
-        return bool(self.solid.get().any())
+    def closed(self) -> np.ndarray:
+        return self.solid.get()
 
     def velocity_at_centres(self) -> np.ndarray:
         return self.velocity.read.get()

@@ -186,9 +186,14 @@ class Scheme(ABC):
         return self._carrier
 
     @property
-    @abstractmethod
     def has_solids(self) -> bool:
         """True if some cell is closed, if only in part; waits for the GPU where one was drawn."""
+        return bool(self.closed.any())
+
+    @property
+    @abstractmethod
+    def closed(self) -> np.ndarray:
+        """How far each cell is closed, (ny, nx) uint8, 255 for solid; read back where one was drawn."""
 
     @abstractmethod
     def velocity_at_centres(self) -> np.ndarray:

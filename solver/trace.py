@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.grid import Grid
 from solver.params import Walls
+
+# In each part of the way the largest gradient of the velocity, times the time that it takes, is this at most. Below 1
+# ways do not cross (Smolarkiewicz and Pudykiewicz), and below .73 neither do those of the midpoint rule.
+STRAIN = 0.5
+MOST_PARTS = 16  # a bound on the cost only
 
 
 @dataclass(frozen=True)
@@ -28,24 +35,37 @@ class Trace:
     """
 
     def __init__(self, device: Device, size: tuple[int, int]) -> None:
+        self.device = device
         self.field = device.field(size, 2, "trace")
+        blocks = blocks_of((size[0] - 1, size[1] - 1))
+        self._steepness = device.field(blocks, 1, "trace, steepness")
+        self._find_steepest = Reduction(device, blocks, 1, "max")
         self._dt: float | None = None  # the step that it is of
 
     def is_of(self, dt: float) -> bool:
         """True if it is there for this step, and the velocity has not changed since."""
         return self._dt == dt
 
-    def begin(self, velocity: Field, dt: float, grid: Grid, walls: Walls) -> Tracing:
-        """What drawing it for a velocity on MAC faces takes; from here on it is that of `dt`, until `forget`."""
+    def begin(self, velocity: Field, dt: float, grid: Grid, walls: Walls, in_parts: bool = False) -> Tracing:
+        """What drawing it for a velocity on MAC faces takes; from here on it is that of `dt`, until `forget`.
+
+        `in_parts`: as many as its gradient asks for, which waits for the GPU.
+        """
         self._dt = dt
         hx, hy = grid.spacing
-        return Tracing(
-            self.field, walls.defines, {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **walls.inputs}
-        )
+        defines, inputs = walls.defines, {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **walls.inputs}
+        if in_parts:
+            find = self.device.pass_("warp/steepness.frag")
+            find(self._steepness, displacement=velocity, spacing=grid.spacing, side=SIDE)
+            strain = dt * math.sqrt(self._find_steepest(self._steepness)[0])
+            defines = defines | {"PARTS": 1}
+            inputs["parts"] = float(min(max(math.ceil(strain / STRAIN), 1), MOST_PARTS))
+        return Tracing(self.field, defines, inputs)
 
     def forget(self) -> None:
         """Hear that the velocity has changed."""
         self._dt = None
 
     def release(self) -> None:
-        self.field.release()
+        for thing in (self.field, self._steepness, self._find_steepest):
+            thing.release()

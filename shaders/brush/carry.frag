@@ -2,9 +2,10 @@
 // that it pushes at or from, so that it comes to rest there smoothly.
 // u_motion: the fluid at the brush, from probe; u_slip: from slip; u_brush_velocity: lengths / s, the local part of it;
 // u_viscosity: cells, lengths^2 / s: what is thicker than at the brush is carried less.
-// With SOLIDS: u_solid, cells, how far they are closed; towards and away from these less and less within the radius, or all
-// that is pushed at one would be pressed into the last cell before it.
-// reads: 5, and 580 with SOLIDS
+// With SOLIDS: u_apart, cells, lengths to what is closed: within the radius all is carried less, beside it by the square of
+// that. What is local knows no pressure, so in proportion to it all would be pressed together, or drawn out, exponentially
+// with the way; and along it, held by nothing, be sheared within a cell.
+// reads: 5, and 9 with SOLIDS
 #include "lib/brush.glsl"
 uniform sampler2D u_motion;
 uniform sampler2D u_slip;
@@ -13,23 +14,7 @@ uniform vec2 u_brush_velocity;
 uniform vec2 u_spacing;
 in vec2 v_uv;
 #ifdef SOLIDS
-uniform sampler2D u_solid;
-
-// What is left of a motion at a place (cells) near closed cells: their direction and nearness from a lattice of them.
-vec2 beside_solids(vec2 place, vec2 motion) {
-    vec2 reach = u_radius / u_spacing, apart = max(ceil(reach / 6.0), 1.0);
-    vec2 size = vec2(textureSize(u_solid, 0)), first = apart * ceil((place - reach) / apart), cell, towards = vec2(0.0);
-    float nearest = 0.0;
-    for (cell.y = first.y; cell.y < place.y + reach.y; cell.y += apart.y)
-        for (cell.x = first.x; cell.x < place.x + reach.x; cell.x += apart.x) {
-            vec2 away = (cell + 0.5 - place) / reach;
-            float near = max(1.0 - length(away), 0.0) * texture(u_solid, (cell + 0.5) / size).r, weight = near * near;
-            nearest = max(nearest, near);
-            towards += weight * weight * away;
-        }
-    towards /= max(length(towards), 1e-20);
-    return motion - nearest * dot(motion, towards) * towards;
-}
+uniform sampler2D u_apart;
 #endif
 layout(location = 0) out vec2 out_velocity;
 
@@ -41,11 +26,10 @@ void main() {
     vec2 before = vec2(texture(u_viscosity, v_uv - vec2(texel.x, 0.0)).r, texture(u_viscosity, v_uv - vec2(0.0, texel.y)).r);
     vec2 thickest = max(max(before, texture(u_viscosity, v_uv).r), 1e-9);
     vec2 attenuation = min(max(texelFetch(u_motion, ivec2(0), 0).w, 1e-9) / thickest, 1.0);
-    vec2 motion = u_brush_velocity;
 #ifdef SOLIDS
-    if (max(weight.x, weight.y) > 0.0)
-        motion = vec2(beside_solids(p - vec2(0.5, 0.0), motion).x, beside_solids(p - vec2(0.0, 0.5), motion).y);
+    float left = texture(u_apart, v_uv - vec2(texel.x, 0.0)).r, above = texture(u_apart, v_uv - vec2(0.0, texel.y)).r;
+    weight *= smoothstep(0.0, u_radius, 0.5 * (texture(u_apart, v_uv).r + vec2(left, above)));
 #endif
-    out_velocity = texelFetch(u_slip, ivec2(0), 0).r * attenuation * max(weight, 0.0) * motion
+    out_velocity = texelFetch(u_slip, ivec2(0), 0).r * attenuation * max(weight, 0.0) * u_brush_velocity
                  * vec2(greaterThan(p, vec2(1.0)));
 }

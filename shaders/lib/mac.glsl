@@ -37,6 +37,21 @@ vec2 mac_centre(sampler2D velocity, vec2 p) {
 // when all of them have.
 const float BENT = 0.5; // cells a step that it changes by: from there on more and more, from twice as much on wholly
 
+// With PARTS in as many parts, u_parts, as the steepest gradient asks for, all over the grid: between places in one part and
+// in two there is a step, which a local push, steeper than any flow, folds. 16 reads for each.
+#ifdef PARTS
+uniform float u_parts;
+
+vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
+    vec2 edge = vec2(textureSize(velocity, 0)), along = cells_a_speed / u_parts;
+    for (float part = 0.0; part < u_parts; ++part) {
+        vec2 at = clamp(p - 0.5 * along * here, vec2(0.0), edge);
+        p = clamp(p - along * mac_velocity(velocity, at), vec2(0.0), edge);
+        if (part < u_parts - 1.0) here = mac_velocity(velocity, p);
+    }
+    return p;
+}
+#else
 vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
     vec2 edge = vec2(textureSize(velocity, 0));
     vec2 begun = p, at = clamp(p - 0.5 * cells_a_speed * here, vec2(0.0), edge), once;
@@ -55,6 +70,7 @@ vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
     }
     return mix(once, at, bent);
 }
+#endif
 
 // The same from the centre of the cell at p, as how far it is: x_d - x, in cells. 11 reads, and 24 more in two halves.
 vec2 mac_trace(sampler2D velocity, vec2 p, vec2 cells_a_speed) {

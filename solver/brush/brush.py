@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.brush.distance import Distance
 from solver.brush.push import Push, Slip
 from solver.brush.tip import NEAR, Tip
 from solver.brush.twirl import Twirl
@@ -34,6 +35,7 @@ class Brush:
         self._motion = device.field((1, 1), 4, "motion at the brush")
         self._obstruction = device.field((1, 1), 1, "obstruction factor")
         self._slip = Slip(device)
+        self._distance = Distance(device)
         self._sums: dict[tuple[tuple[int, int], int], Sum] = {}
 
     def lead(self, fluid: Scheme, motion: Motion, gain: float = 1.0, warp: WarpMap | None = None) -> None:
@@ -62,13 +64,13 @@ class Brush:
         self._draw(fluid, motion, velocity, 1.0, attenuation)
 
     def carry(self, fluid: Scheme, push: Push, warp: WarpMap | None = None) -> None:
-        """Let the local part of a push carry the picture until the fluid's next step; what is thicker, less."""
+        """Let the local part of a push carry the picture until the next step; less what is thicker or near solids."""
         check_type("what is carried", push, Push)
         _check(fluid, push, warp)
         if not push.local:
             return
         self._look(fluid, push, fluid.faces(), warp)
-        solids: dict[str, Any] = {"solid": fluid.solid} if fluid.has_solids else {}
+        solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
         carry = self.device.pass_("brush/carry.frag", **({"SOLIDS": 1} if solids else {}))
         region = push.tip.region(fluid.grid)
         inputs = push.tip.inputs(fluid.grid) | {"brush_velocity": push.local_velocity, "viscosity": fluid.viscosity}
@@ -97,7 +99,7 @@ class Brush:
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self._motion, self._obstruction, self._slip, *self._sums.values()):
+        for item in (self._motion, self._obstruction, self._slip, self._distance, *self._sums.values()):
             item.release()
 
     def _look(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None) -> None:

@@ -8,8 +8,9 @@ from scipy import ndimage
 
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Stroke
+from app.model.windows import detail_for
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.resample.sampler import Sampler
@@ -156,6 +157,36 @@ def test_at_the_ring_the_map_has_no_step(
         for beside in np.array([(1, 0), (-1, 0), (0, 1), (0, -1)]) / 256:
             assert np.abs(warp.at(places + beside * texel) - at).max() < 0.1 * texel
     assert warp.statistics().displacement_max > 3 * texel
+    replay.release()
+
+
+@pytest.mark.parametrize("radius", [0.03, 0.04])
+@pytest.mark.parametrize("past", [True, False])
+def test_local_dabs_in_a_window_past_what_is_frozen_and_towards_it_fold_nothing(
+    past: bool, radius: float, device: Device
+) -> None:
+    """Ten small ones about the same place: the picture is neither sheared nor torn at the ring."""
+    rng, disc, size = np.random.default_rng(7), 1.5 * radius, (1500, 1000)
+    strokes = [Stroke(tool="freeze", radius=disc, samples=((0, 0.5, 0.5, 1.0),))]
+    recipe = Recipe(fluid=FluidSettings(grid=64, viscosity=0.3, drag=0.0), duration=1.0)
+    detail = detail_for(radius, recipe, recipe.fluid)
+    for first in range(2, 52, 5):
+        turned, apart = rng.normal(0, 0.15), disc + radius * rng.uniform(0.1, 0.5)
+        out = np.array([np.cos(turned), np.sin(turned)])
+        way = 0.15 * radius * (np.array([-out[1], out[0]]) if past else -out)
+        start, end = apart * out - way, apart * out + way
+        (x0, y0), (x1, y1) = (0.5 + np.array([start, end]) * [1, 1.5]).tolist()
+        samples = (first, x0, y0, 1.0), (first + 4, x1, y1, 1.0)
+        strokes.append(Stroke(tool="push", radius=radius, detail=detail, local=1.0, samples=samples))
+    replay = Replay(
+        device, recipe.edited(stroke=tuple(strokes)), Pictures(Picture(np.zeros((*size[::-1], 3), np.uint8))), budget=0
+    )
+    replay.seek(recipe.ticks)
+    assert replay.window is not None
+    turned, apart = np.meshgrid(np.linspace(0, 2 * np.pi, 800), disc + np.linspace(0, radius, 80))
+    ring = np.stack([0.5 + apart * np.cos(turned), 1 / 3 + apart * np.sin(turned)], axis=-1).reshape(-1, 2)
+    assert replay.warp.determinants(ring).min() > 0
+    assert replay.warp.statistics().displacement_max > radius
     replay.release()
 
 

@@ -80,6 +80,20 @@ def test_a_push_of_a_radius_a_tick_folds_nothing(device: Device) -> None:
     replay.release()
 
 
+@pytest.mark.parametrize("grid", [341, 682])
+def test_a_local_push_of_half_a_radius_a_tick_folds_nothing(grid: int, device: Device) -> None:
+    """It has steeper sides than a flow, and the ways along which the picture is carried must not cross there."""
+    samples = ((0, 0.5, 0.44, 1.0), (4, 0.5, 0.56, 1.0))
+    push = {"tool": "push", "local": 1.0, "radius": 0.04, "hardness": 0.5, "samples": samples}
+    fluid = {"grid": grid, "viscosity": 0.3, "drag": 0.0}
+    recipe = Recipe.model_validate({"fluid": fluid, "stroke": (push,)})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((1000, 1500, 3), np.uint8))))
+    replay.seek(6)
+    assert replay.warp.statistics().det_min > 0.05
+    assert replay.warp.statistics().displacement_max > 0.04
+    replay.release()
+
+
 @pytest.mark.parametrize("slant", [0.0, 0.1])
 def test_a_local_push_into_something_frozen_presses_what_it_brings_together_smoothly(
     device: Device, slant: float
