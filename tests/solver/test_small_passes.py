@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -12,7 +14,7 @@ from solver.grid import Grid
 
 GRID = Grid(20, 12, (1.0, 0.75))
 ENDS = np.array([(0.3, 0.2), (0.6, 0.5)])
-BRUSH = {"segment": (0.3, 0.2, 0.6, 0.5), "radius": 0.25, "hardness": 0.4}
+BRUSH: dict[str, Any] = {"segment": (0.3, 0.2, 0.6, 0.5), "radius": 0.25, "hardness": 0.4}
 RNG = np.random.default_rng(8)
 
 
@@ -30,19 +32,20 @@ def weight(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return (1 - q**2) ** 3
 
 
-def drawn(
-    device: Device, shader: str, components: int, size: tuple[int, int] = GRID.size, **inputs: object
-) -> np.ndarray:
+def drawn(device: Device, shader: str, components: int, size: tuple[int, int] = GRID.size, **inputs: Any) -> np.ndarray:
     target = device.field(size, components)
     defines = {name: inputs.pop(name) for name in [*inputs] if name.isupper()}
-    given = {name: device.upload(value) if isinstance(value, np.ndarray) else value for name, value in inputs.items()}
+    given: dict[str, Any] = {
+        name: device.upload(value) if isinstance(value, np.ndarray) else value for name, value in inputs.items()
+    }
     device.pass_(shader, **defines)(target, **given)
     return target.get().astype(np.float64)
 
 
 @pytest.mark.parametrize(("shader", "amount"), [("expand", "rate"), ("thicken", "amount")])
 def test_what_a_brush_puts_into_cells_falls_off_with_it(device: Device, shader: str, amount: str) -> None:
-    found = drawn(device, f"brush/{shader}.frag", 1, spacing=GRID.spacing, **BRUSH, **{amount: -2.5})
+    inputs: dict[str, Any] = BRUSH | {amount: -2.5, "spacing": GRID.spacing}
+    found = drawn(device, f"brush/{shader}.frag", 1, **inputs)
     np.testing.assert_allclose(found, -2.5 * weight(*GRID.centres()), atol=1e-5)
 
 
@@ -202,7 +205,7 @@ def test_a_picture_is_looked_up_times_its_alpha_and_in_light(device: Device, pre
     picture = RNG.random((12, 20, 4)).astype(np.float32)
     if premultiplied:
         picture[..., :3] *= picture[..., 3:]
-    defines = {"PREMULTIPLIED": 1} if premultiplied else {}
+    defines: dict[str, Any] = {"PREMULTIPLIED": 1} if premultiplied else {}
     defines |= {"LINEAR_LIGHT": 1} if light else {}
     found = drawn(device, "resample/prepare.frag", 4, picture=picture, **defines)
     alpha = picture[..., 3:]
