@@ -73,8 +73,8 @@ def test_a_message_goes_by_itself(desk: Desk) -> None:
     desk.do("mousemove", "1140", "780")
     before = still(desk)
     desk.key("ctrl+shift+c")
-    desk.until(lambda: differs(desk.seen(), before, 300, 600, 760, 690), "the message")
-    desk.until(lambda: not differs(desk.seen(), before, 300, 600, 760, 690), "the message to go")
+    desk.until(lambda: differs(desk.seen(), before, 640, 50, 1000, 130), "the message")
+    desk.until(lambda: not differs(desk.seen(), before, 640, 50, 1000, 130), "the message to go")
 
 
 @busy
@@ -82,7 +82,7 @@ def test_a_dialog_is_whole_after_the_interface_has_changed_its_size(desk: Desk) 
     desk.key("ctrl+comma")
     before = still(desk)
     # 150 % of the five sizes.
-    desk.do("mousemove", "730", "365", "sleep", "0.3", "click", "1")
+    desk.do("mousemove", "730", "347", "sleep", "0.3", "click", "1")
     desk.until(lambda: differs(desk.seen(), before, 300, 100, 980, 700), "the new size")
     seen = still(desk)
     # Nothing has been left for later: a key that does nothing draws some frames more.
@@ -127,7 +127,7 @@ def test_clicks_beside_the_picture_do_not_paint(desk: Desk, tmp_path: Path) -> N
     desk.do("mousemove", "1140", "780")
     before = still(desk)
     subprocess.run(command, env=desk.env, check=True, timeout=60)
-    desk.until(lambda: differs(desk.seen(), before, 300, 600, 760, 690), "the message")
+    desk.until(lambda: differs(desk.seen(), before, 640, 50, 1000, 130), "the message")
     message = still(desk)
     changed = np.abs(message - before)[560:700, 300:800].max(axis=-1) > 20
     rows, columns = np.nonzero(changed)
