@@ -101,6 +101,7 @@ def test_a_stroke_is_stretched_to_whole_ticks_and_back() -> None:
     assert [tick for tick, *_ in slow.samples] == [4, 7, 7, 28]
     assert [sample[1:] for sample in slow.samples] == [sample[1:] for sample in one.samples]
     assert slow.lasting(4, 12) == one
+    assert [tick for tick, *_ in one.lasting(4, 9).samples] == [4, 5, 5, 9]  # the nearest ones
     assert one.lasting(30, 38) == one.moved(26)
     fast = one.lasting(4, 4)
     assert {tick for tick, *_ in fast.samples} == {4}

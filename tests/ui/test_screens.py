@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from app.media.pictures import read_picture, write_picture
+from app.model.bars import Which
 from app.model.forces import VortexForce
 from app.model.picture import Picture
 from app.ui.events import Mods
@@ -106,8 +107,9 @@ def lanes(robot: Robot) -> None:
     session = robot.editor.session
     whirl = VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1, name="Whirl", during=(0.5, 1.8))
     session.edit("Forces", force=(whirl, whirl.edited(during=None, formula="t", name="")))
-    muted = {("stroke", 2): {"muted": True}, ("stroke", 1): {"repeat": 3, "every": 30}}
-    for which, keys in muted.items():
+    edits: dict[Which, dict[str, object]]
+    edits = {("stroke", 2): {"muted": True}, ("stroke", 1): {"repeat": 3, "every": 30}}
+    for which, keys in edits.items():
         session.edit_bars("Bar", {which}, lambda one, keys=keys: one.model_copy(update=keys))
     robot.rest()
     session.seek(session.end // 2)
