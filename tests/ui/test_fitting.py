@@ -18,6 +18,7 @@ from solver.gl.device import Device
 from support.editing import Robot, command_line, small_project
 from support.widgets import Widgets
 
+PATIENCE = 300.0  # seconds, of a machine that does much else
 MOVES = ((0.4, 0.5), (0.45, 0.47)), ((0.7, 0.4), (0.7, 0.45))
 
 
@@ -39,7 +40,7 @@ def names(robot: Robot) -> list[str]:
 
 
 def wait(robot: Robot) -> None:
-    robot.until(lambda: not robot.editor.fits.is_running)
+    robot.until(lambda: not robot.editor.fits.is_running, PATIENCE)
     robot.rest()
 
 
@@ -88,7 +89,7 @@ def test_stopped_it_keeps_the_best_so_far(robot: Robot, monkeypatch: pytest.Monk
     widgets.click("Fit")
     process = robot.editor.fits._process
     assert process is not None
-    robot.until(lambda: process.state.startswith("best so far"))
+    robot.until(lambda: process.state.startswith("best so far"), PATIENCE)
     widgets.click("Stop")
     wait(robot)
     assert names(robot)[-1] == "Fit"
