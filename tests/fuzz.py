@@ -28,7 +28,7 @@ import numpy as np  # noqa: E402
 
 from app.errors import UserError  # noqa: E402
 from app.media.animation import animation_writer  # noqa: E402
-from app.media.landmarks import read_pairs, write_pairs  # noqa: E402
+from app.media.landmarks import Pairs, read_pairs, write_pairs  # noqa: E402
 from app.media.maps import Displacement, read_map, write_map  # noqa: E402
 from app.media.opening import open_source  # noqa: E402
 from app.media.pictures import write_picture  # noqa: E402
@@ -112,7 +112,7 @@ def make_map(path: Path) -> None:
 
 
 def make_pairs(path: Path) -> None:
-    write_pairs(path, np.random.default_rng(0).random((5, 2, 2)), SIZE)
+    write_pairs(path, Pairs.points(np.random.default_rng(0).random((5, 2, 2))), SIZE)
 
 
 def make_journal(path: Path) -> None:

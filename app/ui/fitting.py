@@ -23,18 +23,19 @@ class Fits:
 
     Attributes:
         evaluations: see `fitted`.
+        process: that fits, while one does.
     """
 
     def __init__(self, workspace: Workspace, messages: Messages) -> None:
         self._workspace, self._messages = workspace, messages
         self.evaluations = EVALUATIONS
-        self._process: FitProcess | None = None
+        self.process: FitProcess | None = None
         self._session: Session | None = None  # whose handles are fitted
         self._stopping = False
 
     @property
     def is_running(self) -> bool:
-        return self._process is not None
+        return self.process is not None
 
     def start(self) -> None:
         """Begin to fit the handles of the work that is open, as it is at its end."""
@@ -48,30 +49,30 @@ class Fits:
         self._session, self._stopping = session, False
         project = session.project
         fit = Fit(session.recipe, project.picture, project.folder, evaluations=self.evaluations)
-        self._process = FitProcess(fit)
+        self.process = FitProcess(fit)
 
     def finish(self) -> None:
         """Let it end with the best so far."""
-        if self._process is not None:
-            self._process.finish()
+        if self.process is not None:
+            self.process.finish()
             self._stopping = True
 
     def give_up(self) -> None:
         """Stop it; nothing comes of it."""
-        if self._process is not None:
-            self._process.stop()
-            self._process = None
+        if self.process is not None:
+            self.process.stop()
+            self.process = None
 
     def draw(self, ui: Ui, canvas: Rect, down: float) -> None:
         """How far it is and how near it comes, so many points below the canvas's edge; with a button to stop it."""
-        if (process := self._process) is None:
+        if (process := self.process) is None:
             return
         process.poll()
         if not self._is_still_of_use(process.fit.recipe):
             self.give_up()
             self._messages.say("The fit has been given up: what it was of has been changed.")
         elif process.is_done:
-            self._process = None
+            self.process = None
             self._take(process)
         else:
             state = "checking the best" if self._stopping else process.state or "getting ready"

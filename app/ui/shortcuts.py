@@ -42,6 +42,10 @@ class Shortcuts(Dialog):
     def is_listening(self) -> bool:
         return self._wanted is not None and not self._pressed
 
+    def choose(self, action: Keyed) -> None:
+        """Let the next key that is pressed be this action's."""
+        self._wanted, self._pressed = action, ""
+
     def hear(self, chord: str) -> None:
         if self._wanted is None or self._pressed:
             return
@@ -100,7 +104,7 @@ class Shortcuts(Dialog):
         imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), 0))
         for action in actions:
             if self._row(ui, action.label, keys_shown(self._keys.of(action.name)), action):
-                self._wanted, self._pressed = action, ""
+                self.choose(action)
         if name == "Mouse":
             for label, keys in MOUSE:
                 self._row(ui, label, keys)

@@ -58,9 +58,10 @@ class Thumbnails:
         if session.recipe is entry.recipe and (
             kept is None or (kept.recipe is not entry.recipe and not session.is_moving)
         ):
-            self._take(entry.number, session)
+            self.take(entry.number, session)
 
-    def _take(self, number: int, session: Session) -> None:
+    def take(self, number: int, session: Session) -> None:
+        """Draw the picture of an entry, in the place of the oldest where there are enough."""
         oldest = number if number in self._kept or len(self._kept) < MOST else next(iter(self._kept))
         kept = self._kept.pop(oldest, None)
         if kept is None:

@@ -159,7 +159,7 @@ class Handles:
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
         rows = _runs(self._counts[in_force])  # of each in what is listed
         places, radii = self._places[listed], self._radii[listed]
-        slower = self._slower(listed)
+        slower = self.slower(listed)
         for each in rows:
             slower[each] = slower[each].min()  # what is led as a whole goes as slowly as the slowest of it
         wanted, growths = self._wanted(active, rows, slower, time, dt)
@@ -332,7 +332,7 @@ class Handles:
             growths.append(float(slower[each.start]) * part * growth / dt)
         return wanted, growths
 
-    def _slower(self, numbers: np.ndarray) -> np.ndarray:
+    def slower(self, numbers: np.ndarray) -> np.ndarray:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
         if not len(numbers):
             return np.zeros(0)

@@ -15,7 +15,8 @@ from app.media.recipes import read_recipe
 from app.model.handles import ARRIVED
 from app.model.recipe import Recipe
 from solver.gl.device import Device
-from support.editing import Robot, command_line, small_project
+from support.commands import Run
+from support.editing import Robot, small_project
 from support.widgets import Widgets
 
 PATIENCE = 300.0  # seconds, of a machine that does much else
@@ -64,7 +65,7 @@ def test_a_fit_is_one_edit_that_leads_all_at_once_and_is_played(robot: Robot) ->
 
 
 def test_the_command_line_gives_the_same_from_the_handles_and_from_a_file_of_the_same_pairs(
-    robot: Robot, tmp_path: Path
+    robot: Robot, fluidwarp: Run, tmp_path: Path
 ) -> None:
     session = robot.editor.session
     recipe, project = session.recipe, session.project
@@ -79,7 +80,7 @@ def test_the_command_line_gives_the_same_from_the_handles_and_from_a_file_of_the
     projects.save(bare, tmp_path / "bare.fluidwarp")
     for words in (["w.fluidwarp"], ["bare.fluidwarp", "--pairs", str(tmp_path / "p.csv")]):
         target = tmp_path / "f.toml"
-        command_line("fit", str(tmp_path / words[0]), *words[1:], "-o", str(target), "--evaluations", "2")
+        assert fluidwarp(tmp_path, "fit", *words, "-o", target.name, "--evaluations", "2").returncode == 0
         assert read_recipe(target).text() == made.edited(picture=None).text()
 
 
@@ -87,7 +88,7 @@ def test_stopped_it_keeps_the_best_so_far(robot: Robot, monkeypatch: pytest.Monk
     robot.editor.fits.evaluations = 100_000
     widgets = Widgets(robot, monkeypatch)
     widgets.click("Fit")
-    process = robot.editor.fits._process
+    process = robot.editor.fits.process
     assert process is not None
     robot.until(lambda: process.state.startswith("best so far"), PATIENCE)
     widgets.click("Stop")

@@ -36,7 +36,7 @@ def sheet(robot: Robot) -> Shortcuts:
 
 def choose(robot: Robot, sheet: Shortcuts, name: str, chord: str) -> None:
     """As a click on the action's row and the key do."""
-    sheet._wanted, sheet._pressed = ACTIONS[name], ""
+    sheet.choose(ACTIONS[name])
     robot.frame()
     robot.key(chord)
     robot.frame(count=2)
@@ -128,7 +128,7 @@ def test_escape_gives_up_choosing_and_not_the_sheet(robot: Robot, sheet: Shortcu
 
 
 def test_a_modifier_alone_is_no_key(robot: Robot, sheet: Shortcuts) -> None:
-    sheet._wanted = ACTIONS["actual"]
+    sheet.choose(ACTIONS["actual"])
     robot.frame(Key("", True, Mods(ctrl=True)))
     assert sheet.is_listening
 

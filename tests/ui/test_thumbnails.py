@@ -95,8 +95,8 @@ def test_no_picture_is_made_while_one_paints(robot: Robot) -> None:
     """The frame of a stroke has better things to do."""
     made: list[int] = []
     thumbnails = robot.editor.canvas.thumbnails
-    take = thumbnails._take
-    thumbnails._take = lambda number, session: (made.append(number), take(number, session))[1]
+    take = thumbnails.take
+    thumbnails.take = lambda number, session: (made.append(number), take(number, session))[1]
     robot.move(*robot.at(0.3, 0.5))
     robot.press()
     for step in range(6):

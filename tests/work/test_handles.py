@@ -105,7 +105,7 @@ def test_a_point_is_turned_and_scaled(rotate: float | None, scale: float | None,
 def test_a_map_that_nobody_moved_bears_a_handle_at_its_edges(device: Device):
     """Whatever its texels: no look leaves the picture."""
     led, _ = led_alone(device, *(Handle((x, y), radius=0.05) for x in (0.01, 0.99) for y in (0.01, 0.99)), ticks=1)
-    assert (led._slower(np.arange(4)) == 1).all()
+    assert (led.slower(np.arange(4)) == 1).all()
 
 
 def test_a_line_is_moved_as_one_and_turned(device: Device):
