@@ -15,7 +15,7 @@ from app.media import project as projects
 from app.media.animation import ANIMATIONS as CONTAINERS
 from app.media.formats import FORMATS
 from app.media.maps import MAP_ENDINGS
-from app.model.strokes import Change, Stroke
+from app.model.strokes import BrushPath, Change, Stroke
 from app.progress import Progress
 from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PRESETS, ExportDialog
 from app.ui.panels import inspector
@@ -247,7 +247,7 @@ def test_a_stroke_is_painted_with_symmetry_and_undone_as_one(
     robot.drag((0.2, 0.3), (0.28, 0.36), steps=6)
     robot.rest()
     stroke = (*session.recipe.stroke, *session.recipe.mask)[-1]
-    assert isinstance(stroke, Stroke)
+    assert isinstance(stroke, BrushPath)
     assert stroke.symmetry == {"Left and right": "left-right", "Radial": "radial", "Both": "both"}[words]
     assert stroke.sectors == (5 if words == "Radial" else 6)
     frozen = session.replay.masks.frozen.get()
@@ -428,6 +428,8 @@ local, Local: 0% to 100%, 0%
 held radius, Reach: 1 px to 240 px by ratios, 36 px
 held stiffness, Stiffness: 1% to 100%, 100%
 held local, Local: 0% to 100%, 0%
+held rotate, Rotate: -180° to 180°, 0°
+held scale, Scale: 25% to 400% by ratios, 100%
 hardness, Hardness: 0% to 100%, 0%
 strength, Strength: 5% to 100%, 100%
 mask amount, Fill with: 0.001 x to 1e+05 x by ratios, 100 x

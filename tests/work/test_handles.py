@@ -131,7 +131,7 @@ def test_an_outline_goes_into_another_form_and_size(device: Device):
 
 
 def test_what_of_a_line_is_outside_is_not_led(device: Device):
-    led, _ = led_alone(device, Handle((0.1, 0.5), (0.15, 0.55), duration=0.5, points=((-0.2, 0.5), (0.3, 0.5))))
+    led, _ = led_alone(device, Handle((0.1, 0.5), (0.11, 0.55), duration=0.5, points=((-0.2, 0.5), (0.3, 0.5))))
     (shape,) = led.shapes
     assert shape.min() > 0.02
     assert led.away[0] * PIXELS < 0.5

@@ -9,6 +9,7 @@ from itertools import pairwise
 import pytest
 
 from app.model.history import Entry, History
+from app.model.recipe import VERSION as RECIPE_VERSION
 from app.model.recipe import Recipe
 from app.model.strokes import Change, Stroke
 from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuation, read
@@ -137,7 +138,7 @@ def test_what_is_no_journal_is_damaged(data: bytes) -> None:
         read(data)
 
 
-@pytest.mark.parametrize("head", [b"fluidwarp journal 2 1\n", b"fluidwarp journal 1 5\n"])
+@pytest.mark.parametrize("head", [b"fluidwarp journal 2 1\n", f"fluidwarp journal 1 {RECIPE_VERSION + 1}\n".encode()])
 def test_a_newer_journal_says_so(head: bytes) -> None:
     with pytest.raises(Newer):
         read(head + b"whatever there may be then\n")

@@ -32,13 +32,13 @@ def opened(name: str, file: Path, max_pixels: int) -> Iterator[Any]:
     """Pillow's image of a file that is of its kind `name`, not decoded yet."""
     from PIL import Image, PngImagePlugin
 
-    # Only frames after the first meet its limit, of twice this; ours is in check_size.
-    Image.MAX_IMAGE_PIXELS = max(max_pixels // 2, 1)
+    Image.MAX_IMAGE_PIXELS = None  # what a file says of itself has our limit: see check_size
     warnings.simplefilter("ignore", Image.DecompressionBombWarning)
     PngImagePlugin.MAX_TEXT_CHUNK = MOST_TEXT  # 1 MiB of its own is less than some profiles have
     with Image.open(file, formats=["JPEG", "MPO"] if name == "JPEG" else [name]) as image:
         check_size(file, *image.size, max_pixels)
         try:
+            Image.MAX_IMAGE_PIXELS = max(max_pixels // 2, 1)  # a later frame is refused beyond twice this
             yield image
         except Image.DecompressionBombError:
             raise UserError(
