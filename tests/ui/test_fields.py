@@ -15,7 +15,7 @@ from app.media import project as projects
 from app.media.animation import ANIMATIONS as CONTAINERS
 from app.media.formats import FORMATS
 from app.media.maps import MAP_ENDINGS
-from app.model.strokes import BrushPath, Change, Stroke
+from app.model.strokes import BrushPath, Change
 from app.progress import Progress
 from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PRESETS, ExportDialog
 from app.ui.panels import inspector

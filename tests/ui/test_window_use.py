@@ -129,12 +129,12 @@ def test_clicks_beside_the_picture_do_not_paint(desk: Desk, tmp_path: Path) -> N
     subprocess.run(command, env=desk.env, check=True, timeout=60)
     desk.until(lambda: differs(desk.seen(), before, 640, 50, 1000, 130), "the message")
     message = still(desk)
-    changed = np.abs(message - before)[560:700, 300:800].max(axis=-1) > 20
+    changed = np.abs(message - before)[50:130, 640:1000].max(axis=-1) > 20
     rows, columns = np.nonzero(changed)
-    right, top = int(columns.max()) + 300, int(rows.min()) + 560
+    right, top = int(columns.max()) + 640, int(rows.min()) + 50
     desk.do("mousemove", str(right - 25), str(top + 20), "sleep", "0.5", "click", "1", "sleep", "0.5")
     desk.do("mousemove", "1140", "780")
-    desk.until(lambda: not differs(desk.seen(), before, 300, 600, 760, 690), "the message to be closed")
+    desk.until(lambda: not differs(desk.seen(), before, 640, 50, 1000, 130), "the message to be closed")
     assert desk.title() == "pattern - fluidwarp"
 
 
