@@ -32,7 +32,19 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
     pytest.importorskip("copykitten")
     desk = Desk(tmp_path)
     yield desk
+    take_clipboard(desk)
     desk.close()
+
+
+def take_clipboard(desk: Desk) -> None:
+    """As another program that fills it: who serves it until then ends, and would outlast its screen otherwise."""
+    from Xlib import X, display
+
+    screen = display.Display(desk.env["DISPLAY"])
+    window = screen.screen().root.create_window(0, 0, 1, 1, 0, 0)
+    window.set_selection_owner(screen.intern_atom("CLIPBOARD"), X.CurrentTime)
+    screen.sync()
+    screen.close()
 
 
 def on_clipboard(desk: Desk) -> np.ndarray | None:
