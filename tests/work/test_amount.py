@@ -31,7 +31,7 @@ def random_recipe(seed: int) -> Recipe:
     """Up to five strokes, each of a tool that moves the fluid."""
     rng, strokes, tick = np.random.default_rng(seed), list[Stroke](), 0
     for _ in range(rng.integers(1, 6)):
-        tool, count = str(rng.choice(["push", "push", "twirl", "bloat", "pinch"])), int(rng.integers(3, 20))
+        tool, count = rng.choice(["push", "push", "twirl", "bloat", "pinch"]), int(rng.integers(3, 20))
         start, way = rng.uniform(0.1, 0.9, 2), rng.uniform(-0.25, 0.25, 2)
         path = np.clip(start + way * np.linspace(0, 1, count)[:, None], 0, 1).tolist()
         samples = tuple((tick + n, x, y, 1.0) for n, (x, y) in enumerate(path))
