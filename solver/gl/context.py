@@ -79,6 +79,7 @@ class Context:
         has_threads = os.environ.get("LP_NUM_THREADS") != "0"
         self.fences = Fences(ctx, needed=has_threads and "llvmpipe" in self.limits.renderer.lower())
         self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
+        self._drawn_into: dict[int, set[tuple[int, ...]]] = {}  # by texture, the keys of its framebuffers
         self._rest = ctx.simple_framebuffer((1, 1))
         # Reads a texture between its texels, where a look is enough.
         self.linear = ctx.sampler(repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR))
@@ -109,6 +110,8 @@ class Context:
         key = tuple(texture.glo for texture in textures)
         if key not in self._targets:
             self._targets[key] = self.ctx.framebuffer(textures)
+            for glo in key:
+                self._drawn_into.setdefault(glo, set()).add(key)
         return self._targets[key]
 
     def forget_targets(self, texture: moderngl.Texture) -> None:
@@ -116,8 +119,10 @@ class Context:
         # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
         self.use()
         self._rest.use()
-        for key in [key for key in self._targets if texture.glo in key]:
+        for key in self._drawn_into.pop(texture.glo, ()):
             self._targets.pop(key).release()
+            for glo in key:
+                self._drawn_into.get(glo, set()).discard(key)
 
     def collect(self) -> None:
         """Free the GL objects that Python has dropped."""

@@ -277,39 +277,44 @@ def viscous_system(
     u, v = np.full((2, ny + 2, nx + 2), -1)
     u[1:-1, 1:-1] = np.where(fluid[1:-1, 1:-1] & fluid[1:-1, :-2], np.arange(count).reshape(ny, nx), -1)
     v[1:-1, 1:-1] = np.where(fluid[1:-1, 1:-1] & fluid[:-2, 1:-1], np.arange(count).reshape(ny, nx) + count, -1)
-    stiffness, strains, wall_strain = [], [], []
-    for j in range(1, ny + 1):
-        for i in range(1, nx + 1):
-            if fluid[j, i]:
-                stiffness += [2 * mu[j, i]] * 2
-                strains += [{u[j, i + 1]: 1 / hx, u[j, i]: -1 / hx}, {v[j + 1, i]: 1 / hy, v[j, i]: -1 / hy}]
-                wall_strain += [0, 0]
-    for j in range(1, ny + 2):
-        for i in range(1, nx + 2):
-            around = [(j - 1, i - 1), (j - 1, i), (j, i - 1), (j, i)]
-            wet = [cell for cell in around if fluid[cell]]
-            sides = [side for side, at in zip(no_slip, (i == 1, i == nx + 1, j == 1, j == ny + 1), strict=False) if at]
-            if not wet or (len(wet) < 4 and not (any(sides) if sides else no_slip[4])):
-                continue
-            node = len(wet) / sum(1 / mu[cell] for cell in wet)
-            strain, moving = {u[j, i]: 1 / hy, u[j - 1, i]: -1 / hy, v[j, i]: 1 / hx, v[j, i - 1]: -1 / hx}, 0.0
-            if len(wet) == 2:
-                # A flat wall: the velocity beyond it is 2 U minus the one inside, so the strain is twice what it is
-                # with a resting face there, and half the energy belongs to the fluid's side.
-                node *= 2
-                moving += (speed[2] * (j == 1) * -1 + speed[3] * (j == ny + 1)) / hy
-                moving += (speed[0] * (i == 1) * -1 + speed[1] * (i == nx + 1)) / hx
-            stiffness.append(node)
-            strains.append(strain)
-            wall_strain.append(moving)
-    rows = [row for row, strain in enumerate(strains) for face in strain if face >= 0]
-    columns = [face for strain in strains for face in strain if face >= 0]
-    signs = [sign for strain in strains for face, sign in strain.items() if face >= 0]
-    strain_of = sparse.csr_matrix((signs, (rows, columns)), (len(strains), 2 * count))
-    weighted = strain_of.T @ sparse.diags(np.asarray(stiffness) * dt)
+
+    def rates(wanted: np.ndarray, *terms: tuple[np.ndarray, float]) -> sparse.csr_matrix:
+        """A row for each wanted place: the sum of its faces, each by its weight."""
+        faces = np.stack([numbers[wanted] for numbers, _ in terms], axis=-1)
+        weights = np.broadcast_to([weight for _, weight in terms], faces.shape)
+        rows = np.broadcast_to(np.arange(len(faces))[:, None], faces.shape)
+        free = faces >= 0
+        return sparse.csr_matrix((weights[free], (rows[free], faces[free])), (len(faces), 2 * count))
+
+    cells = fluid[1:-1, 1:-1]
+    inner, right, below = np.s_[1:-1, 1:-1], np.s_[1:-1, 2:], np.s_[2:, 1:-1]
+    stretches = [
+        rates(cells, (u[right], 1 / hx), (u[inner], -1 / hx)),
+        rates(cells, (v[below], 1 / hy), (v[inner], -1 / hy)),
+    ]
+    # The nodes, at the corners of the cells: how many fluid cells are around, and which walls they lie on.
+    corners = [np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1], np.s_[1:, 1:]]
+    wet = np.sum([fluid[corner] for corner in corners], axis=0)
+    resistance = np.sum([fluid[corner] / np.where(fluid[corner], mu[corner], 1.0) for corner in corners], axis=0)
+    on = np.zeros((4, ny + 1, nx + 1), bool)  # left, right, top, bottom
+    on[0, :, 0] = on[1, :, -1] = on[2, 0] = on[3, -1] = True
+    sticks = np.where(on.any(axis=0), (on & np.array(no_slip[:4])[:, None, None]).any(axis=0), no_slip[4])
+    sheared = (wet == 4) | (wet > 0) & sticks
+    here, above, left = np.s_[1:, 1:], np.s_[:-1, 1:], np.s_[1:, :-1]
+    shear = rates(sheared, (u[here], 1 / hy), (u[above], -1 / hy), (v[here], 1 / hx), (v[left], -1 / hx))
+    # A flat wall: the velocity beyond it is 2 U minus the one inside, so the strain is twice what it is with a resting
+    # face there, and half the energy belongs to the fluid's side.
+    flat = wet[sheared] == 2
+    node = wet[sheared] / resistance[sheared] * np.where(flat, 2, 1)
+    pulls = np.array([-speed[0] / hx, speed[1] / hx, -speed[2] / hy, speed[3] / hy])
+    moving = np.where(flat, np.tensordot(pulls, on, 1)[sheared], 0.0)
+    strain_of = sparse.vstack([*stretches, shear])
+    stiffness = np.concatenate([2 * mu[inner][cells], 2 * mu[inner][cells], node])
+    wall_strain = np.concatenate([np.zeros(2 * np.count_nonzero(cells)), moving])
+    weighted = strain_of.T @ sparse.diags(stiffness * dt)
     matrix = sparse.identity(2 * count) + weighted @ strain_of
     free = np.isin(np.arange(2 * count), np.concatenate([u, v]))
-    return sparse.csc_matrix(matrix), -(weighted @ np.asarray(wall_strain)), free
+    return sparse.csc_matrix(matrix), -(weighted @ wall_strain), free
 
 
 def viscous_step(
@@ -318,5 +323,8 @@ def viscous_step(
     """The exact implicit viscous step of (ny, nx, 2) velocities on MAC faces."""
     matrix, added, free = viscous_system(viscosity, dt, h, **walls)  # pyright: ignore[reportArgumentType]
     right = np.where(free, np.moveaxis(np.asarray(faces, np.float64), -1, 0).ravel() + added, 0.0)
-    solution = sparse_linalg.splu(matrix).solve(right)
+    # It is symmetric and positive definite, so no pivoting is needed: half the time and memory.
+    options = {"SymmetricMode": True}
+    factors = sparse_linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    solution = factors.solve(right)
     return np.moveaxis(solution.reshape(2, *viscosity.shape), 0, -1)
