@@ -44,6 +44,8 @@ CHECKED = """
 assert vorticity.shape == stream.shape == (41, 65)
 assert abs(displacement).max() > 0.01
 assert fluid.motion().kinetic_energy > 0
+assert handles.away.max() <= 0.001
+assert warp.statistics().folds == 0
 """
 
 
