@@ -519,16 +519,16 @@ def _distorted(warp: WarpMap, points: np.ndarray, wanted: np.ndarray | None = No
     where it is folded. Only where `wanted` (k, n, m) is true the map is looked at, and the second is right where it is
     of both neighbours too.
     """
-    wanted = np.ones(points.shape[:-1], bool) if wanted is None else wanted
-    listed, found, original = points[wanted], np.zeros((*points.shape[:-1], 3)), points.copy()
+    chosen = slice(None) if wanted is None else np.flatnonzero(wanted)
+    listed, found, original = points.reshape(-1, 2)[chosen], np.zeros((*points.shape[:-1], 3)), points.copy()
     texel = np.divide(warp.extent, warp.size)
     corner = np.minimum(listed, warp.extent - texel)  # so that no triangle leaves the picture
-    places = np.stack([listed, corner, corner + texel * (1, 0), corner + texel * (0, 1)])
-    here, *moved = warp.at(places.reshape(-1, 2)).astype(np.float64).reshape(places.shape)
+    places = np.concatenate([listed, corner, corner + texel * (1, 0), corner + texel * (0, 1)])
+    here, *moved = warp.at(places).astype(np.float64).reshape(4, -1, 2)
     right, below = (np.eye(2)[axis] + (moved[1 + axis] - moved[0]) / texel[axis] for axis in (0, 1))
-    original[wanted] += here
-    found[wanted, 0] = warp.determinants(listed)
-    found[wanted, 2] = right[:, 0] * below[:, 1] - right[:, 1] * below[:, 0]
+    original.reshape(-1, 2)[chosen] += here
+    found.reshape(-1, 3)[chosen, 0] = warp.determinants(listed)
+    found.reshape(-1, 3)[chosen, 2] = right[:, 0] * below[:, 1] - right[:, 1] * below[:, 0]
     for axis in (1, 2):
         apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, points))
         ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
