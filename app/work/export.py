@@ -5,10 +5,9 @@ One long class: what a job simulates, looks up and writes must go in one order.
 
 from __future__ import annotations
 
-import gc
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -77,25 +76,11 @@ def run(device: Device, job: Job, progress: Progress) -> Report:
         UserError: what is wrong with the recipe, the picture or the output.
         Cancelled: if `progress` says so.
     """
-    with _garbage_kept():
-        export = _Export(device, job, progress)
-        try:
-            return export.run()
-        finally:
-            export.release()
-
-
-@contextmanager
-def _garbage_kept() -> Iterator[None]:
-    """Collect no garbage but where we say, in this thread: in the writer's there is no GL to release textures with."""
-    was_enabled = gc.isenabled()
-    gc.disable()
+    export = _Export(device, job, progress)
     try:
-        yield
+        return export.run()
     finally:
-        gc.collect()
-        if was_enabled:
-            gc.enable()
+        export.release()
 
 
 class _Export:
@@ -314,7 +299,6 @@ class _Export:
                 take_map((number, self._map(self.outputs.maps)))
             frame = self._frame_of(picture) if self.outputs.file is not None else nothing
             self._note(number, position)
-            gc.collect(1)
             yield number, frame
 
     def _frame_of(self, picture: Picture) -> Frame:

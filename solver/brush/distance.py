@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
 
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldPool
@@ -37,6 +36,8 @@ def distances(closed: np.ndarray, grid: Grid) -> np.ndarray:
 
     closed: how far each cell is, 255 wholly and less and less over a cell more, (ny, nx) uint8, not all zero.
     """
+    from scipy import ndimage  # a third of what a process needs until it can begin
+
     (hx, hy), (ny, nx) = grid.spacing, closed.shape
     nearest = np.empty((2, ny, nx), np.int32)
     ndimage.distance_transform_edt(closed == 0, (hy, hx), return_distances=False, return_indices=True, indices=nearest)

@@ -339,17 +339,20 @@ class Handles:
         extent, radii = np.array(self._warp.extent), self._radii[numbers]
         count = np.maximum(self._fluid.grid.size, PLACES * extent / extent.max()).astype(int)
         columns, rows = ((np.arange(n) + 0.5) * side / n for n, side in zip(count, extent, strict=True))
-        over = _distorted(self._warp, np.stack(np.meshgrid(columns, rows), axis=-1)[None])[0]
+        low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
+        high = np.maximum(np.ceil((self._places[numbers] + radii[:, None]) / extent * count).astype(int), low + 1)
+        boxes = [np.s_[top:bottom, left:right] for (left, top), (right, bottom) in zip(low, high, strict=True)]
+        wanted = np.zeros((1, count[1], count[0]), bool)
+        for rows_of, columns_of in boxes:  # with the neighbours to the left and above
+            wanted[0, max(rows_of.start - 1, 0) : rows_of.stop, max(columns_of.start - 1, 0) : columns_of.stop] = True
+        over = _distorted(self._warp, np.stack(np.meshgrid(columns, rows), axis=-1)[None], wanted)[0]
         angles = 2 * np.pi * np.arange(AROUND + 1) / AROUND
         rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         close = self._places[numbers, None, None] + rings * radii[:, None, None, None]
         near = _distorted(self._warp, np.clip(close, 0.0, extent)).reshape(len(numbers), -1, 3)
         least, most = near[..., 0].min(axis=1), near[..., 1].max(axis=1)
         triangle = near[..., 2].min(axis=1)
-        low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
-        high = np.ceil((self._places[numbers] + radii[:, None]) / extent * count).astype(int)
-        for row, ((left, top), (right, bottom)) in enumerate(zip(low, high, strict=True)):
-            box = over[top : max(bottom, top + 1), left : max(right, left + 1)]
+        for row, box in enumerate(over[part] for part in boxes):
             least[row] = min(least[row], box[..., 0].min())
             most[row] = max(most[row], box[..., 1].max())
             triangle[row] = min(triangle[row], box[..., 2].min())
@@ -509,22 +512,23 @@ def _brushes(lead: Lead) -> tuple[list[Point], list[float]]:
     return [(x, y) for x, y in lead.places[lead.pushed].tolist()], lead.radii[lead.pushed].tolist()
 
 
-def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
+def _distorted(warp: WarpMap, points: np.ndarray, wanted: np.ndarray | None = None) -> np.ndarray:
     """At lattices of places (k, n, m, 2): det J, how many times nearer than in the original a neighbour lies, and area.
 
     That is how many times larger in the original the triangle with the next texel to the right and below is, negative
-    where it is folded.
+    where it is folded. Only where `wanted` (k, n, m) is true the map is looked at, and the second is right where it is
+    of both neighbours too.
     """
-    listed, found = points.reshape(-1, 2), np.zeros((*points.shape[:-1], 3))
+    chosen = slice(None) if wanted is None else np.flatnonzero(wanted)
+    listed, found, original = points.reshape(-1, 2)[chosen], np.zeros((*points.shape[:-1], 3)), points.copy()
     texel = np.divide(warp.extent, warp.size)
-    found[..., 0] = warp.determinants(listed).reshape(points.shape[:-1])
-    original = points + warp.at(listed).astype(np.float64).reshape(points.shape)
     corner = np.minimum(listed, warp.extent - texel)  # so that no triangle leaves the picture
-    moved = warp.at(corner).astype(np.float64)
-    right, below = (
-        np.eye(2)[axis] + (warp.at(corner + texel * np.eye(2)[axis]) - moved) / texel[axis] for axis in (0, 1)
-    )
-    found[..., 2] = (right[:, 0] * below[:, 1] - right[:, 1] * below[:, 0]).reshape(points.shape[:-1])
+    places = np.concatenate([listed, corner, corner + texel * (1, 0), corner + texel * (0, 1)])
+    here, *moved = warp.at(places).astype(np.float64).reshape(4, -1, 2)
+    right, below = (np.eye(2)[axis] + (moved[1 + axis] - moved[0]) / texel[axis] for axis in (0, 1))
+    original.reshape(-1, 2)[chosen] += here
+    found.reshape(-1, 3)[chosen, 0] = warp.determinants(listed)
+    found.reshape(-1, 3)[chosen, 2] = right[:, 0] * below[:, 1] - right[:, 1] * below[:, 0]
     for axis in (1, 2):
         apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, points))
         ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes.util
 import os
 import sys
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -78,8 +79,8 @@ class Context:
         # Without threads of its own llvmpipe draws in ours, and no other holds a fence.
         has_threads = os.environ.get("LP_NUM_THREADS") != "0"
         self.fences = Fences(ctx, needed=has_threads and "llvmpipe" in self.limits.renderer.lower())
-        self._targets: dict[tuple[int, ...], moderngl.Framebuffer] = {}
-        self._drawn_into: dict[int, set[tuple[int, ...]]] = {}  # by texture, the keys of its framebuffers
+        # By each of the textures that they hold.
+        self._targets: defaultdict[int, dict[tuple[int, ...], moderngl.Framebuffer]] = defaultdict(dict)
         self._rest = ctx.simple_framebuffer((1, 1))
         # Reads a texture between its texels, where a look is enough.
         self.linear = ctx.sampler(repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR))
@@ -108,21 +109,22 @@ class Context:
     def framebuffer(self, textures: Sequence[moderngl.Texture]) -> moderngl.Framebuffer:
         """The framebuffer that draws into several textures at once, kept until one of them is released."""
         key = tuple(texture.glo for texture in textures)
-        if key not in self._targets:
-            self._targets[key] = self.ctx.framebuffer(textures)
-            for glo in key:
-                self._drawn_into.setdefault(glo, set()).add(key)
-        return self._targets[key]
+        target = self._targets[key[0]].get(key)
+        if target is None:
+            target = self.ctx.framebuffer(textures)
+            for name in key:
+                self._targets[name][key] = target
+        return target
 
     def forget_targets(self, texture: moderngl.Texture) -> None:
         """Drop the framebuffers that hold a texture, because it is being released."""
         # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
         self.use()
         self._rest.use()
-        for key in self._drawn_into.pop(texture.glo, ()):
-            self._targets.pop(key).release()
-            for glo in key:
-                self._drawn_into.get(glo, set()).discard(key)
+        for key, target in self._targets.pop(texture.glo, {}).items():
+            target.release()
+            for name in set(key) - {texture.glo}:
+                del self._targets[name][key]
 
     def collect(self) -> None:
         """Free the GL objects that Python has dropped."""
