@@ -144,11 +144,19 @@ class Replay:
     # -- going through time -----------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """Make one step: everything that the recipe has at this tick."""
+        """Make one step: everything that the recipe has at this tick.
+
+        Raises:
+            UserError: if the map could not follow a force; it is then at some moment before.
+        """
         self._leave_passing()
         if self.tick % CHECKPOINT_EVERY == 0 or self._begins_here():
             self.checkpoint()
-        self._step(1.0)
+        try:
+            self._step(1.0)
+        except UserError:
+            self._load(self.checkpoints.nearest(self.recipe, self.tick))
+            raise
         self.tick += 1
         self._edit_masks()
 
