@@ -84,7 +84,8 @@ class Messages:
         ink = packed(ui.palette.accent)
         icons.draw(imgui.get_window_draw_list(), message.icon, corner.x, corner.y, ui.px(18), ink)
         room = width - ui.px(80)
-        words = _fitting(message.text, room, canvas.middle[1] - top - ui.px(44 if others else 24))
+        height = canvas.middle[1] - top - ui.px(24)
+        words = _fitting(message.text, room, height)
         text = imgui.calc_text_size(words, wrap_width=room)
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + ui.px(28))
         imgui.begin_group()
@@ -92,7 +93,7 @@ class Messages:
         ui.text(words, size=14)
         if words != message.text:
             ui.tooltip("All of it", more=message.text)
-        if others:
+        if others and text.y + ui.px(20) <= height:
             ui.dim(f"{others} more", 12)
         imgui.pop_text_wrap_pos()
         imgui.end_group()

@@ -301,11 +301,11 @@ class Replay:
         if not self.handles.handles:
             return
         solid = self.fluid.solid.get()
-        for (label, _), far, (x, y) in zip(self.led, self.handles.away, self.handles.places, strict=True):
+        for (label, led), far, points in zip(self.led, self.handles.away, self.handles.shapes, strict=True):
             if not far <= within:
-                (nx, ny), (hx, hy) = self.grid.size, self.grid.spacing
-                frozen = solid[min(int(y / hy), ny - 1), min(int(x / hx), nx - 1)] == 255
-                why = ": what it holds is frozen" if frozen else ""
+                held = points if led.points else points[:1]
+                columns, rows = np.clip(held / self.grid.spacing, 0, np.array(self.grid.size) - 1).astype(int).T
+                why = ": what it holds is frozen" if (solid[rows, columns] == 255).any() else ""
                 pixels = far * max(self.pictures.source.width, self.pictures.source.height)
                 yield f"{label} is {far:.3g} longer sides ({pixels:.3g} pixels) away from where it is led{why}"
 
