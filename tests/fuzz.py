@@ -46,7 +46,7 @@ PICTURES = ".png", ".jpg", ".webp", ".avif", ".tif", ".exr", ".gif", ".bmp", ".t
 CLIPS = ".mp4", ".webm", ".apng"
 SIZE = 24, 20
 MOST_PIXELS = 2**24  # that a picture may have here; what a person admits is another matter
-RECIPE = """version = 1
+RECIPE = """version = 5
 picture = "cat.png"
 duration = 0.06
 [fluid]
@@ -68,6 +68,36 @@ formula = "1 + sin(3 * t) ** 2"
 [[handle]]
 at = [0.3, 0.4]
 to = [0.5, 0.5]
+rotate = 30
+scale = 1.5
+keys = [[1.5, 0.4, 0.5], [2, 0.4, 0.6]]
+[[handle]]
+points = [[0.2, 0.2], [0.4, 0.2], [0.3, 0.4]]
+goals = [[0.2, 0.3], [0.4, 0.3], [0.3, 0.5]]
+closed = true
+[[pin]]
+points = [[0.7, 0.7], [0.9, 0.8]]
+stiffness = 0.5
+[[mask]]
+kind = "fill"
+tick = 0
+of = "frozen"
+amount = 1
+window = { box = [0.1, 0.1, 0.3, 0.2], shape = "ellipse" }
+[[mask]]
+kind = "fill"
+tick = 1
+of = "thickness"
+amount = 2
+segment = { at = [0.5, 0.5], color = "#808080", tolerance = 0.2 }
+[[stroke]]
+tool = "push"
+muted = true
+repeat = 3
+every = 4
+symmetry = "radial"
+sectors = 5
+samples = [[0, 0.3, 0.4, 1.0], [3, 0.6, 0.5, 0.5]]
 """
 # What parsers trip over, for text and for binary files.
 WORDS = [

@@ -54,9 +54,15 @@ def bar_of(one: Stroke | Force, which: Which, ticks: int, dt: float) -> Bar:
 
 def bars(recipe: Recipe) -> list[Bar]:
     """All of a recipe, forces first."""
+    return bars_of("force", recipe.force, recipe) + bars_of("stroke", recipe.stroke, recipe)
+
+
+def bars_of(
+    kind: Literal["stroke", "force"], several: Sequence[Stroke | Force], recipe: Recipe, first: int = 0
+) -> list[Bar]:
+    """Those of a recipe's strokes or forces from a number on."""
     ticks, dt = recipe.ticks, recipe.fluid.dt
-    forces = [bar_of(force, ("force", number), ticks, dt) for number, force in enumerate(recipe.force)]
-    return forces + [bar_of(stroke, ("stroke", number), ticks, dt) for number, stroke in enumerate(recipe.stroke)]
+    return [bar_of(one, (kind, number), ticks, dt) for number, one in enumerate(several[first:], first)]
 
 
 def lanes(several: Sequence[Bar], least: float = 0.0) -> list[list[Bar]]:
@@ -76,6 +82,14 @@ def lanes(several: Sequence[Bar], least: float = 0.0) -> list[list[Bar]]:
         packed[lane].append(bar)
         heappush(busy, (max(bar.stops, bar.start + least), lane))
     return packed
+
+
+def with_last(packed: list[list[Bar]], bar: Bar, least: float = 0.0) -> list[list[Bar]]:
+    """The lanes with a bar more, where `lanes` would have it: for one that begins no sooner than all others."""
+    for number, lane in enumerate(packed):
+        if max(lane[-1].stops, lane[-1].start + least) <= bar.start:
+            return [*packed[:number], [*lane, bar], *packed[number + 1 :]]
+    return [*packed, [bar]]
 
 
 def one_of(recipe: Recipe, which: Which) -> Stroke | Force | None:

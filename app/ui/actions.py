@@ -105,7 +105,7 @@ def _table() -> list[Action]:
     add("Time", "lanes", "Strokes and forces as bars", "l", lambda c: c.toggle_lanes())
     add("Time", "bars_earlier", "Bars a step earlier", "left", lambda c: c.nudge(-1), repeats=True)
     add("Time", "bars_later", "Bars a step later", "right", lambda c: c.nudge(1), repeats=True)
-    add("Time", "bars_together", "Start together", "", lambda c: c.state.lanes.together(c.workspace.session))
+    add("Time", "bars_together", "Start together", "", lambda c: c.bars_together())
     add("Time", "bars_mute", "Mute the selected bars", "u", lambda c: c.mute_bars())
 
     add("Help", "shortcuts", "Keyboard shortcuts", "f1", lambda c: c.ask_shortcuts())

@@ -67,7 +67,9 @@ class Commands:
     @property
     def bars_selected(self) -> bool:
         """Bars of the timeline are selected, and seen."""
-        return self.state.lanes.shown and bool(self.state.lanes.selected)
+        lanes = self.state.lanes
+        lanes.look(self.workspace.session)  # what was done in this frame may have taken them away
+        return lanes.shown and bool(lanes.selected)
 
     def toggle_lanes(self) -> None:
         lanes = self.state.lanes
@@ -79,6 +81,11 @@ class Commands:
         """Move the selected bars."""
         if self.bars_selected:
             self.state.lanes.nudge(self.workspace.session, ticks)
+
+    def bars_together(self) -> None:
+        """Let the selected bars begin with the first of them."""
+        if self.bars_selected:
+            self.state.lanes.together(self.workspace.session)
 
     def mute_bars(self) -> None:
         """Mute the selected bars, or let them act again."""

@@ -92,7 +92,7 @@ class Editor:
             self.dialogs,
             likes,
             self.selecting,
-            lambda: self._key("space", "space"),
+            lambda chord: self._key("space", chord if self.keys.action(chord) else "space"),
         )
         self.commands = Commands(
             self.workspace, self.state, self.pointer, self.files, self.chooser, self.exports, self.fits,
@@ -182,7 +182,7 @@ class Editor:
                 events = [event for event in events if not (isinstance(event, Text) or _is_press(event))]
             self.workspace.keep()
             with self.clock.measure("simulate"):
-                self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
+                self._advance(dt)
             self.quality.look(dt)
             self.selecting.look()
             self.canvas.thumbnails.look(self.session)
@@ -227,6 +227,12 @@ class Editor:
         is_open = state.over_narrow if state.is_narrow else state.inspector
         names, groups = self.preferences.names, len(strip.GROUP_ENDS) + 1
         return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, names, state.lanes.shown)
+
+    def _advance(self, dt: float) -> None:
+        try:
+            self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
+        except UserError as error:
+            self.messages.warn(error.in_window)
 
     def _handle(self, events: Sequence[Event]) -> None:
         for event in events:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import ceil, floor, log2
+from operator import is_
 from typing import Literal, NamedTuple
 
-from app.model.bars import Bar, Which, bar_of, bars, lanes, moved, named, one_of, stretched
+from app.model.bars import Bar, Which, bar_of, bars_of, lanes, moved, named, one_of, stretched, with_last
 from app.model.forces import Force
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
@@ -14,6 +16,7 @@ from app.ui.viewport import Rect
 from app.work.session import Session
 
 Part = Literal["move", "start", "end"]
+Strokes = tuple[Stroke, ...]
 ROOM = 0.06  # of the recording that is shown after its end, for bars that go there
 CLOSEST = 24  # ticks that are shown at least
 MOST_BLOCKS = 100  # of one stroke on the track
@@ -71,7 +74,9 @@ class Lanes:
     drawn: list[tuple[Bar, Rect]] = field(default_factory=list)
     view: tuple[float, float] | None = None
     _packed: tuple[tuple[object, ...], list[list[Bar]]] = field(default=((), []), init=False)
-    _blocks: tuple[tuple[object, ...], list[Block]] = field(default=((), []), init=False)
+    # Those of strokes, and blocks, and what both are of: the strokes that are done, while another one is painted.
+    _laid: tuple[Strokes, float, list[list[Bar]]] = field(default=((), 0.0, []), init=False)
+    _blocks: tuple[Strokes, float, list[Block]] = field(default=((), 0.0, []), init=False)
     _of: tuple[Recipe | None, Session | None] = field(default=(None, None), init=False)
 
     def look(self, session: Session) -> None:
@@ -91,31 +96,36 @@ class Lanes:
             self.drag = self.drag if one_of(before, which) is one_of(recipe, which) else None
 
     def packed(self, recipe: Recipe, ticks: int, least: float) -> list[list[Bar]]:
-        """The lanes, those of forces first; `least` ticks are taken by each bar."""
-        made_of = recipe.stroke, recipe.force, ticks, round(least, 6)
+        """The lanes, those of forces first; each bar takes `least` ticks, or up to twice as many.
+
+        So they are packed anew only where a recording has become twice as long, and stay where they are meanwhile.
+        """
+        made_of = recipe.stroke, recipe.force, ticks, 2.0 ** ceil(log2(least))
         if not _same(self._packed[0], made_of):
-            all_, least = bars(recipe), made_of[3]
-            kinds = ([bar for bar in all_ if bar.which[0] == kind] for kind in ("force", "stroke"))
-            self._packed = made_of, [lane for several in kinds for lane in lanes(several, least)]
+            wide = made_of[3]
+            forces = lanes(bars_of("force", recipe.force, recipe), wide)
+            self._packed = made_of, [*forces, *self._lanes_of_strokes(recipe, wide)]
         return self._packed[1]
+
+    def _lanes_of_strokes(self, recipe: Recipe, least: float) -> list[list[Bar]]:
+        strokes, wide, packed = self._laid
+        more = recipe.stroke[len(strokes) :]
+        is_last = all(lane[-1].start <= stroke.first_tick for stroke in more for lane in packed)
+        if wide != least or not is_last or not _goes_on(strokes, recipe.stroke):
+            strokes, packed = recipe.stroke, lanes(bars_of("stroke", recipe.stroke, recipe), least)
+            self._laid = strokes, least, packed
+        for bar in bars_of("stroke", recipe.stroke, recipe, len(strokes)):
+            packed = with_last(packed, bar, least)
+        return packed
 
     def blocks(self, recipe: Recipe, pixel: float) -> list[Block]:
         """The strokes as they are seen on the track, where a pixel is so many ticks: many lie in the same one."""
-        made_of = recipe.stroke, round(pixel, 3)
-        if not _same(self._blocks[0], made_of):
-            seen: dict[tuple[int, int, str], Block] = {}
-            for stroke in recipe.stroke:
-                # Where it repeats so often that the track would be full of it, it is one block.
-                times, last = (1, stroke.end_tick) if stroke.repeat > MOST_BLOCKS else (stroke.repeat, stroke.last_tick)
-                length = last + 1 - stroke.first_tick
-                for time in range(times):
-                    start = stroke.first_tick + time * stroke.every
-                    block = Block(start, start + length, stroke.tool, stroke.muted)
-                    at = int(start / pixel), int((start + length) / pixel), stroke.tool
-                    if at not in seen or seen[at].muted:
-                        seen[at] = block
-            self._blocks = made_of, list(seen.values())
-        return self._blocks[1]
+        pixel = 2.0 ** floor(log2(pixel))
+        strokes, narrow, blocks = self._blocks
+        if narrow != pixel or not _goes_on(strokes, recipe.stroke):
+            strokes, blocks = recipe.stroke, _blocks(recipe.stroke, pixel)
+            self._blocks = strokes, pixel, blocks
+        return [*blocks, *_blocks(recipe.stroke[len(strokes) :], pixel)]
 
     # -- what is shown ----------------------------------------------------------------------------------------------
 
@@ -185,9 +195,9 @@ class Lanes:
         return stretched(one, start, max(end + drag.ticks, start + 1), dt)
 
     def earliest(self, session: Session) -> float:
-        """The tick at which the first of the selected bars begins."""
-        recipe = session.recipe
-        ones = ((which, one_of(recipe, which)) for which in self.selected)
+        """The tick at which the first of the bars begins that are selected or in hand."""
+        recipe, those = session.recipe, self.selected | ({self.drag.bar.which} if self.drag else set())
+        ones = ((which, one_of(recipe, which)) for which in those)
         return min(bar_of(one, which, session.end, session.dt).start for which, one in ones if one is not None)
 
     # -- edits ------------------------------------------------------------------------------------------------------
@@ -239,6 +249,26 @@ class Lanes:
             self.selected = set()
         self.drag = None
         return had
+
+
+def _blocks(strokes: Strokes, pixel: float) -> list[Block]:
+    seen: dict[tuple[int, int, str], Block] = {}
+    for stroke in strokes:
+        # Where it repeats so often that the track would be full of it, it is one block.
+        times, last = (1, stroke.end_tick) if stroke.repeat > MOST_BLOCKS else (stroke.repeat, stroke.last_tick)
+        length = last + 1 - stroke.first_tick
+        for time in range(times):
+            start = stroke.first_tick + time * stroke.every
+            block = Block(start, start + length, stroke.tool, stroke.muted)
+            at = int(start / pixel), int((start + length) / pixel), stroke.tool
+            if at not in seen or seen[at].muted:
+                seen[at] = block
+    return list(seen.values())
+
+
+def _goes_on(before: Strokes, now: Strokes) -> bool:
+    """The same strokes, or with one more."""
+    return now is before or (len(before) <= len(now) <= len(before) + 1 and all(map(is_, before, now)))
 
 
 def _same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -83,12 +84,16 @@ class Messages:
         ink = packed(ui.palette.accent)
         icons.draw(imgui.get_window_draw_list(), message.icon, corner.x, corner.y, ui.px(18), ink)
         room = width - ui.px(80)
-        text = imgui.calc_text_size(message.text, wrap_width=room)
+        height = canvas.middle[1] - top - ui.px(24)
+        words = _fitting(message.text, room, height)
+        text = imgui.calc_text_size(words, wrap_width=room)
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + ui.px(28))
         imgui.begin_group()
         imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + min(room, text.x + 2))
-        ui.text(message.text, size=14)
-        if others:
+        ui.text(words, size=14)
+        if words != message.text:
+            ui.tooltip("All of it", more=message.text)
+        if others and text.y + ui.px(20) <= height:
             ui.dim(f"{others} more", 12)
         imgui.pop_text_wrap_pos()
         imgui.end_group()
@@ -102,3 +107,15 @@ class Messages:
     def _add(self, message: Message) -> None:
         self.shown = [*[other for other in self.shown if other.text != message.text][-(MOST - 1) :], message]
         self._changed()
+
+
+def _fitting(text: str, width: float, height: float) -> str:
+    """As much of a text as there is room for."""
+
+    def is_too_long(text: str) -> bool:
+        return imgui.calc_text_size(text, wrap_width=width).y > height
+
+    if not is_too_long(text):
+        return text
+    first = bisect_left(range(len(text)), True, key=lambda count: is_too_long(f"{text[:count]} ..."))
+    return f"{text[: max(first - 1, 1)]} ..."

@@ -31,7 +31,7 @@ class PointerController:
     """Turns events on the canvas into what they mean; at most one drag is under way.
 
     Attributes:
-        play: called where Space was tapped.
+        tap: called where Space was tapped, with its chord.
         x, y: where the pointer is, in points.
         drag: what the button that is down does: "paint", "hold" a handle that may be dragged, "pan", "zoom", "brush",
             "split", "select", or None.
@@ -44,7 +44,7 @@ class PointerController:
     dialogs: Dialogs
     preferences: Preferences
     selecting: Selecting
-    play: Callable[[], None]
+    tap: Callable[[str], None]
     x: float = -1e6
     y: float = -1e6
     pressure: float = 1.0
@@ -53,6 +53,7 @@ class PointerController:
     space: bool = False
     _button: int = field(default=LEFT, init=False)
     _space_used: bool = field(default=False, init=False)
+    _space_chord: str = field(default="", init=False)
     _start: tuple[float, float] = field(default=(0.0, 0.0), init=False)
     _moved: bool = field(default=False, init=False)
     _pressed: Held | None = field(default=None, init=False)
@@ -144,13 +145,13 @@ class PointerController:
     # -- what is held -----------------------------------------------------------------------------------------------
 
     def _hold_space(self, down: bool, repeat: bool) -> None:
-        """Space held pans; Space tapped plays."""
+        """Space held pans; Space tapped is a key as any other."""
         if down and not repeat:
-            self.space, self._space_used = True, False
+            self.space, self._space_used, self._space_chord = True, False, self.mods.chord("space")
         elif not down and self.space:
             self.space = False
             if not self._space_used and self.drag is None:
-                self.play()
+                self.tap(self._space_chord)
 
     def release_all(self) -> None:
         """The window lost the keyboard: nothing is held any more."""

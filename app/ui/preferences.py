@@ -9,13 +9,14 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from app.errors import UserError
+from app.errors import UserError, shown
 from app.media.inputs import read_input
 from app.media.opening import shipped_recipes
 from app.ui.clipboard import pasted_folder
 
 MOST_RECENT = 10
 MOST_BYTES = 2**20  # of the file
+MOST_PIXELS = 2**20  # from the corner of the screen to that of a window
 LONGEST_STRING = 200.0  # points of the screen, of the stabiliser
 
 
@@ -78,11 +79,12 @@ class Preferences:
         kept.scale = min(max(kept.scale, 0.75), 3.0) if math.isfinite(kept.scale) else 1.0
         kept.recent = [str(name) for name in kept.recent][:MOST_RECENT]
         kept.stabiliser = min(max(kept.stabiliser, 0.0), LONGEST_STRING) if math.isfinite(kept.stabiliser) else 0.0
-        kept.window = kept.window if len(kept.window) == 5 and _all(int, kept.window) else []
+        is_place = len(kept.window) == 5 and all(isinstance(n, int) and abs(n) < MOST_PIXELS for n in kept.window)
+        kept.window = kept.window if is_place else []
         kept.sections = {name: shown for name, shown in kept.sections.items() if isinstance(shown, bool)}
-        kept.keys = {name: keys for name, keys in kept.keys.items() if isinstance(keys, list) and _all(str, keys)}
+        kept.keys = {name: keys for name, keys in kept.keys.items() if isinstance(keys, list) and _can_be_shown(*keys)}
         kept.brushes = _numbers(kept.brushes)
-        kept.presets = _numbers(kept.presets)
+        kept.presets = {name: brush for name, brush in _numbers(kept.presets).items() if _can_be_shown(name)}
         return kept
 
     def save(self) -> None:
@@ -134,8 +136,9 @@ class Preferences:
         return _first_of(self.export_folder, self.folder)
 
 
-def _all(kind: type, values: list[Any]) -> bool:
-    return all(isinstance(value, kind) for value in values)
+def _can_be_shown(*words: Any) -> bool:
+    """They are texts, and of letters that the window has."""
+    return all(isinstance(word, str) and word and shown(word) == word for word in words)
 
 
 def _numbers(table: dict[str, Any]) -> dict[str, dict[str, float]]:

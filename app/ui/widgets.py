@@ -454,8 +454,9 @@ def _fraction(value: float, low: float, high: float, logarithmic: bool) -> float
 
 
 _NAMES = {
-    "ctrl": "Ctrl", "shift": "Shift", "alt": "Alt", "space": "Space", "left": "←", "right": "→", "escape": "Esc",
-    "delete": "Del", "home": "Home", "end": "End", "enter": "Enter", "tab": "Tab",
+    "ctrl": "Ctrl", "shift": "Shift", "alt": "Alt", "space": "Space", "left": "Left", "right": "Right", "up": "Up",
+    "down": "Down", "pageup": "Page Up", "pagedown": "Page Down", "escape": "Esc", "delete": "Del", "home": "Home",
+    "end": "End", "enter": "Enter", "tab": "Tab", "backspace": "Backspace",
 }  # fmt: skip
 
 

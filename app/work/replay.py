@@ -144,11 +144,19 @@ class Replay:
     # -- going through time -----------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """Make one step: everything that the recipe has at this tick."""
+        """Make one step: everything that the recipe has at this tick.
+
+        Raises:
+            UserError: if the map could not follow a force; it is then at some moment before.
+        """
         self._leave_passing()
         if self.tick % CHECKPOINT_EVERY == 0 or self._begins_here():
             self.checkpoint()
-        self._step(1.0)
+        try:
+            self._step(1.0)
+        except UserError:
+            self._load(self.checkpoints.nearest(self.recipe, self.tick))
+            raise
         self.tick += 1
         self._edit_masks()
 
@@ -293,11 +301,11 @@ class Replay:
         if not self.handles.handles:
             return
         solid = self.fluid.solid.get()
-        for (label, _), far, (x, y) in zip(self.led, self.handles.away, self.handles.places, strict=True):
+        for (label, led), far, points in zip(self.led, self.handles.away, self.handles.shapes, strict=True):
             if not far <= within:
-                (nx, ny), (hx, hy) = self.grid.size, self.grid.spacing
-                frozen = solid[min(int(y / hy), ny - 1), min(int(x / hx), nx - 1)] == 255
-                why = ": what it holds is frozen" if frozen else ""
+                held = points if led.points else points[:1]
+                columns, rows = np.clip(held / self.grid.spacing, 0, np.array(self.grid.size) - 1).astype(int).T
+                why = ": what it holds is frozen" if (solid[rows, columns] == 255).any() else ""
                 pixels = far * max(self.pictures.source.width, self.pictures.source.height)
                 yield f"{label} is {far:.3g} longer sides ({pixels:.3g} pixels) away from where it is led{why}"
 

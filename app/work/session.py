@@ -123,7 +123,9 @@ class Session:
         self._still = True
         self._backwards = False  # it is played from its end to its start
         self._coasted = 0
-        self._joined: Recipe | None = None  # the state that the next joined edit goes on from
+        # The state that the next joined edit goes on from, and the bars that it is of.
+        self._joined: tuple[Recipe, frozenset[Which]] | None = None
+        self._has_committed = False  # the last commit was an edit, and not of nothing
 
     # -- what it is now ---------------------------------------------------------------------------------------------
 
@@ -222,6 +224,8 @@ class Session:
             return
         self.release()
         self._taken = None
+        if held is not None and not self._can_take(held.led):
+            return
         if tool.name == "handle" and held is None:
             self._check_room(line=shift)
             press = replace(press, at=self._under(x, y), under=self._original)
@@ -368,7 +372,7 @@ class Session:
         """
         parts = self._with_led(label, lambda led: (led.model_copy(update=settings),))
         last = max((handle.last for handle in parts["handle"] if handle.turns), default=0.0)
-        if lasts := last > self._live.duration:
+        if lasts := last > self._base.duration:
             parts["duration"] = (ceil(last / self.dt) + 1) * self.dt
         self.preview(**parts)
         if lasts:
@@ -414,23 +418,42 @@ class Session:
         if line and sum(bool(each.points) for each in led) >= MOST_LINES:
             raise UserError(f"There are {MOST_LINES} lines already; remove one to set another.")
 
-    def _take(self, led: RecipeHandle | RecipePin) -> RecipeHandle | None:
+    def _can_take(self, led: RecipeHandle | RecipePin) -> bool:
+        """True if it is still there, and has begun where what is done next begins."""
+        tick = self.target if self._went_back else self.end
+        return led in (*self._live.handle, *self._live.pin) and led.first_tick(self.dt) < tick
+
+    def _take(self, led: RecipeHandle | RecipePin) -> RecipeHandle:
         """Take a handle in hand; a pin becomes one, for good if it is led."""
         base = self._base
-        kept = led if isinstance(led, RecipePin) else led.before(self._pen, self.dt)
-        if isinstance(led, RecipePin) and led in base.pin:
+        if isinstance(led, RecipePin):
             handle = RecipeHandle.model_validate(led.model_dump() | {"keys": ()})
-            base = base.edited(pin=tuple(pin for pin in base.pin if pin != led), handle=(*base.handle, handle))
-            self._base, kept = base, handle
-        if kept not in base.handle:
-            return None
-        self._taken = base.handle.index(kept)
-        return base.handle[self._taken]
+            pins = tuple(pin for pin in base.pin if pin != led)
+            self._base = base.edited(pin=pins, handle=(*base.handle, handle))
+        else:
+            # What comes after this moment has been cut off, if the playhead was sent back here.
+            cut = led.before(self._pen, self.dt)
+            handle = cut if cut is not None and cut in base.handle else led
+        self._taken = self._base.handle.index(handle)
+        return handle
 
     # -- time -------------------------------------------------------------------------------------------------------
 
     def advance(self, ticks: int) -> None:
-        """Let time go on by up to `ticks`, but always by one; on the way to the playhead's target, by what it takes."""
+        """Let time go on by up to `ticks`, but always by one; on the way to the playhead's target, by what it takes.
+
+        Raises:
+            UserError: if the map could not follow a force; time stands still before it.
+        """
+        try:
+            self._advance(ticks)
+        except UserError:
+            self.playing = self.coasting = self.is_rebuilding = False
+            self._target = None
+            self.changes += 1
+            raise
+
+    def _advance(self, ticks: int) -> None:
         start = time.perf_counter()
         if self._target is not None:
             self._approach(start + PATIENCE)
@@ -473,7 +496,7 @@ class Session:
 
     @property
     def _repeats(self) -> bool:
-        return self.loops or self._live.time.ping_pong
+        return self.end > 0 and (self.loops or self._live.time.ping_pong)
 
     def _play_on(self) -> None:
         """A tick of the recording, on or back; after its end it begins anew, or turns."""
@@ -702,7 +725,10 @@ class Session:
 
     def commit(self, name: str) -> None:
         """Make what was previewed an entry of the history."""
-        self.document.history.commit(name, self._live)
+        history = self.document.history
+        before = history.recipe
+        history.commit(name, self._live)
+        self._has_committed = history.recipe is not before
         self._base = self._live
         self.changes += 1
 
@@ -734,11 +760,12 @@ class Session:
         self._went_back &= self.target < self.end
         if not commit:
             return
-        history = self.document.history
-        if joined and history.recipe is self._joined:
+        history, those = self.document.history, frozenset(which)
+        goes_on = joined and self._joined is not None and self._joined[0] is history.recipe and self._joined[1] == those
+        if goes_on:
             history.amend(recipe)
         self.commit(name)
-        self._joined = history.recipe if joined else None
+        self._joined = (history.recipe, those) if joined and (goes_on or self._has_committed) else None
         if coasts:
             self._coast()
 
@@ -822,6 +849,11 @@ class Session:
         if name is not None:
             self._show(self.document.history.undo())
         return name
+
+    def retract(self) -> None:
+        """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it."""
+        if self._has_committed:
+            self.undo()
 
     def redo(self) -> str | None:
         """Make an edit again that was taken back; its name."""

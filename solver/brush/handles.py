@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.brush.brush import Brush
 from solver.brush.handle import Handle, Shape, area, spun
-from solver.brush.tip import Point, Tip
+from solver.brush.tip import SMALLEST, Point, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
 from solver.grid import Grid
@@ -175,7 +175,7 @@ class Handles:
             elif shape.around is not None:
                 loops.append(each)
                 middle = places[each].mean(axis=0)
-                tip = _tip(middle, float(np.hypot(*(places[each] - middle).T).max()) / CORE)
+                tip = _tip(middle, max(float(np.hypot(*(places[each] - middle).T).max()) / CORE, SMALLEST))
                 self._brush.expand(self._fluid, tip, (1 - local) * growth)
         pushed = np.flatnonzero(is_pushed)
         share = self._local[listed][pushed]

@@ -15,8 +15,8 @@ from solver.limits import check_type
 
 Point = tuple[float, float]
 
-# Longer sides: how far off the picture a tip may be, and how large.
-FARTHEST = 100.0
+# Longer sides: how far off the picture a tip may be, and how large, and how small.
+FARTHEST, SMALLEST = 100.0, 1e-6
 
 # Radii within which a tip that is `near` takes back what it does to the rest.
 NEAR = 4.0
@@ -53,7 +53,7 @@ class Tip:
             raise ValueError(
                 f"a brush from {self.start} to {self.end} is off the picture by more than {FARTHEST:g} sides"
             )
-        if not 1e-6 <= self.radius <= FARTHEST:
+        if not SMALLEST <= self.radius <= FARTHEST:
             raise ValueError(f"a brush of radius {self.radius} was given; it must be from 1e-06 to {FARTHEST:g}")
         if math.isnan(self.hardness):
             raise ValueError("a brush's hardness must be a number from 0 to 1")

@@ -62,14 +62,15 @@ def test_kept_brushes_that_cannot_be_are_made_so_that_they_can(robot: Robot, tmp
     path.parent.mkdir(exist_ok=True)
     path.write_text(
         """{"brushes": {"push": {"radius": 99, "hardness": -1, "strength": NaN, "no": 1}, "no tool": {}, "twirl": 3},
-        "presets": {"mine": {"radius": 1e300}}, "stabiliser": 1e9, "window": [1, "a"], "keys": {"open": "k", "x": [1]},
-        "sections": {"view": 1}}"""
+        "presets": {"mine": {"radius": 1e300}, "\\ud800": {}, "": {}}, "stabiliser": 1e9, "sections": {"view": 1},
+        "keys": {"open": "k", "x": [1], "undo": ["\\ud800"]}, "window": [0, 0, 1%s, 600, 0]}"""
+        % (400 * "0")
     )
     kept = Preferences.load()
     state = EditorState.recalled(kept)
     assert (state.brush.radius, state.brush.hardness, state.brush.strength) == (0.5, 0, 1)
     assert (kept.stabiliser, kept.window, kept.keys, kept.sections) == (200, [], {}, {})
-    assert presets(kept)[-1].radius == 0.15
+    assert [(preset.name, preset.radius) for preset in presets(kept)[len(BRUSHES) :]] == [("mine", 0.15)]
 
 
 def test_brushes_are_kept_by_name_chosen_and_deleted(robot: Robot, widgets: Widgets) -> None:

@@ -124,6 +124,36 @@ def test_a_handle_is_turned_in_the_inspector_and_arrives(robot: Robot) -> None:
     assert np.degrees(np.angle(arms.sum())) == pytest.approx(40, abs=1)
 
 
+@pytest.mark.parametrize("previews", [1, 2])
+def test_a_turn_takes_its_time_however_its_slider_was_dragged(robot: Robot, previews: int) -> None:
+    robot.click(*robot.at(0.4, 0.5))
+    robot.rest()
+    session = robot.editor.session
+    for turn in range(previews + 1):
+        session.edit_held("Turn of a handle", "handle[1]", turn == previews, rotate=10.0 * turn)
+        robot.frame()
+    assert session.end * session.dt >= session.recipe.handle[0].last
+
+
+@pytest.mark.parametrize("key", ["ctrl+z", "home"])
+def test_a_handle_that_has_gone_under_the_finger_is_not_led(robot: Robot, key: str) -> None:
+    robot.key("p")
+    drag(robot, (0.7, 0.3), (0.75, 0.3))
+    robot.key("g")
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    x, y = robot.at(0.45, 0.5)
+    robot.move(x, y)
+    robot.press()
+    robot.key(key)
+    robot.rest()
+    before = robot.editor.session.recipe
+    robot.move(x + 40, y)
+    robot.release()
+    robot.rest()
+    assert robot.editor.session.recipe == before
+    assert not robot.editor.messages.shown
+
+
 def test_a_handle_is_picked_again_and_led_on(robot: Robot) -> None:
     drag(robot, (0.4, 0.5), (0.45, 0.5))
     drag(robot, (0.45, 0.5), (0.45, 0.56))

@@ -680,7 +680,8 @@ def test_names_stand_beside_the_tools_if_they_are_wanted_and_there_is_room(robot
 
 
 @pytest.mark.parametrize(
-    ("size", "scale"), [((1280, 800), 1.0), ((1280, 800), 2.0), ((800, 520), 1.0), ((3840, 2160), 2.0)]
+    ("size", "scale"),
+    [((1280, 800), 1.0), ((1280, 800), 2.0), ((800, 520), 1.0), ((800, 520), 2.0), ((3840, 2160), 2.0)],
 )
 def test_a_message_is_alone_in_a_corner_and_never_over_the_middle(
     device: Device, tmp_path: Path, size: tuple[int, int], scale: float

@@ -142,6 +142,16 @@ def test_what_space_does_can_be_changed(robot: Robot, sheet: Shortcuts) -> None:
     assert robot.editor.state.tool_name == "twirl"
 
 
+def test_space_with_a_modifier_is_a_chord_too(robot: Robot, sheet: Shortcuts) -> None:
+    choose(robot, sheet, "tool_twirl", "ctrl+space")
+    robot.key("escape")
+    robot.frame(count=2)
+    robot.key("space")
+    assert robot.editor.state.tool_name == "push"
+    robot.key("ctrl+space")
+    assert robot.editor.state.tool_name == "twirl"
+
+
 def test_a_row_that_is_clicked_waits_for_its_key(robot: Robot, sheet: Shortcuts) -> None:
     """The first row of the first column: Open."""
     robot.click(sheet.rect.x + 60, sheet.rect.y + 88)

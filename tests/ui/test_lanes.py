@@ -13,7 +13,7 @@ from app.model.bars import Which
 from app.model.forces import VortexForce
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
-from app.ui.events import Mods
+from app.ui.events import Key, Mods
 from app.ui.lanes import Lanes
 from app.ui.viewport import Rect
 from solver.gl.device import Device
@@ -154,6 +154,50 @@ def test_arrows_move_what_is_selected_by_a_tick(painted: Robot) -> None:
     assert names(painted)[3:] == ["Move stroke"]
 
 
+def test_a_bar_that_is_added_with_shift_may_be_dragged_at_once(painted: Robot) -> None:
+    before = [stroke.first_tick for stroke in recipe(painted).stroke]
+    painted.mods = Mods(shift=True)
+    drag(painted, 1, 60.0)
+    assert recipe(painted).stroke[1].first_tick > before[1]
+    assert lanes(painted).selected == {("stroke", 1)}
+    painted.rest()
+    after = recipe(painted).stroke
+    drag(painted, 0, 40.0)
+    ticks = recipe(painted).stroke[0].first_tick - after[0].first_tick
+    assert ticks > 0
+    assert recipe(painted).stroke == tuple(stroke.moved(ticks) for stroke in after)
+    assert names(painted)[3:] == ["Move stroke", "Move strokes"]
+
+
+def test_an_arrow_at_the_beginning_does_not_make_the_next_one_a_part_of_what_was_done_before(painted: Robot) -> None:
+    before = recipe(painted)
+    painted.click(*place(painted, 0).middle)
+    for key in ("left", "right", "right"):
+        painted.key(key)
+    assert names(painted)[2:] == ["Push", "Move stroke"]
+    painted.key("ctrl+z")
+    assert recipe(painted) == before
+
+
+def test_a_key_that_comes_with_the_undo_of_what_is_selected_does_nothing(painted: Robot) -> None:
+    painted.click(*place(painted, 1).middle)
+    painted.frame(Key("z", True, Mods(ctrl=True)), Key("right", True), Key("u", True), Key("delete", True))
+    assert len(recipe(painted).stroke) == 1
+    assert painted.editor.session.document.history.can_redo
+
+
+@pytest.mark.parametrize("returns", [False, True])
+def test_playing_ends_where_nothing_is_left(painted: Robot, returns: bool) -> None:
+    session = painted.editor.session
+    session.repeat(not returns, returns)
+    session.play()
+    painted.frame(count=3)
+    lanes(painted).selected = {("stroke", 0), ("stroke", 1)}
+    painted.key("delete")
+    painted.frame(count=3)
+    assert (session.end, session.is_moving) == (0, False)
+
+
 def test_a_press_beside_the_bars_lets_go_of_them_and_delete_then_does_nothing_to_them(painted: Robot) -> None:
     before = recipe(painted)
     painted.click(*place(painted, 0).middle)
@@ -221,6 +265,23 @@ def test_forces_are_bars_too(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> N
     assert recipe(robot).force[0] == vortex
 
 
+def test_a_force_that_no_map_can_follow_is_told_of_and_undone(robot: Robot) -> None:
+    """In the middle of the recording, so that something has been made of it by then."""
+    vortex = VortexForce(kind="vortex", point=(0.5, 0.5), strength=1.0, at=(0.2,))
+    session = robot.editor.session
+    session.edit("Forces", force=(vortex,), duration=0.5)
+    robot.drag((0.3, 0.5), (0.4, 0.5))
+    robot.rest()
+    before = robot.warp()
+    session.edit_bars("Strength of a force", {("force", 0)}, lambda one: one.model_copy(update={"strength": 1e6}))
+    robot.frame(count=3)
+    assert "throws the fluid" in robot.editor.messages.shown[-1].text
+    assert not session.is_moving
+    robot.key("ctrl+z")
+    robot.rest()
+    assert np.array_equal(robot.warp(), before)
+
+
 def many(count: int) -> tuple[Stroke, ...]:
     dice = random.Random(1)
     made = []
@@ -242,6 +303,9 @@ def test_of_two_thousand_strokes_only_what_is_seen_is_drawn(robot: Robot) -> Non
     assert all(rect.y - 23 < place.y < rect.bottom for _, place in lanes(robot).drawn)
     packed = lanes(robot).packed(recipe(robot), robot.editor.session.end, 1.0)
     assert packed is lanes(robot).packed(recipe(robot), robot.editor.session.end, 1.0)
+    more = recipe(robot).edited(stroke=(*recipe(robot).stroke, recipe(robot).stroke[-1].moved(3)))
+    assert lanes(robot).packed(more, robot.editor.session.end + 3, 1.0) == Lanes().packed(more, 0, 1.0)
+    assert set(lanes(robot).blocks(more, 4.0)) == set(Lanes().blocks(more, 4.0))
     blocks = lanes(robot).blocks(recipe(robot), robot.editor.session.end / 800)
     assert len(blocks) <= 2 * 3 * 800
     robot.editor.session.edit("None", stroke=())

@@ -209,8 +209,22 @@ def test_keys_that_are_pressed_again_make_one_entry(session: Session) -> None:
     session.edit_bars("Move stroke", {("stroke", 0)}, lambda one: moved(one, 1, DT), joined=True)
     session.edit_bars("Mute stroke", {("stroke", 0)}, lambda one: one.model_copy(update={"muted": True}))
     session.edit_bars("Move stroke", {("stroke", 0)}, lambda one: moved(one, 1, DT), joined=True)
+    paint(session, "twirl", (0.5, 0.5), (0.5, 0.5))
+    for which in (0, 1):
+        session.edit_bars("Move stroke", {("stroke", which)}, lambda one: moved(one, 1, DT), joined=True)
     names = [entry.name for entry in session.document.history.entries]
-    assert names[2:] == ["Move stroke", "Mute stroke", "Move stroke"]
+    assert names[2:] == ["Move stroke", "Mute stroke", "Move stroke", "Twirl", "Move stroke", "Move stroke"]
+
+
+def test_what_a_double_click_takes_back_is_what_its_first_click_has_done_and_nothing_before_that(
+    session: Session,
+) -> None:
+    paint(session, "push", (0.3, 0.5), (0.5, 0.5))
+    before = session.recipe
+    for by in (0, 3):  # a slider that was moved by less than a tick, and by more
+        session.edit_bars("Move stroke", {("stroke", 0)}, lambda one, by=by: moved(one, by, DT))
+        session.retract()
+        assert session.recipe == before
 
 
 def test_a_slider_that_is_dragged_starts_from_what_was(session: Session) -> None:

@@ -328,6 +328,25 @@ def test_what_is_not_reached_is_told_by_number(device: Device):
     replay.release()
 
 
+def test_a_line_that_is_led_about_a_place_far_outside_is_told_of(device: Device):
+    """Its own middle is frozen, one end of it is not."""
+    frozen_disc = {"kind": "path", "points": [[0.3, 0.5]], "radius": 0.1, "hardness": 1.0}
+    line = {"at": [0.5, -4.0], "points": [[0.2, 0.5], [0.6, 0.5]], "to": [0.5, -3.8], "duration": 0.1}
+    replay = replay_of(device, handle=[line], freeze=[frozen_disc], duration=0.1)
+    replay.seek(4)
+    (said,) = replay.unmet(ARRIVED)
+    assert said.endswith("away from where it is led: what it holds is frozen")
+    replay.release()
+
+
+def test_an_outline_of_no_size_is_led(device: Device):
+    corners = [[0.5, 0.5], [0.5 + 1e-9, 0.5], [0.5, 0.5 + 1e-9]]
+    replay = replay_of(device, handle=[{"points": corners, "closed": True, "to": [0.52, 0.5], "scale": 2.0}])
+    replay.seek(4)
+    assert np.isfinite(replay.warp.read()).all()
+    replay.release()
+
+
 def test_what_walls_part_from_its_goal_is_told_and_folds_nothing(device: Device):
     """The handle is in a ring of what is frozen, and one tells of it outside."""
     angles = np.linspace(0, 2 * np.pi, 49)

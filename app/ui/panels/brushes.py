@@ -48,7 +48,7 @@ def draw(ui: Ui, state: EditorState, likes: Preferences, width: float) -> None:
     name = state.preset_name.strip()[:LONGEST_NAME]
     imgui.same_line(0, ui.px(8))
     with ui.enabled(bool(name)):
-        if (ui.button("Keep", width=64) or entered) and name:
+        if (ui.button("Keep", width=64, height=27) or entered) and name:
             likes.presets[name] = {
                 "radius": brush.radius, "hardness": brush.hardness, "strength": brush.strength,
             }  # fmt: skip

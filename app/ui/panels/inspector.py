@@ -215,7 +215,7 @@ def _whereabouts(workspace: Workspace, label: str) -> str:
 
 def _set_held(session: Session, label: str, name: str, slid: Slid, **setting: float) -> None:
     if slid.again:
-        session.undo()
+        session.retract()
     if slid.changed or slid.done:
         session.edit_held(name, label, slid.done, **setting)
 
@@ -246,7 +246,7 @@ def _fluid(ui: Ui, session: Session, state: EditorState) -> None:
 def _set(session: Session, name: str, slid: Slid, **setting: float) -> None:
     """Set what a slider says: an edit once it is let go of."""
     if slid.again:
-        session.undo()
+        session.retract()
     if slid.changed:
         session.preview_change(**setting)
     if slid.done:
@@ -355,7 +355,7 @@ def _brightness(ui: Ui, session: Session, state: EditorState) -> None:
     way = bool(ui.segmented("thick", ("Bright is thick", "Dark is thick"), int(dark_is_thick), -1))
     state.dark_is_thick, turned = way, own is not None and way != dark_is_thick
     if slid.again:
-        session.undo()
+        session.retract()
     if slid.changed or turned:
         edit = PictureMask(kind="picture", tick=0, of="thickness", white=round(log10(slid.value), 3), invert=way)
         session.edit_masks("Thickness by brightness", edit, commit=turned)

@@ -104,6 +104,6 @@ def _set(
 ) -> None:
     """Set what a slider says: an edit once it is let go of."""
     if slid.again:
-        session.undo()
+        session.retract()
     if slid.changed or slid.done:
         session.edit_bars(name, {which}, changed, commit=slid.done)

@@ -79,7 +79,7 @@ def _amount(ui: Ui, session: Session, state: EditorState, across: float) -> None
         )  # fmt: skip
         state.is_scaling = imgui.is_item_active() and not slid.done
     if slid.again:
-        session.undo()
+        session.retract()
     if slid.changed:
         session.preview(amount=round(slid.value, 4))
     if slid.done:
