@@ -1,33 +1,38 @@
-"""What acts in time, as bars: strokes and forces are moved, stretched, muted, repeated and taken away afterwards.
+"""What acts in time, as bars: strokes, forces, handles and pins are moved, stretched, muted and taken away afterwards.
 
-A bar is known by its kind and its place in the recipe. Times are in ticks; a force has its own in seconds.
+A bar is known by its kind and its place in the recipe. Times are in ticks; all but strokes have their own in seconds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from heapq import heappop, heappush
-from math import ceil, floor
-from typing import Any, Literal, NamedTuple, TypeVar
+from math import ceil, floor, inf
+from typing import Any, Literal, NamedTuple, TypeVar, cast, get_args
 
 from app.errors import UserError
 from app.model.forces import Force
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.recipe import MOST_TICKS, Recipe
 from app.model.strokes import Stroke
 
-Which = tuple[Literal["stroke", "force"], int]
+Kind = Literal["force", "handle", "pin", "stroke"]
+KINDS: tuple[Kind, ...] = get_args(Kind)  # from the highest lane down
+Which = tuple[Kind, int]
 """("stroke", 2) is the recipe's third stroke."""
-One = TypeVar("One", bound=Stroke | Force)
-Changed = Callable[[Stroke | Force], Stroke | Force | None]
-"""What takes the place of a stroke or a force; None where it is taken away."""
+Actor = Stroke | Force | RecipeHandle | RecipePin
+One = TypeVar("One", bound=Actor)
+Changed = Callable[[Actor], Actor | None]
+"""What takes the place of one; None where it is taken away."""
 
 
 class Bar(NamedTuple):
     """Where one of them lies in time.
 
     Attributes:
-        start, end: ticks from its beginning to its end, without its repetitions.
-        stops: the end of its last repetition.
+        start, end: ticks from its beginning to its end, without its repetitions; of a handle, of its way. What has no
+            end ends at infinity.
+        stops: the end of its last repetition; of a handle, when it lets go.
         every: ticks from one beginning to the next, 0 where it does not repeat.
         is_free: it can be moved; a formula of the time cannot.
     """
@@ -41,26 +46,25 @@ class Bar(NamedTuple):
     is_free: bool = True
 
 
-def bar_of(one: Stroke | Force, which: Which, ticks: int, dt: float) -> Bar:
-    """The bar of a stroke or a force in a recording of so many ticks."""
+def bar_of(one: Actor, which: Which, ticks: int, dt: float) -> Bar:
+    """The bar of one in a recording of so many ticks."""
     if isinstance(one, Stroke):
         return Bar(which, one.first_tick, one.last_tick + 1, one.end_tick + 1, one.every, one.muted)
     if one.span is None:
         return Bar(which, 0, ticks, ticks, 0, one.muted, False)
     start, end = (time / dt for time in one.span)
     end = max(end, start + 1)  # an impulse is of one tick
-    return Bar(which, start, end, end, 0, one.muted)
+    stops = max(end, one.let_go / dt) if isinstance(one, RecipeHandle | RecipePin) else end
+    return Bar(which, start, end, stops, 0, one.muted)
 
 
 def bars(recipe: Recipe) -> list[Bar]:
     """All of a recipe, forces first."""
-    return bars_of("force", recipe.force, recipe) + bars_of("stroke", recipe.stroke, recipe)
+    return [bar for kind in KINDS for bar in bars_of(kind, several_of(recipe, kind), recipe)]
 
 
-def bars_of(
-    kind: Literal["stroke", "force"], several: Sequence[Stroke | Force], recipe: Recipe, first: int = 0
-) -> list[Bar]:
-    """Those of a recipe's strokes or forces from a number on."""
+def bars_of(kind: Kind, several: Sequence[Actor], recipe: Recipe, first: int = 0) -> list[Bar]:
+    """Those of several of a kind from a number on."""
     ticks, dt = recipe.ticks, recipe.fluid.dt
     return [bar_of(one, (kind, number), ticks, dt) for number, one in enumerate(several[first:], first)]
 
@@ -92,10 +96,15 @@ def with_last(packed: list[list[Bar]], bar: Bar, least: float = 0.0) -> list[lis
     return [*packed, [bar]]
 
 
-def one_of(recipe: Recipe, which: Which) -> Stroke | Force | None:
-    """The stroke or force that is called so, if there is one."""
+def several_of(recipe: Recipe, kind: Kind) -> tuple[Actor, ...]:
+    """All of a kind."""
+    return cast(tuple[Actor, ...], getattr(recipe, kind))
+
+
+def one_of(recipe: Recipe, which: Which) -> Actor | None:
+    """The one that is called so, if there is one."""
     kind, number = which
-    several = recipe.stroke if kind == "stroke" else recipe.force
+    several = several_of(recipe, kind)
     return several[number] if number < len(several) else None
 
 
@@ -130,27 +139,35 @@ def named(verb: str, which: Collection[Which]) -> str:
 
 
 def with_changed(recipe: Recipe, which: Collection[Which], changed: Changed) -> dict[str, Any]:
-    """The parts of a recipe with others in the place of some strokes and forces, and its duration.
+    """The parts of a recipe with others in the place of some, and its duration.
 
     The recording ends as long after its last stroke as it did; where forces or handles act, it does not end sooner.
 
     Raises:
         UserError: if it would be longer than a recipe may be.
     """
-
-    def those(kind: Literal["stroke", "force"], several: tuple[Any, ...]) -> tuple[Any, ...]:
-        made = (changed(one) if (kind, number) in which else one for number, one in enumerate(several))
-        return tuple(one for one in made if one is not None)
-
-    strokes, forces = those("stroke", recipe.stroke), those("force", recipe.force)
-    before, after = (max((stroke.end_tick for stroke in each), default=-1) for each in (recipe.stroke, strokes))
+    parts: dict[str, Any] = {}
+    kinds: set[Kind] = {kind for kind, _ in which}
+    for kind in kinds:
+        several = enumerate(several_of(recipe, kind))
+        made = [changed(one) if (kind, number) in which else one for number, one in several]
+        parts[kind] = tuple(one for one in made if one is not None)
+    if recipe.handle and parts.get("handle") == ():
+        parts["stop"] = recipe.stop.model_copy(update={"handles_within": None})
+    edited = recipe.edited(**parts)
+    before, after = (max((stroke.end_tick for stroke in each.stroke), default=-1) for each in (recipe, edited))
     ticks, dt = recipe.ticks + after - before, recipe.fluid.dt
     if recipe.force or recipe.leads:
         ticks = max(ticks, recipe.ticks)
-    ends = [force.span[1] / dt for force in forces if force.span is not None and force not in recipe.force]
+    spans = [
+        one.span
+        for kind in KINDS
+        for one in parts.get(kind, ())
+        if not isinstance(one, Stroke) and one not in several_of(recipe, kind)
+    ]
+    ends = [span[1] / dt for span in spans if span is not None and span[1] < inf]
     here = [after, *(change.tick for change in recipe.change), *(edit.tick - 1 for edit in recipe.mask)]
     ticks = max(ticks, 1 + max(here), *(ceil(end - 1e-6) for end in ends), 1)
     if ticks > MOST_TICKS:
         raise UserError(f"a recording has at most {MOST_TICKS} ticks, and this would be of {ticks}")
-    duration = recipe.duration if ticks == recipe.ticks else ticks * dt
-    return {"stroke": strokes, "force": forces, "duration": duration}
+    return parts | {"duration": recipe.duration if ticks == recipe.ticks else ticks * dt}

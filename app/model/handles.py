@@ -27,6 +27,10 @@ Time = Annotated[float, Field(ge=0, le=1_000_000)]
 Line = Annotated[Several[Point], Field(max_length=500)]
 Key = tuple[Time, Place, Place]
 """(seconds, x, y): when a handle shall be where, as fractions of the picture's width and height."""
+Degrees = Annotated[float, Field(ge=-720, le=720)]
+Scale = Annotated[float, Field(ge=0.1, le=10)]
+Turn = tuple[Time, Degrees, Scale]
+"""(seconds, degrees, scale): when a handle shall be turned how far, clockwise, and how many times as large."""
 
 
 def _middle(line: Any) -> Point | None:
@@ -43,6 +47,7 @@ class _Led(Model):
 
     Attributes:
         name: what messages call it.
+        muted: it does nothing.
         at: the place in the picture of what is led or held, as fractions of width and height; of a line by default the
             mean of its corners.
         points: the corners of a line that is led or held as a whole, likewise.
@@ -53,6 +58,7 @@ class _Led(Model):
     """
 
     name: str = ""
+    muted: bool = False
     at: Point
     points: Line = ()
     closed: bool = False
@@ -84,12 +90,30 @@ class _Led(Model):
 
     @property
     def takes_hold(self) -> bool:
-        """True if some of it is in the picture."""
-        return any(is_inside(place) for place in self.corners)
+        """True if it is not muted and some of it is in the picture."""
+        return not self.muted and any(is_inside(place) for place in self.corners)
+
+    @property
+    def let_go(self) -> float:
+        """The seconds at which it lets go; infinite where it never does."""
+        return inf if self.end is None else self.end
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The seconds from its start to the end of its way; of what has none, until it lets go."""
+        return self.start, self.let_go
+
+    def spanning(self, start: float, end: float) -> dict[str, Any]:
+        """Its times, with its way between others."""
+        return {"start": _short(start), "end": None if end == inf else _short(end)}
+
+    def edited(self, **keys: Any) -> Self:
+        """The same with other values of some keys, validated."""
+        return type(self).model_validate({name: getattr(self, name) for name in type(self).model_fields} | keys)
 
     def is_in_force(self, tick: int, dt: float) -> bool:
         """True if it leads or holds in a tick, as `Handles.lead` has it."""
-        return self.start <= tick * dt + dt / 2 < (inf if self.end is None else self.end)
+        return self.start <= tick * dt + dt / 2 < self.let_go
 
     def first_tick(self, dt: float) -> int:
         """The tick in which it begins: as `Handles.lead` has it, however that is rounded."""
@@ -109,6 +133,7 @@ class RecipeHandle(_Led):
         goals: where the corners of its line shall be, as many; without, they keep their places about `at`.
         rotate, scale: degrees that it is turned about `at` in that time, clockwise, and times that it is made as large.
             A point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1.
+        turned: how it shall be turned and scaled after that, or from its start, at an even speed from one to the next.
     """
 
     kind: ClassVar = "handle"
@@ -117,8 +142,9 @@ class RecipeHandle(_Led):
     keys: Several[Key] | None = None
     local: Fraction01 = 0.0
     goals: Line = ()
-    rotate: Annotated[float, Field(ge=-720, le=720)] | None = None
-    scale: Annotated[float, Field(ge=0.1, le=10)] | None = None
+    rotate: Degrees | None = None
+    scale: Scale | None = None
+    turned: Several[Turn] = ()
 
     @model_validator(mode="after")
     def _led_somewhere(self) -> Self:
@@ -128,9 +154,12 @@ class RecipeHandle(_Led):
             raise ValueError(f"'points' has {len(self.points)} places and 'goals' {len(self.goals)}; give as many")
         if self.goals and self.turns:
             raise ValueError("give either 'goals', or 'rotate' and 'scale'")
-        times = [self.ready, *(key[0] for key in self.keys or ())]
-        if any(later < earlier for earlier, later in pairwise(times)):
-            raise ValueError("the times of 'keys' must not go backwards, nor begin before its other way has ended")
+        for name, ready in (("keys", self.ready), ("turned", self.upright)):
+            times = [ready, *(key[0] for key in getattr(self, name) or ())]
+            if any(later < earlier for earlier, later in pairwise(times)):
+                raise ValueError(
+                    f"the times of '{name}' must not go backwards, nor begin before its other way has ended"
+                )
         return self
 
     @property
@@ -141,18 +170,52 @@ class RecipeHandle(_Led):
     @property
     def turns(self) -> bool:
         """True if it is told how it is turned or scaled."""
-        return self.rotate is not None or self.scale is not None
+        return self.rotate is not None or self.scale is not None or bool(self.turned)
+
+    @property
+    def upright(self) -> float:
+        """The seconds at which it has made its first turn, and `turned` may begin."""
+        return self.start if self.rotate is None and self.scale is None else self.start + self.duration
 
     @property
     def last(self) -> float:
         """The seconds from which on it only stays."""
-        last = self.keys[-1][0] if self.keys else self.ready
-        return max(last, self.start + self.duration) if self.turns else last
+        return max(self.keys[-1][0] if self.keys else self.ready, self.turned[-1][0] if self.turned else self.upright)
+
+    def turn_key(self, tick: int, dt: float) -> Turn:
+        """The last key of its turn and size up to a tick, or that of its first turn."""
+        keys = (self.upright, self.rotate or 0.0, self.scale or 1.0), *self.turned
+        return [key for number, key in enumerate(keys) if not number or key[0] <= (tick + SAME_TIME) * dt][-1]
+
+    def turned_to(self, tick: int, dt: float, rotate: float, scale: float) -> RecipeHandle:
+        """The handle, with another key of its turn and size at a tick."""
+        time = max(tick * dt, self.upright)
+        others = (key for key in self.turned if abs(key[0] - time) > SAME_TIME * dt)
+        return self.model_copy(update={"turned": tuple(sorted([*others, (time, rotate, scale)]))})
 
     @property
     def goal(self) -> Point | None:
         """Where it is led in the end; None if nowhere but where it is at its start."""
         return self.keys[-1][1:] if self.keys else self.to
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The seconds from its start to the end of its way; of what has none, until it lets go."""
+        return (self.start, self.last) if self.goal or self.turns else super().span
+
+    def spanning(self, start: float, end: float) -> dict[str, Any]:
+        """Its times, with its way between others; what it holds after that it holds as long."""
+        if not (self.goal or self.turns):
+            return super().spanning(start, end)
+        first, last = self.span
+        factor, end = ((end - start) / (last - first), end) if last > first else (1.0, start)
+        begun = self.model_copy(update={"start": _short(start), "duration": _short(factor * self.duration)})
+        keys, turned = (
+            each and tuple((max(_short(start + factor * (time - first)), ready), *rest) for time, *rest in each)
+            for each, ready in ((self.keys, begun.ready), (self.turned, begun.upright))
+        )
+        held = None if self.end is None else max(_short(self.end + end - last), begun.start)
+        return {"start": begun.start, "duration": begun.duration, "keys": keys, "turned": turned, "end": held}
 
     def led_to(self, tick: int, dt: float, place: Point, rests: Point) -> RecipeHandle:
         """The handle, led to a place in this tick, from `rests`, where it has been led so far."""
@@ -166,21 +229,27 @@ class RecipeHandle(_Led):
         """What of it is led before a tick, and stays from then on; None if nothing is."""
         if self.first_tick(dt) >= tick:
             return None
-        kept = tuple(key for key in self.keys or () if key[0] <= (tick + SAME_TIME) * dt)
-        return self if kept == (self.keys or ()) else self.model_copy(update={"keys": kept})
+        mine = self.keys or (), self.turned
+        keys, turned = (tuple(key for key in each if key[0] <= (tick + SAME_TIME) * dt) for each in mine)
+        if (keys, turned) == mine:
+            return self
+        if self.turned and not turned and self.upright == self.start:
+            turned = ((self.start, 0.0, 1.0),)  # it is measured as one that is turned
+        return self.model_copy(update={"keys": keys, "turned": turned})
 
     def agrees_until(self, other: RecipeHandle, dt: float) -> float:
         """The tick before which both are led the same; infinite where they are for ever."""
-        heads = (led.model_copy(update={"keys": None, "end": None}) for led in (self, other))
-        if next(heads) != next(heads):
+        heads = (led.model_copy(update={"keys": None, "turned": (), "end": None}) for led in (self, other))
+        if next(heads) != next(heads) or self.turns != other.turns:
             return min(self.first_tick(dt), other.first_tick(dt))
         agreed = inf
         if self.end != other.end:
-            agreed = max(floor(min(inf if led.end is None else led.end for led in (self, other)) / dt) - 1, 0)
-        if self.keys != other.keys:
-            both = zip(self.keys or (), other.keys or (), strict=False)
-            common = [mine[0] for mine, theirs in takewhile(lambda pair: pair[0] == pair[1], both)]
-            agreed = min(agreed, floor((common[-1] if common else self.ready) / dt + SAME_TIME))
+            agreed = max(floor(min(self.let_go, other.let_go) / dt) - 1, 0)
+        for mine, theirs, ready in ((self.keys, other.keys, self.ready), (self.turned, other.turned, self.upright)):
+            if mine != theirs:
+                both = zip(mine or (), theirs or (), strict=False)
+                common = [one[0] for one, another in takewhile(lambda pair: pair[0] == pair[1], both)]
+                agreed = min(agreed, floor((common[-1] if common else ready) / dt + SAME_TIME))
         return agreed
 
 
@@ -199,6 +268,11 @@ def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list
     ]
 
 
+def _short(seconds: float) -> float:
+    """To a billionth of a second, so that moving it there and back leaves no digits behind."""
+    return round(seconds, 9)
+
+
 def is_inside(point: Point) -> bool:
     """True if a place lies in the picture."""
     return all(0 <= fraction <= 1 for fraction in point)
@@ -208,7 +282,7 @@ def objections(
     handles: Sequence[RecipeHandle], pins: Sequence[RecipePin], extent: tuple[float, float]
 ) -> Iterator[str]:
     """What of them cannot be met, each by number; what can be is done all the same."""
-    led = [_Way(label, one, extent) for label, one in labelled(handles, pins)]
+    led = [_Way(label, one, extent) for label, one in labelled(handles, pins) if not one.muted]
     for way in led:
         outside, beyond = (((places < 0) | (places > extent)).any(axis=1) for places in (way.before, way.after))
         if outside.all():
@@ -246,7 +320,7 @@ class _Way:
     """Where a handle or a pin leads its corners: before and after, (n, 2) in longer sides."""
 
     def __init__(self, label: str, led: RecipeHandle | RecipePin, extent: Point) -> None:
-        self.label, self.led, self.until = label, led, inf if led.end is None else led.end
+        self.label, self.led, self.until = label, led, led.let_go
         self.before = self.after = np.multiply(led.corners, extent)
         lines = [self.before]
         if isinstance(led, RecipeHandle):
@@ -255,7 +329,8 @@ class _Way:
                 lines.append(np.multiply(led.goals, extent))
                 self.after = lines[1] + goal - np.multiply(led.to, extent)
             else:
-                angle, scale = radians(led.rotate or 0.0), led.scale or 1.0
+                angle, scale = led.turned[-1][1:] if led.turned else (led.rotate or 0.0, led.scale or 1.0)
+                angle = radians(angle)
                 turn = np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
                 self.after = goal + scale * (self.before - at) @ turn
         rounds = ([*line, line[0]] if led.closed else line for line in lines)

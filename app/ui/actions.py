@@ -102,7 +102,7 @@ def _table() -> list[Action]:
     add("Time", "start", "To the start", "home", lambda c: c.workspace.session.seek(0))
     add("Time", "end", "To the end", "end", lambda c: c.workspace.session.seek(c.workspace.session.end))
 
-    add("Time", "lanes", "Strokes and forces as bars", "l", lambda c: c.toggle_lanes())
+    add("Time", "lanes", "Strokes, forces and handles as bars", "l", lambda c: c.toggle_lanes())
     add("Time", "bars_earlier", "Bars a step earlier", "left", lambda c: c.nudge(-1), repeats=True)
     add("Time", "bars_later", "Bars a step later", "right", lambda c: c.nudge(1), repeats=True)
     add("Time", "bars_together", "Start together", "", lambda c: c.bars_together())

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import ceil, floor, log2
+from math import ceil, floor, inf, log2
 from operator import is_
 from typing import Literal, NamedTuple
 
-from app.model.bars import Bar, Which, bar_of, bars_of, lanes, moved, named, one_of, stretched, with_last
-from app.model.forces import Force
+from app.model.bars import (
+    KINDS,
+    Actor,
+    Bar,
+    Changed,
+    Which,
+    bar_of,
+    bars_of,
+    lanes,
+    moved,
+    named,
+    one_of,
+    several_of,
+    stretched,
+    with_last,
+)
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.ui.viewport import Rect
@@ -88,7 +102,7 @@ class Lanes:
         if session is not of or before is None:
             self.selected, self.drag, self.view = set(), None, None
             return
-        if recipe.stroke is before.stroke and recipe.force is before.force:
+        if all(several_of(recipe, kind) is several_of(before, kind) for kind in KINDS):
             return
         self.selected = {which for which in self.selected if _alike(one_of(before, which), one_of(recipe, which))}
         if self.drag is not None:
@@ -96,15 +110,16 @@ class Lanes:
             self.drag = self.drag if one_of(before, which) is one_of(recipe, which) else None
 
     def packed(self, recipe: Recipe, ticks: int, least: float) -> list[list[Bar]]:
-        """The lanes, those of forces first; each bar takes `least` ticks, or up to twice as many.
+        """The lanes, those of forces first and of strokes last; each bar takes `least` ticks, or up to twice as many.
 
         So they are packed anew only where a recording has become twice as long, and stay where they are meanwhile.
         """
-        made_of = recipe.stroke, recipe.force, ticks, 2.0 ** ceil(log2(least))
+        made_of = *(several_of(recipe, kind) for kind in KINDS), ticks, 2.0 ** ceil(log2(least))
         if not _same(self._packed[0], made_of):
-            wide = made_of[3]
-            forces = lanes(bars_of("force", recipe.force, recipe), wide)
-            self._packed = made_of, [*forces, *self._lanes_of_strokes(recipe, wide)]
+            wide = made_of[-1]
+            others = (bars_of(kind, several_of(recipe, kind), recipe) for kind in KINDS if kind != "stroke")
+            packed = [lane for several in others for lane in lanes(several, wide)]
+            self._packed = made_of, [*packed, *self._lanes_of_strokes(recipe, wide)]
         return self._packed[1]
 
     def _lanes_of_strokes(self, recipe: Recipe, least: float) -> list[list[Bar]]:
@@ -156,7 +171,7 @@ class Lanes:
 
     # -- what is selected -------------------------------------------------------------------------------------------
 
-    def only(self, recipe: Recipe) -> tuple[Which, Stroke | Force] | None:
+    def only(self, recipe: Recipe) -> tuple[Which, Actor] | None:
         """The one bar that is selected, and what it is of; None if there are none or several."""
         if len(self.selected) != 1:
             return None
@@ -168,6 +183,8 @@ class Lanes:
         """The pointer went down on a bar, at a tick and a place; `end`: ticks recorded."""
         if not adds and bar.which not in self.selected:
             self.selected = {bar.which}
+        if part == "end" and bar.end == inf:
+            bar = bar._replace(end=round(at))
         self.drag = Drag(bar, part, at, x, adds, self.span(end))
 
     def release(self, session: Session) -> None:
@@ -185,8 +202,8 @@ class Lanes:
             verb = "Move" if drag.part == "move" else "Stretch"
             session.edit_bars(named(verb, edited), edited, lambda one: self.dragged(one, drag, dt))
 
-    def dragged(self, one: Stroke | Force, drag: Drag, dt: float) -> Stroke | Force:
-        """What becomes of a stroke or a force that is dragged so."""
+    def dragged(self, one: Actor, drag: Drag, dt: float) -> Actor:
+        """What becomes of one that is dragged so."""
         if drag.part == "move":
             return moved(one, drag.ticks, dt)
         start, end = drag.bar.start, drag.bar.end
@@ -202,7 +219,7 @@ class Lanes:
 
     # -- edits ------------------------------------------------------------------------------------------------------
 
-    def _edit(self, session: Session, verb: str, changed: Callable[[Stroke | Force], Stroke | Force | None]) -> None:
+    def _edit(self, session: Session, verb: str, changed: Changed) -> None:
         if self.selected:
             session.edit_bars(named(verb, self.selected), self.selected, changed)
 
@@ -218,7 +235,7 @@ class Lanes:
         if len(self.selected) > 1:
             first, dt = self.earliest(session), session.dt
 
-            def changed(one: Stroke | Force) -> Stroke | Force:
+            def changed(one: Actor) -> Actor:
                 return moved(one, round(first - bar_of(one, ("stroke", 0), session.end, dt).start), dt)
 
             session.edit_bars("Start together", self.selected, changed)
@@ -232,7 +249,7 @@ class Lanes:
         """Let what is selected do nothing; if that is so already, let it act again."""
         muted = not self.is_muted(session)
 
-        def changed(one: Stroke | Force) -> Stroke | Force:
+        def changed(one: Actor) -> Actor:
             return one.model_copy(update={"muted": muted})
 
         self._edit(session, "Mute" if muted else "Unmute", changed)
@@ -278,10 +295,12 @@ def _same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
     )
 
 
-def _alike(one: Stroke | Force | None, other: Stroke | Force | None) -> bool:
-    """They may be the same stroke or force, before an edit and after it."""
+def _alike(one: Actor | None, other: Actor | None) -> bool:
+    """They may be the same, before an edit and after it."""
     if one is None or other is None:
         return False
     if isinstance(one, Stroke) and isinstance(other, Stroke):
         return one.tool == other.tool and one.samples[0][1:] == other.samples[0][1:]
+    if isinstance(one, RecipeHandle | RecipePin) and isinstance(other, RecipeHandle | RecipePin):
+        return one.kind == other.kind and one.at == other.at
     return type(one) is type(other)

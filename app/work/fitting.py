@@ -161,10 +161,12 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
         one = RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if any(pairs.curves) else 0.0)
         made = (one,) * len(pairs.places)
         return _Aim(base, Pairs(np.round(pairs.places, DECIMALS), pairs.curves), made)
-    led, places, pins = [], [], list(recipe.pin)
+    led, places, pins, muted = [], [], list(recipe.pin), tuple(handle for handle in recipe.handle if handle.muted)
     extent = np.array([picture.width, picture.height]) / max(picture.width, picture.height)
     for handle, start in zip(recipe.handle, _starts(device, recipe, picture, folder), strict=True):
         end = np.round(handle.goal or start, DECIMALS)
+        if handle.muted:
+            continue
         if np.hypot(*((end - handle.at) * extent)) > ARRIVED:
             led.append(handle)
             places.append((np.round(handle.at, DECIMALS), end))
@@ -172,7 +174,7 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
             pins.append(RecipePin(name=handle.name, at=handle.at, radius=handle.radius, stiffness=handle.stiffness))
     if not led:
         raise UserError("no handle of the recipe leads anywhere; give --pairs, or [[handle]]s with a place to go to")
-    base = recipe.edited(handle=(), pin=tuple(pins))
+    base = recipe.edited(handle=muted, pin=tuple(pins))
     if not (base.stroke or base.change or base.mask or base.force):  # which have their times
         base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
     return _Aim(base, Pairs.points(np.array(places)), tuple(led))

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from math import ceil, hypot, inf
+from math import ceil, hypot
 from typing import Any
 
 import numpy as np
@@ -602,17 +602,17 @@ class Replay:
         made, extent = [], self.grid.extent
         for _, led in self.led:
             at = led.at[0] * extent[0], led.at[1] * extent[1]
-            end = inf if led.end is None else led.end
             way: dict[str, Any] = {
                 "points": np.multiply(led.points, extent) if led.points else (),
                 "closed": led.closed,
             }
             if isinstance(led, RecipeHandle):
                 way |= {"duration": led.duration, "local": led.local, "rotate": led.rotate, "scale": led.scale}
+                way |= {"turned": led.turned}
                 way |= {"to": led.to and self._in_longer_sides(led.to)}
                 way |= {"keys": tuple((time, *self._in_longer_sides((x, y))) for time, x, y in led.keys or ())}
                 way |= {"goals": np.multiply(led.goals, extent) if led.goals else ()}
-            made.append(Handle(at, radius=led.radius, start=led.start, end=end, stiffness=led.stiffness, **way))
+            made.append(Handle(at, radius=led.radius, start=led.start, end=led.let_go, stiffness=led.stiffness, **way))
         return made
 
     def _in_longer_sides(self, place: tuple[float, float]) -> tuple[float, float]:

@@ -43,6 +43,8 @@ class Handle:
         goals: where the corners shall be, as many; without, they keep their places about `at`.
         rotate, scale: degrees that it is turned about `at` on its way, clockwise, and times that it is made as large. A
             point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1.
+        turned: times, degrees and scales (t, angle, scale), in order and none before its first way has ended: how it
+            is turned and how large it is after that, likewise at an even speed.
 
     Raises:
         ValueError: if a number is not finite (but for `end`) or out of its range.
@@ -62,13 +64,16 @@ class Handle:
     goals: tuple[Point, ...] = ()
     rotate: float | None = None
     scale: float | None = None
+    turned: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "at", numbers("a handle's place", self.at, 2))
         if self.to is not None:
             object.__setattr__(self, "to", numbers("where a handle goes", self.to, 2))
-        check_type("a handle's keys", self.keys, Iterable)
-        object.__setattr__(self, "keys", tuple(numbers("a handle's key", key, 3) for key in self.keys))
+        for name in ("keys", "turned"):
+            keys = getattr(self, name)
+            check_type("a handle's keys", keys, Iterable)
+            object.__setattr__(self, name, tuple(numbers("a handle's key", key, 3) for key in keys))
         for number in (self.radius, self.start, self.duration, self.end, self.stiffness, self.local):
             check_type("a number of a handle", number)
         self._check_line()
@@ -83,8 +88,11 @@ class Handle:
             raise ValueError(f"a handle of stiffness {self.stiffness} was given; it must be from 0.001 to 1")
         if not 0 <= self.local <= 1:
             raise ValueError("the local part of a handle must be from 0 to 1")
-        times = [self.ready, *(key[0] for key in self.keys), math.inf]
-        if not all(earlier <= later for earlier, later in pairwise(times)):
+        if not all(
+            earlier <= later
+            for ready, keys in ((self.ready, self.keys), (self.upright, self.turned))
+            for earlier, later in pairwise([ready, *(key[0] for key in keys), math.inf])
+        ):
             raise ValueError("the times of a handle's keys must not go backwards, nor begin before its way has ended")
 
     def _check_line(self) -> None:
@@ -96,23 +104,35 @@ class Handle:
             raise ValueError(f"a line of a handle has {2 + self.closed} different points or more")
         if self.goals and len(self.goals) != len(self.points):
             raise ValueError(f"a line of {len(self.points)} points has {len(self.goals)} goals; as many are wanted")
-        if self.goals and (self.rotate is not None or self.scale is not None):
+        if self.goals and self.turns:
             raise ValueError("a line that has goals is not turned or scaled besides")
         if self.goals and self.to is None:
             object.__setattr__(self, "to", tuple(np.mean(self.goals, axis=0).tolist()))
-        for number in (self.rotate or 0.0, self.scale or 1.0):
-            check_type("a number of a handle", number)
-        if not abs(self.rotate or 0.0) <= MOST_TURNED:
-            raise ValueError(f"a handle that is turned by {self.rotate} was given; at most {MOST_TURNED:g} are wanted")
-        if self.scale is not None and not LEAST_SCALE <= self.scale <= MOST_SCALE:
-            raise ValueError(
-                f"a handle's scale of {self.scale} was given; it must be from {LEAST_SCALE} to {MOST_SCALE:g}"
-            )
+        scale = 1.0 if self.scale is None else self.scale
+        for angle, size in ((self.rotate or 0.0, scale), *(key[1:] for key in self.turned)):
+            check_type("a number of a handle", angle)
+            check_type("a number of a handle", size)
+            if not abs(angle) <= MOST_TURNED:
+                raise ValueError(f"a handle that is turned by {angle} was given; at most {MOST_TURNED:g} are wanted")
+            if not LEAST_SCALE <= size <= MOST_SCALE:
+                raise ValueError(
+                    f"a handle's scale of {size} was given; it must be from {LEAST_SCALE} to {MOST_SCALE:g}"
+                )
 
     @property
     def ready(self) -> float:
         """When it has gone its first way, and its keys may begin."""
         return self.start if self.to is None else self.start + self.duration
+
+    @property
+    def turns(self) -> bool:
+        """True if it is told how it is turned or scaled."""
+        return self.rotate is not None or self.scale is not None or bool(self.turned)
+
+    @property
+    def upright(self) -> float:
+        """When it has made its first turn, and `turned` may begin."""
+        return self.start if self.rotate is None and self.scale is None else self.start + self.duration
 
     @property
     def goal(self) -> Point | None:
@@ -128,13 +148,17 @@ class Handle:
 
         if not self.keys or time < self.ready:
             return start if self.to is None else start + self.passed(time) * within(self.to)
-        stations = [(self.ready, *(start if self.to is None else self.to)), *self.keys]
-        number = max(number for number, (since, *_) in enumerate(stations) if since <= time + SAME_TIME * dt)
-        (since, *here), (until, *there) = stations[number], stations[min(number + 1, len(stations) - 1)]
-        if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
-            return start + within(here)
-        part = (time - since) / (until - since)
+        here, there, part = _between([(self.ready, *(start if self.to is None else self.to)), *self.keys], time, dt)
         return start + (1 - part) * within(here) + part * within(there)
+
+    def turn(self, time: float, dt: float) -> tuple[float, float]:
+        """The angle, radians, and the scale that it shall have at a time; as `wanted`."""
+        rotate, scale = self.rotate or 0.0, self.scale or 1.0
+        if not self.turned or time < self.upright:
+            return math.radians(rotate) * self.passed(time), scale ** self.passed(time)
+        here, there, part = _between([(self.upright, rotate, scale), *self.turned], time, dt)
+        angle = (1 - part) * here[0] + part * there[0]
+        return math.radians(angle), here[1] ** (1 - part) * there[1] ** part
 
     @cached_property
     def reach(self) -> float:
@@ -144,7 +168,7 @@ class Handle:
     @property
     def is_whole(self) -> bool:
         """True if it leads more than a point."""
-        return bool(self.points) or self.rotate is not None or self.scale is not None
+        return bool(self.points) or self.turns
 
     @property
     def push_radius(self) -> float:
@@ -233,14 +257,14 @@ class Shape:
         there = handle.wanted(middle, time, dt)
         if len(starts) == 1:
             return there[None]
-        way = self._about(there, starts, handle.passed(time)) - starts
+        way = self._about(there, starts, time, dt) - starts
         far = np.hypot(*way.T)[:, None]
         return starts + way * np.minimum(1.0, LARGEST_LEAD * handle.reach / np.maximum(far, 1e-30))
 
     def ends(self, starts: np.ndarray) -> np.ndarray:
         """Where its points shall be in the end, (n, 2)."""
         goal = self.handle.goal
-        return self._about(self.middle(starts) if goal is None else np.array(goal), starts, 1.0)
+        return self._about(self.middle(starts) if goal is None else np.array(goal), starts, math.inf)
 
     def away(self, places: np.ndarray, starts: np.ndarray) -> float:
         """How far what is farthest of it is from where it shall be; of a ring, by how far it is turned and scaled."""
@@ -253,18 +277,19 @@ class Shape:
             return float(np.hypot(*left[0]) + math.hypot(turned, scaled))
         return float(np.hypot(*left.T).max())
 
-    def _about(self, there: np.ndarray, starts: np.ndarray, part: float) -> np.ndarray:
-        """Its points with the handle at a place, and a part of its turn made."""
+    def _about(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float = 1.0) -> np.ndarray:
+        """Its points with the handle at a place, turned as at a time."""
         if len(starts) == 1:
             return there[None]
-        return np.clip(self._laid(there, starts, part), 0.0, self.extent)
+        return np.clip(self._laid(there, starts, time, dt), 0.0, self.extent)
 
-    def _laid(self, there: np.ndarray, starts: np.ndarray, part: float) -> np.ndarray:
+    def _laid(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
         handle, from_middle = self.handle, starts - self.middle(starts)
         if self.goals is not None:
             assert handle.to is not None
+            part = handle.passed(time)
             return there + (1 - part) * from_middle + part * (self.goals - handle.to)
-        angle, scale = math.radians(handle.rotate or 0.0) * part, (handle.scale or 1.0) ** part
+        angle, scale = handle.turn(time, dt)
         turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
         return there + scale * from_middle @ turn
 
@@ -279,6 +304,17 @@ def area(loop: np.ndarray) -> float:
     """The area within a closed line of places (n, 2), positive clockwise."""
     x, y = (loop - loop.mean(axis=0)).T
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def _between(
+    keys: Sequence[tuple[float, ...]], time: float, dt: float
+) -> tuple[Sequence[float], Sequence[float], float]:
+    """The last of some keys that has come, the next, and the part of the way between them; the time comes first."""
+    number = max(number for number, (since, *_) in enumerate(keys) if since <= time + SAME_TIME * dt)
+    (since, *here), (until, *there) = keys[number], keys[min(number + 1, len(keys) - 1)]
+    if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
+        return here, here, 0.0
+    return here, there, (time - since) / (until - since)
 
 
 def _line(corners: Sequence[Point], closed: bool) -> np.ndarray:

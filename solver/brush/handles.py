@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.brush.brush import Brush
 from solver.brush.handle import Handle, Shape, area, spun
-from solver.brush.tip import SMALLEST, Point, Tip
+from solver.brush.tip import SMALLEST, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
 from solver.grid import Grid
@@ -28,6 +28,9 @@ FARTHEST_STEP = 0.07
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
 RIDGE = 1e-3
+# Where handles lie beside one another each has a push so many times as wide, too, which counts so much in the squares:
+# what they have in common is cheaper by it, and would else flow back between them.
+WIDE, WIDE_SHARE = 3.0, 0.1
 # Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
 # what becomes of the area of triangles of texels, as the local one, since a remap keeps what is at its texels only;
 # and how many times farther apart in the original two neighbours on a lattice lie. From the first of
@@ -71,9 +74,11 @@ class Lead(NamedTuple):
     Attributes:
         places, radii: of all of them, (n, 2) and (n,).
         pushed: the numbers of those that are pushed, p of them.
+        drawn, reaches: of each push the number of its point, and how far it reaches, (m,): the p, and some wide ones.
         rings: r of them.
         loops: which of them are closed lines.
-        influence: what the pushes and the turns of rings do to the pushed and to rings, (2 p + r, 2 p + r).
+        influence: what the pushes and the turns of rings do to the pushed and to rings, (2 p + r, 2 m + r).
+        shares: how much each of those counts in the squares, (2 m + r,).
         soft: what of their will they give up, (2 p + r,): see (H3).
         wanted: how the fluid shall move at them all, (n, 2), longer sides / s.
         local: what of their motion carries the picture and not the fluid, (p, 2).
@@ -82,9 +87,12 @@ class Lead(NamedTuple):
     places: np.ndarray
     radii: np.ndarray
     pushed: np.ndarray
+    drawn: np.ndarray
+    reaches: np.ndarray
     rings: list[Ring]
     loops: list[slice]
     influence: np.ndarray
+    shares: np.ndarray
     soft: np.ndarray
     wanted: np.ndarray
     local: np.ndarray
@@ -180,15 +188,22 @@ class Handles:
         pushed = np.flatnonzero(is_pushed)
         share = self._local[listed][pushed]
         self._calm(places[pushed], radii[pushed], 1 - slower[pushed])
-        push, local = self._influences(places, places[pushed], radii[pushed])
+        beside = _beside(places, radii, np.repeat(np.arange(len(rows)), self._counts[in_force]))[pushed]
+        many, side = np.flatnonzero(beside), min(self._fluid.grid.picture)
+        drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
+        reaches = np.concatenate([radii[pushed], np.maximum(np.minimum(WIDE * radii, side), radii)[pushed[many]]])
+        shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
+        push, local = self._influences(places, places[drawn], reaches)
+        local = local[:, : len(pushed)]
         # What is local is shared out first: the fluid would else do all of it, going on by itself.
-        both = (1 - share[:, None, None]) * push + share[:, None, None] * local
+        both = (1 - share[:, None, None]) * push[:, : len(pushed)] + share[:, None, None] * local
         soft = np.repeat(self._soft[listed][pushed], 2)
         carried = share[:, None] * _solved(_matrix(both[pushed]), wanted[pushed].ravel(), soft).reshape(-1, 2)
         wanted = wanted - np.einsum("ijab,jb->ia", local, carried)
         soft = np.concatenate([soft, self._soft[listed][[ring.centre for ring in rings]]])
-        influence = _with_rings(places, pushed, push, rings)
-        lead = self._lead = Lead(places, radii, pushed, rings, loops, influence, soft, wanted, carried)
+        shares = np.concatenate([shares, np.ones(len(rings))])
+        ways = _with_rings(places, pushed, push, rings), shares, soft, wanted, carried
+        lead = self._lead = Lead(places, radii, pushed, drawn, reaches, rings, loops, *ways)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -206,8 +221,11 @@ class Handles:
             return
         viscosity = self._probed(lead, fluid.faces())[lead.pushed, 3]
         shader = fluid.device.pass_("brush/carry.frag")
-        for place, radius, motion, here in zip(*_brushes(lead), lead.local, viscosity, strict=True):
-            tip = Tip(place, place, radius)
+        radii = lead.radii[lead.pushed].tolist()
+        for (x, y), radius, motion, here in zip(
+            lead.places[lead.pushed].tolist(), radii, lead.local, viscosity, strict=True
+        ):
+            tip = Tip((x, y), (x, y), radius)
             self._motion.clear(0.0, 0.0, 0.0, here)
             inputs = tip.inputs(grid) | {"brush_velocity": tuple(motion.tolist()), "viscosity": fluid.viscosity}
             inputs |= {"motion": self._motion, "slip": self._one}
@@ -447,18 +465,20 @@ class Handles:
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             lacks[loop] -= (lacks[loop] * arms).sum() / max((arms**2).sum(), 1e-30) * arms
         told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
-        strengths, count = _solved(lead.influence, told, lead.soft), 2 * len(lead.pushed)
+        strengths, count = _solved(lead.influence, told, lead.soft, lead.shares), 2 * len(lead.drawn)
         lacking, spins = strengths[:count].reshape(-1, 2), strengths[count:]
         masks: dict[str, Any] = {}
         if attenuated:
-            lacking *= found[lead.pushed, 2:3]
+            lacking *= found[lead.drawn, 2:3]
             masks["viscosity"] = fluid.viscosity
         for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
             self._spin(ring, spin, faces, found[ring.centre], **attenuated)
         draw, size = fluid.device.pass_("brush/handle_stream.frag", **attenuated), self._stream.size
         self._stream.clear()
         for mirror, shift in _images(grid):
-            for (x, y), radius, force, here in zip(*_brushes(lead), lacking, found[lead.pushed, 3], strict=True):
+            for (x, y), radius, force, here in zip(
+                lead.places[lead.drawn].tolist(), lead.reaches.tolist(), lacking, found[lead.drawn, 3], strict=True
+            ):
                 place = float(mirror[0] * x + shift[0]), float(mirror[1] * y + shift[1])
                 x0, y0, width, height = region = Tip(place, place, radius).region(grid)
                 if x0 >= size[0] or y0 >= size[1] or x0 + width <= 0 or y0 + height <= 0:
@@ -472,9 +492,19 @@ class Handles:
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 
-def _solved(influence: np.ndarray, wanted: np.ndarray, soft: np.ndarray) -> np.ndarray:
+def _solved(
+    influence: np.ndarray, wanted: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0
+) -> np.ndarray:
     """The forces that together make what is wanted, as far as the ridge and stiffness let them: (H3)."""
-    return influence.T @ np.linalg.solve(influence @ influence.T + np.diag(soft), wanted)
+    back = (shares * influence).T
+    return back @ np.linalg.solve(influence @ back + np.diag(soft), wanted)
+
+
+def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray) -> np.ndarray:
+    """How much of others lies within reach of each, 0-1: 1 - product of 1 - (1 - q^2)^3, q in sums of both radii."""
+    far = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) / (radii[:, None] + radii)
+    near = np.maximum(1 - far**2, 0.0) ** 3 * (handles[:, None] != handles)
+    return 1 - (1 - near).prod(axis=1)
 
 
 def _matrix(influence: np.ndarray) -> np.ndarray:
@@ -489,7 +519,7 @@ def _spins(motion: np.ndarray, rings: list[Ring]) -> np.ndarray:
 
 def _with_rings(places: np.ndarray, pushed: np.ndarray, push: np.ndarray, rings: list[Ring]) -> np.ndarray:
     """The matrix of what pushes do to what is pushed, with what they do to rings, and turns of rings to all."""
-    columns = [push[:, number, :, axis] for number in range(len(pushed)) for axis in (0, 1)]
+    columns = [push[:, number, :, axis] for number in range(push.shape[1]) for axis in (0, 1)]
     columns += [_turned(places, ring) for ring in rings]
     return np.stack([np.concatenate([each[pushed].ravel(), _spins(each, rings)]) for each in columns], axis=-1)
 
@@ -505,11 +535,6 @@ def _tip(place: np.ndarray, radius: float) -> Tip:
     """A brush that is hard as far as its core."""
     at = float(place[0]), float(place[1])
     return Tip(at, at, radius, CORE / 0.9)
-
-
-def _brushes(lead: Lead) -> tuple[list[Point], list[float]]:
-    """Places and radii of what is pushed."""
-    return [(x, y) for x, y in lead.places[lead.pushed].tolist()], lead.radii[lead.pushed].tolist()
 
 
 def _distorted(warp: WarpMap, points: np.ndarray, wanted: np.ndarray | None = None) -> np.ndarray:

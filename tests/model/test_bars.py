@@ -1,7 +1,8 @@
-"""Strokes and forces as bars: where they lie, how they are edited, and what the recipe says of it."""
+"""Strokes, forces, handles and pins as bars: where they lie, how they are edited, and what the recipe says of it."""
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -10,13 +11,15 @@ import pytest
 from pydantic import ValidationError
 
 from app.errors import UserError
-from app.model.bars import Bar, Which, bars, lanes, moved, stretched, with_changed
+from app.model.bars import Actor, Bar, Which, bars, lanes, moved, stretched, with_changed
 from app.model.forces import Force, PointForce, VortexForce
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.history import History
-from app.model.recipe import Recipe
+from app.model.recipe import Recipe, Stop
 from app.model.strokes import Change, Dab, Stroke
 
 DT = 1 / 60
+LED = RecipeHandle, RecipePin
 
 
 def stroke(*samples: tuple[int, float, float, float], **more: object) -> Stroke:
@@ -27,6 +30,10 @@ def stroke(*samples: tuple[int, float, float, float], **more: object) -> Stroke:
 
 def force(**more: object) -> VortexForce:
     return VortexForce.model_validate({"kind": "vortex", "point": (0.5, 0.5), **more})
+
+
+def handle(**more: object) -> RecipeHandle:
+    return RecipeHandle.model_validate({"at": (0.4, 0.5), "to": (0.5, 0.5), **more})
 
 
 def random_stroke(dice: random.Random) -> Stroke:
@@ -213,6 +220,53 @@ def test_the_law_of_a_force_is_that_of_its_keys_also_after_a_change() -> None:
     assert one.model_copy(update={"during": (0.0, 0.25)}).law.impulse(0, 1) == 0.25
 
 
+# -- handles ----------------------------------------------------------------------------------------------------------
+
+KEYED = handle(
+    start=0.2,
+    duration=0.3,
+    keys=((0.5, 0.5, 0.5), (1.0, 0.6, 0.5)),
+    turned=((0.4, 20.0, 1.5), (1.2, 0.0, 1.0)),
+    end=2.0,
+)
+
+
+def test_a_handle_that_is_moved_or_stretched_goes_its_way_then() -> None:
+    assert KEYED.span == (0.2, 1.2)
+    later = moved(KEYED, 30, DT)
+    assert later.keys == ((1.0, 0.5, 0.5), (1.5, 0.6, 0.5))
+    assert later.turned == ((0.9, 20.0, 1.5), (1.7, 0.0, 1.0))
+    assert (later.start, later.duration, later.end) == (0.7, 0.3, 2.5)
+    assert moved(later, -30, DT) == KEYED
+    assert moved(KEYED, -1000, DT).start == 0
+    slow = stretched(KEYED, 12, 132, DT)  # and lets go as long after it
+    assert slow.keys == ((pytest.approx(0.8), 0.5, 0.5), (pytest.approx(1.8), 0.6, 0.5))
+    assert slow.turned == ((pytest.approx(0.6), 20.0, 1.5), (pytest.approx(2.2), 0.0, 1.0))
+    assert (slow.start, slow.duration, slow.end) == pytest.approx((0.2, 0.6, 3.0))
+    assert stretched(handle(duration=0.0), 6, 60, DT) == handle(start=0.1, duration=0.0)
+
+
+@pytest.mark.parametrize("pin", [RecipePin(at=(0.4, 0.5), start=0.5), handle(to=None, keys=(), start=0.5)])
+def test_what_only_stays_lets_go_once_its_end_is_dragged(pin: RecipePin | RecipeHandle) -> None:
+    assert bars(Recipe.model_validate({pin.kind: (pin,)}))[0][1:4] == (30, math.inf, math.inf)
+    assert moved(pin, -12, DT) == pin.edited(start=0.3)
+    assert stretched(pin, 6, math.inf, DT) == pin.edited(start=0.1)
+    assert stretched(pin, 30, 60, DT) == pin.edited(end=1.0)
+
+
+def test_a_recording_lasts_until_its_handles_have_gone_their_way_and_waits_for_none_that_are_gone() -> None:
+    handles, pins = (handle(), handle(muted=True)), (RecipePin(at=(0.1, 0.1)),)
+    recipe = Recipe(handle=handles, pin=pins, stop=Stop(handles_within=0.01))
+    assert edited(recipe, ("handle", 0), lambda one: moved(one, 60, DT)).ticks == 120
+    assert edited(recipe, ("pin", 0), lambda one: moved(one, 60, DT)).ticks == 60
+    last = edited(recipe, ("handle", 0), lambda one: None)
+    assert last.stop.handles_within == 0.01
+    assert edited(last, ("handle", 0), lambda one: None).stop.handles_within is None
+    muted = edited(recipe, ("handle", 0), lambda one: one.model_copy(update={"muted": True}))
+    assert recipe.agrees_until(muted) == 0
+    assert recipe.agrees_until(edited(recipe, ("handle", 1), lambda one: moved(one, 9, DT))) == math.inf
+
+
 # -- lanes ------------------------------------------------------------------------------------------------------------
 
 
@@ -252,7 +306,7 @@ def test_a_bar_lies_where_its_stroke_or_force_does() -> None:
 # -- edits of a recipe ------------------------------------------------------------------------------------------------
 
 
-def edited(recipe: Recipe, which: Which, changed: Callable[[Stroke | Force], Stroke | Force | None]) -> Recipe:
+def edited(recipe: Recipe, which: Which, changed: Callable[[Actor], Actor | None]) -> Recipe:
     return recipe.edited(**with_changed(recipe, {which}, changed))
 
 
@@ -279,11 +333,13 @@ def any_edit(recipe: Recipe, dice: random.Random) -> Recipe:
     all_ = [bar.which for bar in bars(recipe)]
     which = dice.sample(all_, min(len(all_), dice.choice([1, 1, 3])))
     by, start, end = dice.randrange(-15, 15), dice.randrange(40), dice.randrange(41, 60)
-    changes: list[Callable[[Stroke | Force], Stroke | Force | None]] = [
+    changes: list[Callable[[Actor], Actor | None]] = [
         lambda one: moved(one, by, DT),
         lambda one: stretched(one, start, end, DT),
         lambda one: one.model_copy(update={"muted": not one.muted}),
-        lambda one: one.model_copy(update={"strength": round(dice.random(), 2)}),
+        lambda one: one.model_copy(
+            update={"stiffness" if isinstance(one, LED) else "strength": dice.choice([0.2, 0.7])}
+        ),
         lambda one: one.repeated(dice.randrange(1, 5), 12) if isinstance(one, Stroke) else one,
         lambda one: None if dice.random() < 0.3 else one,
     ]
@@ -294,7 +350,8 @@ def walk(seed: int, steps: int) -> Iterator[tuple[History, list[Recipe], int]]:
     """A history under random edits, undo and redo, beside a plain list of what it should hold."""
     dice = random.Random(seed)
     forces = tuple(force(**law, strength=float(number + 1)) for number, law in enumerate(LAWS))
-    recipe = Recipe(stroke=tuple(random_stroke(dice) for _ in range(12)), force=forces, duration=3.0)
+    strokes, pins = tuple(random_stroke(dice) for _ in range(12)), (RecipePin(at=(0.1, 0.1)),)
+    recipe = Recipe(stroke=strokes, force=forces, handle=(handle(), KEYED), pin=pins, duration=3.0)
     history, states, now = History(recipe), [recipe], 0
     for _ in range(steps):
         match dice.choice(["edit", "edit", "undo", "redo"]):

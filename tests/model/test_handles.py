@@ -49,6 +49,9 @@ def test_what_is_led_before_a_tick() -> None:
     assert led.before(2, 0.1) is None
     assert [len(cut.keys or ()) for tick in (3, 4, 5) if (cut := led.before(tick, 0.1))] == [1, 2, 2]
     assert led.before(5, 0.1) is led
+    turned = handle(start=0.2, turned=[[0.4, 30.0, 1.0], [0.8, 0.0, 1.0]])
+    cuts = [cut.turned for tick in (3, 4, 8) if (cut := turned.before(tick, 0.1))]
+    assert cuts == [((0.2, 0.0, 1.0),), turned.turned[:1], turned.turned]  # one that is turned is measured otherwise
 
 
 def test_handles_agree_until_one_is_led_elsewhere() -> None:
@@ -60,8 +63,18 @@ def test_handles_agree_until_one_is_led_elsewhere() -> None:
         (led.model_copy(update={"keys": (*(led.keys or ()), (1.0, 0.1, 0.1))}), 8),
         (led.model_copy(update={"keys": (led.keys or ())[:1]}), 6),
         (led.model_copy(update={"keys": None}), 5),
+        (led.model_copy(update={"turned": ((0.9, 20.0, 1.0),)}), 2),
     ):
         assert led.agrees_until(other, 0.1) == other.agrees_until(led, 0.1) == tick
+
+
+def test_a_key_of_a_turn_takes_the_place_of_one_at_the_same_tick() -> None:
+    led = handle(rotate=20.0, duration=0.4).turned_to(8, 0.1, 30.0, 1.0).turned_to(6, 0.1, 10.0, 2.0)
+    assert [key[1:] for key in led.turned] == [(10.0, 2.0), (30.0, 1.0)]
+    assert [led.turn_key(tick, 0.1)[1] for tick in (3, 6, 7, 8)] == [20.0, 10.0, 10.0, 30.0]
+    assert led.turned_to(8, 0.1, 50.0, 1.0).turned == (led.turned[0], (pytest.approx(0.8), 50.0, 1.0))
+    one, other = led.turned_to(8, 0.1, 50.0, 1.0), led
+    assert one.agrees_until(other, 0.1) == 6
 
 
 def test_items_are_counted_from_one_handles_first() -> None:

@@ -1,4 +1,4 @@
-"""The lanes: strokes and forces as bars, used with pointer and keys."""
+"""The lanes: strokes, forces and handles as bars, used with pointer and keys."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.model.bars import Which
+from app.model.bars import Which, moved
 from app.model.forces import VortexForce
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.ui.events import Key, Mods
@@ -280,6 +281,36 @@ def test_a_force_that_no_map_can_follow_is_told_of_and_undone(robot: Robot) -> N
     robot.key("ctrl+z")
     robot.rest()
     assert np.array_equal(robot.warp(), before)
+
+
+def test_handles_and_pins_are_bars_too(robot: Robot) -> None:
+    handle = RecipeHandle(at=(0.4, 0.5), to=(0.42, 0.5), start=0.1, duration=0.3)
+    robot.editor.session.edit("Handles", handle=(handle,), pin=(RecipePin(at=(0.7, 0.5)),), duration=1.0)
+    robot.rest()
+    robot.key("l")
+    robot.frame(count=2)
+    begun = recipe(robot)
+    drag(robot, 0, 90.0, kind="handle")
+    later = recipe(robot).handle[0]
+    assert later == moved(handle, round((later.start - 0.1) / robot.editor.session.dt), robot.editor.session.dt)
+    assert later.start > 0.15
+    assert robot.editor.state.selected == "handle[1]"
+    drag(robot, 0, 60.0, part=0.99, kind="handle")
+    assert recipe(robot).handle[0].start == later.start
+    assert recipe(robot).handle[0].duration > 0.35
+    drag(robot, 0, -600.0, part=0.998, kind="pin")
+    (pin,) = recipe(robot).pin
+    assert pin.start == 0
+    assert pin.end is not None
+    assert 0.2 < pin.end < 1
+    robot.key("u")
+    assert recipe(robot).pin[0].muted
+    robot.key("delete")
+    assert recipe(robot).pin == ()
+    assert names(robot)[2:] == ["Move handle", "Stretch handle", "Stretch pin", "Mute pin", "Delete pin"]
+    for _ in range(5):
+        robot.key("ctrl+z")
+    assert recipe(robot) == begun
 
 
 def many(count: int) -> tuple[Stroke, ...]:

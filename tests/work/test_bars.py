@@ -15,6 +15,7 @@ from app.media import project as projects
 from app.media.auxiliary import Pictures
 from app.model.bars import Which, bars, moved, stretched
 from app.model.forces import FieldForce, VortexForce
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.mask_edits import FillMask
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Stroke
@@ -95,7 +96,9 @@ def test_going_back_to_where_a_moving_fluid_was_frozen_changes_no_bit(device: De
 
 def test_what_is_muted_is_as_if_it_were_not_there(device: Device) -> None:
     muted = STROKE.model_copy(update={"muted": True})
-    recipe = RECIPE.edited(stroke=(muted, TWIRL), force=(vortex(muted=True),))
+    held = {"at": (0.3, 0.5), "muted": True}
+    handle, pin = RecipeHandle.model_validate({"to": (0.5, 0.5), **held}), RecipePin.model_validate(held)
+    recipe = RECIPE.edited(stroke=(muted, TWIRL), force=(vortex(muted=True),), handle=(handle,), pin=(pin,))
     assert same(rendered(device, recipe), rendered(device, RECIPE.edited(stroke=(TWIRL,))))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import hypot, log10
 from pathlib import PurePath
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -180,16 +181,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             )  # fmt: skip
             _set_held(session, label, f"Flow of a {led.kind}", slid, local=slid.value)
             if not led.goals:
-                slid = ui.slider(
-                    "held rotate", "Rotate", led.rotate or 0.0, -180.0, 180.0, DEGREES, 0.0,
-                    title="Rotate", more="Clockwise. It turns from its start on.",
-                )  # fmt: skip
-                _set_held(session, label, f"Turn of a {led.kind}", slid, rotate=slid.value)
-                slid = ui.slider(
-                    "held scale", "Scale", led.scale or 1.0, 0.25, 4.0, PERCENT, 1.0, logarithmic=True,
-                    title="Scale", more="It grows or shrinks from its start on.",
-                )  # fmt: skip
-                _set_held(session, label, f"Size of a {led.kind}", slid, scale=slid.value)
+                _turn(ui, session, label, led)
         if ui.button("Remove", width=-1, height=30):
             do("remove")
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
@@ -200,6 +192,27 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             do("fit_handles")
         more = "Searches how far and how fast each reaches; may take a minute."
         ui.tooltip("Let all go at once, with the least work", ACTIONS["fit_handles"].key, more)
+
+
+def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
+    """How a handle is turned and scaled: from its start on, or, once it has keys, at the playhead."""
+    tick, dt = session.target, session.dt
+    _, rotate, scale = led.turn_key(tick, dt)
+    when = "A key at the playhead." if led.turned else "From its start on."
+    slid = ui.slider(
+        "held rotate", "Rotate", rotate, -180.0, 180.0, DEGREES, 0.0, title="Rotate", more=f"Clockwise. {when}"
+    )
+    turned = {"turned": led.turned_to(tick, dt, slid.value, scale).turned} if led.turned else {"rotate": slid.value}
+    _set_held(session, label, f"Turn of a {led.kind}", slid, **turned)
+    slid = ui.slider("held scale", "Scale", scale, 0.25, 4.0, PERCENT, 1.0, logarithmic=True, title="Scale", more=when)
+    turned = {"turned": led.turned_to(tick, dt, rotate, slid.value).turned} if led.turned else {"scale": slid.value}
+    _set_held(session, label, f"Size of a {led.kind}", slid, **turned)
+    keyed = led.turned_to(tick, dt, rotate, scale).turned
+    is_key = keyed == led.turned
+    if ui.button("Remove the key of its turn" if is_key else "Key its turn here", width=-1, height=30):
+        kept = tuple(key for key in led.turned if key != led.turn_key(tick, dt)) if is_key else keyed
+        session.edit_held(f"Key of a {led.kind}", label, turned=kept)
+    ui.tooltip("A key at the playhead", more="It keeps this turn and size until here; what is set later becomes a key.")
 
 
 def _whereabouts(workspace: Workspace, label: str) -> str:
@@ -213,7 +226,7 @@ def _whereabouts(workspace: Workspace, label: str) -> str:
     return ""
 
 
-def _set_held(session: Session, label: str, name: str, slid: Slid, **setting: float) -> None:
+def _set_held(session: Session, label: str, name: str, slid: Slid, **setting: Any) -> None:
     if slid.again:
         session.retract()
     if slid.changed or slid.done:

@@ -1,22 +1,25 @@
-"""The lanes above the timeline: strokes and forces as bars, to be moved, stretched, muted and taken away."""
+"""The lanes above the timeline: strokes, forces and handles as bars, to be moved, stretched, muted and taken away."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable
-from math import ceil, floor
+from math import ceil, floor, inf
+from typing import NamedTuple
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.model.bars import Bar, bar_of, one_of
-from app.model.forces import Force
+from app.model.bars import KINDS, Actor, Bar, bar_of, one_of, several_of
+from app.model.handles import RecipeHandle, RecipePin
+from app.model.recipe import MOST_TICKS
+from app.model.schema import label_of
 from app.model.strokes import Stroke
 from app.ui import icons
 from app.ui.actions import ACTIONS, Do
 from app.ui.editor_state import EditorState
 from app.ui.lanes import Part
-from app.ui.panels.timebar import FORCES, KINDS, MASKS
+from app.ui.panels import timebar
+from app.ui.panels.timebar import FORCES, HANDLES, MASKS
 from app.ui.theme import packed, rgb
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
@@ -29,8 +32,30 @@ GRIP = 6.0  # points at a bar's ends by which it is stretched
 NARROWEST = 9.0  # points of a bar
 SHAKE = 3.0  # points that the pointer may move and is not dragging yet
 INK = rgb("1a1a1a")
-ICONS = {"thin": "thicken", "thaw": "freeze", "vortex": "twirl", "source": "bloat", "sink": "pinch"}
+ICONS = {"thin": "thicken", "thaw": "freeze", "vortex": "twirl", "source": "bloat", "sink": "pinch", "pin": "handle"}
 STEPS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600)  # seconds between two numbers
+
+
+class Scale(NamedTuple):
+    """Where ticks lie on the screen: from `start` to `stop` between `x0` and `x1`."""
+
+    x0: float
+    x1: float
+    start: float
+    stop: float
+
+    @property
+    def a_tick(self) -> float:
+        """Points that a tick takes."""
+        return (self.x1 - self.x0) / (self.stop - self.start)
+
+    def across(self, tick: float) -> float:
+        """Where a tick lies; what has no end lies at the end."""
+        return self.x1 if tick == inf else self.x0 + (tick - self.start) * self.a_tick
+
+    def tick_at(self, x: float) -> float:
+        """The tick that lies there."""
+        return self.start + (x - self.x0) / self.a_tick
 
 
 def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> None:
@@ -43,19 +68,12 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         ui.rule(ImVec2(rect.x, rect.y), ImVec2(rect.right, rect.y + ui.px(1)))
         _head(ui, session, state, do)
         bar = imgui.get_style().scrollbar_size
-        x0, x1 = rect.x + ui.px(12), rect.right - ui.px(14) - bar
-        start, stop = lanes.span(session.end)
-
-        def across(tick: float) -> float:
-            return x0 + (x1 - x0) * (tick - start) / (stop - start)
-
-        def tick_at(x: float) -> float:
-            return start + (stop - start) * (x - x0) / (x1 - x0)
-
+        x0 = rect.x + ui.px(12)
+        scale = Scale(x0, max(rect.right - ui.px(14) - bar, x0 + 1.0), *lanes.span(session.end))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
         if rect.height > ui.px(LOW):
-            _ruler(ui, session, x0, x1, (start, stop), across, tick_at)
-        let_go = _bars(ui, session, state, x0, x1, (start, stop), across, tick_at)
+            _ruler(ui, session, scale)
+        let_go = _bars(ui, session, state, scale)
         imgui.pop_style_var()
     if let_go:
         lanes.release(session)
@@ -99,15 +117,17 @@ def _told(session: Session, state: EditorState) -> str:
         return f"{name_of(one)}: {when(session, bar_of(one, which, session.end, session.dt))}"
     if lanes.selected:
         return f"{len(lanes.selected)} selected"
-    counts = [(len(recipe.stroke), "stroke"), (len(recipe.force), "force")]
+    counts = [(len(several_of(recipe, kind)), kind) for kind in reversed(KINDS)]
     told = [f"{count} {noun}{'s' if count != 1 else ''}" for count, noun in counts if count]
     return ", ".join(told) or "Strokes become bars here: move them, stretch them, repeat them."
 
 
-def name_of(one: Stroke | Force) -> str:
+def name_of(one: Actor) -> str:
     """What a person calls it."""
     if isinstance(one, Stroke):
         return one.tool.capitalize()
+    if isinstance(one, RecipeHandle | RecipePin):
+        return one.name or one.kind.capitalize()
     return one.name or f"{one.kind.capitalize()} force"
 
 
@@ -116,33 +136,25 @@ def when(session: Session, bar: Bar) -> str:
     if not bar.is_free:
         return "by a formula of the time"
     dt = session.dt
-    return f"from {bar.start * dt:.2f} s, for {(bar.end - bar.start) * dt:.2f} s"
+    lasts = "on" if bar.end == inf else f"for {(bar.end - bar.start) * dt:.2f} s"
+    return f"from {bar.start * dt:.2f} s{', ' * (bar.end < inf) or ' '}{lasts}"
 
 
-def _ruler(
-    ui: Ui,
-    session: Session,
-    x0: float,
-    x1: float,
-    shown: tuple[float, float],
-    across: Callable[[float], float],
-    tick_at: Callable[[float], float],
-) -> None:
+def _ruler(ui: Ui, session: Session, scale: Scale) -> None:
     """Seconds, and the playhead, which follows the pointer that is pressed here."""
-    corner, height, dt = imgui.get_cursor_screen_pos(), ui.px(RULER), session.dt
+    corner, height, dt, x1 = imgui.get_cursor_screen_pos(), ui.px(RULER), session.dt, scale.x1
     imgui.invisible_button("ruler", ImVec2(max(x1 - corner.x, 1.0), height))
     if imgui.is_item_active() and session.end:
-        tick = round(min(max(tick_at(imgui.get_mouse_pos().x), 0), session.end))
+        tick = round(min(max(scale.tick_at(imgui.get_mouse_pos().x), 0), session.end))
         if tick != session.target:
             session.seek(tick)
     elif imgui.is_item_hovered():
         ui.tooltip("The recording", more="Drag to go through it. The wheel with Ctrl shows less of it, or more.")
     draw, palette = imgui.get_window_draw_list(), ui.palette
-    per_second = (x1 - x0) / (shown[1] - shown[0]) / dt
-    step = next((step for step in STEPS if step * per_second >= ui.px(56)), STEPS[-1])
+    step = next((step for step in STEPS if step * scale.a_tick / dt >= ui.px(56)), STEPS[-1])
     imgui.push_font(ui.fonts.regular, 11.5)
-    for number in range(ceil(shown[0] * dt / step - 1e-6), floor(shown[1] * dt / step + 1e-6) + 1):
-        x = across(number * step / dt)
+    for number in range(ceil(scale.start * dt / step - 1e-6), floor(scale.stop * dt / step + 1e-6) + 1):
+        x = scale.across(number * step / dt)
         words = f"{number * step:g} s"
         ui.rule(ImVec2(x, corner.y + height - ui.px(5)), ImVec2(x + ui.px(1), corner.y + height))
         if x + imgui.calc_text_size(words).x + ui.px(4) < x1 + ui.px(14):
@@ -151,27 +163,16 @@ def _ruler(
     ui.rule(ImVec2(corner.x, corner.y + height - ui.px(1)), ImVec2(x1, corner.y + height))
 
 
-def _bars(
-    ui: Ui,
-    session: Session,
-    state: EditorState,
-    x0: float,
-    x1: float,
-    shown: tuple[float, float],
-    across: Callable[[float], float],
-    tick_at: Callable[[float], float],
-) -> bool:
+def _bars(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
     """The bars; True if the pointer has let go of them."""
     lanes = state.lanes
-    width = x1 - x0
-    least = ui.px(NARROWEST) * (shown[1] - shown[0]) / max(width, 1.0)
-    packed_lanes = lanes.packed(session.recipe, session.end, least)
+    packed_lanes = lanes.packed(session.recipe, session.end, ui.px(NARROWEST) / scale.a_tick)
     imgui.begin_child("rows", ImVec2(0, 0), 0, imgui.WindowFlags_.no_background)
     corner, row = imgui.get_cursor_screen_pos(), ui.px(ROW + GAP)
     room = imgui.get_content_region_avail().y
     height = max(len(packed_lanes) * row + ui.px(GAP), room)
-    imgui.invisible_button("bars", ImVec2(max(x1 - corner.x + ui.px(6), 1.0), height))
-    let_go = _point(ui, session, state, tick_at)
+    imgui.invisible_button("bars", ImVec2(max(scale.x1 - corner.x + ui.px(6), 1.0), height))
+    let_go = _point(ui, session, state, scale)
     draw = imgui.get_window_draw_list()
     top = imgui.get_window_pos().y
     lanes.drawn.clear()
@@ -180,28 +181,20 @@ def _bars(
     for number in range(first, min(last, len(packed_lanes))):
         lane = packed_lanes[number]
         y = corner.y + ui.px(GAP) + number * row
-        at = max(bisect_right(lane, shown[0], key=lambda bar: bar.start) - 1, 0)
+        at = max(bisect_right(lane, scale.start, key=lambda bar: bar.start) - 1, 0)
         for bar in lane[at:]:
-            if bar.start > shown[1]:
+            if bar.start > scale.stop:
                 break
-            _bar(ui, session, state, bar, y, across, (x0, x1))
-    now = across(session.target)
-    if x0 <= now <= x1 and session.end:
+            _bar(ui, session, state, bar, y, scale)
+    now = scale.across(session.target)
+    if scale.x0 <= now <= scale.x1 and session.end:
         low, high = ImVec2(now, top), ImVec2(now + ui.px(1.5), top + imgui.get_window_height())
         draw.add_rect_filled(low, high, packed(ui.palette.text))
     imgui.end_child()
     return let_go
 
 
-def _bar(
-    ui: Ui,
-    session: Session,
-    state: EditorState,
-    bar: Bar,
-    y: float,
-    across: Callable[[float], float],
-    ends: tuple[float, float],
-) -> None:
+def _bar(ui: Ui, session: Session, state: EditorState, bar: Bar, y: float, scale: Scale) -> None:
     lanes, draw, palette = state.lanes, imgui.get_window_draw_list(), ui.palette
     one = one_of(session.recipe, bar.which)
     if one is None:
@@ -211,15 +204,18 @@ def _bar(
         taken = lanes.selected if drag.part == "move" else ()
         if bar.which == drag.bar.which or bar.which in taken:
             bar = bar_of(lanes.dragged(one, drag, session.dt), bar.which, session.end, session.dt)
-    left, right = across(bar.start), across(bar.end)
+    left, right = scale.across(bar.start), scale.across(bar.end)
     right = max(right - ui.px(1), left + ui.px(NARROWEST - 2))
     low, high = ImVec2(left, y), ImVec2(right, y + ui.px(ROW))
     lanes.drawn.append((bar, Rect(left, y, right - left, ui.px(ROW))))
     kind = one.tool if isinstance(one, Stroke) else one.kind
-    colour = KINDS.get(kind, MASKS) if isinstance(one, Stroke) else FORCES
+    if isinstance(one, Stroke):
+        colour = timebar.KINDS.get(kind, MASKS)
+    else:
+        colour = HANDLES if isinstance(one, RecipeHandle | RecipePin) else FORCES
     faint = 0.28 if bar.muted else 1.0
-    if bar.every:
-        _repeats(ui, bar, y, packed(colour, 0.45 * faint), across, ends)
+    if bar.stops > bar.end:
+        _after(ui, bar, y, packed(colour, 0.45 * faint), scale)
     draw.add_rect_filled(low, high, packed(colour, faint), ui.px(4))
     if bar.which in lanes.selected:
         draw.add_rect(low, high, packed(palette.text), ui.px(4), ui.px(2))
@@ -228,7 +224,7 @@ def _bar(
     ink = packed(palette.text if bar.muted else INK, 0.6 if bar.muted else 0.9)
     icon = "mute" if bar.muted else ICONS.get(kind, kind)
     icon = icon if icon in icons.PATHS else "force"
-    x = max(left, ends[0]) + ui.px(6)
+    x = max(left, scale.x0) + ui.px(6)
     draw.push_clip_rect(low, ImVec2(high.x - ui.px(4), high.y), True)
     icons.draw(draw, icon, x, y + ui.px(3.5), ui.px(13), ink, 2.0)
     if right - left > ui.px(60):
@@ -238,27 +234,25 @@ def _bar(
     draw.pop_clip_rect()
 
 
-def _repeats(
-    ui: Ui, bar: Bar, y: float, colour: int, across: Callable[[float], float], ends: tuple[float, float]
-) -> None:
-    """The repetitions of a bar that are seen; one long bar where they lie too close to be told apart."""
-    draw, length = imgui.get_window_draw_list(), bar.end - bar.start
-    spacing = across(bar.every) - across(0)
+def _after(ui: Ui, bar: Bar, y: float, colour: int, scale: Scale) -> None:
+    """The repetitions of a bar that are seen, or what it holds; one long bar where they cannot be told apart."""
+    draw, length, across = imgui.get_window_draw_list(), bar.end - bar.start, scale.across
+    spacing = bar.every * scale.a_tick
     top, bottom = y + ui.px(3), y + ui.px(ROW - 3)
     if spacing < ui.px(4):
-        low, high = ImVec2(max(across(bar.end), ends[0]), top), ImVec2(min(across(bar.stops), ends[1]), bottom)
+        low, high = ImVec2(max(across(bar.end), scale.x0), top), ImVec2(min(across(bar.stops), scale.x1), bottom)
         draw.add_rect_filled(low, high, colour, ui.px(3))
         return
     times = round((bar.stops - bar.end) / bar.every)
-    first = max(floor((ends[0] - across(bar.end)) / spacing), 1)
-    last = min(ceil((ends[1] - across(bar.start)) / spacing), times)
+    first = max(floor((scale.x0 - across(bar.end)) / spacing), 1)
+    last = min(ceil((scale.x1 - across(bar.start)) / spacing), times)
     for time in range(first, last + 1):
         left, right = across(bar.start + time * bar.every), across(bar.start + time * bar.every + length)
         right = max(right - ui.px(1), left + ui.px(3))
         draw.add_rect_filled(ImVec2(left, top), ImVec2(right, bottom), colour, ui.px(3))
 
 
-def _point(ui: Ui, session: Session, state: EditorState, tick_at: Callable[[float], float]) -> bool:
+def _point(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
     """What the pointer does to the bars; True if it has let go of them."""
     lanes, mouse, io = state.lanes, imgui.get_mouse_pos(), imgui.get_io()
     hovered, let_go = imgui.is_item_hovered(), imgui.is_item_deactivated()
@@ -266,18 +260,18 @@ def _point(ui: Ui, session: Session, state: EditorState, tick_at: Callable[[floa
     if imgui.is_item_activated():
         adds = io.key_shift or io.key_ctrl
         if found is not None:
-            state.selected = ""
-            lanes.press(*found, tick_at(mouse.x), mouse.x, adds, session.end)
+            state.selected = _label(session, found[0])
+            lanes.press(*found, scale.tick_at(mouse.x), mouse.x, adds, session.end)
         elif not adds:
             lanes.selected = set()
     elif imgui.is_item_active() and lanes.drag is not None:
         drag = lanes.drag
         drag.moved |= abs(mouse.x - drag.x) > ui.px(SHAKE)
-        drag.ticks = _limited(state, session, round(tick_at(mouse.x) - drag.at))
+        drag.ticks = _limited(state, session, round(scale.tick_at(mouse.x) - drag.at))
     elif found is not None:
         _tell(ui, session, found[0])
     if hovered and io.mouse_wheel and io.key_ctrl:
-        lanes.zoom(session.end, tick_at(mouse.x), 0.8**io.mouse_wheel)
+        lanes.zoom(session.end, scale.tick_at(mouse.x), 0.8**io.mouse_wheel)
     elif hovered and (io.mouse_wheel_h or (io.mouse_wheel and io.key_shift)):
         lanes.pan(session.end, -0.1 * (io.mouse_wheel_h or io.mouse_wheel))
     return let_go
@@ -291,7 +285,7 @@ def _limited(state: EditorState, session: Session, ticks: int) -> int:
         return 0
     if drag.part == "move":
         return max(ticks, -int(state.lanes.earliest(session)))
-    length = int(drag.bar.end - drag.bar.start)
+    length = int(min(drag.bar.end - drag.bar.start, MOST_TICKS))
     return max(min(ticks, length - 1), -int(drag.bar.start)) if drag.part == "start" else max(ticks, 1 - length)
 
 
@@ -306,6 +300,13 @@ def _under(ui: Ui, state: EditorState, x: float, y: float) -> tuple[Bar, Part] |
                 return bar, "end"
             return bar, "start" if x < rect.x + grip and rect.width > 2 * ui.px(GRIP) else "move"
     return None
+
+
+def _label(session: Session, bar: Bar) -> str:
+    """What messages call the handle or pin of a bar; nothing where it is of none."""
+    one = one_of(session.recipe, bar.which)
+    held = isinstance(one, RecipeHandle | RecipePin)
+    return label_of(one.kind, bar.which[1] + 1, one.name) if held else ""
 
 
 def _tell(ui: Ui, session: Session, bar: Bar) -> None:

@@ -1,11 +1,12 @@
-"""The fields of a stroke or a force whose bar is selected: when, how long, how strong, how often."""
+"""The fields of what is selected by its bar: when, how long, how strong, how often."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 
-from app.model.bars import Which, bar_of, stretched
-from app.model.forces import Force
+from app.model.bars import Actor, Which, bar_of, stretched
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.strokes import Stroke
 from app.ui.editor_state import EditorState
 from app.ui.panels.lanes import name_of
@@ -35,9 +36,10 @@ def draw(ui: Ui, session: Session, state: EditorState) -> None:
         )  # fmt: skip
         _set(session, which, "Strength of a stroke", slid, lambda one: one.model_copy(update={"strength": slid.value}))
         _repeats(ui, session, which, one)
-    else:
+    elif not isinstance(one, RecipeHandle | RecipePin):  # which have a section of their own
         saved = state.lanes.only(session.document.recipe)
-        most = STRONGEST * max(abs(saved[1].strength if saved else one.strength), 0.5)
+        before = saved[1] if saved and isinstance(saved[1], type(one)) else one
+        most = STRONGEST * max(abs(before.strength), 0.5)
         slid = ui.slider(
             "bar strength", "Strength", one.strength, -most, most, THREE_DIGITS,
             title="Strength", more="Below zero it acts the other way round.",
@@ -45,7 +47,7 @@ def draw(ui: Ui, session: Session, state: EditorState) -> None:
         _set(session, which, "Strength of a force", slid, lambda one: one.model_copy(update={"strength": slid.value}))
 
 
-def _times(ui: Ui, session: Session, which: Which, one: Stroke | Force) -> None:
+def _times(ui: Ui, session: Session, which: Which, one: Actor) -> None:
     dt, end = session.dt, max(session.end, 1)
     bar = bar_of(one, which, end, dt)
     if not bar.is_free:
@@ -54,20 +56,22 @@ def _times(ui: Ui, session: Session, which: Which, one: Stroke | Force) -> None:
     latest = max(FARTHEST * end, bar.start) * dt
     slid = ui.slider("bar start", "Start", bar.start * dt, 0.0, latest, SECONDS, title="When it begins")
 
-    def begun(one: Stroke | Force) -> Stroke | Force:
+    def begun(one: Actor) -> Actor:
         here = bar_of(one, which, end, dt)
         return stretched(one, slid.value / dt, slid.value / dt + here.end - here.start, dt)
 
     _set(session, which, f"Move {which[0]}", slid, begun)
     if not isinstance(one, Stroke) and one.span is not None and one.span[0] == one.span[1]:
         return  # an instant
+    if bar.end == inf:
+        return
     length = bar.end - bar.start
     slid = ui.slider(
         "bar length", "Duration", length * dt, dt, max(FARTHEST * end, length) * dt, SECONDS,
         title="How long it lasts", more="The hand goes as much faster, or slower." if which[0] == "stroke" else "",
     )  # fmt: skip
 
-    def lasted(one: Stroke | Force) -> Stroke | Force:
+    def lasted(one: Actor) -> Actor:
         start = bar_of(one, which, end, dt).start
         return stretched(one, start, start + max(round(slid.value / dt), 1), dt)
 
@@ -92,16 +96,14 @@ def _repeats(ui: Ui, session: Session, which: Which, one: Stroke) -> None:
     _set(session, which, "Repeat stroke", slid, lambda one: _repeated(one, 0, every))
 
 
-def _repeated(one: Stroke | Force, times: int, every: int) -> Stroke | Force:
+def _repeated(one: Actor, times: int, every: int) -> Actor:
     """With other times or another spacing; 0 leaves it, and the first spacing is one right after the other."""
     if not isinstance(one, Stroke):
         return one
     return one.repeated(times or one.repeat, every or one.every or one.last_tick + 1 - one.first_tick)
 
 
-def _set(
-    session: Session, which: Which, name: str, slid: Slid, changed: Callable[[Stroke | Force], Stroke | Force]
-) -> None:
+def _set(session: Session, which: Which, name: str, slid: Slid, changed: Callable[[Actor], Actor]) -> None:
     """Set what a slider says: an edit once it is let go of."""
     if slid.again:
         session.retract()

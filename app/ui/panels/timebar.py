@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.model.handles import RecipeHandle, labelled
-from app.ui.actions import Do
+from app.ui.actions import ACTIONS, Do
 from app.ui.editor_state import EditorState
 from app.ui.theme import Colour, blend, packed, rgb
 from app.ui.units import PERCENT
@@ -57,7 +57,7 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
             do("repeat")
         imgui.same_line(0, ui.px(2))
         shown = state.lanes.shown
-        if ui.icon_button("lanes", "lanes", "Strokes and forces as bars", "l", "To move them in time.", active=shown):
+        if ui.icon_button("lanes", "lanes", ACTIONS["lanes"].label, "l", "To move them in time.", active=shown):
             do("lanes")
         imgui.same_line(0, ui.px(10))
         if imgui.get_window_width() > ui.px(560):
