@@ -42,7 +42,7 @@ class EnergyBound:
         energy = self.device.pass_("step/energy.frag", **({"PARTIAL": 1} if weights else {}))
         energy(self._squares, **w3.inputs(), departed=before, side=SIDE, **(weights or {}))
         after, departed = self._sum(self._squares).tolist()
-        if not (departed <= self._cells * LARGEST_SPEED**2 and math.isfinite(after)):
+        if not (departed <= 2 * self._cells * LARGEST_SPEED**2 and math.isfinite(after)):
             raise ValueError("the forces and brushes of this step are beyond all measure")
         most = math.sqrt(departed) + wall_speed * math.sqrt(self._cells)
         if math.sqrt(after) <= most:

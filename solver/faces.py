@@ -17,6 +17,8 @@ Vector = np.ndarray | Function
 # A force, lengths / s^2: a vector, or a field on faces with its time law integrated over the step, seconds.
 Force = Vector | tuple[Field, float]
 Forces = Vector | Iterable[Force]
+# Those in a step: fields with their impulses, and the velocity that all others add, if there are any.
+Impulses = tuple[list[tuple[Field, float]], np.ndarray | None]
 
 
 def on_faces(what: str, vector: Vector, grid: Grid, time: float = 0.0) -> np.ndarray:
@@ -80,8 +82,8 @@ def check_field(what: str, field: Field, grid: Grid) -> None:
         raise ValueError(f"{what} is {field}, {grid.nx} x {grid.ny} x 2 is wanted")
 
 
-def impulses(forces: Forces, grid: Grid, time: float, dt: float) -> tuple[list[tuple[Field, float]], np.ndarray | None]:
-    """What forces add from `time` on in `dt`: fields with their impulses, and the velocity of all others together.
+def impulses(forces: Forces, grid: Grid, time: float, dt: float) -> Impulses:
+    """What forces add from `time` on in `dt`.
 
     Raises:
         ValueError: for a force of another shape, or one that is not finite or beyond all measure.
@@ -100,7 +102,8 @@ def impulses(forces: Forces, grid: Grid, time: float, dt: float) -> tuple[list[t
             if impulse != 0.0:
                 fields.append((field, float(impulse)))
         else:
-            faces = dt * on_faces("a force", force, grid, time + dt / 2)
+            with np.errstate(over="ignore"):
+                faces = dt * on_faces("a force", force, grid, time + dt / 2)
             check_size("what a force adds to the velocity", faces)
             total = faces if total is None else total + faces
     return fields, total

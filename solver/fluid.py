@@ -7,7 +7,8 @@ below the other. What they do is in `advection`, `viscosity`, `energy` and `pres
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 
 from solver.advection import Advected, Advection, Blocks
 from solver.energy import EnergyBound
-from solver.faces import Forces, Vector, impulses, on_faces
+from solver.faces import Forces, Impulses, Vector, impulses, on_faces
 from solver.flow import Flow
 from solver.gl.device import Device
 from solver.gl.field import Field
@@ -26,7 +27,6 @@ from solver.packing import PackedFaces
 from solver.params import FluidParams
 from solver.pressure.projection import Projection
 from solver.scheme import Residuals, Scheme
-from solver.state import State
 from solver.trace import Trace, Tracing
 from solver.viscosity.solve import Viscosity
 
@@ -69,28 +69,27 @@ class Fluid(Scheme):
         dt = check_step(dt)
         if steer is not None:
             check_type("what steers", steer, Callable)
+        self._check_source()
+        given = impulses(forces, self.grid, self.time, dt)
         self.local.clear()
         self.residuals = Residuals()
-        w1 = self._add_force(forces, dt)
-        w2 = self._advect(w1, dt)
-        w3 = self._diffuse(w2)
-        w3 = self._bound_energy(w3, w2.energy)
-        if steer is None:
-            self._project(w3)
-        else:
-            self._unpack(w3)
-            steer(self.velocity.read)
-            self._project()
+        with self._whole_or_not_at_all():
+            w2 = self._advect(self._add_force(given), dt)
+            w3 = self._bound_energy(self._diffuse(w2), w2.energy)
+            if steer is None:
+                self._project(w3)
+            else:
+                self._replace(partial(self._viscosity_solver.unpack, w3), steer)
+                self._project()
         self.time += dt
 
-    def _add_force(self, forces: Forces, dt: float) -> Blocks:
+    def _add_force(self, given: Impulses) -> Blocks:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn: equation (S2).
 
         g is half of what pressure did in the last step; the projection takes off the rest where the fluid arrives. So
         pressure acts along the path by the trapezoidal rule, which is of second order in time.
         """
-        self._check_source()
-        force = self._force(forces, dt)
+        force = self._together(given)
         with self.device.stage("add force"):
             w1 = self._advection.depart(self.velocity.read, self.params.walls, carried=self._carried.read, **force)
         self.impulse.clear()
@@ -126,15 +125,11 @@ class Fluid(Scheme):
         Walls that move may besides bring all of the fluid to their own speed.
 
         Raises:
-            ValueError: if what departed is not finite, or beyond all measure; the velocity stays as it was.
+            ValueError: if what departed is not finite, or beyond all measure.
         """
         with self.device.stage("diffuse"):
-            try:
-                weights = self._pressure_solver.weights
-                return self._energy_bound.apply(w3, before, max(map(abs, self.params.walls.driving_speed)), weights)
-            except ValueError:
-                self._forget_last_step()
-                raise
+            wall_speed = max(map(abs, self.params.walls.driving_speed))
+            return self._energy_bound.apply(w3, before, wall_speed, self._pressure_solver.weights)
 
     def _project(self, w3: PackedFaces | None = None, carries: bool = True) -> None:
         """w4 = w3 - grad q with lap q = div w3 - source, and g for the next step; w3 is by default `velocity`."""
@@ -162,22 +157,25 @@ class Fluid(Scheme):
 
     def add_force(self, forces: Forces, dt: float) -> None:
         """Add forces, and what brushes have drawn, to the velocity; see `step`."""
-        if force := self._force(forces, check_step(dt)):
-            self.device.pass_("step/add_impulse.frag")(self.velocity.read, add=True, **force)
+        given = impulses(forces, self.grid, self.time, check_step(dt))
+        with self._whole_or_not_at_all():
+            if force := self._together(given):
+                before, add = self.velocity.read, self.device.pass_("step/add_impulse.frag")
+                self._replace(lambda faces: faces.copy_from(before), partial(add, add=True, **force))
         self.impulse.clear()
-        self._velocity_changed()
 
     def advect(self, dt: float) -> None:
-        """Let the velocity carry itself for `dt` seconds; the result is not free of divergence."""
+        """Let the velocity carry itself for `dt` seconds, with no more energy; the result is not free of divergence."""
         dt = check_step(dt)
-        w1 = self._advection.depart(self.velocity.read, self.params.walls)
-        self._unpack(self._advect(w1, dt).faces)
+        with self._whole_or_not_at_all():
+            w2 = self._advect(self._advection.depart(self.velocity.read, self.params.walls), dt)
+            self._unpack(self._bound_energy(w2.faces, w2.energy))
 
     def diffuse(self, dt: float) -> None:
         """Let viscosity act on the velocity for `dt` seconds; the result is not free of divergence."""
         self._take_up_masks(check_step(dt))
         with self.device.stage("diffuse"):
-            self._viscosity_solver.diffuse(self.velocity)
+            self._viscosity_solver.diffuse(self.velocity.read)
             self._velocity_changed()
 
     def project(self) -> None:
@@ -305,10 +303,6 @@ class Fluid(Scheme):
 
     # -- its state --------------------------------------------------------------------------------------------------
 
-    def restore(self, state: State) -> None:
-        super().restore(state)
-        self._velocity_changed()
-
     def release(self) -> None:
         super().release()
         for item in (self.velocity, self._carried, self._trace, self._flux, self._advection, self._energy_bound):
@@ -324,12 +318,12 @@ class Fluid(Scheme):
 
     # -- parts of the stages ----------------------------------------------------------------------------------------
 
-    def _force(self, forces: Forces, dt: float) -> dict[str, Any]:
+    def _together(self, given: Impulses) -> dict[str, Any]:
         """All that acts in a step as one `force` and its `impulse`, empty if nothing does.
 
         More than one are added up where brushes draw.
         """
-        fields, faces = impulses(forces, self.grid, self.time, dt)
+        fields, faces = given
         upload = None if faces is None else self.device.upload(faces, "force")
         if upload:
             fields.append((upload, 1.0))
@@ -341,6 +335,23 @@ class Fluid(Scheme):
         if upload:
             upload.release()
         return {"force": fields[0][0], "impulse": fields[0][1]} if fields else {}
+
+    @contextmanager
+    def _whole_or_not_at_all(self) -> Iterator[None]:
+        """Where something fails inside, the velocity stays as it was, and what was put in for the step is forgotten."""
+        try:
+            yield
+        except BaseException:
+            self._forget_last_step()
+            raise
+
+    def _replace(self, *draws: Callable[[Field], object]) -> None:
+        """Let `draws`, one after the other, make another velocity, if it is not beyond all measure."""
+        for draw in draws:
+            draw(self.velocity.write)
+        check_size("the velocity", self.velocity.write.get())
+        self.velocity.swap()
+        self._velocity_changed()
 
     def _unpack(self, faces: PackedFaces) -> None:
         """Let packed faces be the velocity."""

@@ -262,8 +262,11 @@ class Scheme(ABC):
             ValueError: if the state is of another grid or of another scheme.
         """
         check_type("what to go back to", state, State)
+        time = state.values.get("time", np.array(np.nan))
+        if time.shape or not np.isfinite(time):
+            raise ValueError("the state is of no time")
         state.write_to(self._live())
-        self.time = float(state.values["time"])
+        self.time = float(time)
         self.impulse.clear()
         self.source.clear()
         self.local.clear()

@@ -303,6 +303,7 @@ class Masks:
 
     def _region(self, tip: Tip) -> Region:
         """The texels of the canvas that a tip touches."""
+        check_type("what paints", tip, Tip)
         x, y, width, height = tip.region(self.canvas)
         left, top = max(x, 0), max(y, 0)
         right, bottom = min(x + width, self.canvas.nx), min(y + height, self.canvas.ny)

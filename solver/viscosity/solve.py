@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.gl.device import Device
-from solver.gl.field import DoubleField, Field
+from solver.gl.field import Field
 from solver.packing import DoublePackedFaces, PackedFaces, Packing
 from solver.params import Walls
 from solver.viscosity.conjugate_gradients import ConjugateGradients
@@ -90,10 +90,10 @@ class Viscosity:
         finest = self.multigrid.finest
         return Packing(finest.region, {"UNIFORM": 1} if "UNIFORM" in finest.defines else {}, finest.open)
 
-    def diffuse(self, velocity: DoubleField) -> None:
+    def diffuse(self, velocity: Field) -> None:
         """Replace the velocity on MAC faces (lengths / s) by the solution; see `solve`."""
-        self._pack(velocity.read, self.v_star)
-        self.unpack(self.solve(), velocity.read)
+        self._pack(velocity, self.v_star)
+        self.unpack(self.solve(), velocity)
 
     def solve(self) -> PackedFaces:
         """The solution for `v_star`, packed, in lengths / s; valid until the next solve."""

@@ -36,7 +36,7 @@ def costs(device: Device, case: Case, jacobi: Jacobi) -> tuple[float, float]:
     for _ in range(REPEATS):
         stamps = [time.process_time()]
         solver.set_coefficients(*fields, 1 / max(nx, ny) ** 2, case.walls)
-        for job in (lambda: None, jacobi.ten, lambda: solver.diffuse(velocity), jacobi.ten):
+        for job in (lambda: None, jacobi.ten, lambda: solver.diffuse(velocity.read), jacobi.ten):
             device.ctx.finish()
             stamps.append(time.process_time())
             velocity.read.set(case.faces)

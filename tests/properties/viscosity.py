@@ -140,7 +140,7 @@ class Case:
         solver.set_coefficients(*fields, hx * hy, self.walls)
         velocity = device.double_field((nx, ny), 2, "velocity")
         velocity.read.set(self.faces)
-        solver.diffuse(velocity)
+        solver.diffuse(velocity.read)
         found = velocity.read.get().astype(np.float64)
         for item in (solver, velocity, *fields):
             item.release()
@@ -251,7 +251,7 @@ def solved(solver: Viscosity, faces: np.ndarray) -> bytes:
     velocity = solver.device.double_field(solver.size, 2, "velocity")
     velocity.read.set(faces)
     solver.forget()
-    solver.diffuse(velocity)
+    solver.diffuse(velocity.read)
     found = velocity.read.get().tobytes()
     velocity.release()
     return found

@@ -30,7 +30,7 @@ from solver import (
 )
 from solver.brush.push import Push
 from solver.gl.context import ContextError
-from solver.gl.field import FieldError
+from solver.gl.field import Field, FieldError
 from solver.resample.plan import Sampling
 from solver.resample.sampler import Sampler
 from solver.warp.inverse import ForwardMap
@@ -93,7 +93,7 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
     "a force of one array": (lambda fluid: fluid.step(0.1, lambda x, y, t: x), "two components"),
     "a complex force": (lambda fluid: fluid.step(0.1, np.full((12, 20, 2), 1j)), "real"),
     "a velocity of nothing": (lambda fluid: fluid.set_velocity(np.full((12, 20, 2), None)), "real"),
-    "solids of words": (lambda fluid: fluid.set_solid(np.full((12, 20), "ice")), "true or false"),
+    "solids of words": (lambda fluid: fluid.set_solid(np.full((12, 20), "ice")), "real"),
     "a source of another grid": (lambda fluid: fluid.add_source(fluid.device.upload(np.ones((5, 20)))), "source"),
     "a source of two components": (lambda fluid: fluid.add_source(fluid.device.upload(np.ones((12, 20, 2)))), "source"),
     "sticky walls": (lambda fluid: Walls(cast(Any, "sticky")), "slip"),
@@ -179,6 +179,45 @@ def test_what_cannot_be_simulated_is_refused_and_nothing_has_happened(fluid: Flu
     assert np.isfinite(fluid.u).all()
 
 
+def fail(_: Field) -> None:
+    raise KeyError("it fails")
+
+
+FAILING: dict[str, Callable[[Fluid, Field], object]] = {
+    "what steers fails": lambda fluid, _: fluid.step(0.1, np.ones((12, 20, 2)), fail),
+    "what steers makes too much": lambda fluid, huge: fluid.step(0.1, (), lambda faces: faces.copy_from(huge)),
+    "a stage makes too much": lambda fluid, huge: fluid.add_force([(huge, 1.0)], 0.1),
+    "brushes do": lambda fluid, huge: (fluid.impulse.add(lambda faces: faces.copy_from(huge)), fluid.step(0.1)),
+    "they do in a stage": lambda fluid, huge: (fluid.impulse.add(lambda f: f.copy_from(huge)), fluid.add_force((), 1)),
+}
+
+
+@pytest.mark.parametrize("name", FAILING)
+def test_what_fails_on_the_way_leaves_the_velocity_as_if_it_had_just_been_set(fluid: Fluid, name: str) -> None:
+    fluid.step(0.1)
+    before, huge = fluid.faces().get(), fluid.device.upload(np.full((12, 20, 2), 1e30))
+    with pytest.raises((ValueError, KeyError), match=r"beyond|fails"):
+        FAILING[name](fluid, huge)
+    np.testing.assert_array_equal(fluid.faces().get(), before)
+    other = Fluid(fluid.device, fluid.grid)
+    other.set_velocity(before)
+    for one in (fluid, other):
+        one.step(0.1)
+    np.testing.assert_array_equal(fluid.u, other.u)
+    other.release()
+
+
+def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
+    """Up and down from face to face, which the projection leaves nearly as it is, with a stage and with a step."""
+    fluid = Fluid(device, Grid(20, 12))
+    sign = (-1.0) ** np.indices((12, 20)).sum(axis=0)
+    for act in (lambda: fluid.step(1e-9), lambda: fluid.advect(1e-9), lambda: fluid.add_force((), 0.1)):
+        fluid.set_velocity(1e6 * np.stack([sign, sign], axis=-1))
+        act()
+        assert np.isfinite(fluid.u).all()
+    fluid.release()
+
+
 @pytest.mark.parametrize(
     "act",
     [
@@ -259,6 +298,11 @@ def test_a_saved_moment_is_a_copy_and_comes_back(device: Device, kind: type[Flui
         np.testing.assert_array_equal(fluid.u, wanted)
     assert fluid.time == time
     other = kind(device, Grid(16, 24))
+    for time in ({}, {"time": np.array(np.nan)}, {"time": np.zeros(2)}):
+        timeless = state.with_arrays(device, {k: v for k, v in state.arrays().items() if k != "time"} | time)
+        with pytest.raises(ValueError, match="of no time"):
+            fluid.restore(timeless)
+        timeless.release()
     with pytest.raises(ValueError, match="another grid"):
         other.restore(state)
     state.release()
@@ -365,9 +409,13 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         lambda wrong: Masks(device, wrong),
         lambda wrong: Masks(device, grid).set_base(wrong),
         lambda wrong: Masks(device, grid).apply(wrong),
+        lambda wrong: Masks(device, grid).thicken(wrong, 1.0),
         lambda wrong: Sampler(device).apply(warp, wrong),
         lambda wrong: Sampler(device).apply(wrong, np.zeros((6, 6), np.uint8)),
         warp.move_to,
+        lambda wrong: WarpMap(device, grid, wrong or cast(Any, 8)),
+        lambda wrong: WarpMap(device, grid, (wrong, 16)),
+        lambda wrong: WarpMap(device, grid, remap_every=wrong),
         lambda wrong: warp.hold(wrong or cast(Any, still)),
         device.upload,
     ]
@@ -413,9 +461,11 @@ def test_devices_beside_each_other_do_not_mix(device: Device) -> None:
             fluid.step(0.1)
             np.testing.assert_array_equal(fluid.u, wanted)
         force = other.upload(np.ones((12, 20, 2)))
-        with pytest.raises(FieldError, match="another device"):
-            here.step(0.1, [(force, 0.1)])
-        np.testing.assert_array_equal(here.u, wanted)
+        for forces in ([(force, 0.1)], [(device.upload(np.ones((12, 20, 2))), 0.1), (force, 0.1)]):
+            with pytest.raises(FieldError, match="another device"):
+                here.step(0.1, forces)
+            np.testing.assert_array_equal(here.u, wanted)
+            assert here.impulse.is_empty
     here.step(0.1)
     assert np.isfinite(here.u).all()
     with pytest.raises(ContextError, match="released"):
@@ -451,3 +501,5 @@ def test_what_float32_cannot_hold_is_refused_in_a_sentence(device: Device):
             Fluid(device, grid).set_velocity(np.full((16, 24, 2), 1e39))
         with pytest.raises(ValueError, match="not finite"):
             Fluid(device, grid).step(0.1, lambda x, y, t: (0 * x + 1e39, y))
+        with pytest.raises(ValueError, match="beyond"):
+            Fluid(device, grid).step(1e4, np.full((16, 24, 2), 1e35))

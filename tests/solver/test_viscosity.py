@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from scipy import ndimage
 
 from solver import Fluid, Grid, WarpMap
 from solver.gl.device import Device
-from solver.gl.field import Field
 from solver.params import Walls
 from solver.viscosity.solve import Viscosity
 from support import reference
@@ -46,7 +44,7 @@ class Step:
 
     def __call__(self, faces: np.ndarray) -> np.ndarray:
         self.velocity.read.set(faces)
-        self.solver.diffuse(self.velocity)
+        self.solver.diffuse(self.velocity.read)
         return self.velocity.read.get().astype(np.float64)
 
     def exact(self, faces: np.ndarray) -> np.ndarray:
@@ -325,10 +323,6 @@ def test_what_the_last_step_changed_makes_the_next_one_more_exact(device: Device
     assert misled < 1.1 * error(step(push(*size)), exact)
 
 
-def diffuse_by(solver: Viscosity, fluid: Fluid, _: Field) -> None:
-    solver.diffuse(fluid.velocity)
-
-
 def test_strokes_over_a_stiff_disc_end_where_exact_steps_would(device: Device) -> None:
     """What a step leaves undone must not add up: half a turn of a brush around the disc, then coasting."""
     n, dt = 64, 1 / 60
@@ -349,7 +343,7 @@ def test_strokes_over_a_stiff_disc_end_where_exact_steps_would(device: Device) -
             ]
             force = device.upload(np.stack(stroke, axis=-1).astype(np.float32))
             # Exactly: the fluid leaves the viscous step out, and what steers it makes that.
-            steer = partial(diffuse_by, exact.solver, fluid) if exactly else None
+            steer = exact.solver.diffuse if exactly else None
             fluid.step(dt, [(force, 0.03)] if step < 25 else [], steer)
             warp.follow(fluid, dt)
             force.release()
@@ -415,7 +409,7 @@ def test_what_was_solved_before_does_not_matter(device: Device) -> None:
         assert solver.plan.method == "smooth"
         faces = device.double_field(size, 2)
         faces.read.set(velocity)
-        solver.diffuse(faces)
+        solver.diffuse(faces.read)
         found.append(faces.read.get())
         solver.release()
     for other in found[1:]:
