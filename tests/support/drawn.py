@@ -14,7 +14,7 @@ from solver.gl.passes import Pass
 
 SHAPES = (
     "add_circle", "add_circle_filled", "add_convex_poly_filled", "add_image", "add_line", "add_polyline", "add_rect",
-    "add_rect_filled", "add_text", "add_triangle_filled", "push_clip_rect",
+    "add_rect_filled", "add_text", "add_triangle_filled", "push_clip_rect", "pop_clip_rect",
 )  # fmt: skip
 NEAR = 0.6  # points, and of the numbers for the canvas's shader, parts of a hundred
 
