@@ -136,6 +136,21 @@ def test_several_pictures(folder: Path, fluidwarp: Run):
     assert {"cat warped.png", "dog warped.png"} <= here(folder)
 
 
+def test_the_other_pictures_of_a_recipe_are_looked_for_beside_it(folder: Path, fluidwarp: Run):
+    (folder / "elsewhere").mkdir()
+    mask = '[[viscosity]]\nkind = "picture"\npicture = "cat.png"\nscale = 1.0\n'
+    (folder / "a.toml").write_text(RECIPE + mask)
+    assert fluidwarp(folder, "render", "a.toml", "-o", "a.png").returncode == 0
+    ran = fluidwarp(folder / "elsewhere", "render", "../a.toml", "-o", "a.png")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert (folder / "elsewhere" / "a.png").read_bytes() == (folder / "a.png").read_bytes()
+
+
+def test_a_command_stays_one_whatever_lies_in_the_folder(folder: Path, fluidwarp: Run):
+    (folder / "convert").write_text("")
+    assert "none.npy: there is no such file" in fluidwarp(folder, "convert", "none.npy", "-o", "x.npy").stderr
+
+
 def test_an_animation_that_would_begin_after_its_end_is_told(folder: Path, fluidwarp: Run):
     ran = fluidwarp(folder, "render", "a.toml", "-o", "b.gif", "--from", "99")
     assert ran.returncode == 1

@@ -68,7 +68,10 @@ def test_a_sheet_is_as_high_as_its_panels(studio: Studio) -> None:
 def test_what_is_played_ends_as_the_still_and_as_a_replay(studio: Studio) -> None:
     recipe = load("figure-5")
     short = {"duration": 2 * recipe.fluid.dt, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
-    played = studio.play("figure-5", **short)
+    seen: list[np.ndarray] = []
+    played = studio.play("figure-5", watch=lambda replay, frame: seen.append(frame), **short)
+    assert np.array_equal(seen[-1], played.result)
+    assert len(seen) == 2
     assert np.array_equal(played.result, studio.still(recipe.edited(**short)))
     replay = Replay(studio.device, played.recipe, Pictures(Picture(played.source), gallery.recipes_folder()))
     replay.seek(2)

@@ -170,6 +170,8 @@ def test_colours_are_found_in_a_layer_or_a_part(device: Device, tmp_path: Path):
     deep, colours = read_exr(tmp_path / "out.exr")
     assert_same(deep, {"Z": noise(9, np.float32)})
     assert_same(colours, planes)
+    source = saved(tmp_path / "mask.exr", ({}, {"a.Y": noise(9, np.float32), **other}))  # a plane is no picture
+    np.testing.assert_array_equal(read_picture(source).pixels, np.stack(list(other.values()), axis=-1))
 
 
 @pytest.mark.parametrize("bits", [16, 32, None])

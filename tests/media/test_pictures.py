@@ -323,6 +323,9 @@ def test_odd_tiffs(tmp_path: Path):
     tifffile.imwrite(path, premultiplied, photometric="rgb", extrasamples=["assocalpha"])
     assert read_picture(path).pixels[0, 0].tolist() == [64, 64, 64, 128]
     assert read_picture(path).straight().pixels[0, 0].tolist() == [128, 128, 128, 128]
+    whole = noise(3, np.uint16).astype(np.uint32) * 65536 + 40_000
+    tifffile.imwrite(path, whole, photometric="rgb")
+    np.testing.assert_array_equal(read_picture(path).pixels, whole // 65536)
     for unsupported in (np.zeros((4, 4), np.complex64), np.zeros((4, 4), np.int16)):
         tifffile.imwrite(path, unsupported)
         with pytest.raises(UserError, match="convert it to 16 bits"):

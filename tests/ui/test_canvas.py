@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from app.ui.canvas import EDGES
 from solver.gl.device import Device
+from support.golden import Golden, told
 
 SIDE = 4
 
@@ -62,3 +64,59 @@ def test_squares_shine_through_as_far_as_the_picture_is_transparent(device: Devi
     light = np.kron([[0, 1], [1, 0]], np.ones((2, 2), bool))[..., None]  # the lowest square on the left is light
     squares = np.where(light, np.array([0.9, 0.8, 0.7]), np.array([0.3, 0.2, 0.1]))
     np.testing.assert_allclose(found, picture[..., :3] + (1 - picture[..., 3:]) * squares, atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def golden(shared_device: Device) -> Iterator[Golden]:
+    if not shared_device.limits.is_software:
+        pytest.skip("what is written down is of the software rasteriser")
+    golden = Golden("canvas.txt")
+    yield golden
+    golden.close()
+
+
+@pytest.mark.parametrize("name", ["grid", "viscosity", "frozen", "arrows", "forces", "selected"])
+def test_overlays_are_drawn_as_it_is_written_down(device: Device, name: str, golden: Golden) -> None:
+    """Over part of the picture, at two zooms."""
+    rng, (y, x) = np.random.default_rng(4), np.mgrid[0:24, 0:32] / 32
+    window = {"window": (0.1, 0.2, 0.7, 0.6)}
+    waves = np.stack([np.sin(7 * x + 3 * y), np.cos(5 * x - 6 * y)], axis=-1)
+    half = (waves[..., :1] > 0.3).astype(np.float32)
+    given: dict[str, dict[str, Any]] = {
+        "grid": {"GRID": 1, "grid": 12.0, "grid_opacity": 0.8, "pixel": 1.5},
+        "viscosity": {
+            "VISCOSITY": 1, "viscosity": 10 ** (waves[..., 0] - 2), "thickness": 0.375 + 0.2 * waves[..., 1],
+            "base": 0.02, "viscosity_opacity": 0.7, "contour": 1.5, **window,
+        },
+        "frozen": {"FROZEN": 1, "frozen": half, "frozen_opacity": 0.6, "hatch": 9.0},
+        "arrows": {
+            "ARROWS": 1, "velocity": 0.3 * waves, "arrow": 21.0, "speed": 0.4, "arrows_opacity": 0.8,
+            "arrow_colour": (1.0, 0.9, 0.8), **window,
+        },
+        "forces": {
+            "FORCES": 1, "force": waves, "room": waves[..., 0] * half[..., 0], "force_arrow": 25.0,
+            "forces_opacity": 0.7, "force_colour": (1.0, 0.8, 0.2),
+        },
+        "selected": {"SELECTED": 1, "selected": half, "dash": 7.0, "dash_width": 1.5},
+    }  # fmt: skip
+    inputs: dict[str, Any] = given[name]
+    inputs = {key: device.upload(value) if isinstance(value, np.ndarray) else value for key, value in inputs.items()}
+    defines = {key: value for key, value in inputs.items() if key.isupper()}
+    draw, target = device.pass_("view/canvas.frag", EDGES=2, **defines), device.field((160, 120), 4)
+    smooth = ("displacement", "viscosity", "thickness", "frozen", "velocity", "force", "room")
+    picture = device.upload(rng.uniform(0, 1, (24, 32, 4)))
+    for zoom in (1.0, 2.3):
+        target.clear()
+        draw.draw_into(
+            target.framebuffer,
+            smooth,
+            picture=picture,
+            displacement=device.upload(0.05 * waves),
+            shown=(0.0, 0.0, 1.0, 1.0),
+            extent=(1.0, 0.75),
+            origin=(-20.0, 13.0),
+            step=(1 / (150 * zoom), 1 / (112 * zoom)),
+            target_height=120.0,
+            **{key: value for key, value in inputs.items() if key not in defines},
+        )
+        golden.compare(f"{name} {zoom}", told(target.get()[..., :3]))

@@ -186,6 +186,7 @@ def test_a_handle_is_removed_as_if_it_had_never_been(robot: Robot, way: str) -> 
     if way == "delete":
         robot.key("delete")
     elif way == "alt":
+        robot.editor.state.selected = "pin[1]"  # whichever is selected
         robot.mods = Mods(alt=True)
         robot.click(*robot.at(0.45, 0.5))
     else:

@@ -115,6 +115,15 @@ def test_a_bar_is_stretched_at_its_ends(painted: Robot) -> None:
     assert earlier.last_tick == longer.last_tick
     assert earlier.first_tick < longer.first_tick
     painted.rest()
+    lanes(painted).selected = {("stroke", 0), ("stroke", 1)}
+    painted.frame()
+    before = place(painted, 0), place(painted, 1)
+    drag(painted, 1, 20.0, part=0.99, drop=False)
+    assert place(painted, 0) == before[0], "what else is selected stays as it is"
+    assert place(painted, 1).width > before[1].width + 10
+    painted.key("escape")
+    painted.release()
+    painted.frame()
     drag(painted, 1, -4000.0, part=0.99)
     assert recipe(painted).stroke[1].last_tick == recipe(painted).stroke[1].first_tick
 

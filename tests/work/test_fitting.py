@@ -15,7 +15,7 @@ from app.media.recipes import read_recipe
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
-from app.work.fitting import LEAST_DET, Fitted, fitted
+from app.work.fitting import LEAST_DET, Fitted, Trial, fitted
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.inverse import ForwardMap
@@ -191,6 +191,13 @@ def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp:
     there = read_pairs([tmp_path / "out" / "a.tps"], (64, 48))
     np.testing.assert_allclose(there.places, PAIRS, atol=0.1 / 64)
     assert fluidwarp(tmp_path, "render", "out/f.toml", "-o", "out/f.png").returncode == 0
+
+
+def test_a_fit_is_told_in_a_line():
+    nothing, pairs = np.zeros(0), Pairs.points(PAIRS)
+    trial = Trial(Recipe(), pairs.places, nothing, work=1.25, det=0.5, folds=3)
+    told = Fitted(trial, pairs, np.array([0.25, 0.75, np.nan]), False, ()).told
+    assert told == "2 pairs, mean error 0.5 pixels, most 0.75; work 1.25, least det J 0.5, 3 folds"
 
 
 def test_outlines_of_masks_are_fitted_and_written_as_a_curve(fluidwarp: Run, tmp_path: Path):

@@ -1,0 +1,135 @@
+"""What the window draws, in words: every line, shape and text with its place and colour, noted where it is drawn."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import Any
+
+import pytest
+from imgui_bundle import imgui
+
+from app.ui.widgets import Ui
+from solver.gl.passes import Pass
+
+SHAPES = (
+    "add_circle", "add_circle_filled", "add_convex_poly_filled", "add_image", "add_line", "add_polyline", "add_rect",
+    "add_rect_filled", "add_text", "add_triangle_filled", "push_clip_rect", "pop_clip_rect",
+)  # fmt: skip
+NEAR = 0.6  # points, and of the numbers for the canvas's shader, parts of a hundred
+
+
+class Drawn:
+    """Notes what is drawn from now on, as lines of a kind, numbers in points, `|` and words.
+
+    Args:
+        monkeypatch: of the test, at whose end nothing is noted any more.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.lines: list[str] = []
+        for name in SHAPES:
+            self._note_shape(monkeypatch, name)
+        for name in ("menu_item", "combo", "begin_menu", "text_unformatted", "input_text"):
+            self._note_words(monkeypatch, name)
+        tooltip, draw_into = Ui.tooltip, Pass.draw_into
+
+        def told(ui: Ui, title: str, key: str = "", more: str = "", at_once: bool = False) -> None:
+            self.lines.append(f"tooltip | {title} | {ui.shown(key)} | {more} | {at_once}")
+            tooltip(ui, title, key, more, at_once)
+
+        def drawing(self_: Pass, framebuffer: Any, smooth: Any = (), **inputs: Any) -> None:
+            if self_.shader == "view/canvas.frag":
+                numbers = {name: value for name, value in inputs.items() if isinstance(value, (float, tuple))}
+                self.lines += [f"canvas {name} {_told(value, 4)}" for name, value in numbers.items()]
+                self.lines.append(f"canvas | {sorted(inputs)}")
+            draw_into(self_, framebuffer, smooth, **inputs)
+
+        monkeypatch.setattr(Ui, "tooltip", told)
+        monkeypatch.setattr(Pass, "draw_into", drawing)
+
+    def _note_shape(self, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+        drawn = getattr(imgui.ImDrawList, name)
+
+        def noting(lines: imgui.ImDrawList, *given: Any) -> Any:
+            words = "".join(f" | {value}" for value in given if isinstance(value, str))
+            told = " ".join(_told(value) for value in given if not isinstance(value, (str, imgui.ImTextureRef)))
+            self.lines.append(f"{name} {told}{words}")
+            return drawn(lines, *given)
+
+        monkeypatch.setattr(imgui.ImDrawList, name, noting)
+
+    def _note_words(self, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+        drawn = getattr(imgui, name)
+
+        def noting(*given: Any) -> Any:
+            at, size = imgui.get_cursor_screen_pos(), imgui.get_font_size()
+            self.lines.append(f"{name} {_told(at)} {_told(size)} | {' | '.join(str(value) for value in given)}")
+            return drawn(*given)
+
+        monkeypatch.setattr(imgui, name, noting)
+
+    def take(self) -> list[str]:
+        """What has been noted since the last time."""
+        taken, self.lines = self.lines, []
+        return taken
+
+
+def new_in(lines: list[str], before: Counter[str]) -> list[str]:
+    """Those that are not, or not so often, among others."""
+    left = before.copy()
+    found = []
+    for line in lines:
+        if left[line]:
+            left[line] -= 1
+        else:
+            found.append(line)
+    return found
+
+
+def differences(found: list[str], wanted: list[str]) -> list[str]:
+    """The lines of one that the other has not, numbers compared with a tolerance."""
+    if len(found) == len(wanted):
+        return [f"{one}    not    {other}" for one, other in zip(found, wanted, strict=True) if not _alike(one, other)]
+    return [
+        *(f"+ {line}" for line in found if line not in wanted),
+        *(f"- {line}" for line in wanted if line not in found),
+    ]
+
+
+def _alike(one: str, other: str) -> bool:
+    (numbers, *words), (numbers_too, *words_too) = one.split(" | "), other.split(" | ")
+    mine, theirs = numbers.split(), numbers_too.split()
+    if words != words_too or len(mine) != len(theirs):
+        return False
+    share = 0.01 if mine[:1] == ["canvas"] else 0.0
+    for a, b in zip(mine, theirs, strict=True):
+        if a != b and not (_is_number(a) and _is_number(b)):
+            return False
+        if a != b and abs(float(a) - float(b)) > (share * max(abs(float(b)), 0.01) if share else NEAR):
+            return False
+    return True
+
+
+def _is_number(text: str) -> bool:
+    return re.fullmatch(r"-?[\d.]+(e-?\d+)?", text) is not None
+
+
+def _told(value: Any, digits: int = 1) -> str:
+    if isinstance(value, bool):
+        return str(value)
+    if isinstance(value, int):
+        return f"#{value:08x}" if value > 0xFFFF else str(value)
+    if isinstance(value, float):
+        return f"{value:.{digits}f}" if digits == 1 else f"{value:.{digits}g}"
+    if isinstance(value, imgui.ImVec2):
+        return f"{_told(value.x)} {_told(value.y)}"
+    if isinstance(value, list):
+        return f"{len(value)} {_told(value[0])} {_told(value[-1])} {_told(_middle(value))}"
+    if isinstance(value, tuple):
+        return " ".join(_told(float(part), digits) for part in value)
+    return str(value)
+
+
+def _middle(places: list[imgui.ImVec2]) -> imgui.ImVec2:
+    return imgui.ImVec2(sum(place.x for place in places) / len(places), sum(place.y for place in places) / len(places))

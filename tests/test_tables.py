@@ -1,0 +1,61 @@
+"""The tables of the program, as `golden/tables.txt` has them: a change of one is a line there.
+
+After a change that is meant: `FLUIDWARP_GOLDEN=write pytest tests/test_tables.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from itertools import product
+from typing import Any
+
+from app.media import clip, encoders, formats
+from app.model import presets, tools
+from app.ui import actions, editor_state, exporting, shortcuts
+from app.ui.preferences import Preferences
+from support.golden import GOLDEN, WRITES
+
+FILE = GOLDEN / "tables.txt"
+
+
+def told(value: Any) -> str:
+    """A value without its functions, its sets in order."""
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {part.name: getattr(value, part.name) for part in fields(value)}
+        return f"({', '.join(f'{name}={told(part)}' for name, part in parts.items() if not callable(part))})"
+    if isinstance(value, (set, frozenset)):
+        return told(sorted(value))
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {told(part)}' for key, part in value.items() if not callable(part))}}}"
+    if isinstance(value, (tuple, list)):
+        return f"[{', '.join(map(told, value))}]"
+    return repr(value)
+
+
+def rows() -> Iterator[str]:
+    for ending, container in encoders.ANIMATIONS.items():
+        yield f"{ending}: {told(container)}, codecs {list(container.codecs)}"
+        for codec, alpha, bits, quality in product(container.codecs, (False, True), (8, 16), (None, 70)):
+            if codec not in ("h265", "av1"):  # some ffmpegs have none
+                options = container.encoding(codec)(encoders.Stream(alpha, bits, quality, loops=3))
+                yield f"{codec}, {alpha=}, {bits=}, {quality=}: {' '.join(options)}"
+    yield f"largest: {told(encoders.LARGEST)}"
+    yield f"colours: {told(clip.CODES)}"
+    for kind in formats.TABLE:
+        yield f"{kind.name}: {told(kind)}"
+    for one in (*presets.FEELS, *presets.BRUSHES, *tools.TOOLS, *actions.ACTIONS.values(), *exporting.PRESETS):
+        yield f"{type(one).__name__} {told(one)}"
+    for label, files in exporting.KINDS:
+        yield from (f"{label}: {told(file)}" for file in files)
+    yield f"rated: {exporting.RATED}"
+    yield f"brush: {told(tools.BrushSettings())} {told(editor_state.LIMITS)}"
+    yield f"window: {told(Preferences())} {told(editor_state.overlays())}"
+    yield from (f"mouse: {line}" for line in shortcuts.MOUSE)
+
+
+def test_the_tables_are_as_they_are_written_down() -> None:
+    found = list(rows())
+    if WRITES:
+        FILE.write_text("\n".join(found) + "\n", "utf-8")
+    assert found == FILE.read_text("utf-8").splitlines()

@@ -1,0 +1,110 @@
+"""A recipe gives the same for ever: numbers of short runs of all that one can have, as `golden/runs.txt` has them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+
+from app.media.auxiliary import Pictures
+from app.media.pictures import write_picture
+from app.model.picture import Picture
+from app.model.recipe import Recipe
+from app.model.schema import frozen
+from app.work.export import displacement
+from app.work.replay import Replay
+from solver.gl.device import Device
+from solver.resample.plan import Edges, GivenMap, Sampling
+from solver.resample.sampler import Sampler
+from support.golden import GOLDEN, Golden, told
+
+RUNS: dict[str, Any] = tomllib.loads((GOLDEN / "runs.toml").read_text("utf-8"))
+TICKS = 9
+
+
+def picture(width: int = 60, height: int = 45, channels: int = 3) -> np.ndarray:
+    """Smooth and rough, with no symmetry, (h, w, c) uint8."""
+    y, x = np.mgrid[0:height, 0:width] / width
+    waves = [np.sin((7 + 3 * k) * x + 2 * k) * np.cos((5 + 4 * k) * y + k) for k in range(channels)]
+    rough = np.random.default_rng(1).random((height, width, channels))
+    return ((0.4 * np.stack(waves, axis=-1) + 0.5 + 0.1 * rough).clip(0, 1) * 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def golden(shared_device: Device) -> Iterator[Golden]:
+    if not shared_device.limits.is_software:
+        pytest.skip("what is written down is of the software rasteriser")
+    golden = Golden("runs.txt")
+    yield golden
+    golden.close()
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_a_run_gives_the_numbers_that_are_written_down(
+    device: Device, name: str, golden: Golden, tmp_path: Path
+) -> None:
+    write_picture(tmp_path / "field.png", Picture(picture(30, 20)))
+    parts = {"duration": 1.0} | RUNS[name]
+    parts["fluid"] = {"grid": 36, "dt": 0.025, "viscosity": 0.002} | parts.get("fluid", {})
+    replay = Replay(device, Recipe.model_validate(frozen(parts)), Pictures(Picture(picture()), tmp_path))
+    found: dict[str, list[float]] = {}
+    try:
+        for _ in range(TICKS):
+            replay.advance()
+        replay.fluid.measuring = True
+        found["map"] = told(replay.warp.read())
+        found["velocity"] = told(replay.fluid.velocity_at_centres())
+        found["viscosity"] = told(np.log(replay.fluid.viscosity.get() + 1e-9))
+        found["solid"] = told(replay.fluid.solid.get())
+        found["pressure"] = told(replay.fluid.pressure())
+        motion, statistics = replay.fluid.motion(), replay.warp.statistics()
+        found |= {f"motion {key}": [float(value)] for key, value in vars(motion).items()}
+        found |= {f"map {key}": [float(value)] for key, value in vars(statistics).items()}
+        for forward in (False, True):
+            found[f"displacement {forward}"] = told(displacement(replay, (30, 24), 3, forward).values)
+        if replay.density is not None:
+            found["density"] = told(replay.density.get())
+        if replay.handles.handles:
+            found["handles"] = told(np.concatenate([replay.handles.places.ravel(), replay.handles.away]))
+        replay.advance()
+        residuals = replay.fluid.residuals
+        # What a fixed number of cycles leaves tells how good they are.
+        found["decades of divergence left"] = [np.log10(max(residuals.divergence_left, 1e-7))]
+        if residuals.viscous_residual is not None:
+            found["decades of viscous residual"] = [np.log10(max(residuals.viscous_residual, 1e-7))]
+    finally:
+        replay.release()
+    for what, numbers in found.items():
+        golden.compare(f"{name} {what}", numbers, 0.1 if what.startswith("decades") else None)
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+def test_pictures_are_looked_up_as_it_is_written_down(device: Device, channels: int, golden: Golden) -> None:
+    y, x = np.mgrid[0:30, 0:40] / 40
+    values = np.stack([0.2 * np.sin(9 * y) + 0.1 * x, 0.15 * np.cos(11 * x) - 0.2 * y], axis=-1).astype(np.float32)
+    warp, sampler = GivenMap(device, values), Sampler(device)
+    pixels = picture(channels=channels)
+    depths = pixels, pixels.astype(np.uint16) * 257, (pixels / 200).astype(np.float32)
+    ways: list[tuple[int, dict[str, Any], tuple[int, int] | None]] = [
+        *((depth, {}, None) for depth in range(3)), (0, {}, (33, 51)), (1, {"samples": 1}, (91, 40)),
+    ]  # fmt: skip
+    if channels == 4:
+        edges = get_args(Edges)
+        ways += [(number % 3, {"edges": edge}, (70, 50)) for number, edge in enumerate(edges)]
+        ways += [
+            (0, {"quality": "bilinear"}, None),
+            (2, {"quality": "nearest"}, None),
+            (0, {"premultiplied": True}, None),
+        ]
+        ways += [(1, {"linear_light": False, "samples": 4}, None), (0, {"dither": False}, None)]
+    try:
+        for depth, way, size in ways:
+            found = sampler.apply(warp, depths[depth], size, Sampling(**way))
+            golden.compare(f"{channels} channels, {depths[depth].dtype} {way} {size}".replace(": ", " "), told(found))
+    finally:
+        sampler.release()
+        warp.release()
