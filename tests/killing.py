@@ -222,7 +222,7 @@ def kill_windows(kills: int, seed: int) -> Iterator[Outcome]:
         folder = Path(name)
         root = folder / "state" / "fluidwarp" / "journals"
         write_picture(folder / "pattern.png", pattern())
-        desk = Desk(folder)
+        desk = Desk(folder, threads=True)
         try:
             for _ in range(kills):
                 painter = Painter(root, ["--edit", str(folder / "pattern.png")], desk.env)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import moderngl
 import numpy as np
 from PIL import Image
@@ -25,7 +27,6 @@ FORCE_COLOUR = (1.0, 0.87, 0.2)
 RESTING = 0.5  # how strong a force is shown while it does not act
 GRID_LINES = 24.0
 MOVING = 4  # pixels of the screen to one for which the warp is found while things move: nobody sees the difference
-KEPT = 1024  # texels along the warp that is kept while it is made again
 
 WHOLE = 0.0, 0.0, 1.0, 1.0
 
@@ -55,9 +56,8 @@ class Canvas:
         self._still = device.field((1, 1), 2, "no displacement")
         self._fields = FieldPool(device, "canvas")
         self._drawn: object = None  # what the displacement was found for
-        # The warp as it was last seen at rest, shown while it is made again on another grid.
-        self._kept: Field | None = None
-        self._kept_at = -1
+        # The warp as it was last seen, shown on while it is made again on another grid.
+        self._last: tuple[Field, tuple[float, ...]] | None = None
         self._selected: Field | None = None
         self._selected_area: np.ndarray | None = None
         self.thumbnails = Thumbnails(device, self.size, self._draw_small)
@@ -153,9 +153,8 @@ class Canvas:
         self.thumbnails.release()
         self._still.release()
         self._fields.release()
-        for field in (self._kept, self._selected):
-            if field is not None:
-                field.release()
+        if self._selected is not None:
+            self._selected.release()
         self._release_forces()
 
     def _release_forces(self) -> None:
@@ -190,29 +189,32 @@ class Canvas:
     ) -> tuple[Field, tuple[float, ...]]:
         """The displacement to show, and where it lies: left, top, width and height, 0-1 of the picture.
 
-        Found for the pixels of the screen only, so that it costs the same at any zoom and on any picture.
+        Found for the pixels of the screen only, so that it costs no more at any zoom and on any picture.
         """
         warp = session.seen
-        if session.is_rebuilding and self._kept is not None:
-            return self._kept, WHOLE
-        if not session.is_moving and session.changes != self._kept_at:
-            self._kept_at = session.changes
-            if self._kept is None:
-                size = [max(1, round(KEPT * side / max(self.size))) for side in self.size]
-                self._kept = self.device.field((size[0], size[1]), 2, "warp last seen")
-            warp.draw(self._kept, (0.0, 0.0), self._kept.texel)
-        apart = MOVING if session.is_moving or state.is_scaling else 1
+        if session.is_rebuilding and self._last is not None:
+            return self._last
+        if warp.is_untouched:
+            self._last = self._still, WHOLE
+            return self._last
         (left, top, right, bottom), rect, density = seen, viewport.rect, viewport.density
+        # Of a picture that is magnified, as far apart as what is exported of it is found too.
+        whole = ceil(rect.width * density), ceil(rect.height * density)
+        apart = max(1, whole[0] // warp.size_for(self.size, whole)[0])
+        if moves := session.is_moving or state.is_scaling:
+            apart = max(apart, MOVING)
         # One more on every side, to be interpolated between.
         size = -(-(right - left) // apart) + 2, -(-(bottom - top) // apart) + 2
         origin = (left - rect.x * density) / apart - 1, (top - rect.y * density) / apart - 1
         step = apart / (rect.width * density), apart / (rect.height * density)
         shown = origin[0] * step[0], origin[1] * step[1], size[0] * step[0], size[1] * step[1]
-        field = self._fields.get("displacement", size, 2)
-        if (drawn := (warp, warp.version, size, shown)) != self._drawn:
+        # Two are kept: each stroke begins and ends a movement.
+        field = self._fields.get("displacement, moving" if moves else "displacement", size, 2)
+        if (drawn := (field, warp, warp.version, shown)) != self._drawn:
             warp.draw(field, origin, step)
             self._drawn = drawn
-        return field, shown
+        self._last = field, shown
+        return self._last
 
     def _selection(self, area: np.ndarray) -> Field:
         """What is selected, uploaded where it is another."""

@@ -200,7 +200,7 @@ class Editor:
         """Seconds that may pass before the next frame if no event comes."""
         if self.wants_frame():
             return 0.0
-        if self.clock.hovering:
+        if self.clock.hovering and self.backend.is_hovering:
             return PACE
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
         working = self.exports.is_running or self.fits.is_running

@@ -49,6 +49,11 @@ class ImGuiBackend:
         """Text is being typed into a field, as of the last frame."""
         return imgui.get_io().want_text_input
 
+    @property
+    def is_hovering(self) -> bool:
+        """The pointer is on something, of which more may be shown if it rests there, as of the last frame."""
+        return imgui.is_any_item_hovered() or bool(self._context.hover_item_delay_id)
+
     def begin(
         self, size: tuple[float, float], density: float, dt: float, events: Iterable[Event], by_keys: bool = False
     ) -> None:

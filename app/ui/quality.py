@@ -127,10 +127,13 @@ class Quality:
             self._wanted = self.grid
 
     def _watch(self, session: Session) -> None:
-        """Begin to watch the rate anew."""
+        """Begin to watch the rate anew, and to measure if that has not come to an end."""
         self._session, self._wanted = session, None
         self._steps, self._has_stepped = session.replay.steps, False
         self._slow_for = self._spare_for = 0.0
+        if self.speed is None:
+            self.release()
+            self._frames, self._spent = 0, [[]]
 
     def release(self) -> None:
         """Give up what is being measured."""
@@ -140,7 +143,7 @@ class Quality:
 
     @property
     def is_measuring(self) -> bool:
-        return self.state.auto_quality and self.speed is None
+        return self.is_on and self.speed is None
 
     def warm_up(self, begun: float) -> None:
         """After the first frames, one that paints each: compile what the first stroke needs, and measure this machine.
@@ -186,10 +189,9 @@ class Quality:
         `dt`: seconds since the last frame.
         """
         session = self.workspace.session
-        if session is not self._session:
+        if session is not self._session or not self.is_on:
             self._watch(session)
         if not self.is_on:
-            self._wanted = None
             session.forget_grid()
         elif session.is_painting:
             self._judge(dt)

@@ -92,6 +92,11 @@ class WarpMap:
         """Where it is held, texel by texel, from 1/2 on; None if nothing is."""
         return self._frozen.held
 
+    @property
+    def is_untouched(self) -> bool:
+        """True if it has been the identity from its beginning."""
+        return self.version == 0
+
     # -- moving it --------------------------------------------------------------------------------------------------
 
     def follow(self, fluid: Fluid, dt: float) -> None:

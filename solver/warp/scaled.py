@@ -36,6 +36,11 @@ class ScaledMap:
         return self.warp.version, self.amount
 
     @property
+    def is_untouched(self) -> bool:
+        """As `WarpMap.is_untouched`."""
+        return self.warp.is_untouched
+
+    @property
     def held(self) -> Field | None:
         return self.warp.held
 

@@ -10,12 +10,16 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from Xlib import X, display
+from Xlib.error import BadWindow
 
 NEEDED = ("Xvfb", "xdotool")
 PATIENCE = 90.0
@@ -29,9 +33,16 @@ needs_a_screen = pytest.mark.skipif(
 
 
 class Desk:
-    """A virtual screen with the editor on it."""
+    """A virtual screen with the editor on it.
 
-    def __init__(self, folder: Path, size: tuple[int, int] = (1280, 800)) -> None:
+    Args:
+        folder: for the files of the screen, of the editor and of the test.
+        size: of the screen, in pixels.
+        threads: llvmpipe draws in threads of its own, as for most who use it; handing small passes to them costs half
+            as much again, while the tests' processes keep the cores busy anyway.
+    """
+
+    def __init__(self, folder: Path, size: tuple[int, int] = (1280, 800), threads: bool = False) -> None:
         self.folder = folder
         # The server takes a display that nobody has, and tells its number once it listens.
         command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size[0]}x{size[1]}x24", "-noreset", "-nolisten", "tcp"]
@@ -48,6 +59,7 @@ class Desk:
             "PATH": os.environ["PATH"],
             # Under another home Mesa would compile every shader anew, which is most of what a window costs.
             "MESA_SHADER_CACHE_DIR": os.environ.get("MESA_SHADER_CACHE_DIR") or str(SHADERS),
+            **({} if threads else {"LP_NUM_THREADS": "0"}),
         }
         self.env.pop("WAYLAND_DISPLAY", None)
         self.editor: subprocess.Popen[str] | None = None
@@ -64,28 +76,57 @@ class Desk:
             text=True,
         )
         self.until(lambda: self.is_shown, "a window")
-        self.window = self._find()[0]
+        self.window = next(iter(self._titles()))
         self.until(lambda: self.title() == f"{file.stem} - fluidwarp", "the file to be open")
+
+    def open_pattern(self) -> None:
+        """Start the editor with the pattern on a coarse grid, which is nobody's to choose: nothing is measured."""
+        from support.editing import small_project
+
+        recipe = small_project(self.folder).recipe.edited(picture="pattern.png")
+        (self.folder / "pattern.toml").write_text(recipe.text(), "utf-8")
+        self.open(self.folder / "pattern.toml")
 
     @property
     def is_shown(self) -> bool:
         """A window is to be seen, and not minimised."""
-        return bool(self._find())
+        return bool(self._titles())
 
-    def _find(self) -> list[str]:
-        return self.do("search", "--onlyvisible", "--name", "fluidwarp").split()
+    def _titles(self) -> dict[str, str]:
+        """What stands on the windows that are to be seen, by their numbers."""
+        found = dict[str, str]()
+        for window in self._x.screen().root.query_tree().children:
+            with suppress(BadWindow):  # it has just been closed
+                if window.get_attributes().map_state == X.IsViewable and (title := self._title(window.id)):
+                    found[str(window.id)] = title
+        return found
+
+    def _title(self, window: int) -> str:
+        name = self._x.create_resource_object("window", window).get_full_text_property(self._name)
+        return name or ""
+
+    @cached_property
+    def _x(self) -> Any:
+        """A connection to the screen: a process for each look at it would cost more than what is looked at."""
+        return display.Display(self.env["DISPLAY"])
+
+    @cached_property
+    def _name(self) -> int:
+        return self._x.intern_atom("_NET_WM_NAME")
 
     def seen(self) -> np.ndarray:
-        """The screen as it is now, (h, w, 3) int, from the file in which the server keeps it."""
+        """The screen as it is now, (h, w, 3) uint8, from the file in which the server keeps it."""
         data = (self.folder / "Xvfb_screen0").read_bytes()
         # The header of an X window dump: 25 numbers, then the window's name up to its own length, then the colours.
         head = np.frombuffer(data, ">u4", 25)
         start, width, height, row, colours = (int(head[at]) for at in (0, 4, 5, 12, 19))
         rows = np.frombuffer(data, np.uint8, row * height, start + 12 * colours).reshape(height, row)
-        return rows[:, : 4 * width].reshape(height, width, 4)[..., 2::-1].astype(int)
+        return rows[:, : 4 * width].reshape(height, width, 4)[..., 2::-1]
 
     def title(self) -> str:
-        return self.do("getwindowname", self.window or (self._find() or ["0"])[0]).strip()
+        with suppress(BadWindow):
+            return self._title(int(self.window))
+        return ""
 
     def do(self, *words: str) -> str:
         return subprocess.run(["xdotool", *words], env=self.env, capture_output=True, text=True).stdout
@@ -175,5 +216,6 @@ class Desk:
         if self.editor is not None and self.editor.poll() is None:
             self.editor.kill()
             self.editor.wait()
+        self._x.close()
         self.screen.terminate()
         self.screen.wait(10)

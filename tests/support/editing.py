@@ -169,6 +169,12 @@ class Robot:
         """The displacement, (h, w, 2), longer sides."""
         return self.editor.session.replay.warp.read()
 
+    def __enter__(self) -> Robot:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
         self.editor.release()
         _release(self.target)

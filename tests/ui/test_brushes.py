@@ -23,14 +23,8 @@ from support.widgets import Widgets
 def robot(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
     monkeypatch.setattr("platformdirs.user_config_path", lambda name: tmp_path / "kept")
     preferences = Preferences(auto_quality=False, path=tmp_path / "kept" / "preferences.json")
-    robot = Robot(device, small_project(tmp_path), preferences=preferences)
-    yield robot
-    robot.close()
-
-
-@pytest.fixture
-def widgets(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Widgets:
-    return Widgets(robot, monkeypatch)
+    with Robot(device, small_project(tmp_path), preferences=preferences) as robot:
+        yield robot
 
 
 def open_more(robot: Robot, widgets: Widgets) -> None:

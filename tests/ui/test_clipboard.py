@@ -16,6 +16,7 @@ from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
 from app.ui import clipboard
 from solver.gl.device import Device
+from support.commands import Run
 from support.desk import Desk, needs_a_screen
 from support.editing import Robot, pattern, small_project
 
@@ -63,10 +64,10 @@ def on_clipboard(desk: Desk) -> np.ndarray | None:
 
 
 @needs_a_screen
-def test_a_picture_is_pasted_warped_and_copied(desk: Desk, tmp_path: Path) -> None:
-    write_picture(tmp_path / "opened.png", pattern(60, 40))
-    write_picture(tmp_path / "other.png", pattern())
-    desk.open(tmp_path / "opened.png")
+def test_a_picture_is_pasted_warped_and_copied(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
+    other = pattern(200, 160)
+    write_picture(tmp_path / "other.png", other)
+    desk.open_pattern()
     filling = FILLING.format(path=str(tmp_path / "other.png"))
     subprocess.run([sys.executable, "-c", filling], env=desk.env, check=True)
     desk.insist(lambda: desk.key("ctrl+v"), lambda: desk.title().startswith("pasted "), "the picture to be pasted")
@@ -74,17 +75,16 @@ def test_a_picture_is_pasted_warped_and_copied(desk: Desk, tmp_path: Path) -> No
     desk.until(lambda: " * - " in desk.title(), "the push to be recorded")
     desk.save(tmp_path / "work.fluidwarp")
     work = projects.load(tmp_path / "work.fluidwarp")
-    assert np.array_equal(work.picture.pixels, pattern().pixels)
+    assert np.array_equal(work.picture.pixels, other.pixels)
     assert work.embedded
     desk.key("ctrl+c")
 
     def is_copied() -> bool:
         found = on_clipboard(desk)
-        return found is not None and not np.array_equal(found, pattern().pixels)
+        return found is not None and not np.array_equal(found, other.pixels)
 
     desk.until(is_copied, "the picture to be on the clipboard")
-    command = [sys.executable, "-m", "app", "render", "work.fluidwarp", "-o", "rendered.png"]
-    subprocess.run(command, check=True, cwd=tmp_path, env=desk.env | {"PYTHONPATH": str(Path(__file__).parents[2])})
+    assert fluidwarp(tmp_path, "render", "work.fluidwarp", "-o", "rendered.png").returncode == 0
     found = on_clipboard(desk)
     assert found is not None
     assert np.array_equal(found, read_picture(tmp_path / "rendered.png").pixels)
@@ -94,9 +94,8 @@ def test_a_picture_is_pasted_warped_and_copied(desk: Desk, tmp_path: Path) -> No
 def robot(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
     """An editor where copykitten is not installed."""
     monkeypatch.setitem(sys.modules, "copykitten", None)
-    robot = Robot(device, small_project(tmp_path))
-    yield robot
-    robot.close()
+    with Robot(device, small_project(tmp_path)) as robot:
+        yield robot
 
 
 @pytest.mark.parametrize("chord", ["ctrl+c", "ctrl+v"])

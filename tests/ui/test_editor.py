@@ -32,7 +32,7 @@ from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
-from app.ui.quality import GRIDS, TRIALS, Speed
+from app.ui.quality import GRIDS, PATIENCE, TRIALS, Speed
 from app.ui.saving import SaveDialog
 from app.ui.shortcuts import Shortcuts
 from app.work.export import run
@@ -41,13 +41,6 @@ from solver.brush.masks import ZERO
 from solver.gl.device import Device
 from support.commands import Run
 from support.editing import Robot, export_dialog, pattern, small_project, write_foreign_map
-
-
-@pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path))
-    yield robot
-    robot.close()
 
 
 def names(robot: Robot) -> list[str]:
@@ -305,6 +298,19 @@ def test_overlays_show_something(robot: Robot, key: str) -> None:
     robot.key(key)
     robot.frame()
     assert np.abs(robot.canvas() - without).max() <= 1
+
+
+def test_what_was_seen_stays_while_it_is_made_again_on_another_grid(robot: Robot) -> None:
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.see()
+    robot.move(900, 20)
+    robot.frame(count=2)
+    seen = robot.canvas()
+    robot.editor.session.set_grid(512)
+    robot.frame()
+    assert robot.editor.session.is_rebuilding
+    assert np.array_equal(robot.canvas(), seen)
 
 
 # Time ---------------------------------------------------------------------------------------------------------------
@@ -1276,7 +1282,14 @@ def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> No
     assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
 
 
-def paint_at(robot: Robot, dt: float, seconds: float = 2.5) -> None:
+@pytest.fixture
+def measured(automatic: Robot) -> Robot:
+    """As if it had measured a machine that is quick enough for any grid."""
+    automatic.editor.quality.speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
+    return automatic
+
+
+def paint_at(robot: Robot, dt: float, seconds: float = PATIENCE + 0.3) -> None:
     """A stroke on a machine that takes `dt` seconds for a frame."""
     robot.move(*robot.at(0.4, 0.5))
     robot.press()
@@ -1302,81 +1315,87 @@ def until_on(robot: Robot, grid: int) -> None:
     assert session.document.recipe == session.recipe
 
 
-def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(automatic: Robot) -> None:
-    automatic.until(lambda: not automatic.editor.quality.is_measuring)
-    session = automatic.editor.session
+def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(measured: Robot) -> None:
+    session = measured.editor.session
     session.begin_with(grid=128)
-    automatic.drag((0.4, 0.3), (0.5, 0.3))
-    automatic.editor.session.settle()
-    seen = automatic.warp()
-    paint_at(automatic, 0.1)
-    automatic.key("ctrl+z")
-    until_on(automatic, 96)
-    assert "below 30 frames a second" in automatic.editor.messages.shown[-1].text
-    assert names(automatic) == ["Open", "Push", "Push"]
+    measured.drag((0.4, 0.3), (0.5, 0.3))
+    measured.editor.session.settle()
+    seen = measured.warp()
+    paint_at(measured, 0.1)
+    measured.key("ctrl+z")
+    until_on(measured, 96)
+    assert "below 30 frames a second" in measured.editor.messages.shown[-1].text
+    assert names(measured) == ["Open", "Push", "Push"]
     # What is seen is the work on this grid, which is nearly what it was on the other; and it can still be redone.
-    warp = automatic.warp()
+    warp = measured.warp()
     assert np.abs(warp).max() == pytest.approx(np.abs(seen).max(), rel=0.1)
     session.replay.checkpoints.clear()
     session.replay.seek(0)
     session.replay.seek(session.end)
-    assert np.array_equal(automatic.warp(), warp)
-    automatic.key("ctrl+y")
-    automatic.rest()
+    assert np.array_equal(measured.warp(), warp)
+    measured.key("ctrl+y")
+    measured.rest()
     assert len(session.recipe.stroke) == 2
     for _ in range(2):
-        automatic.key("ctrl+z")
+        measured.key("ctrl+z")
     assert session.recipe.fluid.grid == 96
-    assert not automatic.editor.workspace.is_dirty
+    assert not measured.editor.workspace.is_dirty
 
 
-@pytest.mark.long
-def test_the_grid_is_finer_again_where_there_is_time(automatic: Robot) -> None:
-    automatic.until(lambda: not automatic.editor.quality.is_measuring)
-    quality, session = automatic.editor.quality, automatic.editor.session
-    quality.speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
-    session.begin_with(grid=128, dt=1 / 60)
-    paint_at(automatic, 0.1)
-    until_on(automatic, 96)
-    paint_at(automatic, 1 / 60)
-    until_on(automatic, 128)
-    assert names(automatic) == ["Open", "Push", "Push"]
+def test_the_grid_is_finer_again_where_there_is_time(measured: Robot) -> None:
+    measured.editor.session.begin_with(grid=128, dt=1 / 60, viscosity=0.3, drag=0.0)  # which halts with the brush
+    paint_at(measured, 0.1)
+    until_on(measured, 96)
+    paint_at(measured, 1 / 60)
+    until_on(measured, 128)
+    assert names(measured) == ["Open", "Push", "Push"]
 
 
-def test_a_grid_that_was_chosen_stays(automatic: Robot) -> None:
-    automatic.until(lambda: not automatic.editor.quality.is_measuring)
-    quality, session = automatic.editor.quality, automatic.editor.session
+def test_a_grid_that_was_chosen_stays(measured: Robot) -> None:
+    quality, session = measured.editor.quality, measured.editor.session
     session.begin_with(grid=160)
     session.set_grid(128, "Grid of 128")
-    paint_at(automatic, 0.1)
-    automatic.frame(count=20)
+    paint_at(measured, 0.1)
+    measured.frame(count=20)
     assert session.recipe.fluid.grid == 128
-    assert names(automatic)[-2:] == ["Grid of 128", "Push"]
-    assert not automatic.editor.wants_frame() or automatic.editor.clock.settling
+    assert names(measured)[-2:] == ["Grid of 128", "Push"]
+    assert not measured.editor.wants_frame() or measured.editor.clock.settling
     # Until it is left to the machine again.
     quality.grid = 96
     quality.turn_on()
-    until_on(automatic, 96)
+    until_on(measured, 96)
 
 
-def test_the_grid_of_saved_work_stays(automatic: Robot, tmp_path: Path) -> None:
+def test_the_grid_of_saved_work_stays(measured: Robot, tmp_path: Path) -> None:
     """What is exported is what the command line makes of the file, also if another grid was about to be taken."""
-    automatic.until(lambda: not automatic.editor.quality.is_measuring)
-    session = automatic.editor.session
+    session = measured.editor.session
     session.begin_with(grid=128)
-    paint_at(automatic, 0.1)
-    assert automatic.editor.files.save_as(tmp_path / "work.fluidwarp")
-    automatic.frame(count=200, dt=0.02)
+    paint_at(measured, 0.1)
+    assert measured.editor.files.save_as(tmp_path / "work.fluidwarp")
+    measured.frame(count=200, dt=0.02)
     assert session.recipe.fluid.grid == 128
 
 
 def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
-    robot = Robot(device, small_project(tmp_path, 128), preferences=Preferences(auto_quality=True))
-    robot.until(lambda: not robot.editor.quality.is_measuring)
-    paint_at(robot, 0.1)
-    robot.frame(count=20)
-    assert robot.editor.session.recipe.fluid.grid == 128
-    robot.close()
+    with Robot(device, small_project(tmp_path, 128), preferences=Preferences(auto_quality=True)) as robot:
+        paint_at(robot, 0.1)
+        robot.frame(count=20)
+        assert robot.editor.session.recipe.fluid.grid == 128
+
+
+def test_for_a_project_the_machine_is_not_measured(automatic: Robot, tmp_path: Path) -> None:
+    """Nor is what had begun for a picture gone on with, if that is worked on again."""
+    quality = automatic.editor.quality
+    automatic.frame(count=12)
+    automatic.editor.open(small_project(tmp_path, 64))
+    automatic.frame(count=5)
+    assert not quality.is_measuring
+    assert not automatic.editor.wants_frame()
+    automatic.key("ctrl+z")
+    assert quality.is_measuring
+    automatic.until(lambda: not quality.is_measuring)
+    assert quality.speed is not None
+    assert quality.speed.growing > 0
 
 
 # What is lost -------------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 from inspect import signature
 from pathlib import Path
@@ -22,22 +21,9 @@ from app.ui.panels import inspector
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from app.work.export import run
-from solver.gl.device import Device
 from support.commands import Run
-from support.editing import Robot, export_dialog, small_project
+from support.editing import Robot, export_dialog
 from support.widgets import Widgets
-
-
-@pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path))
-    yield robot
-    robot.close()
-
-
-@pytest.fixture
-def widgets(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Widgets:
-    return Widgets(robot, monkeypatch)
 
 
 def only(robot: Robot, *sections: str) -> None:
@@ -323,10 +309,7 @@ def test_a_file_that_will_be_replaced_is_told(
         dialog.job().target.write_bytes(b"")
 
 
-def test_an_exported_picture_is_what_is_asked_for(
-    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    widgets = Widgets(robot, monkeypatch)
+def test_an_exported_picture_is_what_is_asked_for(robot: Robot, dialog: ExportDialog, widgets: Widgets) -> None:
     widgets.click("16 bits")
     assert (dialog.job().target.suffix, dialog.job().outputs.bits) == (".png", 16)
     widgets.click("JPEG")
@@ -342,10 +325,7 @@ def test_an_exported_picture_is_what_is_asked_for(
     assert dialog.job().recipe.ticks == 3
 
 
-def test_an_exported_animation_is_what_is_asked_for(
-    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    widgets = Widgets(robot, monkeypatch)
+def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: ExportDialog, widgets: Widgets) -> None:
     widgets.click("Animation")
     for words, ending in (("GIF", ".gif"), ("Frames", ".%04d.png"), ("EXR", ".%04d.exr"), ("MP4", ".mp4")):
         widgets.click(words)
@@ -362,10 +342,7 @@ def test_an_exported_animation_is_what_is_asked_for(
     assert (job.recipe.output.fps, job.recipe.time.start, job.recipe.time.end) == pytest.approx((24, 0.1, 0.2))
 
 
-def test_an_exported_map_is_what_is_asked_for(
-    robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    widgets = Widgets(robot, monkeypatch)
+def test_an_exported_map_is_what_is_asked_for(robot: Robot, dialog: ExportDialog, widgets: Widgets) -> None:
     widgets.click("Warp map")
     maps = dialog.job().outputs.maps
     assert maps is not None

@@ -23,17 +23,26 @@ PATIENCE = 300.0  # seconds, of a machine that does much else
 MOVES = ((0.4, 0.5), (0.45, 0.47)), ((0.7, 0.4), (0.7, 0.45))
 
 
+@pytest.fixture(scope="module")
+def dragged(shared_device: Device, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+    """With two handles that have been dragged one after the other, for all of these tests."""
+    with Robot(shared_device, small_project(tmp_path_factory.mktemp("fitting"), grid=32)) as robot:
+        robot.key("g")
+        for start, end in MOVES:
+            robot.drag(start, end, steps=6)
+            robot.rest()
+        yield robot
+
+
 @pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    """With two handles that have been dragged one after the other."""
-    robot = Robot(device, small_project(tmp_path, grid=32))
-    robot.key("g")
-    for start, end in MOVES:
-        robot.drag(start, end, steps=6)
-        robot.rest()
-    robot.editor.fits.evaluations = 2
-    yield robot
-    robot.close()
+def robot(dragged: Robot, device: Device) -> Iterator[Robot]:
+    """It once more, as it was then."""
+    dragged.editor.session.go_to(len(MOVES))
+    dragged.rest()
+    dragged.editor.fits.evaluations = 2
+    yield dragged
+    dragged.editor.fits.give_up()
+    dragged.editor.messages.shown.clear()
 
 
 def names(robot: Robot) -> list[str]:
@@ -45,12 +54,14 @@ def wait(robot: Robot) -> None:
     robot.rest()
 
 
-def test_a_fit_is_one_edit_that_leads_all_at_once_and_is_played(robot: Robot) -> None:
+def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, fluidwarp: Run, tmp_path: Path) -> None:
+    """From the handles, and from a file of the same pairs; and it leads all at once."""
     session, led = robot.editor.session, robot.warp()
-    before = session.recipe
+    before, project = session.recipe, session.project
     robot.key("shift+g")
     assert robot.editor.fits.is_running
     wait(robot)
+    made = session.recipe
     assert names(robot) == ["Open", "Handle", "Handle", "Fit"]
     assert [handle.start for handle in session.recipe.handle] == [0, 0]
     assert [handle.at for handle in session.recipe.handle] == [handle.at for handle in before.handle]
@@ -63,20 +74,11 @@ def test_a_fit_is_one_edit_that_leads_all_at_once_and_is_played(robot: Robot) ->
     assert session.recipe == before
     assert np.array_equal(robot.warp(), led)
 
-
-def test_the_command_line_gives_the_same_from_the_handles_and_from_a_file_of_the_same_pairs(
-    robot: Robot, fluidwarp: Run, tmp_path: Path
-) -> None:
-    session = robot.editor.session
-    recipe, project = session.recipe, session.project
-    projects.save(replace(project, recipe=recipe), tmp_path / "w.fluidwarp")
+    projects.save(replace(project, recipe=before), tmp_path / "w.fluidwarp")
     size = project.picture.width, project.picture.height
-    pairs = Pairs.points(np.array([[handle.at, handle.goal] for handle in recipe.handle]))
+    pairs = Pairs.points(np.array([[handle.at, handle.goal] for handle in before.handle]))
     write_pairs(tmp_path / "p.csv", pairs, size)
-    robot.editor.do("fit_handles")
-    wait(robot)
-    made = session.recipe
-    bare = replace(project, recipe=recipe.edited(handle=(), duration=made.duration))
+    bare = replace(project, recipe=before.edited(handle=(), duration=made.duration))
     projects.save(bare, tmp_path / "bare.fluidwarp")
     for words in (["w.fluidwarp"], ["bare.fluidwarp", "--pairs", str(tmp_path / "p.csv")]):
         target = tmp_path / "f.toml"
@@ -84,9 +86,8 @@ def test_the_command_line_gives_the_same_from_the_handles_and_from_a_file_of_the
         assert read_recipe(target).text() == made.edited(picture=None).text()
 
 
-def test_stopped_it_keeps_the_best_so_far(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stopped_it_keeps_the_best_so_far(robot: Robot, widgets: Widgets) -> None:
     robot.editor.fits.evaluations = 100_000
-    widgets = Widgets(robot, monkeypatch)
     widgets.click("Fit")
     process = robot.editor.fits.process
     assert process is not None

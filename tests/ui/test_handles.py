@@ -28,10 +28,9 @@ from support.editing import Robot, small_project
 
 @pytest.fixture
 def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path, grid=64))
-    robot.key("g")
-    yield robot
-    robot.close()
+    with Robot(device, small_project(tmp_path, grid=64)) as robot:
+        robot.key("g")
+        yield robot
 
 
 def names(robot: Robot) -> list[str]:

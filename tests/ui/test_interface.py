@@ -15,7 +15,7 @@ from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER
 from app.model.tools import TOOL, TOOLS, Press
-from app.ui.clock import HOVERING
+from app.ui.clock import FRAMES, HOVERING, PACE
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog
 from app.ui.files import load_any
@@ -27,13 +27,6 @@ from app.ui.viewport import Rect
 from solver.gl.device import Device
 from support.editing import Robot, export_dialog, pattern, small_project
 from support.widgets import Widgets
-
-
-@pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path))
-    yield robot
-    robot.close()
 
 
 def live(robot: Robot, seconds: float) -> int:
@@ -93,6 +86,14 @@ def test_at_rest_nothing_is_drawn(robot: Robot) -> None:
     live(robot, 5)
     assert live(robot, 59) == 0
     assert robot.editor.wait() == 60
+
+
+def test_frames_are_drawn_for_a_pointer_that_rests_only_where_something_may_come_to_it(robot: Robot) -> None:
+    for place, wait in (((24, 130), PACE), (robot.at(0.5, 0.5), 60)):
+        robot.frame(Move(*place))
+        robot.frame(count=FRAMES, dt=0.01)
+        assert robot.editor.clock.hovering
+        assert robot.editor.wait() == wait
 
 
 def test_a_message_stays_for_five_seconds(robot: Robot) -> None:
@@ -532,10 +533,8 @@ def test_what_cannot_be_opened_asks_nothing_about_unsaved_work(robot: Robot, tmp
 
 
 @pytest.mark.parametrize("grid", [48, 96, 160, 1024])
-def test_the_grid_of_the_work_is_chosen_in_the_inspector(
-    robot: Robot, monkeypatch: pytest.MonkeyPatch, grid: int
-) -> None:
-    session, widgets = robot.editor.session, Widgets(robot, monkeypatch)
+def test_the_grid_of_the_work_is_chosen_in_the_inspector(robot: Robot, widgets: Widgets, grid: int) -> None:
+    session = robot.editor.session
     robot.editor.state.sections |= {"quality": True, "view": False, "fluid": False}
     robot.frame(count=3)
     fluid = session.recipe.fluid.model_copy(update={"grid": grid})

@@ -20,9 +20,8 @@ from support.widgets import Widgets
 @pytest.fixture
 def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
     preferences = Preferences(auto_quality=False, path=tmp_path / "kept" / "preferences.json")
-    robot = Robot(device, small_project(tmp_path), preferences=preferences)
-    yield robot
-    robot.close()
+    with Robot(device, small_project(tmp_path), preferences=preferences) as robot:
+        yield robot
 
 
 @pytest.fixture
@@ -92,8 +91,7 @@ def test_kept_keys_are_read_again(robot: Robot, sheet: Shortcuts, monkeypatch: p
     assert Keys(ACTIONS.values(), kept.keys, kept.save).action("space") is None
 
 
-def test_a_conflict_is_told_and_taken_or_left(robot: Robot, sheet: Shortcuts, monkeypatch: pytest.MonkeyPatch) -> None:
-    widgets = Widgets(robot, monkeypatch)
+def test_a_conflict_is_told_and_taken_or_left(robot: Robot, widgets: Widgets, sheet: Shortcuts) -> None:
     choose(robot, sheet, "tool_twirl", "ctrl+s")
     widgets.click("Cancel")
     assert not robot.editor.keys.are_changed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +19,6 @@ from app.ui.viewport import Rect
 from solver.gl.device import Device
 from support.editing import Robot, small_project
 from support.widgets import Widgets
-
-
-@pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path))
-    yield robot
-    robot.close()
 
 
 @pytest.fixture
@@ -225,11 +217,8 @@ def test_a_press_beside_the_bars_lets_go_of_them_and_delete_then_does_nothing_to
     assert lanes(painted).selected == set()
 
 
-def test_the_fields_of_a_bar_set_when_how_long_how_strong_and_how_often(
-    painted: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_fields_of_a_bar_set_when_how_long_how_strong_and_how_often(painted: Robot, widgets: Widgets) -> None:
     painted.key("h")  # which has no strength of its own
-    widgets = Widgets(painted, monkeypatch)
     before, dt = recipe(painted).stroke[1], painted.editor.session.dt
     painted.click(*place(painted, 1).middle)
     for label, text in (("Start", "1"), ("Duration", "0.5"), ("Strength", "50"), ("Times", "3"), ("Every", "1.5")):
@@ -244,7 +233,7 @@ def test_the_fields_of_a_bar_set_when_how_long_how_strong_and_how_often(
     assert painted.editor.session.end > stroke.end_tick
 
 
-def test_forces_are_bars_too(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_forces_are_bars_too(robot: Robot, widgets: Widgets) -> None:
     vortex = VortexForce(kind="vortex", point=(0.5, 0.5), strength=2.0, during=(0.5, 1.0))
     robot.editor.session.edit("Forces", force=(vortex, vortex.edited(during=None, formula="sin(t)")), duration=2.0)
     robot.rest()
@@ -259,7 +248,6 @@ def test_forces_are_bars_too(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> N
     assert names(robot)[1:] == ["Forces", "Move force"]
     robot.click(*place(robot, 0, "force").middle)
     robot.key("h")
-    widgets = Widgets(robot, monkeypatch)
     widgets.type("Strength", "-1.5")
     widgets.type("Start", "0.25")
     widgets.type("Duration", "1")

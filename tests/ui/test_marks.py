@@ -22,9 +22,8 @@ def robot(device: Device, tmp_path: Path, request: pytest.FixtureRequest) -> Ite
     """A picture of middle grey, on which black and white show."""
     width, height = request.param
     write_picture(tmp_path / "grey.png", Picture(np.full((height, width, 3), 110, np.uint8)))
-    robot = Robot(device, load_any(tmp_path / "grey.png"))
-    yield robot
-    robot.close()
+    with Robot(device, load_any(tmp_path / "grey.png")) as robot:
+        yield robot
 
 
 def brightness_by_radius(robot: Robot, x: float, y: float) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,16 +12,8 @@ from app.errors import UserError
 from app.media.pictures import read_picture
 from app.model.mask_edits import FeatherMask, FillMask, SpreadMask
 from app.ui.actions import ACTIONS
-from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import Robot
 from support.widgets import Widgets
-
-
-@pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path))
-    yield robot
-    robot.close()
 
 
 def frozen(robot: Robot) -> np.ndarray:
@@ -74,14 +65,14 @@ def test_a_mark_stands_on_the_timeline(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("kind", ["invert", "fill", "clear", "feather", "grow", "shrink"])
-def test_a_button_edits_the_mask_of_the_tool(robot: Robot, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+def test_a_button_edits_the_mask_of_the_tool(robot: Robot, widgets: Widgets, kind: str) -> None:
     """With what the sliders say."""
     robot.key("v")
     robot.drag((0.5, 0.5), (0.55, 0.5), steps=3)
     state = robot.editor.state
     state.sections = {name: name == "masks" for name in ("fluid", "view", "quality", "masks", "history", "numbers")}
     state.mask_reach, state.mask_decades = 0.07, -1.5
-    Widgets(robot, monkeypatch).click(kind.capitalize())
+    widgets.click(kind.capitalize())
     edit = robot.editor.session.recipe.mask[-1]
     assert (edit.kind, edit.tick) == (kind, 0)
     assert not isinstance(edit, (FeatherMask, SpreadMask)) or edit.radius == 0.07

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import exp
-from pathlib import Path
 
 import pytest
 
 from app.ui.events import LEFT, MIDDLE, RIGHT, Mods, Move
-from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import Robot
 
 PLACE = (0.4, 0.45)
 
 
 @pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path))
+def robot(robot: Robot) -> Robot:
     robot.key("ctrl+1")
-    yield robot
-    robot.close()
+    return robot
 
 
 def pull(robot: Robot, dx: float, dy: float, button: int = LEFT) -> None:

@@ -30,9 +30,8 @@ def robot(device: Device, tmp_path: Path, request: pytest.FixtureRequest) -> Ite
     """An editor on a screen of one pixel a point, or of as many as the test says."""
     if not device.limits.is_software:
         pytest.skip("golden pictures are of the software rasteriser")
-    robot = Robot(device, small_project(tmp_path), SIZE, density=getattr(request, "param", 1.0))
-    yield robot
-    robot.close()
+    with Robot(device, small_project(tmp_path), SIZE, density=getattr(request, "param", 1.0)) as robot:
+        yield robot
 
 
 def start(robot: Robot) -> None:

@@ -40,10 +40,9 @@ def blobs() -> Picture:
 
 @pytest.fixture
 def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, replace(small_project(tmp_path), picture=blobs()))
-    robot.key("m")
-    yield robot
-    robot.close()
+    with Robot(device, replace(small_project(tmp_path), picture=blobs())) as robot:
+        robot.key("m")
+        yield robot
 
 
 def frozen(robot: Robot) -> np.ndarray:
@@ -119,9 +118,9 @@ def test_a_lasso_is_what_was_drawn_around(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("by", ["colour", "brightness"])
-def test_a_click_selects_what_is_like_it(robot: Robot, monkeypatch: pytest.MonkeyPatch, by: str) -> None:
+def test_a_click_selects_what_is_like_it(robot: Robot, widgets: Widgets, by: str) -> None:
     """Where it is connected or, with the switch, everywhere; and as unlike as the slider says, at once."""
-    widgets, state = Widgets(robot, monkeypatch), robot.editor.state
+    state = robot.editor.state
     select(robot, by, (0.33, 0.5))
     assert state.selected_area is not None
     robot.key("enter")
@@ -245,8 +244,8 @@ def test_its_key_goes_through_what_can_be_selected_by(robot: Robot) -> None:
     assert (state.tool_name, state.select_by) == ("select", "rectangle")
 
 
-def test_a_selection_thickens_with_what_the_slider_says(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    widgets, masks = Widgets(robot, monkeypatch), robot.editor.session.replay.masks
+def test_a_selection_thickens_with_what_the_slider_says(robot: Robot, widgets: Widgets) -> None:
+    masks = robot.editor.session.replay.masks
     widgets.click("Thickness")
     widgets.type("Fill with", "1000")
     select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
@@ -256,8 +255,8 @@ def test_a_selection_thickens_with_what_the_slider_says(robot: Robot, monkeypatc
     assert (masks.thickness.get() == 24576).all()
 
 
-def test_thickness_by_brightness_is_live_and_one_edit(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    widgets, session = Widgets(robot, monkeypatch), robot.editor.session
+def test_thickness_by_brightness_is_live_and_one_edit(robot: Robot, widgets: Widgets) -> None:
+    session = robot.editor.session
     widgets.click("Thickness")
     widgets.look()
     slider = widgets.at["By brightness"]
@@ -325,12 +324,11 @@ def test_random_selections_are_replayed_to_the_byte(robot: Robot, seed: int) -> 
 @needs_a_screen
 def test_a_person_selects_freezes_and_renders_the_same(tmp_path: Path, fluidwarp: Run) -> None:
     """With a real pointer and real keys; what the command line makes of the project is what was exported."""
-    from app.media.pictures import read_picture, write_picture
+    from app.media.pictures import read_picture
 
     desk, work = Desk(tmp_path), tmp_path / "work.fluidwarp"
     try:
-        write_picture(tmp_path / "pattern.png", pattern())
-        desk.open(tmp_path / "pattern.png")
+        desk.open_pattern()
         desk.key("m")
         desk.drag((300, 200), (500, 400))
         desk.do("keydown", "shift", "sleep", "0.2")

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import moderngl
 import numpy as np
-import pytest
 from PIL import Image
 
 from app.ui.thumbnails import LONGER, MOST, Thumbnails
 from solver.gl.device import Device
-from support.editing import Robot, small_project
-
-
-@pytest.fixture
-def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
-    robot = Robot(device, small_project(tmp_path))
-    yield robot
-    robot.close()
+from support.editing import Robot
 
 
 def pixels(texture: moderngl.Texture | None) -> np.ndarray:

@@ -27,12 +27,13 @@ pytestmark = needs_a_screen
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Iterator[Desk]:
-    desk = Desk(tmp_path)
+def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
+    desk = Desk(tmp_path, threads=getattr(request, "param", False))
     yield desk
     desk.close()
 
 
+@pytest.mark.parametrize("desk", [True], indirect=True, ids=["threads"])
 def test_a_whole_session(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
@@ -77,15 +78,13 @@ def test_a_whole_session(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
 def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     """Four of them are drawn while the first is simulated, and exported while the last ones still wait."""
     work, exported, rendered = (tmp_path / name for name in ("work.fluidwarp", "work warped.png", "rendered.png"))
-    projects.save(small_project(tmp_path, grid=384), work)
+    projects.save(small_project(tmp_path, grid=320), work)
     desk.open(work)
     words = ["mousemove", "300", "200", "sleep", "0.5"]
     for y in (200, 300, 400, 500):
         words += ["mousemove", "300", str(y), "mousedown", "1", "sleep", "0.05"]
         words += ["mousemove", "500", str(y), "sleep", "0.05", "mousemove", "700", str(y), "mouseup", "1"]
     desk.do(*words)
-    desk.until(lambda: desk.title() == "work * - fluidwarp", "the strokes to be recorded")
-    desk.insist(lambda: desk.key("ctrl+s"), lambda: desk.title() == "work - fluidwarp", "it to be saved")
 
     def export() -> None:
         desk.key("ctrl+e")
@@ -93,6 +92,7 @@ def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path
         desk.key("Return")
 
     desk.insist(export, exported.exists, "the export")
+    desk.insist(lambda: desk.key("ctrl+s"), lambda: desk.title() == "work - fluidwarp", "it to be saved")
     strokes = projects.load(work).recipe.stroke
     assert len(strokes) == 4
     for stroke in strokes:
@@ -103,10 +103,8 @@ def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path
 
 
 def test_a_killed_editor_gives_the_work_back(desk: Desk, tmp_path: Path) -> None:
-    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
-    journals = tmp_path / "state" / "fluidwarp" / "journals"
-    write_picture(picture, pattern())
-    desk.open(picture)
+    work, journals = tmp_path / "work.fluidwarp", tmp_path / "state" / "fluidwarp" / "journals"
+    desk.open_pattern()
     for number in range(3):
         desk.drag((400, 300 + 100 * number), (520, 300 + 100 * number))
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the pushes to be recorded")
@@ -120,8 +118,7 @@ def test_a_killed_editor_gives_the_work_back(desk: Desk, tmp_path: Path) -> None
     assert [entry.name for entry in found.work.entries if entry.name == "Push"] == ["Push"] * 3
     found.leave()
 
-    desk.window = ""
-    desk.open(picture)
+    desk.open_pattern()
 
     def restore() -> None:
         desk.do("mousemove", "846", "405", "sleep", "0.6", "click", "1", "sleep", "1")
@@ -132,7 +129,6 @@ def test_a_killed_editor_gives_the_work_back(desk: Desk, tmp_path: Path) -> None
     assert list(journals.iterdir()) == []
     desk.key("ctrl+q")
     desk.until_gone()
-    desk.window = ""
     desk.open(work)  # and is asked nothing
     desk.key("ctrl+q")
     desk.until_gone()
@@ -157,9 +153,7 @@ def close_minimised(desk: Desk) -> None:
 
 
 def test_the_window_comes_back_as_it_was_left(desk: Desk, tmp_path: Path) -> None:
-    picture = tmp_path / "pattern.png"
-    write_picture(picture, pattern())
-    desk.open(picture)
+    desk.open_pattern()
     desk.do("windowsize", desk.window, "900", "610", "windowmove", desk.window, "140", "70")
     time.sleep(0.5)
     desk.key("ctrl+l")
@@ -167,7 +161,7 @@ def test_the_window_comes_back_as_it_was_left(desk: Desk, tmp_path: Path) -> Non
     desk.key("bracketright")
     desk.key("ctrl+q")
     desk.until_gone()
-    desk.open(picture)
+    desk.open_pattern()
     wanted = {"X": "140", "Y": "70", "WIDTH": "900", "HEIGHT": "610"}
 
     def is_there() -> bool:
@@ -184,16 +178,14 @@ def test_the_window_comes_back_as_it_was_left(desk: Desk, tmp_path: Path) -> Non
     assert (seen[400, 1030] == 0xD2).all()
 
 
-def test_a_minimised_window_is_closed_at_once(desk: Desk, tmp_path: Path) -> None:
-    write_picture(tmp_path / "pattern.png", pattern())
-    desk.open(tmp_path / "pattern.png")
+def test_a_minimised_window_is_closed_at_once(desk: Desk) -> None:
+    desk.open_pattern()
     close_minimised(desk)
     desk.until_gone()
 
 
-def test_a_minimised_window_with_unsaved_work_comes_back_to_ask(desk: Desk, tmp_path: Path) -> None:
-    write_picture(tmp_path / "pattern.png", pattern())
-    desk.open(tmp_path / "pattern.png")
+def test_a_minimised_window_with_unsaved_work_comes_back_to_ask(desk: Desk) -> None:
+    desk.open_pattern()
     desk.drag((400, 400), (520, 400))
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
     close_minimised(desk)
@@ -222,10 +214,9 @@ def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, fluidwarp: Run
 
 
 def test_a_file_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
-    picture, other = tmp_path / "pattern.png", tmp_path / "Käse 2.png"
-    write_picture(picture, pattern())
+    other = tmp_path / "Käse 2.png"
     write_picture(other, pattern(100, 60))
-    desk.open(picture)
+    desk.open_pattern()
     command = [sys.executable, str(Path(__file__).parents[1] / "support" / "dropping.py"), desk.window, str(other)]
     subprocess.run(command, env=desk.env, check=True, timeout=PATIENCE)
     desk.until(lambda: desk.title() == "Käse 2 - fluidwarp", "the dropped picture")
@@ -238,10 +229,9 @@ def test_a_file_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
 
 
 def test_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
-    picture, st_map = tmp_path / "pattern.png", tmp_path / "st.exr"
-    write_picture(picture, pattern())
+    st_map = tmp_path / "st.exr"
     write_foreign_map(st_map, 240, 180)
-    desk.open(picture)
+    desk.open_pattern()
     command = [sys.executable, str(Path(__file__).parents[1] / "support" / "dropping.py"), desk.window, str(st_map)]
 
     def use_as_map() -> None:
@@ -252,9 +242,8 @@ def test_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Pa
 
 
 def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Path) -> None:
-    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
-    write_picture(picture, pattern())
-    desk.open(picture)
+    work = tmp_path / "work.fluidwarp"
+    desk.open_pattern()
     desk.save(work)
 
     def viscosity() -> float:
@@ -279,9 +268,8 @@ def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Pat
 
 
 def test_keys_of_files_work_while_a_number_is_typed(desk: Desk, tmp_path: Path) -> None:
-    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
-    write_picture(picture, pattern())
-    desk.open(picture)
+    work = tmp_path / "work.fluidwarp"
+    desk.open_pattern()
     desk.save(work)
 
     def type_number(text: str) -> None:
@@ -328,12 +316,10 @@ FORMATS = 213
 def test_what_is_exported_is_what_the_command_line_makes(
     desk: Desk, tmp_path: Path, fluidwarp: Run, exports: list[tuple[str, int, str]]
 ) -> None:
-    picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
-    write_picture(picture, pattern())
-    desk.open(picture)
+    desk.open_pattern()
     desk.drag((400, 400), (520, 400))
     desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
-    desk.save(work)
+    desk.save(tmp_path / "work.fluidwarp")
     for kind, across, name in exports:
         export(desk, kind, across)
         compare(desk, tmp_path, fluidwarp, kind, name)
