@@ -318,5 +318,6 @@ def viscous_step(
     """The exact implicit viscous step of (ny, nx, 2) velocities on MAC faces."""
     matrix, added, free = viscous_system(viscosity, dt, h, **walls)  # pyright: ignore[reportArgumentType]
     right = np.where(free, np.moveaxis(np.asarray(faces, np.float64), -1, 0).ravel() + added, 0.0)
-    solution = sparse_linalg.splu(matrix).solve(right)
+    factors = sparse_linalg.splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    solution = factors.solve(right)
     return np.moveaxis(solution.reshape(2, *viscosity.shape), 0, -1)
