@@ -71,11 +71,12 @@ def find_parts(stiff: np.ndarray, stiffness: np.ndarray, open_u: np.ndarray, ope
 
 def _opened(stiff: np.ndarray) -> np.ndarray:
     """The union of all squares of `BROAD` cells in the stiff ones; walls count as stiff."""
-    for _ in ("down the rows", "then, turned over, across"):
-        full, count = np.pad(stiff, ((BROAD - 1, BROAD - 1), (0, 0)), constant_values=True), len(stiff) + BROAD - 1
-        whole = np.logical_and.reduce([full[start : start + count] for start in range(BROAD)])
-        stiff = np.logical_or.reduce([whole[start : start + len(stiff)] for start in range(BROAD)]).T
-    return stiff
+    whole = np.pad(stiff, BROAD - 1, constant_values=True)
+    for combined in (np.logical_and, np.logical_or):  # which squares are stiff, and what lies in one of them
+        for _ in ("down the rows", "then, turned over, across"):
+            count = len(whole) - BROAD + 1
+            whole = combined.reduce([whole[start : start + count] for start in range(BROAD)]).T
+    return whole
 
 
 def _numbered(inside: np.ndarray, stiffness: np.ndarray, side: int) -> np.ndarray:

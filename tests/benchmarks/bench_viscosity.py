@@ -21,7 +21,7 @@ from solver import Device, Grid
 from solver.viscosity.solve import Viscosity
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
-from properties.viscosity import CLASSES, Case, error
+from properties.viscosity import MASKS, Case, error
 
 REPEATS = 5
 
@@ -69,7 +69,7 @@ def main() -> None:
             jacobi = Jacobi(device, Grid(*size), pairs=1)
             for softest in options.softest:
                 for contrast in options.contrasts:
-                    for kind in CLASSES:
+                    for kind in MASKS:
                         rows = []
                         for seed in range(options.seeds):
                             case = Case.random(kind, size, contrast, softest, np.random.default_rng(seed))

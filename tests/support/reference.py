@@ -324,7 +324,6 @@ def viscous_step(
     matrix, added, free = viscous_system(viscosity, dt, h, **walls)  # pyright: ignore[reportArgumentType]
     right = np.where(free, np.moveaxis(np.asarray(faces, np.float64), -1, 0).ravel() + added, 0.0)
     # It is symmetric and positive definite, so no pivoting is needed: half the time and memory.
-    options = {"SymmetricMode": True}
-    factors = sparse_linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    factors = sparse_linalg.splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     solution = factors.solve(right)
     return np.moveaxis(solution.reshape(2, *viscosity.shape), 0, -1)
