@@ -240,8 +240,8 @@ class GradientForce(_Force):
 
     By itself an incompressible fluid balances a gradient by pressure and stands still; where the viscosity varies, only
     the splitting into stages moves it a little. (In the paper it moves because few Jacobi sweeps leave most of the
-    divergence.) So either the force acts only `within` a window, whose border makes it push, or it `swells`: then it is
-    a velocity, lengths / s, whose divergence the projection leaves in, and what is chosen grows. Both together lift
+    divergence.) So either the force acts only `within` a window, whose border makes it push, or with `swell` it is a
+    velocity, lengths / s, whose divergence the projection leaves in, and what is chosen grows. Both together lift
     what is in the window: it is pressed together ahead and stretched behind, and nothing flows back beside it.
 
     Attributes:

@@ -29,13 +29,12 @@ class History:
 
     Args:
         recipe: where the work begins.
-        name: of that first state, as the list shows it.
         budget: bytes that the entries may hold together; what entries share is counted once.
     """
 
-    def __init__(self, recipe: Recipe, name: str = "Open", budget: int = DEFAULT_BUDGET) -> None:
+    def __init__(self, recipe: Recipe, budget: int = DEFAULT_BUDGET) -> None:
         self.budget = budget
-        self._entries = [Entry(name, recipe, _own_bytes(recipe, None))]
+        self._entries = [Entry("Open", recipe, _own_bytes(recipe, None))]
         self._index = self._made = 0
 
     @classmethod

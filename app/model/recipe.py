@@ -140,7 +140,7 @@ class Output(Model):
     Attributes:
         size: longer side of the result in pixels; left out, the picture's own.
         fps: frames per second of an animation.
-        quality: 1-100, of JPEG, WebP and video.
+        quality: 1-100, of JPEG, WebP, AVIF and video.
         samples: places looked up along a side of each pixel: "auto", as many as the map stretches there; 1 is sharper,
             and shows steps where the map shrinks the picture.
     """

@@ -19,6 +19,7 @@ from solver.components import connected_components
 from solver.grid import Grid
 
 FINEST = 2048  # pixels along the longer side, at most, that masks are worked out on
+ROWS_AT_ONCE = 64  # of a canvas
 SOURCE = "source"
 """The name by which a recipe calls the picture that is warped, where it could name an auxiliary one."""
 
@@ -101,7 +102,7 @@ def to_grid(values: np.ndarray, grid: Grid) -> np.ndarray:
     return _resized(_resized(values, grid.nx, 1), grid.ny, 0).astype(np.float32)
 
 
-def strips(values: np.ndarray, grid: Grid, rows: int = 64) -> Iterator[tuple[slice, np.ndarray]]:
+def strips(values: np.ndarray, grid: Grid) -> Iterator[tuple[slice, np.ndarray]]:
     """The rows of a grid a few at a time, each time with `values` (h, w) of no more cells interpolated to them.
 
     Rows in which all of them are 0 are left out.
@@ -110,8 +111,8 @@ def strips(values: np.ndarray, grid: Grid, rows: int = 64) -> Iterator[tuple[sli
     above, below, down = _between(len(values), grid.ny)
     left, right, across = _between(values.shape[1], grid.nx)
     down, across = down.astype(np.float32), across.astype(np.float32)
-    for top in range(0, grid.ny, rows):
-        here = slice(top, min(top + rows, grid.ny))
+    for top in range(0, grid.ny, ROWS_AT_ONCE):
+        here = slice(top, min(top + ROWS_AT_ONCE, grid.ny))
         part = down[here, None]
         tall = values[above[here]] * (1 - part) + values[below[here]] * part
         if tall.any():

@@ -35,6 +35,7 @@ REST = 0.004  # longer sides a second: a pixel of a screen in four frames
 LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each waits for the GPU
 KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
 MOST_COASTING = 60.0  # seconds
+BUDGET = 400 * 2**20  # bytes of texture memory for checkpoints
 PATIENCE = 0.05  # seconds of a frame for getting to where the playhead was sent
 QUICK = 0.01  # seconds a tick may take for another one in the same frame: rather a slower fluid than fewer frames
 
@@ -68,7 +69,6 @@ class Session:
     Args:
         device: where it is simulated.
         project: what is worked on.
-        budget: bytes of texture memory for checkpoints.
 
     Attributes:
         project: where it came from and is saved to.
@@ -85,12 +85,12 @@ class Session:
         changes: grows with everything that changes what is seen.
     """
 
-    def __init__(self, device: Device, project: Project, budget: int = 400 * 2**20) -> None:
+    def __init__(self, device: Device, project: Project) -> None:
         self.device = device
         self.project = project
         self.document = Document(project.picture, project.recipe, project.path)
         self.pictures = Pictures(project.picture, project.folder)
-        self.replay = Replay(device, project.recipe, self.pictures, budget)
+        self.replay = Replay(device, project.recipe, self.pictures, BUDGET)
         self.playing = False
         self.loops = False
         self.coasting = False
@@ -109,7 +109,6 @@ class Session:
         self._went_back = False
         self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
         self._tool: Tool | None = None
-        self._opposite = False
         self._taken: int | None = None  # the number of the handle in hand, if there was one where it was pressed
         self._touch: Touch | None = None
         self._string = PulledString(0.0, self.replay.grid.extent, (0.0, 0.0))
@@ -120,7 +119,6 @@ class Session:
         self._base = project.recipe
         self._live = project.recipe
         self._target: int | None = self.end or None
-        self._still = True
         self._backwards = False  # it is played from its end to its start
         self._coasted = 0
         # The state that the next joined edit goes on from, and the bars that it is of.
@@ -238,7 +236,7 @@ class Session:
         if held is not None:
             press = replace(press, held=self._take(held.led), rests=held.target)
         self._target = None
-        self._tool, self._opposite = tool, press.opposite
+        self._tool = tool
         self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
         self.path = [self._touch[1:3]]
         self._string = PulledString(press.string, self.extent, self.path[0])
