@@ -65,9 +65,7 @@ class WarpMap:
         if np.shape(self.size) != (2,) or not all(isinstance(side, Integral) and side >= 6 for side in self.size):
             raise ValueError(f"a map of {size!r} texels was asked for; (width, height) from 6 x 6 is wanted")
         if not (isinstance(remap_every, Integral) and remap_every >= 1):
-            raise ValueError(
-                f"{remap_every!r} steps between remaps were asked for; a whole number from 1 is wanted"
-            )
+            raise ValueError(f"{remap_every!r} steps between remaps were asked for; a whole number from 1 is wanted")
         self._accumulated = AccumulatedMap(device, self.size, self.extent)
         self._frozen = Frozen(device, self.size)
         self._remapping = Remapping(device, self._accumulated, self._frozen)
