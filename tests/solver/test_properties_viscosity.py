@@ -39,8 +39,8 @@ def test_viscous_step_is_stable(device: Device, seed: int) -> None:
     viscosity.check_viscous_step_is_stable(device, seed)
 
 
-@pytest.mark.parametrize("kind", viscosity.CLASSES)
-@pytest.mark.parametrize(("contrast", "softest"), [(1e2, 1.0), (1e5, 1.0), (1e5, 30.0)])
+@pytest.mark.parametrize("kind", viscosity.MASKS)
+@pytest.mark.parametrize(("contrast", "softest"), [(1e2, 30.0), (1e5, 1.0), (1e5, 30.0)])
 def test_every_class_of_mask(device: Device, kind: str, contrast: float, softest: float) -> None:
     case = viscosity.Case.random(kind, (96, 96), contrast, softest, np.random.default_rng(0))
     found, iterations = case.solved(device)
@@ -59,6 +59,14 @@ def test_stiffer_parts_in_stiff_ones(device: Device, seed: int, softest: float) 
     found, iterations = case.solved(device)
     assert viscosity.error(found, case.exact()) < viscosity.ERROR[1e5]
     assert iterations <= viscosity.ITERATIONS[softest]
+
+
+def test_a_soft_mask_that_is_steep_in_a_few_places(device: Device) -> None:
+    """It has no rigid parts: with them 9 % were left after ten iterations."""
+    case = viscosity.Case.random("soft blobs", (96, 96), 1e5, 30.0, np.random.default_rng([3, 7]))
+    found, iterations = case.solved(device)
+    assert viscosity.error(found, case.exact()) < viscosity.ERROR[1e5]
+    assert iterations <= viscosity.ITERATIONS[30.0]
 
 
 def test_cores_are_made_of_squares() -> None:
