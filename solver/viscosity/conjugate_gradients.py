@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, isfinite, sqrt
+from math import inf, isfinite
 from typing import Any
 
 from solver.gl.device import Device
@@ -34,7 +34,7 @@ class ConjugateGradients:
         names = "solution", "residual", "direction", "A p"
         self._x, self._r, self._p, self._ap = (DoublePackedFaces(device, ringed, f"viscous {name}") for name in names)
         self._az = PackedFaces(device, ringed, "viscous A z")
-        self._products = device.field(ringed, 4, "viscous products")
+        self._products, self._norms = (device.field(ringed, n, "viscous products") for n in (4, 2))
         self._sum = Reduction(device, ringed, 4, "sum")
         # Of the guess, with the strains on the far walls, which lie in the ring.
         self._guess_products = device.field(ringed, 4, "viscous products of the guess")
@@ -61,8 +61,8 @@ class ConjugateGradients:
         last without A z and its products: what the guess v* + d lacks is r . A^-1 r, no more than r . r, as A is no
         less than 1.
         """
-        before: dict[str, Any] = {"parts": (1.0, 1.0), **v_star.inputs(), **change.read.inputs("change_")}
-        self._guess(before, rhs)
+        iterate: dict[str, Any] = {"parts": (1.0, 1.0), **v_star.inputs(), **change.read.inputs("change_")}
+        self._guess(iterate, rhs)
         bv, bd, vav, vad = self._sum(self._guess_products).tolist()
         dad, rr = self._sum_of_more(self._more_products).tolist()
         self.iterations = 0
@@ -73,31 +73,33 @@ class ConjugateGradients:
         a, c = least_energy(bv, bd, vav, vad, dad)
         found, lost = a * bv + c * bd, (1.0 - a) ** 2 * vav + 2.0 * (1.0 - a) * (1.0 - c) * vad + (1.0 - c) ** 2 * dad
         if not lost <= (NEAR * tolerance) ** 2 * found:
-            before["parts"] = a, c
-            self._guess(before, rhs)
+            iterate["parts"] = a, c
+            self._guess(iterate, rhs)
         else:
             found -= lost
             if cycle_leaves * rr <= tolerance**2 * found:
                 self.iterations = 1
-                return self._finish(change, before, precondition(self._r.read), 1.0)
-        curvature, gained_before = 0.0, inf
+                return self._finish(change, iterate, precondition(self._r.read), 1.0)
+        curvature, gained_before, pp, smoothest = 0.0, inf, 0.0, 0.0
         while True:
-            is_first = not self.iterations
             self.iterations += 1
             z = precondition(self._r.read)
-            if not is_first:
-                before = {**v_star.inputs(), **self._x.read.inputs("x_"), **self._p.read.inputs("p_"), "beta": 0.0}
-            rz, z_az, z_ap, xx = self._apply_operator(z, before, is_first)
-            alpha, before["beta"], curvature = cg_coefficients(rz, z_az, z_ap, curvature)
+            rz, z_az, z_ap, xx, zz, zp = self._apply_operator(z, iterate)
+            alpha, beta, curvature = cg_coefficients(rz, z_az, z_ap, curvature)
+            iterate["beta"] = beta
             gained = alpha**2 * curvature
             found += gained
             left = max(gained, _series(gained, gained_before))
-            size = found if cycle_leaves < inf else sqrt(max(found * xx, 0.0))
-            if not alpha or self.iterations == most or left <= tolerance**2 * size:
+            if not self._is_one:
+                pp = zz + beta * (2.0 * zp + beta * pp)
+                smoothest = max(smoothest, pp / curvature) if alpha else inf
+                left *= smoothest
+            if not alpha or self.iterations == most or left <= tolerance**2 * (found if self._is_one else xx):
                 # What has been spoiled may be no number.
-                return self._finish(change, before, z if alpha else self._r.read, alpha)
+                return self._finish(change, iterate, z if alpha else self._r.read, alpha)
             gained_before = gained
-            self._update(before, z, alpha, is_first)
+            self._update(iterate, z, alpha)
+            iterate = {**v_star.inputs(), **self._x.read.inputs("x_"), **self._p.read.inputs("p_"), "beta": 0.0}
 
     def _guess(self, guess: dict[str, Any], rhs: PackedFaces) -> None:
         """The residual of a v* + c d, (a, c) its `parts`, and the products that tell the best ones."""
@@ -106,49 +108,51 @@ class ConjugateGradients:
         targets = *self._r.read.fields, self._guess_products, self._more_products
         draw(targets, region=(x, y, width + 1, height + 1), **guess, **rhs.inputs("rhs_"), **self.level.operator)
 
-    def _apply_operator(self, z: PackedFaces, before: dict[str, Any], first: bool) -> list[float]:
-        """A z, and r . z, z . A z, z . A p (at first 0) and x . x (of one viscosity 0); x is that `before`."""
-        draw = self.device.pass_("viscosity/apply_operator.frag", **_first(first), **self.level.defines)
-        draw(
-            (*self._az.fields, self._products),
-            region=self.level.region,
-            **before,
-            **z.inputs("z_"),
-            **self._r.read.inputs("r_"),
-            **({} if first else self._ap.read.inputs("ap_")),
-            **self.level.operator,
-        )
-        return self._sum(self._products).tolist()
+    def _apply_operator(self, z: PackedFaces, iterate: dict[str, Any]) -> list[float]:
+        """A z, and r . z, z . A z, z . A p, x . x, z . z, z . p; at first 0 with p, of one viscosity the last three."""
+        first = _first(iterate)
+        targets = *self._az.fields, self._products, *(() if self._is_one else (self._norms,))
+        draw = self.device.pass_("viscosity/apply_operator.frag", **first, **self.level.defines)
+        draw(targets, region=self.level.region, **iterate, **z.inputs("z_"), **self._r.read.inputs("r_"),
+             **({} if first else self._ap.read.inputs("ap_")), **self.level.operator)  # fmt: skip
+        more = [0.0, 0.0] if self._is_one else self._sum_of_more(self._norms).tolist()
+        return self._sum(self._products).tolist() + more
 
-    def _update(self, before: dict[str, Any], z: PackedFaces, alpha: float, first: bool) -> None:
-        """p = z + beta p, A p likewise, x + alpha p, r - alpha A p; x and p are those `before`."""
-        pairs = self._x, self._r, self._p, self._ap
-        self.device.pass_("viscosity/update.frag", **_first(first))(
-            [field for pair in pairs for field in pair.write.fields],
-            region=self.level.region,
-            alpha=alpha,
-            **before,
-            **z.inputs("z_"),
-            **self._az.inputs("az_"),
-            **self._r.read.inputs("r_"),
-            **({} if first else self._ap.read.inputs("ap_")),
-        )
+    def _update(self, iterate: dict[str, Any], z: PackedFaces, alpha: float) -> None:
+        """p = z + beta p, A p likewise, x + alpha p, r - alpha A p."""
+        first, pairs = _first(iterate), (self._x, self._r, self._p, self._ap)
+        update = self.device.pass_("viscosity/update.frag", **first)
+        targets = [field for pair in pairs for field in pair.write.fields]
+        update(targets, region=self.level.region, alpha=alpha, **iterate, **z.inputs("z_"), **self._az.inputs("az_"),
+               **self._r.read.inputs("r_"), **({} if first else self._ap.read.inputs("ap_")))  # fmt: skip
         for pair in pairs:
             pair.swap()
 
-    def _finish(self, change: DoublePackedFaces, before: dict[str, Any], z: PackedFaces, alpha: float) -> PackedFaces:
-        """x + alpha p, and what that has made of v* as the `change`; x and p are those `before`."""
-        finish = self.device.pass_("viscosity/finish.frag", **_first("parts" in before))
+    def _finish(self, change: DoublePackedFaces, iterate: dict[str, Any], z: PackedFaces, alpha: float) -> PackedFaces:
+        """x + alpha p, and what that has made of v* as the `change`."""
+        finish = self.device.pass_("viscosity/finish.frag", **_first(iterate))
         targets = (*self._x.write.fields, *change.write.fields)
-        finish(targets, region=self.level.region, alpha=alpha, **before, **z.inputs("z_"))
+        finish(targets, region=self.level.region, alpha=alpha, **iterate, **z.inputs("z_"))
         change.swap()
         return self._x.write
+
+    @property
+    def _is_one(self) -> bool:
+        """True if there is but one viscosity."""
+        return "UNIFORM" in self.level.defines
 
     def release(self) -> None:
         """Free the textures."""
         for item in (self._x, self._r, self._p, self._ap, self._az):
             item.release()
-        for item in (self._products, self._sum, self._guess_products, self._more_products, self._sum_of_more):
+        for item in (
+            self._products,
+            self._norms,
+            self._sum,
+            self._guess_products,
+            self._more_products,
+            self._sum_of_more,
+        ):
             item.release()
 
 
@@ -168,9 +172,9 @@ def _series(last: float, before: float) -> float:
     return last**2 / (before - last) if before > last else inf
 
 
-def _first(is_first: bool) -> dict[str, Any]:
-    """The variant of a pass before which there is no iterate and no search direction, only the guess."""
-    return {"FIRST": 1} if is_first else {}
+def _first(iterate: dict[str, Any]) -> dict[str, Any]:
+    """The variant of a pass on an iterate of which there is only the guess, and no search direction."""
+    return {"FIRST": 1} if "parts" in iterate else {}
 
 
 def cg_coefficients(rz: float, z_az: float, z_ap: float, p_ap: float) -> tuple[float, float, float]:

@@ -43,8 +43,8 @@ class TakenUp(NamedTuple):
     """What the coefficients in the textures were made from.
 
     Attributes:
-        basis: (time step, where the fluid sticks, depth of the last level, largest kappa that the coarse levels count):
-            with others nothing can be kept.
+        basis: (time step, where the fluid sticks, how many levels, largest kappa that the coarse ones count): with
+            others nothing can be kept.
         viscosity, solid: of the cells.
     """
 
@@ -67,7 +67,6 @@ class Multigrid:
 
     def __init__(self, device: Device, size: tuple[int, int], spacing: tuple[float, float]) -> None:
         self.device = device
-        self.plan = Plan()
         self.levels: list[Level] = []
         finest = size
         while not self.levels or not self.levels[-1].is_coarsest:
@@ -81,6 +80,7 @@ class Multigrid:
         self.set_spacing(spacing)
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
+        self._sweeps, self._is_full = 1, False  # of a cycle, see `Plan`
         self._largest = 0.0  # kappa
         self._alone: Level | None = None  # of one viscosity: the first that needs no coarser one
 
@@ -93,9 +93,9 @@ class Multigrid:
         for level in self.levels:
             level.shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
 
-    def set_uniform(self, viscosity: float, dt: float, no_slip: NoSlip) -> None:
-        """Take up one viscosity, lengths^2 / s, in a box without solids."""
-        self._taken_up = None
+    def set_uniform(self, viscosity: float, dt: float, no_slip: NoSlip, plan: Plan) -> None:
+        """Take up one viscosity, lengths^2 / s, in a box without solids, and what of the `plan` is said of cycles."""
+        self._taken_up, self._sweeps = None, plan.sweeps
         self._largest = viscosity * self._scale(dt)
         for level in self.levels:
             level.set_uniform(self._kappa(level), no_slip)
@@ -103,24 +103,34 @@ class Multigrid:
         # The direct level is solved at once, and the finest has a plan of its own.
         between = self.levels[1 : self.direct_level.depth]
         self._alone = next((level for level in between if self._sweeps_alone(level) <= MOST_ALONE), None)
-        last = self.last
-        if not self.has_transform and last is self.levels[-1]:
+        last = self.levels[-1]
+        if plan.method == "cg" and not self.has_transform and not self._alone:
             stiffness = last.operator["stiffness"]
             uniform = Coefficients.uniform(stiffness, last.box, last.texels, last.shear, no_slip)
             self._inverse.set(inverse_matrix(uniform))
 
     def set_coefficients(
-        self, viscosity: Field, solid: Field, amount: np.ndarray, is_solid: np.ndarray, dt: float, no_slip: NoSlip
+        self,
+        viscosity: Field,
+        solid: Field,
+        amount: np.ndarray,
+        is_solid: np.ndarray,
+        dt: float,
+        no_slip: NoSlip,
+        plan: Plan,
     ) -> None:
-        """Take up the `viscosity` of the cells, lengths^2 / s, and the `solid` ones, also as arrays (ny, nx).
+        """Take up the `viscosity` of the cells, lengths^2 / s, and the `solid` ones, also as arrays (ny, nx), and what
+        of the `plan` is said of cycles.
 
         What is made again is what has changed: a dab of a brush changes few cells. Where the field holds more than the
         largest `amount`, it counts as that.
         """
         self.has_transform, self._alone = False, None
+        self._sweeps, self._is_full = plan.sweeps, plan.full
         self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
-        most = self.plan.stiff if self.plan.rigid else UNBOUNDED
-        taken_up, basis = self._taken_up, (dt, no_slip, self.last.depth, most)
+        most = plan.stiff if plan.rigid else UNBOUNDED
+        levels = self.levels if plan.method == "cg" else self.levels[:1]
+        taken_up, basis = self._taken_up, (dt, no_slip, len(levels), most)
         self._taken_up = TakenUp(basis, amount, is_solid)
         box: Box | None = Box(0, amount.shape[0], 0, amount.shape[1])
         is_new = not taken_up or taken_up.basis != basis or not np.array_equal(taken_up.solid, is_solid)
@@ -129,11 +139,11 @@ class Multigrid:
             if box is None:
                 return
         self.finest.set_masks(viscosity, solid, self._scale(dt), float(amount.max()), no_slip, box)
-        for finer, level in pairwise(self.levels[: self.last.depth + 1]):
+        for finer, level in pairwise(levels):
             box = box.coarser
             level.coarsen(finer, no_slip, box, is_new, most)
-        if self.last is self.levels[-1]:
-            self._inverse.set(inverse_matrix(self.last.coefficients()))
+        if levels is self.levels:
+            self._inverse.set(inverse_matrix(levels[-1].coefficients()))
 
     def _kappa(self, level: Level) -> float:
         """The largest kappa on a level, of one viscosity."""
@@ -156,11 +166,6 @@ class Multigrid:
         """The level that is solved directly."""
         return self._transform_level if self.has_transform else self.levels[-1]
 
-    @property
-    def last(self) -> Level:
-        """The coarsest level that is visited."""
-        return self.finest if self.plan.method == "smooth" else self._alone or self.direct_level
-
     # -- cycles -----------------------------------------------------------------------------------------------------
 
     def precondition(self, rhs: PackedFaces, start: bool, rigid: Deflation | None = None) -> PackedFaces:
@@ -171,17 +176,22 @@ class Multigrid:
         if "UNIFORM" in self.finest.defines:
             self.sawtooth(self.finest, rhs)
         else:
-            self.cycle(self.finest, rhs, 0 if start else self._begin(self.finest, rhs), rigid)
+            self.cycle(self.finest, rhs, 0 if start else self._begin(self.finest, rhs), rigid, self._is_full)
         return self.finest.faces.read
 
-    def cycle(self, level: Level, rhs: PackedFaces, begun: int, rigid: Deflation | None = None) -> None:
-        """One multigrid cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`."""
+    def cycle(
+        self, level: Level, rhs: PackedFaces, begun: int, rigid: Deflation | None = None, is_full: bool = False
+    ) -> None:
+        """One V-cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`; or an F-cycle.
+
+        That solves for the coarse correction by an F-cycle and then a V-cycle.
+        """
         if level is self.direct_level:
             self.direct_solve(rhs)
             return
-        weights = self.weights(level)
+        weights = self._weights(level)
         self.smooth(level, rhs, weights[begun:])
-        self._coarse_correction(level, rhs, rigid)
+        self._coarse_correction(level, rhs, rigid, is_full)
         self.smooth(level, rhs, weights[::-1])
 
     def sawtooth(self, level: Level, rhs: PackedFaces) -> None:
@@ -196,15 +206,15 @@ class Multigrid:
         coarser = self.levels[level.depth + 1]
         begun = self._restrict(rhs, coarser, start=coarser is self._alone)
         if coarser is self._alone:
-            self.smooth(coarser, coarser.rhs, self.weights(coarser)[begun:])
+            self.smooth(coarser, coarser.rhs, self._weights(coarser)[begun:])
         else:
             self.sawtooth(coarser, coarser.rhs)
         prolong = self.device.pass_("viscosity/prolong.frag", ALONE=1, **level.defines)
         prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **level.bounds)
         level.faces.swap()
-        self.smooth(level, rhs, self.weights(level))
+        self.smooth(level, rhs, self._weights(level))
 
-    def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None) -> None:
+    def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None, is_full: bool) -> None:
         """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts S P in place of P, between two corrections of these."""
         # The write side is free until the correction is added.
         faces, free = level.faces.read, level.faces.write
@@ -215,7 +225,9 @@ class Multigrid:
             moved = rigid.correct(free, faces, add=True)
             self.residual(level, faces, rhs, free)
             averaged = rigid.average(free, moved)
-        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser, start=True))
+        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser, start=True), is_full=is_full)
+        if is_full and coarser is not self.direct_level:
+            self.cycle(coarser, coarser.rhs, 0)
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"ALONE": 1} if rigid else {}))
         prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
                 **level.bounds)  # fmt: skip
@@ -228,16 +240,21 @@ class Multigrid:
 
     # -- its parts --------------------------------------------------------------------------------------------------
 
-    def weights(self, level: Level) -> list[float]:
-        """Chebyshev weights of the smoothing sweeps."""
-        count, k = self.plan.sweeps, self._kappa(level)
+    def smooth_alone(self, rhs: PackedFaces, start: PackedFaces, sweeps: int) -> None:
+        """So many sweeps on the finest level, after which no coarser one takes over."""
+        self.smooth(self.finest, rhs, self._weights_alone(self.finest, sweeps), start)
+
+    def _weights_alone(self, level: Level, sweeps: int) -> list[float]:
+        """Chebyshev weights for all eigenvalues: see `sweeps_alone`. D is 1 + 6 kappa."""
+        k = self._kappa(level)
+        return chebyshev_weights(1.0 / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), sweeps)
+
+    def _weights(self, level: Level) -> list[float]:
+        """Chebyshev weights of a level's sweeps in a cycle."""
         if level is self._alone:
-            count = self._sweeps_alone(level)
-        elif self.plan.method == "cg":
-            largest = LARGEST_EIGENVALUE[1 if level.stencil else 0]
-            return chebyshev_weights(largest / SMOOTHED[count], largest, count)
-        # No coarser level takes over: see `sweeps_alone`. D is 1 + 6 k.
-        return chebyshev_weights(1.0 / (1.0 + 6.0 * k), (1.0 + 16.0 * k) / (1.0 + 6.0 * k), count)
+            return self._weights_alone(level, self._sweeps_alone(level))
+        largest = LARGEST_EIGENVALUE[1 if level.stencil else 0]
+        return chebyshev_weights(largest / SMOOTHED[self._sweeps], largest, self._sweeps)
 
     def smooth(
         self, level: Level, rhs: PackedFaces, weights: list[float], start: PackedFaces | None = None
@@ -287,7 +304,7 @@ class Multigrid:
         if level is self.direct_level:
             return 0
         start = self.device.pass_("viscosity/start.frag", **level.defines)
-        start(level.faces.write.fields, region=level.region, weight=self.weights(level)[0], **rhs.inputs("rhs_"),
+        start(level.faces.write.fields, region=level.region, weight=self._weights(level)[0], **rhs.inputs("rhs_"),
               **level.operator)  # fmt: skip
         level.faces.swap()
         return 1
@@ -296,7 +313,7 @@ class Multigrid:
         """The residual as rhs of the coarser level, to `start` with a first sweep on it if it has any; how many."""
         start = start and coarser is not self.direct_level
         restrict = self.device.pass_("viscosity/restrict.frag", **({"START": 1} if start else {}), **coarser.defines)
-        inputs = {"weight": self.weights(coarser)[0], **coarser.operator} if start else coarser.bounds
+        inputs = {"weight": self._weights(coarser)[0], **coarser.operator} if start else coarser.bounds
         targets = coarser.rhs.fields + (coarser.faces.write.fields if start else ())
         restrict(targets, region=coarser.region, alone=coarser.alone, **residual.inputs(), **inputs)
         if start:

@@ -21,16 +21,19 @@ STIFF_OF_SOFTEST = 4.0
 # Where all is viscous, stiff parts move together through what lies between them. If they have edges, the coarse levels,
 # which count strains in them that they do not have, cannot carry that; nor beside solids, where coarse strains are not
 # those of the fine level. There the coarse levels move parts above this kappa, in those of the softest cell, as a
-# whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without.
+# whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without, or a third.
 RIGID_OF_SOFTEST = 40.0
+# The share of what bounds stiff parts that is an edge from which on they have edges: it is .5 to 1 of masks of two
+# values and of noise, and 0 to .06 of smooth ones, also where these jump by far more than `MODERATE` in a few places.
+EDGED = 0.25
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
 # fifths, if a contrast beyond `MODERATE` leaves more. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
-# Conjugate gradients end when less than this part, squared, is left (README.md): the error is below 1 % where the
-# viscosity varies so much at most, and below 5 % beyond. With .017 noise of one viscosity was 1.8 % off.
+# Conjugate gradients end when the error is less than this part (README.md): 1 % where the viscosity varies so much at
+# most, less what an estimate may miss, and 5 % beyond. With .017 noise of one viscosity was 1.8 % off.
 MODERATE = 300.0
 TOLERANCE = 0.008
-TOLERANCE_STIFF = 0.07
+TOLERANCE_STIFF = 0.05
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
 # third of `TOLERANCE` is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
 # after 60 steps that moved 12, and is .06.
@@ -56,6 +59,7 @@ class Plan:
         cycle_leaves: of the energy of any error, that a cycle leaves at most, where it is known.
         stiff: dt mu / h^2 above which cores and runs are deflated; 0: none are.
         rigid: the coarse levels move each of these parts as a whole, and count no viscosity above `stiff`.
+        full: cycles are F-cycles.
     """
 
     method: Literal["smooth", "direct", "cg"] = "cg"
@@ -65,6 +69,7 @@ class Plan:
     cycle_leaves: float = math.inf
     stiff: float = 0.0
     rigid: bool = False
+    full: bool = False
 
 
 def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
@@ -73,8 +78,13 @@ def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
         return True
     if kappa.min() <= ONE_SWEEP:
         return False
-    pairs = (kappa[1:], kappa[:-1]), (kappa[:, 1:], kappa[:, :-1])
-    return any(bool((np.maximum(*pair) > MODERATE * np.minimum(*pair)).any()) for pair in pairs)
+    borders = edges = 0
+    for one, other in (kappa[1:], kappa[:-1]), (kappa[:, 1:], kappa[:, :-1]):
+        less, more = np.minimum(one, other), np.maximum(one, other)
+        is_border = (less <= RIGID_OF_SOFTEST * kappa.min()) & (more > RIGID_OF_SOFTEST * kappa.min())
+        borders += np.count_nonzero(is_border)
+        edges += np.count_nonzero(is_border & (more > MODERATE * less))
+    return bool(edges > EDGED * borders)
 
 
 def sweeps_alone(kappa: float, leaves: float) -> int:
@@ -104,6 +114,7 @@ def plan_for(least: float, largest: float, cells: int, is_one: bool, is_sharp: b
     count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
     tolerance = TOLERANCE_STIFF if varies else share * TOLERANCE
+    full = least > ONE_SWEEP and not rigid
     if largest <= stiff:
-        return Plan("cg", count, tolerance)
-    return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid)
+        return Plan("cg", count, tolerance, full=full)
+    return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid, full=full)

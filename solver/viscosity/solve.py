@@ -27,11 +27,15 @@ class Viscosity:
         device: where it lives.
         size: (nx, ny) of the grid.
         spacing: (hx, hy), sides of a cell in longer sides of the picture; by default square cells, `1 / max(size)`.
+
+    Attributes:
+        plan: chosen by `set_coefficients`.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], spacing: tuple[float, float] | None = None) -> None:
         self.device = device
         self.size = size
+        self.plan = Plan()
         self.spacing = spacing or (1.0 / max(size), 1.0 / max(size))
         self._wall_speed: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
         self.multigrid = Multigrid(device, size, self.spacing)
@@ -48,15 +52,6 @@ class Viscosity:
         self.spacing = spacing
         self.multigrid.set_spacing(spacing)
 
-    @property
-    def plan(self) -> Plan:
-        """How much is solved: chosen by `set_coefficients`."""
-        return self.multigrid.plan
-
-    @plan.setter
-    def plan(self, plan: Plan) -> None:
-        self.multigrid.plan = plan
-
     def set_coefficients(self, viscosity: Field, solid: Field, dt: float, walls: Walls) -> None:
         """Take up another viscosity (cells, lengths^2 / s), solid cells (1 = solid), time step (s) or walls."""
         self._wall_speed = walls.driving_speed
@@ -71,9 +66,9 @@ class Viscosity:
         self.plan = plan_for(kappa * least, kappa * largest, cells, is_one, is_sharp(kappa * amount, is_solid))
         self.deflation.set_stiff(None)
         if is_one:
-            self.multigrid.set_uniform(least, dt, walls.no_slip)
+            self.multigrid.set_uniform(least, dt, walls.no_slip, self.plan)
         else:
-            self.multigrid.set_coefficients(viscosity, solid, amount, is_solid, dt, walls.no_slip)
+            self.multigrid.set_coefficients(viscosity, solid, amount, is_solid, dt, walls.no_slip, self.plan)
         if self.plan.method != "smooth" and self.multigrid.direct_level is self.multigrid.finest:
             self.plan = Plan("direct")
         elif self.plan.stiff:
@@ -105,7 +100,7 @@ class Viscosity:
         if self.plan.method == "direct":
             self.multigrid.direct_solve(rhs)
         else:
-            self.multigrid.smooth(finest, rhs, self.multigrid.weights(finest), start=v_star)
+            self.multigrid.smooth_alone(rhs, v_star, self.plan.sweeps)
         return finest.faces.read
 
     def _precondition(self, residual: PackedFaces) -> PackedFaces:

@@ -185,7 +185,7 @@ def check_viscous_step(
 ) -> dict[str, float]:
     """Whatever the mask: near the direct solution, in few iterations, and never worse than doing nothing."""
     rng = np.random.default_rng(seed)
-    kind, size = str(rng.choice(list(classes))), sizes[rng.integers(len(sizes))]
+    kind, size = str(rng.choice(list(classes))), sizes[int(rng.integers(len(sizes)))]
     contrast, softest = float(rng.choice(CONTRASTS)), float(rng.choice(SOFTEST))
     case = Case.random(kind, size, contrast, softest, rng, plain=False)
     found, iterations = case.solved(device)

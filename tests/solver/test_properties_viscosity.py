@@ -39,8 +39,8 @@ def test_viscous_step_is_stable(device: Device, seed: int) -> None:
     viscosity.check_viscous_step_is_stable(device, seed)
 
 
-@pytest.mark.parametrize("kind", viscosity.CLASSES)
-@pytest.mark.parametrize(("contrast", "softest"), [(1e2, 1.0), (1e5, 1.0), (1e5, 30.0)])
+@pytest.mark.parametrize("kind", viscosity.MASKS)
+@pytest.mark.parametrize(("contrast", "softest"), [(1e2, 30.0), (1e5, 1.0), (1e5, 30.0)])
 def test_every_class_of_mask(device: Device, kind: str, contrast: float, softest: float) -> None:
     case = viscosity.Case.random(kind, (96, 96), contrast, softest, np.random.default_rng(0))
     found, iterations = case.solved(device)
@@ -61,13 +61,21 @@ def test_stiffer_parts_in_stiff_ones(device: Device, seed: int, softest: float) 
     assert iterations <= viscosity.ITERATIONS[softest]
 
 
+def test_a_soft_mask_that_is_steep_in_a_few_places(device: Device) -> None:
+    """It has no rigid parts: with them 9 % were left after ten iterations."""
+    case = viscosity.Case.random("soft blobs", (96, 96), 1e5, 30.0, np.random.default_rng([3, 7]))
+    found, iterations = case.solved(device)
+    assert viscosity.error(found, case.exact()) < viscosity.ERROR[1e5]
+    assert iterations <= viscosity.ITERATIONS[30.0]
+
+
 def test_cores_are_made_of_squares() -> None:
     """Rows and columns of five cells that are no squares are no core: they hinge."""
     rng, square = np.random.default_rng(0), np.ones((BROAD, BROAD))
     for density in (0.9, 0.97):
         stiff = rng.random((40, 52)) < density
         walled = np.pad(stiff, BROAD, constant_values=True)
-        wanted = ndimage.binary_opening(walled, square)[BROAD:-BROAD, BROAD:-BROAD]
+        wanted = np.asarray(ndimage.binary_opening(walled, square), bool)[BROAD:-BROAD, BROAD:-BROAD]
         stiffness, open_u, open_v = np.where(stiff, 1e5, 0.0), np.ones_like(stiff), np.ones_like(stiff)
         open_u[:, 0] = open_v[0] = False
         parts = find_parts(stiff, stiffness, open_u, open_v, 8)

@@ -13,6 +13,7 @@ from solver.packing import packed, unpacked
 from solver.params import NoSlip
 from solver.viscosity.clusters import ClusterMatrix
 from solver.viscosity.multigrid import Multigrid
+from solver.viscosity.plan import Plan
 
 
 def along(count: int) -> np.ndarray:
@@ -39,7 +40,7 @@ def of_random_viscosity(device: Device, aspect: float) -> Multigrid:
     viscosity, solid = (10 ** rng.uniform(-2, 4, (ny, nx))).astype(np.float32), np.zeros((ny, nx), bool)
     fields = device.upload(viscosity), device.upload(solid.astype(np.uint8))
     multigrid = Multigrid(device, SIZE, (1 / nx, aspect / nx))
-    multigrid.set_coefficients(*fields, viscosity, solid, 1 / nx**2, NoSlip(*5 * [False]))
+    multigrid.set_coefficients(*fields, viscosity, solid, 1 / nx**2, NoSlip(*5 * [False]), Plan())
     return multigrid
 
 
