@@ -49,17 +49,19 @@ class Trace:
     def begin(self, velocity: Field, dt: float, grid: Grid, walls: Walls, in_parts: bool = False) -> Tracing:
         """What drawing it for a velocity on MAC faces takes; from here on it is that of `dt`, until `forget`.
 
-        `in_parts`: as many as its gradient asks for, which waits for the GPU.
+        `in_parts`: as many as its gradient asks for, which waits for the GPU; ValueError if that is beyond all measure.
         """
-        self._dt = dt
         hx, hy = grid.spacing
         defines, inputs = walls.defines, {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **walls.inputs}
         if in_parts:
             find = self.device.pass_("warp/steepness.frag")
             find(self._steepness, displacement=velocity, spacing=grid.spacing, side=SIDE)
             strain = dt * math.sqrt(self._find_steepest(self._steepness)[0])
+            if not math.isfinite(strain):
+                raise ValueError("what carries the picture is beyond all measure")
             defines = defines | {"PARTS": 1}
             inputs["parts"] = float(min(max(math.ceil(strain / STRAIN), 1), MOST_PARTS))
+        self._dt = dt
         return Tracing(self.field, defines, inputs)
 
     def forget(self) -> None:

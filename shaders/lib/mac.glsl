@@ -30,8 +30,10 @@ vec2 mac_centre(sampler2D velocity, vec2 p) {
     return 0.5 * (texture(velocity, uv).rg + beyond * vec2(lessThan(p + 1.0, size)));
 }
 
-// Where the fluid at position p (in cells) was one step ago: second-order (midpoint) backtrace, kept in the grid; in two
-// halves where the velocity changes by much along the way, or quick pushes, of a brush's radius a step, fold what they pass.
+// How far from position p (in cells) the fluid there was one step ago, x_d - x: second-order (midpoint) backtrace, kept in
+// the grid; in two halves where the velocity changes by much along the way, or quick pushes, of a brush's radius a step, fold
+// what they pass. Ways are summed up and not places, which 32 cells from the corner are rounded by 2e-6 cells in every step:
+// where the flow draws out a corner of the picture ten-thousandfold, the map has that to the same amount.
 // `here` is the velocity at p; `cells_a_speed` is dt / spacing. 8 reads, and 24 more in two halves: one look at the velocity
 // each time round, since a rasteriser that draws several fragments at once runs both sides of an `if`, but leaves a loop
 // when all of them have.
@@ -43,36 +45,36 @@ const float BENT = 0.5; // cells a step that it changes by: from there on more a
 uniform float u_parts;
 
 vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
-    vec2 edge = vec2(textureSize(velocity, 0)), along = cells_a_speed / u_parts;
+    vec2 edge = vec2(textureSize(velocity, 0)), along = cells_a_speed / u_parts, back = vec2(0.0);
     for (float part = 0.0; part < u_parts; ++part) {
-        vec2 at = clamp(p - 0.5 * along * here, vec2(0.0), edge);
-        p = clamp(p - along * mac_velocity(velocity, at), vec2(0.0), edge);
-        if (part < u_parts - 1.0) here = mac_velocity(velocity, p);
+        vec2 at = p + clamp(back - 0.5 * along * here, -p, edge - p);
+        back = clamp(back - along * mac_velocity(velocity, at), -p, edge - p);
+        if (part < u_parts - 1.0) here = mac_velocity(velocity, p + back);
     }
-    return p;
+    return back;
 }
 #else
 vec2 mac_backtrace(sampler2D velocity, vec2 p, vec2 here, vec2 cells_a_speed) {
     vec2 edge = vec2(textureSize(velocity, 0));
-    vec2 begun = p, at = clamp(p - 0.5 * cells_a_speed * here, vec2(0.0), edge), once;
+    vec2 begun = vec2(0.0), at = clamp(-0.5 * cells_a_speed * here, -p, edge - p), once;
     float bent = 0.0;
     for (int look = 0; look < 4; ++look) { // in the middle of the whole; of the first half, where it ends, of the second
-        vec2 found = mac_velocity(velocity, at);
+        vec2 found = mac_velocity(velocity, p + at);
         if (look == 0) {
-            once = clamp(p - cells_a_speed * found, vec2(0.0), edge);
+            once = clamp(-cells_a_speed * found, -p, edge - p);
             bent = smoothstep(BENT, 2.0 * BENT, length(cells_a_speed * (found - here)));
             if (bent == 0.0) break;
             found = here;
         }
         bool ends = look % 2 == 1;
-        at = clamp(begun - (ends ? 0.5 : 0.25) * cells_a_speed * found, vec2(0.0), edge);
+        at = clamp(begun - (ends ? 0.5 : 0.25) * cells_a_speed * found, -p, edge - p);
         if (ends) begun = at;
     }
     return mix(once, at, bent);
 }
 #endif
 
-// The same from the centre of the cell at p, as how far it is: x_d - x, in cells. 11 reads, and 24 more in two halves.
+// The same from the centre of the cell at p. 11 reads, and 24 more in two halves.
 vec2 mac_trace(sampler2D velocity, vec2 p, vec2 cells_a_speed) {
-    return mac_backtrace(velocity, p, mac_centre(velocity, p), cells_a_speed) - p;
+    return mac_backtrace(velocity, p, mac_centre(velocity, p), cells_a_speed);
 }

@@ -279,6 +279,7 @@ class Handles:
         Raises:
             ValueError: if it is of none.
         """
+        check_type("what to go back to", state, State)
         counts = state.values.get("counts")
         if counts is None or counts.dtype != self._counts.dtype or counts.ndim != 1 or (counts < 1).any():
             raise ValueError("the state of handles is missing")

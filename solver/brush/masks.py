@@ -252,6 +252,7 @@ class Masks:
         Raises:
             ValueError: if it is of another canvas.
         """
+        check_type("what to go back to", state, State)
         if {name: saved.kind for name, saved in state.tiles.items()} != self._kinds:
             raise ValueError("the state is of another canvas")
         for name, saved in state.tiles.items():

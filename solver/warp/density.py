@@ -85,7 +85,8 @@ class Density:
         return State.of(self.device, {"density": self.values})
 
     def restore(self, state: State) -> None:
-        """Go back to a saved state."""
+        """Go back to a saved state; ValueError if it is of something else."""
+        check_type("what to go back to", state, State)
         state.write_to({"density": self.values})
 
     def release(self) -> None:

@@ -56,14 +56,17 @@ class WarpMap:
     """
 
     def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None, remap_every: int = 64) -> None:
+        check_type("what a map lives in", device, Device)
+        check_type("the cells of a map", grid, Grid)
         self.device = device
         self.extent = grid.picture
         self.remap_every = remap_every
         self._submap = Submap(device, grid)
         across, down = self.coarse_size
-        self.size = size or (LEAST_TEXELS * across, LEAST_TEXELS * down)
-        if np.shape(self.size) != (2,) or not all(isinstance(side, Integral) and side >= 6 for side in self.size):
-            raise ValueError(f"a map of {size!r} texels was asked for; (width, height) from 6 x 6 is wanted")
+        sides = numbers("the size of a map", size or (LEAST_TEXELS * across, LEAST_TEXELS * down), 2)
+        if not all(side >= 6 and side % 1 == 0 for side in sides):
+            raise ValueError(f"a map of {size} texels was asked for; whole numbers from 6 are wanted")
+        self.size = int(sides[0]), int(sides[1])
         if not (isinstance(remap_every, Integral) and remap_every >= 1):
             raise ValueError(f"{remap_every!r} steps between remaps were asked for; a whole number from 1 is wanted")
         self._accumulated = AccumulatedMap(device, self.size, self.extent)

@@ -164,6 +164,13 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "a field of a part of a texel": (lambda fluid: fluid.device.field(cast(Any, (2.5, 3))), "whole"),
     "words on the GPU": (lambda fluid: fluid.device.upload(np.full((3, 3), "a")), "real"),
+    "a local motion beyond all measure": (
+        lambda fluid: (
+            fluid.add_local(fluid.device.upload(1e30 * reference.smooth_velocity(20, 12, seed=3)), 1e6),
+            WarpMap(fluid.device, fluid.grid).follow(fluid, 0.1),
+        ),
+        "beyond",
+    ),
     "an endless growth": (lambda fluid: Brush(fluid.device).expand(fluid, Tip((0, 0), (0, 0), 0.1), np.inf), "rate"),
 }
 
@@ -406,6 +413,9 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         lambda wrong: Handles(fluid, wrong, []),
         lambda wrong: Density(device, wrong),
         lambda wrong: Density(device, np.ones((12, 16))).advance(wrong, grid, 0.1),
+        Density(device, np.ones((12, 16))).restore,
+        Masks(device, grid).restore,
+        Handles(fluid, warp, []).restore,
         lambda wrong: Masks(device, wrong),
         lambda wrong: Masks(device, grid).set_base(wrong),
         lambda wrong: Masks(device, grid).apply(wrong),
@@ -413,8 +423,11 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         lambda wrong: Sampler(device).apply(warp, wrong),
         lambda wrong: Sampler(device).apply(wrong, np.zeros((6, 6), np.uint8)),
         warp.move_to,
+        lambda wrong: WarpMap(device, wrong),
+        lambda wrong: WarpMap(wrong, grid),
         lambda wrong: WarpMap(device, grid, wrong or cast(Any, 8)),
         lambda wrong: WarpMap(device, grid, (wrong, 16)),
+        lambda wrong: WarpMap(device, grid, (16, 5)),
         lambda wrong: WarpMap(device, grid, remap_every=wrong),
         lambda wrong: warp.hold(wrong or cast(Any, still)),
         device.upload,

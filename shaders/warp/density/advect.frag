@@ -13,7 +13,8 @@ layout(location = 0) out vec4 out_density;
 void main() {
     vec2 cells = vec2(textureSize(u_velocity, 0)), size = vec2(textureSize(u_density, 0)), texel = 1.0 / size;
     vec2 p = v_uv * cells;
-    vec2 from = mac_backtrace(u_velocity, p, mac_velocity(u_velocity, p), u_cells_a_speed) / cells * size - 0.5;
+    vec2 back = mac_backtrace(u_velocity, p, mac_velocity(u_velocity, p), u_cells_a_speed);
+    vec2 from = (p + back) / cells * size - 0.5;
     vec2 corner = floor(from), f = from - corner;
     vec4 at = vec4(corner + 0.5, corner + 1.5) * texel.xyxy;
     out_density = mix(mix(texture(u_density, at.xy), texture(u_density, at.zy), f.x),
