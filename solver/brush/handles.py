@@ -175,6 +175,9 @@ class Handles:
                 [np.minimum(borne[:, 0], 1), np.maximum(borne[:, 1], 1), np.minimum(borne[:, 2], 1)], axis=-1
             )
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
+        if not active:
+            self._lead = None
+            return
         rows = _runs(self._counts[in_force])  # of each in what is listed
         places, radii = self._places[listed], self._radii[listed]
         slower = self.slower(listed)
@@ -574,9 +577,11 @@ def _distorted(warp: WarpMap, points: np.ndarray) -> np.ndarray:
     listed, found = points.reshape(-1, 2), np.zeros((*points.shape[:-1], 3))
     texel = np.divide(warp.extent, warp.size)
     found[..., 0] = warp.determinants(listed).reshape(points.shape[:-1])
-    original = points + warp.at(listed).astype(np.float64).reshape(points.shape)
     corner = np.minimum(listed, warp.extent - texel)  # so that no triangle leaves the picture
-    moved = warp.at(corner).astype(np.float64)
+    moved = here = warp.at(corner).astype(np.float64)
+    if (corner != listed).any():
+        here = warp.at(listed).astype(np.float64)
+    original = points + here.reshape(points.shape)
     right, below = (
         np.eye(2)[axis] + (warp.at(corner + texel * np.eye(2)[axis]) - moved) / texel[axis] for axis in (0, 1)
     )

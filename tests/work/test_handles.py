@@ -108,6 +108,12 @@ def test_a_map_that_nobody_moved_bears_a_handle_at_its_edges(device: Device):
     assert (led.slower(np.arange(4)) == 1).all()
 
 
+def test_nothing_is_led_before_it_begins(device: Device):
+    led, warp = led_alone(device, Handle((0.5, 0.5), (0.6, 0.5), start=1.0), ticks=2, cells=16)
+    assert not warp.read().any()
+    assert led.away[0] == pytest.approx(0.1)
+
+
 def test_a_line_is_moved_as_one_and_turned(device: Device):
     line = ((0.35, 0.5), (0.55, 0.5))
     led, warp = led_alone(device, Handle((0.45, 0.5), (0.5, 0.45), rotate=30.0, duration=0.5, points=line))
