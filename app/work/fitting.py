@@ -145,11 +145,15 @@ def fitted(
 
 @dataclass(frozen=True)
 class _Aim:
-    """What is fitted: a recipe without its handles, and what becomes of each pair, but for what is searched."""
+    """What is fitted: a recipe without its handles, and what becomes of each pair, but for what is searched.
+
+    `begins`: where each handle's point is when it begins, (n, 2) in fractions.
+    """
 
     recipe: Recipe
     pairs: Pairs
     handles: tuple[RecipeHandle, ...]
+    begins: np.ndarray
 
 
 def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None) -> _Aim:
@@ -160,8 +164,15 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
         # those that push as a fluid does halt where what is local has pressed the picture together.
         one = RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if any(pairs.curves) else 0.0)
         made = (one,) * len(pairs.places)
-        return _Aim(base, Pairs(np.round(pairs.places, DECIMALS), pairs.curves), made)
-    led, places, pins, muted = [], [], list(recipe.pin), tuple(handle for handle in recipe.handle if handle.muted)
+        places = np.round(pairs.places, DECIMALS)
+        return _Aim(base, Pairs(places, pairs.curves), made, places[:, 0])
+    led, places, begins, pins, muted = (
+        [],
+        [],
+        [],
+        list(recipe.pin),
+        tuple(handle for handle in recipe.handle if handle.muted),
+    )
     extent = np.array([picture.width, picture.height]) / max(picture.width, picture.height)
     for handle, start in zip(recipe.handle, _starts(device, recipe, picture, folder), strict=True):
         end = np.round(handle.goal or start, DECIMALS)
@@ -169,21 +180,29 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
             continue
         if np.hypot(*((end - handle.at) * extent)) > ARRIVED:
             led.append(handle)
+            begins.append(start)
             places.append((np.round(handle.at, DECIMALS), end))
         else:
             pins.append(RecipePin(name=handle.name, at=handle.at, radius=handle.radius, stiffness=handle.stiffness))
     if not led:
         raise UserError("no handle of the recipe leads anywhere; give --pairs, or [[handle]]s with a place to go to")
     base = recipe.edited(handle=muted, pin=tuple(pins))
-    if not (base.stroke or base.change or base.mask or base.force):  # which have their times
+    pairs = Pairs.points(np.array(places))
+    if not _has_times(base):
         base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
-    return _Aim(base, Pairs.points(np.array(places)), tuple(led))
+        led, begins = [each.model_copy(update={"start": 0.0}) for each in led], pairs.places[:, 0]
+    return _Aim(base, pairs, tuple(led), np.array(begins))
+
+
+def _has_times(recipe: Recipe) -> bool:
+    """True if something in it has its time: what is led after it, or beside it, is fitted there."""
+    return bool(recipe.stroke or recipe.change or recipe.mask or recipe.force)
 
 
 def _starts(device: Device, recipe: Recipe, picture: Picture, folder: Path) -> list[np.ndarray]:
-    """Where the points of a recipe's handles are when those begin that only stay: (2,) each, in fractions."""
-    starts = [np.array(handle.at) for handle in recipe.handle]
-    ticks = [handle.first_tick(recipe.fluid.dt) for handle in recipe.handle if handle.goal is None]
+    """Where the points of a recipe's handles are when they begin, if something moves them: (2,) each, in fractions."""
+    starts, timed = [np.array(handle.at) for handle in recipe.handle], _has_times(recipe)
+    ticks = [handle.first_tick(recipe.fluid.dt) for handle in recipe.handle if timed or handle.goal is None]
     if not ticks:
         return starts
     replay = Replay(device, recipe, Pictures(picture, folder), budget=0)
@@ -227,7 +246,7 @@ class _Search:
         small = replace(picture, pixels=np.ascontiguousarray(picture.pixels[::apart, ::apart]))
         self.coarse = _Stage(_coarse(base), Pictures(small, folder))
         self.best: tuple[np.ndarray, Trial, _Stage] | None = None
-        ways = np.hypot(*((pairs[:, 1] - pairs[:, 0]) * self.extent).T)[self.numbers]
+        ways = np.hypot(*((pairs[:, 1] - aim.begins) * self.extent).T)[self.numbers]
         least = np.clip(1.01 * ways / LARGEST_LEAD, RANGES[0][0], 1.0)
         own = max(base.fluid.viscosity, 1e-6)
 
@@ -312,20 +331,19 @@ class _Search:
         values = [_rounded(value) for value in np.exp(self.low + point * (self.high - self.low))]
         count, handles = len(self.numbers), []
         for row, number in enumerate(self.numbers):
-            at, end = self.pairs[number]
-            to = at + part * (np.clip(end, 0, 1) - at)
+            (at, end), handle = self.pairs[number], self.aim.handles[number]
+            to = self.aim.begins[number] + part * (np.clip(end, 0, 1) - self.aim.begins[number])
             values_of = {
                 "at": (float(at[0]), float(at[1])),
                 "name": f"{NAME} {number + 1}",
                 "to": (float(to[0]), float(to[1])),
                 "keys": None,
-                "start": 0.0,
                 "end": None,
                 "radius": values[row],
                 "stiffness": min(values[count + row], 1.0),
-                "duration": _rounded(values[2 * count + row] * base.duration),
+                "duration": _rounded(values[2 * count + row] * max(base.duration - handle.start, 0.0)),
             }
-            handles.append(self.aim.handles[number].model_copy(update=values_of))
+            handles.append(handle.model_copy(update=values_of))
         fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
         return base.edited(handle=(*base.handle, *handles), fluid=fluid)
 

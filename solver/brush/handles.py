@@ -27,10 +27,11 @@ RATE = 8.0  # 1 / s: at which what is left of a way is gone
 FARTHEST_STEP = 0.07
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
 # finite would do both wills. A handle alone gets 1 / (1 + RIDGE) of what it wants in a tick, and the rest in the next.
-RIDGE = 1e-3
+# The points of a line want what hardly differs, and near an edge, whose image wants the contrary, much of it is lost.
+RIDGE, RIDGE_OF_LINES = 1e-3, 1e-4
 # Where handles lie beside one another each has a push so many times as wide, too, which counts so much in the squares:
 # what they have in common is cheaper by it, and would else flow back between them.
-WIDE, WIDE_SHARE = 3.0, 0.1
+WIDE, WIDE_SHARE = 3.0, 0.2
 # Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
 # what becomes of the area of triangles of texels, as the local one, since a remap keeps what is at its texels only;
 # and how many times farther apart in the original two neighbours on a lattice lie. From the first of
@@ -120,6 +121,7 @@ class Handles:
         self._brush = Brush(fluid.device)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
+        self._begun_with = np.zeros((0, 3))  # what the map bore around them by then: see `_borne`
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
         self.replace(handles)
@@ -138,8 +140,11 @@ class Handles:
             np.repeat([getattr(handle, name) for handle in handles], self._counts)
             for name in ("push_radius", "local", "stiffness")
         )
-        self._soft = 1 / stiffness - 1 + RIDGE
-        self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
+        ridges = np.repeat([RIDGE_OF_LINES if handle.points else RIDGE for handle in handles], self._counts)
+        self._soft = 1 / stiffness - 1 + ridges
+        self._places, self._starts, self._begun_with = (
+            self._fitted(kept, before) for kept in (self._places, self._starts, self._begun_with)
+        )
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -164,7 +169,15 @@ class Handles:
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
             self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
+            # What it is counted against: all that it may come to, where none of it is better than in the original.
+            borne = self._borne(np.flatnonzero(new), 2.0)
+            self._begun_with[new] = np.stack(
+                [np.minimum(borne[:, 0], 1), np.maximum(borne[:, 1], 1), np.minimum(borne[:, 2], 1)], axis=-1
+            )
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
+        if not active:
+            self._lead = None
+            return
         rows = _runs(self._counts[in_force])  # of each in what is listed
         places, radii = self._places[listed], self._radii[listed]
         slower = self.slower(listed)
@@ -271,7 +284,8 @@ class Handles:
 
     def save(self) -> State:
         """A copy of this moment."""
-        return State({}, {"places": self._places.copy(), "starts": self._starts.copy(), "counts": self._counts.copy()})
+        kept = {"places": self._places, "starts": self._starts, "begun with": self._begun_with, "counts": self._counts}
+        return State({}, {name: values.copy() for name, values in kept.items()})
 
     def restore(self, state: State) -> None:
         """Go back to a moment, perhaps with other handles than then among those that had not begun.
@@ -283,11 +297,12 @@ class Handles:
         counts = state.values.get("counts")
         if counts is None or counts.dtype != self._counts.dtype or counts.ndim != 1 or (counts < 1).any():
             raise ValueError("the state of handles is missing")
-        for name in ("places", "starts"):
+        columns = {"places": 2, "starts": 2, "begun with": 3}
+        for name, wide in columns.items():
             kept = state.values.get(name)
-            if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), 2):
+            if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), wide):
                 raise ValueError("the state of handles is missing")
-        self._places, self._starts = (self._fitted(state.values[name], counts) for name in ("places", "starts"))
+        self._places, self._starts, self._begun_with = (self._fitted(state.values[name], counts) for name in columns)
         self._lead = None
 
     def release(self) -> None:
@@ -299,7 +314,7 @@ class Handles:
 
     def _fitted(self, kept: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """What was kept of handles with so many points, for those of now; one that has others has not begun yet."""
-        rows = np.full((self._counts.sum(), 2), np.nan)
+        rows = np.full((self._counts.sum(), kept.shape[1]), np.nan)
         parts = np.split(kept, np.cumsum(counts))
         for here, part in zip(self._rows, parts, strict=False):
             if here.stop - here.start == len(part):
@@ -352,10 +367,34 @@ class Handles:
         return wanted, growths
 
     def slower(self, numbers: np.ndarray) -> np.ndarray:
-        """The part of its speed, 0-1, that the map around each of these points still allows."""
+        """The part of its speed, 0-1, that the map around each of these points still allows.
+
+        Against what it was when they began: J of maps one after the other is the product of theirs.
+        """
         if not len(numbers):
             return np.zeros(0)
-        extent, radii = np.array(self._warp.extent), self._radii[numbers]
+        borne, before = self._borne(numbers), self._begun_with[numbers]
+        least, most, triangle = (borne / np.where(before > 0, before, 1.0)).T
+        # Where strokes have brought forth a map that no remap would keep, its triangles tell nothing more.
+        triangle[(before[:, 2] < STOPPED_LOCAL) & (before[:, 0] > SLOWING_LOCAL)] = 1.0
+        grown, local = self._grown(), self._locality(numbers)
+        least, triangle = least * grown, triangle * grown
+        slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
+        stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
+        bears = _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
+        return bears * _smoothstep((triangle - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
+
+    def _locality(self, numbers: np.ndarray) -> np.ndarray:
+        """The local part of each of these points, or of what has begun beside it: it changes det J there too."""
+        begun = np.flatnonzero(~np.isnan(self._starts[:, 0]))
+        apart = self._places[numbers, None] - self._places[begun]
+        meet = np.hypot(apart[..., 0], apart[..., 1]) < self._radii[numbers, None] + self._radii[begun]
+        return np.where(meet, self._local[begun], 0.0).max(axis=1)
+
+    def _borne(self, numbers: np.ndarray, times: float = 1.0) -> np.ndarray:
+        """Of the map within so many radii of each of these points: the least det J, the largest stretch, the least area
+        of triangles, (n, 3); see `_distorted`."""
+        extent, radii = np.array(self._warp.extent), times * self._radii[numbers]
         count = np.maximum(self._fluid.grid.size, PLACES * extent / extent.max()).astype(int)
         columns, rows = ((np.arange(n) + 0.5) * side / n for n, side in zip(count, extent, strict=True))
         low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
@@ -375,12 +414,7 @@ class Handles:
             least[row] = min(least[row], box[..., 0].min())
             most[row] = max(most[row], box[..., 1].max())
             triangle[row] = min(triangle[row], box[..., 2].min())
-        grown = self._grown()
-        least, triangle, local = least * grown, triangle * grown, self._local[numbers]
-        slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
-        stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
-        bears = _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
-        return bears * _smoothstep((triangle - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
+        return np.stack([least, most, triangle], axis=-1)
 
     def _grown(self) -> float:
         """How many times as large as in the original the area is that has grown most within a closed line."""

@@ -1,4 +1,4 @@
-"""Strokes and forces that are moved, stretched, muted and repeated afterwards: what is seen is what a file says."""
+"""Strokes, forces and handles moved, stretched, muted and repeated afterwards: what is seen is what a file says."""
 
 from __future__ import annotations
 

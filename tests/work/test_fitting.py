@@ -144,6 +144,16 @@ def test_what_was_pinned_after_it_had_been_moved_is_led_to_where_it_was_pinned(d
     assert found.trial.recipe.handle[1].to == pytest.approx(moved[0], abs=1e-5)
 
 
+def test_what_is_led_after_strokes_is_fitted_after_them(device: Device):
+    stroke = '[[stroke]]\ntool = "push"\nradius = 0.2\nsamples = [[0, 0.3, 0.5, 1.0], [5, 0.4, 0.5, 1.0]]\n'
+    led = "[[handle]]\nat = [0.3, 0.4]\nstart = 0.4\nkeys = [[0.6, 0.4, 0.45]]\n"
+    found = fit(device, None, 1, FREE + stroke + led)
+    (handle,) = found.trial.recipe.handle
+    assert handle.start == 0.4
+    assert handle.last < 0.8
+    assert found.errors.max() < 0.1
+
+
 def test_the_points_of_a_curve_arrive_and_are_told_by_its_name(device: Device):
     along = np.linspace(0, 1, 5)[:, None]
     line, wall = np.hstack([0.3 + 0 * along, 0.2 + 0.6 * along]), np.array([[[0.5, 0.5], [0.6, 0.5]]])

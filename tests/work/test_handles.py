@@ -22,9 +22,9 @@ EXTENT = (1.0, 0.75)
 DT = 1 / 30  # of the editor: each step is twice as far as one of a recipe
 
 
-def replay_of(device: Device, **parts: Any) -> Replay:
+def replay_of(device: Device, picture: np.ndarray = BLACK, **parts: Any) -> Replay:
     parts = {"duration": 0.8, "fluid": {"grid": 64, "viscosity": 0.03, "drag": 2.0}} | parts
-    return Replay(device, Recipe.model_validate(frozen(parts)), Pictures(Picture(BLACK)))
+    return Replay(device, Recipe.model_validate(frozen(parts)), Pictures(Picture(picture)))
 
 
 def led_to(at: list[float], to: list[float], **rest: Any) -> dict[str, Any]:
@@ -108,6 +108,12 @@ def test_a_map_that_nobody_moved_bears_a_handle_at_its_edges(device: Device):
     assert (led.slower(np.arange(4)) == 1).all()
 
 
+def test_nothing_is_led_before_it_begins(device: Device):
+    led, warp = led_alone(device, Handle((0.5, 0.5), (0.6, 0.5), start=1.0), ticks=2, cells=16)
+    assert not warp.read().any()
+    assert led.away[0] == pytest.approx(0.1)
+
+
 def test_a_line_is_moved_as_one_and_turned(device: Device):
     line = ((0.35, 0.5), (0.55, 0.5))
     led, warp = led_alone(device, Handle((0.45, 0.5), (0.5, 0.45), rotate=30.0, duration=0.5, points=line))
@@ -131,10 +137,34 @@ def test_an_outline_goes_into_another_form_and_size(device: Device):
 
 
 def test_what_of_a_line_is_outside_is_not_led(device: Device):
-    led, _ = led_alone(device, Handle((0.1, 0.5), (0.11, 0.55), duration=0.5, points=((-0.2, 0.5), (0.3, 0.5))))
+    line = Handle((0.1, 0.5), (0.15, 0.55), duration=0.5, points=((-0.2, 0.5), (0.3, 0.5)))
+    led, _ = led_alone(device, line, ticks=30, cells=96)
     (shape,) = led.shapes
     assert shape.min() > 0.02
     assert led.away[0] * PIXELS < 0.5
+
+
+def test_a_fluid_handle_beside_local_ones_arrives(device: Device):
+    """They press the picture together, which tells of no fold."""
+    beside = [Handle((0.45, y), (0.53, y), 0.15, duration=0.4, local=1.0) for y in (0.3, 0.7)]
+    led, warp = led_alone(device, Handle((0.4, 0.5), (0.5, 0.5), RADIUS, duration=0.4), *beside, ticks=24, cells=48)
+    assert led.away.max() * PIXELS < 0.5
+    assert warp.statistics().folds == 0
+
+
+def test_a_handle_goes_its_way_through_what_strokes_have_stirred(device: Device):
+    strokes = [
+        {"tool": "push", "radius": 0.12, "samples": [[tick, *start, 1.0], [tick + 15, *end, 1.0]]}
+        for tick, start, end in ((0, (0.3, 0.5), (0.5, 0.5)), (18, (0.6, 0.3), (0.5, 0.45)))
+    ]
+    later = {"at": [0.42, 0.5], "start": 0.7, "keys": [[0.7, 0.5, 0.5], [1.1, 0.56, 0.42]]}
+    water = {"grid": 64, "viscosity": 0.0065}
+    large = np.zeros((384, 512, 3), np.uint8)
+    replay = replay_of(device, large, handle=[later], stroke=strokes, fluid=water, duration=1.4)
+    replay.seek(84)
+    assert replay.handles.away[0] * PIXELS < 0.5
+    assert replay.warp.statistics().folds == 0
+    replay.release()
 
 
 def test_what_is_local_moves_nothing_beside_it(device: Device):
