@@ -1295,6 +1295,17 @@ def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> No
     assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
 
 
+def test_a_recipe_with_a_force_that_no_map_can_follow_is_told_of_while_the_machine_is_measured(
+    automatic: Robot, tmp_path: Path
+) -> None:
+    force = '[[force]]\nkind = "vortex"\npoint = [0.5, 0.5]\nradius = 0.2\nstrength = 1e6\n'
+    (tmp_path / "r.toml").write_text(f'picture = "pattern.png"\n[fluid]\ngrid = 48\n{force}')
+    automatic.drop(tmp_path / "r.toml")
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    assert "throws the fluid" in automatic.editor.messages.shown[-1].text
+    assert not automatic.editor.session.is_moving
+
+
 def paint_at(robot: Robot, dt: float, seconds: float = 2.5) -> None:
     """A stroke on a machine that takes `dt` seconds for a frame."""
     robot.move(*robot.at(0.4, 0.5))
