@@ -21,6 +21,11 @@ def shown(text: str) -> str:
     return _UNSHOWN.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
 
 
+def printable(name: str) -> str:
+    """The name of a file as a window takes it: bytes in it that are no UTF-8 become "?"."""
+    return name.encode("utf-8", "replace").decode()
+
+
 class UserError(Exception):
     """Something a user can mend: one line naming the file, key or number, and the mend.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.errors import UserError, shown
+from app.errors import UserError, printable, shown
 from app.media.files import replacing
 from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, open_input, read_input
 from app.media.leftovers import temporary_folder
@@ -51,7 +51,7 @@ class Project:
     @property
     def name(self) -> str:
         """What the person calls it."""
-        return self.path.stem if self.path else PurePosixPath(self.recipe.picture or "untitled").stem
+        return printable(self.path.stem if self.path else PurePosixPath(self.recipe.picture or "untitled").stem)
 
 
 def is_project(path: str | os.PathLike[str]) -> bool:
@@ -179,7 +179,7 @@ def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
     files: dict[str, bytes] = {}
     new_names: dict[str, str] = {}
     for name in picture_names(project.recipe):
-        inside = name if _is_plain(name) else Path(name).name
+        inside = printable(name if _is_plain(name) else Path(name).name)
         while inside in files or inside in (RECIPE, FORMAT):
             inside = f"_{inside}"
         if name == project.recipe.picture:
@@ -206,6 +206,8 @@ def _referring(project: Project, path: Path) -> Recipe:
             names[name] = os.path.relpath(target, path.resolve().parent)
         except ValueError:  # another drive
             names[name] = str(target)
+        if printable(names[name]) != names[name]:
+            raise UserError(f"Cannot refer to {target}: its name is no text; keep the picture in the project instead")
     return Recipe.model_validate(_renamed(plain(project.recipe), names))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.errors import shown
+from app.errors import printable, shown
 from app.ui import icons
 from app.ui.dialogs import Dialog
 from app.ui.theme import packed
@@ -42,7 +42,7 @@ class Browser(Dialog):
     ) -> None:
         super().__init__(title)
         self.endings = endings
-        self.name = name or ""
+        self.name = printable(name or "")
         self.writes = name is not None
         self._chosen = chosen
         self._selected: Path | None = None
@@ -51,7 +51,7 @@ class Browser(Dialog):
 
     def go(self, folder: Path) -> None:
         """Show another folder."""
-        self.folder, self.typed = folder, str(folder)
+        self.folder, self.typed = folder, printable(str(folder))
         self._selected, self._problem, self.problem = None, "", ""
         try:
             inside = [Path(entry.path) for entry in os.scandir(folder) if not entry.name.startswith(".")]
@@ -79,8 +79,10 @@ class Browser(Dialog):
         imgui.begin_child("files", ImVec2(0, -foot))
         going: Path | None = None
         done = False
-        for path in self.inside:
+        for number, path in enumerate(self.inside):
+            imgui.push_id(number)
             going, done = self._row(ui, path, going, done)
+            imgui.pop_id()
         if not self.inside:
             ui.dim(self._problem or "Nothing here that can be opened.")
         imgui.end_child()
@@ -100,19 +102,19 @@ class Browser(Dialog):
     def _row(self, ui: Ui, path: Path, going: Path | None, done: bool) -> tuple[Path | None, bool]:
         corner = imgui.get_cursor_screen_pos()
         flags = imgui.SelectableFlags_.allow_double_click
-        picked, _ = imgui.selectable(f"##{path.name}", path == self._selected, flags, ImVec2(0, ui.px(26)))
+        picked, _ = imgui.selectable("##file", path == self._selected, flags, ImVec2(0, ui.px(26)))
         draw = imgui.get_window_draw_list()
         icon = "folder" if path.is_dir() else "picture"
         ink = packed(ui.palette.accent if path.is_dir() else ui.palette.dim)
         icons.draw(draw, icon, corner.x + ui.px(4), corner.y + ui.px(4), ui.px(18), ink)
-        draw.add_text(ImVec2(corner.x + ui.px(30), corner.y + ui.px(5)), packed(ui.palette.text), path.name)
+        draw.add_text(ImVec2(corner.x + ui.px(30), corner.y + ui.px(5)), packed(ui.palette.text), printable(path.name))
         if picked:
             twice = imgui.is_mouse_double_clicked(0)
             if path.is_dir():
                 return (path if twice else going), done
             self._selected = path
             if self.writes:
-                self.name = path.name
+                self.name = printable(path.name)
             return going, done or twice
         return going, done
 

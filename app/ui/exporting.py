@@ -13,7 +13,7 @@ import moderngl
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.errors import UserError
+from app.errors import UserError, printable
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
 from app.ui.canvas import shown_pixels
@@ -377,9 +377,9 @@ class ExportDialog(Dialog):
         self._preferences.exported(self.output, self._told)
 
     def _chosen(self, path: Path) -> None:
-        name = path.name
+        name = printable(path.name)
         self.folder = path.parent
-        self.name = name[: -len(self.ending)] if name.endswith(self.ending) else path.stem
+        self.name = name[: -len(self.ending)] if name.endswith(self.ending) else printable(path.stem)
 
 
 def _clean_up(preview: ExportProcess | None, folder: tempfile.TemporaryDirectory[str]) -> None:

@@ -88,7 +88,7 @@ class Lanes:
     drawn: list[tuple[Bar, Rect]] = field(default_factory=list)
     view: tuple[float, float] | None = None
     _packed: tuple[tuple[object, ...], list[list[Bar]]] = field(default=((), []), init=False)
-    # Those of strokes, and blocks, and what both are of: the strokes that are done, while another one is painted.
+    # The lanes of strokes, and blocks, and what both are of: of all but the last, which may be painted just now.
     _laid: tuple[Strokes, float, list[list[Bar]]] = field(default=((), 0.0, []), init=False)
     _blocks: tuple[Strokes, float, list[Block]] = field(default=((), 0.0, []), init=False)
     _of: tuple[Recipe | None, Session | None] = field(default=(None, None), init=False)
@@ -114,33 +114,36 @@ class Lanes:
 
         So they are packed anew only where a recording has become twice as long, and stay where they are meanwhile.
         """
-        made_of = *(several_of(recipe, kind) for kind in KINDS), ticks, 2.0 ** ceil(log2(least))
+        kinds = [kind for kind in KINDS if kind != "stroke"]
+        others = [several_of(recipe, kind) for kind in kinds]
+        wide = 2.0 ** ceil(log2(least))
+        made_of = recipe.stroke, *others, ticks if any(others) else 0, wide
         if not _same(self._packed[0], made_of):
-            wide = made_of[-1]
-            others = (bars_of(kind, several_of(recipe, kind), recipe) for kind in KINDS if kind != "stroke")
-            packed = [lane for several in others for lane in lanes(several, wide)]
+            bars = (bars_of(kind, several, recipe) for kind, several in zip(kinds, others, strict=True))
+            packed = [lane for several in bars for lane in lanes(several, wide)]
             self._packed = made_of, [*packed, *self._lanes_of_strokes(recipe, wide)]
         return self._packed[1]
 
     def _lanes_of_strokes(self, recipe: Recipe, least: float) -> list[list[Bar]]:
+        done, last = recipe.stroke[:-1], bars_of("stroke", recipe.stroke, recipe, len(recipe.stroke) - 1)
         strokes, wide, packed = self._laid
-        more = recipe.stroke[len(strokes) :]
-        is_last = all(lane[-1].start <= stroke.first_tick for stroke in more for lane in packed)
-        if wide != least or not is_last or not _goes_on(strokes, recipe.stroke):
-            strokes, packed = recipe.stroke, lanes(bars_of("stroke", recipe.stroke, recipe), least)
-            self._laid = strokes, least, packed
-        for bar in bars_of("stroke", recipe.stroke, recipe, len(strokes)):
+        if wide != least or not _are(strokes, done):
+            packed = lanes(bars_of("stroke", done, recipe), least)
+            self._laid = done, least, packed
+        for bar in last:
+            if any(lane[-1].start > bar.start for lane in packed):
+                return lanes(bars_of("stroke", recipe.stroke, recipe), least)
             packed = with_last(packed, bar, least)
         return packed
 
     def blocks(self, recipe: Recipe, pixel: float) -> list[Block]:
         """The strokes as they are seen on the track, where a pixel is so many ticks: many lie in the same one."""
-        pixel = 2.0 ** floor(log2(pixel))
+        done, pixel = recipe.stroke[:-1], 2.0 ** floor(log2(pixel))
         strokes, narrow, blocks = self._blocks
-        if narrow != pixel or not _goes_on(strokes, recipe.stroke):
-            strokes, blocks = recipe.stroke, _blocks(recipe.stroke, pixel)
-            self._blocks = strokes, pixel, blocks
-        return [*blocks, *_blocks(recipe.stroke[len(strokes) :], pixel)]
+        if narrow != pixel or not _are(strokes, done):
+            blocks = _blocks(done, pixel)
+            self._blocks = done, pixel, blocks
+        return [*blocks, *_blocks(recipe.stroke[-1:], pixel)]
 
     # -- what is shown ----------------------------------------------------------------------------------------------
 
@@ -283,9 +286,9 @@ def _blocks(strokes: Strokes, pixel: float) -> list[Block]:
     return list(seen.values())
 
 
-def _goes_on(before: Strokes, now: Strokes) -> bool:
-    """The same strokes, or with one more."""
-    return now is before or (len(before) <= len(now) <= len(before) + 1 and all(map(is_, before, now)))
+def _are(strokes: Strokes, others: Strokes) -> bool:
+    """The same strokes."""
+    return len(strokes) == len(others) and all(map(is_, strokes, others))
 
 
 def _same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:

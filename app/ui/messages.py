@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.errors import printable
 from app.ui import icons
 from app.ui.theme import packed
 from app.ui.viewport import Rect
@@ -105,6 +106,7 @@ class Messages:
         imgui.end()
 
     def _add(self, message: Message) -> None:
+        message.text = printable(message.text)
         self.shown = [*[other for other in self.shown if other.text != message.text][-(MOST - 1) :], message]
         self._changed()
 

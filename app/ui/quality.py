@@ -180,7 +180,7 @@ class Quality:
         session = self.workspace.session
         stroke = Stroke(tool="push", radius=0.15, samples=((0, 0.4, 0.5, 1.0), (TICKS, 0.52, 0.5, 1.0)))
         fluid = session.recipe.fluid.model_copy(update={"grid": grid})
-        recipe = session.recipe.edited(stroke=(stroke,), change=(), fluid=fluid)
+        recipe = session.recipe.edited(stroke=(stroke,), change=(), mask=(), force=(), handle=(), pin=(), fluid=fluid)
         return Replay(session.device, recipe, session.pictures, budget=0)
 
     def look(self, dt: float) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.errors import printable
 from app.media.project import SUFFIX, Project
 from app.ui.chooser import FileChooser
 from app.ui.clipboard import pasted_folder
@@ -42,7 +43,7 @@ class SaveDialog(Dialog):
     ) -> None:
         super().__init__("Save the project")
         self.folder = path.parent
-        self.name = path.name.removesuffix(SUFFIX)
+        self.name = printable(path.name).removesuffix(SUFFIX)
         # A picture that is only inside a project has no file to refer to.
         self.must_embed = project.keeper is not None or project.folder == pasted_folder()
         self.embed = self.must_embed or preferences.embed
@@ -101,7 +102,7 @@ class SaveDialog(Dialog):
         return saved
 
     def _chosen(self, path: Path) -> None:
-        self.folder, self.name = path.parent, path.name.removesuffix(SUFFIX)
+        self.folder, self.name = path.parent, printable(path.name).removesuffix(SUFFIX)
 
 
 def _size(count: int) -> str:

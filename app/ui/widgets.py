@@ -14,6 +14,7 @@ from typing import Any
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2, internal
 
+from app.errors import printable
 from app.ui import icons
 from app.ui.theme import GRID, Colour, Fonts, Palette, packed
 from app.ui.units import PLAIN, Unit
@@ -137,7 +138,7 @@ class Ui:
         """Words; `size` in points of the design, 0 for the ordinary one."""
         imgui.push_font(self.fonts.bold if bold else self.fonts.regular, size)
         imgui.push_style_color(imgui.Col_.text, colour or self.palette.text)
-        imgui.text_unformatted(text)
+        imgui.text_unformatted(printable(text))
         imgui.pop_style_color()
         imgui.pop_font()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -520,6 +521,24 @@ def test_files_that_are_no_pictures_leave_the_work_alone(robot: Robot, tmp_path:
         assert name in robot.editor.messages.shown[-1].text, name
         assert robot.editor.session.recipe is recipe
     assert (tmp_path / "kept.fluidwarp").read_bytes() == whole
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are texts elsewhere")
+def test_a_picture_whose_name_is_no_text_is_opened_chosen_and_saved(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"caf\xe9.png")
+    write_picture(tmp_path / "a.png", pattern())
+    os.rename(tmp_path / "a.png", path)
+    robot.drop(path)
+    assert robot.editor.title == "caf? - fluidwarp"
+    robot.editor.preferences.folder = str(tmp_path)
+    for key in ("ctrl+o", "ctrl+e", "ctrl+s"):
+        robot.key(key)
+        robot.frame(count=3)
+        robot.editor.dialogs.release()
+    assert not robot.editor.files.save_as(tmp_path / "w.fluidwarp", embed=False)
+    assert "its name is no text" in robot.editor.messages.shown[-1].text
+    assert robot.editor.files.save_as(tmp_path / "w.fluidwarp")
+    assert projects.load(tmp_path / "w.fluidwarp").recipe.picture == "caf?.png"
 
 
 def test_saving_where_it_cannot_be_says_so(robot: Robot, tmp_path: Path) -> None:
@@ -1280,6 +1299,17 @@ def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> No
     automatic.key("ctrl+shift+z")
     assert names(automatic) == ["Open", "Push"]
     assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
+
+
+def test_a_recipe_with_a_force_that_no_map_can_follow_is_told_of_while_the_machine_is_measured(
+    automatic: Robot, tmp_path: Path
+) -> None:
+    force = '[[force]]\nkind = "vortex"\npoint = [0.5, 0.5]\nradius = 0.2\nstrength = 1e6\n'
+    (tmp_path / "r.toml").write_text(f'picture = "pattern.png"\n[fluid]\ngrid = 48\n{force}')
+    automatic.drop(tmp_path / "r.toml")
+    automatic.until(lambda: not automatic.editor.quality.is_measuring)
+    assert "throws the fluid" in automatic.editor.messages.shown[-1].text
+    assert not automatic.editor.session.is_moving
 
 
 @pytest.fixture

@@ -331,14 +331,25 @@ def test_of_two_thousand_strokes_only_what_is_seen_is_drawn(robot: Robot) -> Non
     assert all(rect.y - 23 < place.y < rect.bottom for _, place in lanes(robot).drawn)
     packed = lanes(robot).packed(recipe(robot), robot.editor.session.end, 1.0)
     assert packed is lanes(robot).packed(recipe(robot), robot.editor.session.end, 1.0)
-    more = recipe(robot).edited(stroke=(*recipe(robot).stroke, recipe(robot).stroke[-1].moved(3)))
-    assert lanes(robot).packed(more, robot.editor.session.end + 3, 1.0) == Lanes().packed(more, 0, 1.0)
-    assert set(lanes(robot).blocks(more, 4.0)) == set(Lanes().blocks(more, 4.0))
     blocks = lanes(robot).blocks(recipe(robot), robot.editor.session.end / 800)
     assert len(blocks) <= 2 * 3 * 800
     robot.editor.session.edit("None", stroke=())
     robot.frame()
     assert lanes(robot).drawn == []
+
+
+def test_while_a_stroke_is_painted_the_others_stay_in_their_lanes() -> None:
+    done, window = many(50), Lanes()
+    frames: list[Recipe] = []
+    for last in range(260, 263):
+        stroke = Stroke(tool="push", samples=((255, 0.5, 0.5, 1.0), (last, 0.6, 0.5, 1.0)))
+        frames.append(Recipe(stroke=(*done, stroke), duration=last / 60))
+    packed = [window.packed(recipe, recipe.ticks, 4.1 + recipe.ticks / 1000) for recipe in frames]
+    assert packed[-1] == Lanes().packed(frames[-1], 0, 8.0)
+    assert sum(one is other for one, other in zip(*packed[1:], strict=True)) == len(packed[-1]) - 1
+    blocks = [window.blocks(recipe, recipe.ticks / 100) for recipe in frames]
+    assert set(blocks[-1]) == set(Lanes().blocks(frames[-1], 2.0))
+    assert all(one is other for one, other in zip(blocks[1][:-1], blocks[2][:-1], strict=True))
 
 
 def test_the_wheel_with_ctrl_shows_less_of_time_and_all_of_it_again(painted: Robot) -> None:

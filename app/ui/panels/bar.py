@@ -9,7 +9,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.errors import shown
+from app.errors import printable
 from app.model.presets import FEELS
 from app.model.tools import BrushSettings, Tool
 from app.ui.actions import ACTIONS, Do
@@ -226,8 +226,8 @@ def _menu(ui: Ui, top: float, recent: list[str], open_file: Callable[[Path], Non
 def _recent(recent: list[str], open_file: Callable[[Path], None]) -> None:
     if imgui.begin_menu("Open recent", bool(recent)):
         for number, path in enumerate(map(Path, recent)):
-            if imgui.menu_item(f"{shown(path.name)}##{number}", "", False)[0]:
+            if imgui.menu_item(f"{printable(path.name)}##{number}", "", False)[0]:
                 open_file(path)
             if imgui.is_item_hovered():
-                imgui.set_tooltip(shown(str(path.parent)))
+                imgui.set_tooltip(printable(str(path.parent)))
         imgui.end_menu()
