@@ -920,6 +920,7 @@ def test_export_runs_beside_the_window(robot: Robot, tmp_path: Path) -> None:
     frames = 0
     while robot.editor.exports.is_running and frames < 6000:
         robot.frame(dt=0.01)
+        time.sleep(0.01)
         frames += 1
     assert frames > 2
     assert dialog.output.exists(), [message.text for message in robot.editor.messages.shown]
