@@ -64,7 +64,8 @@ def shared_device() -> Iterator[Device]:
     """One headless device for the whole test process.
 
     llvmpipe draws in the process's own thread: handing small passes to others costs up to a third more, and the tests'
-    processes keep the cores busy anyway. What they start (the command line, the window, test_fences.py) has threads.
+    processes keep the cores busy anyway. What they start (the command line, test_fences.py, one of the windows) has
+    threads.
     """
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("LP_NUM_THREADS", "0")

@@ -26,7 +26,7 @@ from app.progress import Progress
 from app.ui import workspace
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.browser import Browser
-from app.ui.canvas import shown_pixels
+from app.ui.canvas import MOVING, shown_pixels
 from app.ui.dialogs import PictureOrMap, Preferring, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
@@ -312,6 +312,24 @@ def test_what_was_seen_stays_while_it_is_made_again_on_another_grid(robot: Robot
     robot.frame()
     assert robot.editor.session.is_rebuilding
     assert np.array_equal(robot.canvas(), seen)
+
+
+def test_a_magnified_picture_is_seen_as_it_is_warped_when_time_stands_still(robot: Robot) -> None:
+    robot.see()
+    robot.move(*robot.at(0.5, 0.5))
+    robot.wheel(3)
+    assert robot.editor.view.scale > MOVING
+    robot.drag((0.45, 0.5), (0.55, 0.5))
+    robot.frame(count=3)
+    robot.editor.session.pause()
+    robot.move(900, 20)
+    robot.frame(count=2)
+    shown = slice(100, 600), slice(200, 800)
+    seen = robot.pixels()[shown]
+    for chord in ("ctrl+z", "ctrl+y"):
+        robot.key(chord)
+        robot.rest()
+    assert np.array_equal(robot.pixels()[shown], seen)
 
 
 # Time ---------------------------------------------------------------------------------------------------------------
@@ -921,6 +939,7 @@ def test_export_runs_beside_the_window(robot: Robot, tmp_path: Path) -> None:
     frames = 0
     while robot.editor.exports.is_running and frames < 6000:
         robot.frame(dt=0.01)
+        time.sleep(0.01)
         frames += 1
     assert frames > 2
     assert dialog.output.exists(), [message.text for message in robot.editor.messages.shown]

@@ -364,7 +364,6 @@ def test_a_stroke_may_begin_where_it_is_told_that_strokes_wait(robot: Robot) -> 
     editor = robot.editor
     session, canvas = editor.session, editor.layout.canvas
     press = Press(editor.state.brush, False, session.extent, session.dt)
-    session.set_grid(512)  # fine enough for the strokes to be ahead of it
     while session.target - session.tick <= BEHIND:
         session.press(TOOL["push"], press, 0.3, 0.5)
         session.move(0.5, 0.5)
