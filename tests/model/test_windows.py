@@ -159,7 +159,7 @@ def off_the_whole(device: Device, stroke: Stroke, feel: Feel) -> tuple[float, fl
 @pytest.mark.parametrize("feel", [PUTTY, HONEY], ids=["putty", "honey"])
 def test_a_stroke_in_a_window_ends_as_on_the_whole_picture(device: Device, feel: Feel):
     """On cells of the same size everywhere, the map differs by no more than a hundredth of the stroke's way."""
-    stroke = a_stroke(np.random.default_rng(0))
+    stroke = a_stroke(np.random.default_rng(5))
     off, moved = off_the_whole(device, stroke, feel)
     assert moved > 0.1 * length(stroke)
     assert off < 0.01 * length(stroke)
@@ -167,7 +167,7 @@ def test_a_stroke_in_a_window_ends_as_on_the_whole_picture(device: Device, feel:
 
 def test_a_push_along_an_edge_that_glides_drives_no_more_than_its_neighbourhood(device: Device):
     along = tuple((tick, 0.5 + 0.005 * tick, 0.02, 1.0) for tick in range(13))
-    stroke = Stroke(tool="push", radius=0.03, detail=455, samples=along)
+    stroke = Stroke(tool="push", radius=0.04, detail=341, samples=along)
     off, moved = off_the_whole(device, stroke, HONEY)
     assert moved > 0.5 * length(stroke)
     assert off < 0.01 * length(stroke)
@@ -177,7 +177,7 @@ def test_a_push_along_an_edge_that_glides_drives_no_more_than_its_neighbourhood(
 def test_what_stands_still_moves_no_more_than_its_neighbourhood(device: Device, tool: str, y: float):
     """A bloat away from the edges and on one, and a twirl there: within a hundredth of what it moves."""
     stroke = Stroke.model_validate(
-        {"tool": tool, "radius": 0.03, "detail": 455, "samples": ((0, 0.5, y, 1.0), (11, 0.5, y, 1.0))}
+        {"tool": tool, "radius": 0.04, "detail": 341, "samples": ((0, 0.5, y, 1.0), (11, 0.5, y, 1.0))}
     )
     off, moved = off_the_whole(device, stroke, HONEY)
     assert moved > 0.05 * stroke.radius
@@ -191,7 +191,7 @@ def test_nothing_moves_at_the_sides_of_a_window(device: Device, feel: Feel, way:
     radius = 160 / 6000
     samples = ((0, 0.4, 0.5, 1.0), (int(5 * way), 0.4 + way * radius, 0.5, 1.0))
     stroke = Stroke(tool="push", radius=radius, detail=455, samples=samples)
-    recipe = painted(stroke, feel=feel)
+    recipe = painted(stroke, feel=feel, ticks=stroke.last_tick + 24)
     replay = replayed(device, recipe)
     for tick in (5, 12, recipe.ticks):
         replay.seek(tick)

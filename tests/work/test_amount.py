@@ -37,7 +37,7 @@ def random_recipe(seed: int) -> Recipe:
         samples = tuple((tick + n, x, y, 1.0) for n, (x, y) in enumerate(path))
         strokes.append(Stroke(tool=tool, radius=rng.uniform(0.06, 0.2), samples=samples))
         tick += count
-    fluid = FluidSettings(grid=96, dt=1 / 30, viscosity=10 ** rng.uniform(-4, -1.5))
+    fluid = FluidSettings(grid=64, dt=1 / 30, viscosity=10 ** rng.uniform(-4, -1.5))
     return Recipe(stroke=tuple(strokes), duration=(tick + 5) / 30, fluid=fluid)
 
 
@@ -80,8 +80,7 @@ def test_what_is_not_folded_is_folded_at_no_amount(device: Device, seed: int) ->
     replay.release()
 
 
-@pytest.mark.parametrize("amount", [0.3, 0.6, 0.95])
-def test_along_what_is_frozen_a_part_tears_no_more_than_all_of_it(device: Device, amount: float) -> None:
+def test_along_what_is_frozen_a_part_tears_no_more_than_all_of_it(device: Device) -> None:
     """A quick push past a frozen square, which used up many factors, too coarse for what is beside it."""
     square = {"kind": "fill", "tick": 0, "of": "frozen", "amount": 1.0, "window": {"box": (0.3, 0.26, 0.51, 0.62)}}
     path = zip(np.linspace(0.38, 0.62, 14).tolist(), np.linspace(0.77, 0.39, 14).tolist(), strict=True)
@@ -95,10 +94,12 @@ def test_along_what_is_frozen_a_part_tears_no_more_than_all_of_it(device: Device
     recipe = Recipe.model_validate(frozen({**told, "mask": [square], "stroke": [push]}))
     replay = Replay(device, recipe, Pictures(Picture(np.zeros((400, 600, 3), np.uint8))), budget=0)
     replay.seek(recipe.ticks)
-    whole, part = ScaledMap(replay.warp), ScaledMap(replay.warp, amount)
-    assert looked_at(device, part).folds <= looked_at(device, whole).folds
-    for thing in (whole, part, replay):
-        thing.release()
+    scaled = ScaledMap(replay.warp)
+    folds = looked_at(device, scaled).folds
+    for scaled.amount in (0.3, 0.6, 0.95):
+        assert looked_at(device, scaled).folds <= folds, scaled.amount
+    scaled.release()
+    replay.release()
 
 
 def test_half_of_a_half_turn_folds_only_if_it_is_scaled_in_one(device: Device) -> None:

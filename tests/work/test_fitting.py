@@ -171,7 +171,7 @@ def test_many_pairs_arrive_with_values_in_common(device: Device):
     x, y = np.meshgrid(np.linspace(0.2, 0.8, 5), np.linspace(0.25, 0.75, 3))
     places = np.stack([x.ravel(), y.ravel()], axis=-1)
     moved = places + 0.03 * np.sin(2 * np.pi * places[:, ::-1])
-    found = fit(device, np.stack([places, moved], axis=1), 20, FREE)
+    found = fit(device, np.stack([places, moved], axis=1), 6, FREE)
     assert found.errors.max() < 0.2
     assert len({(handle.radius, handle.duration) for handle in found.trial.recipe.handle}) == 1
 

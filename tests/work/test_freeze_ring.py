@@ -61,7 +61,7 @@ def wandering(rng: np.random.Generator, tool: str, first: int, last: int, radius
 
 @pytest.mark.parametrize(
     ("size", "seed", "grid"),
-    [((640, 480), 1, 48), ((640, 480), 2, 96), ((301, 193), 1, 48), ((97, 400), 1, 48), ((1500, 40), 2, 48)],
+    [((320, 240), 1, 48), ((320, 240), 2, 96), ((301, 193), 1, 48), ((97, 400), 1, 48), ((1500, 40), 2, 48)],
 )
 def test_what_is_frozen_while_it_moves_keeps_every_bit(
     size: tuple[int, int], seed: int, grid: int, device: Device

@@ -60,8 +60,8 @@ def test_two_hundred_strokes_saved_and_rendered_are_the_same_map(
     for _ in range(200):
         start = dice.uniform(0.1, 0.9), dice.uniform(0.1, 0.9)
         end = start[0] + dice.uniform(-0.08, 0.08), start[1] + dice.uniform(-0.08, 0.08)
-        paint(session, dice.choice(PAINTING).name, start, end, 2, dice.random() < 0.3)
-        session.advance(dice.randrange(3))
+        paint(session, dice.choice(PAINTING).name, start, end, 1, dice.random() < 0.3)
+        session.advance(dice.randrange(2))
     session.settle()
     projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "w.fluidwarp")
     loaded = projects.load(tmp_path / "w.fluidwarp")
@@ -156,7 +156,7 @@ def test_pixels_follow_the_pointer_at_its_speed_in_putty(session: Session) -> No
 
 def pushed(session: Session, brush: BrushSettings, start: float, step: float) -> MapStatistics:
     """The map after a push to the right of fifteen moves, once the fluid has come to rest."""
-    session.set_grid(128)
+    session.set_grid(96)
     session.press(TOOL["push"], Press(brush, False, session.extent, session.dt), start, 0.5)
     for k in range(1, 16):
         session.move(start + step * k, 0.5)
@@ -212,7 +212,7 @@ def test_a_long_fast_push_of_water_does_not_fold(session: Session) -> None:
 
 
 def test_water_swirls_on_by_itself(session: Session) -> None:
-    session.set_grid(128)
+    session.set_grid(96)
     session.change(WATER.name, viscosity=WATER.viscosity, drag=WATER.drag)
     session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.35, 0.5)
     for k in range(1, 16):
@@ -226,7 +226,7 @@ def test_water_swirls_on_by_itself(session: Session) -> None:
 
 
 def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Session) -> None:
-    session.set_grid(128)
+    session.set_grid(96)
     session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
     frozen = Press(BrushSettings(0.07, 0.6), False, session.extent, session.dt)
     session.press(TOOL["freeze"], frozen, 0.67, 0.37)
@@ -250,7 +250,7 @@ def test_a_push_into_something_frozen_does_not_fold_at_its_border(session: Sessi
 def test_a_push_into_something_a_thousand_times_thicker_does_not_fold_at_its_border(
     session: Session, feel: Feel
 ) -> None:
-    session.set_grid(128)
+    session.set_grid(96)
     session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
     thick = Press(BrushSettings(0.07, 1.0), False, session.extent, session.dt)
     session.press(TOOL["thicken"], thick, 0.67, 0.37)
@@ -283,7 +283,7 @@ def test_a_push_into_something_a_thousand_times_thicker_does_not_fold_at_its_bor
     ids=["across", "corner to corner", "four after one another"],
 )
 def test_a_long_push_smears_and_does_not_fold(session: Session, feel: Feel, ways: list) -> None:
-    session.set_grid(128)
+    session.set_grid(96)
     session.change(feel.name, viscosity=feel.viscosity, drag=feel.drag)
     press = Press(BrushSettings(), False, session.extent, session.dt)
     steps, least = 48 // len(ways), 1.0
