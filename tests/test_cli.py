@@ -198,11 +198,13 @@ def test_doctor(folder: Path):
 
 
 def test_doctor_fails_where_something_vital_is_missing(folder: Path):
-    nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ""}
+    nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ":9999"}
     ran = process(folder, "doctor", **nothing)
     assert ran.returncode == 1
     assert "missing" in ran.stdout
     assert "apt-get install" in ran.stdout
+    assert "Failed to open display :9999" in ran.stdout
+    assert "check that the display is there" in ran.stdout
 
 
 def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):

@@ -7,13 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from inspect import signature
 from itertools import product
+from pathlib import Path
 from typing import Any
 
+import solver
 from app.media import clip, encoders, formats
 from app.model import presets, tools
 from app.ui import actions, editor_state, exporting, shortcuts
 from app.ui.preferences import Preferences
+from app.work.jobs import MapOutput, Outputs
 from support.golden import GOLDEN, WRITES
 
 FILE = GOLDEN / "tables.txt"
@@ -30,7 +34,16 @@ def told(value: Any) -> str:
         return f"{{{', '.join(f'{key}: {told(part)}' for key, part in value.items() if not callable(part))}}}"
     if isinstance(value, (tuple, list)):
         return f"[{', '.join(map(told, value))}]"
-    return repr(value)
+    return str(value) if isinstance(value, Path) else repr(value)
+
+
+def defaults(called: Any) -> str:
+    """What need not be given, and what it is then."""
+    try:
+        parts = signature(called).parameters.values()
+    except (TypeError, ValueError):
+        return ""
+    return ", ".join(f"{part.name}={told(part.default)}" for part in parts if part.default is not part.empty)
 
 
 def rows() -> Iterator[str]:
@@ -52,6 +65,13 @@ def rows() -> Iterator[str]:
     yield f"brush: {told(tools.BrushSettings())} {told(editor_state.LIMITS)}"
     yield f"window: {told(Preferences())} {told(editor_state.overlays())}"
     yield from (f"mouse: {line}" for line in shortcuts.MOUSE)
+    yield f"outputs: {told(Outputs(None))} {told(MapOutput(Path('m.exr')))}"
+    for name in sorted(solver.__all__):
+        one = getattr(solver, name)
+        methods = [part for part in dir(one) if not part.startswith("_")] if isinstance(one, type) else []
+        for called, what in ((name, one), *((f"{name}.{part}", getattr(one, part)) for part in methods)):
+            if callable(what) and (given := defaults(what)):
+                yield f"{called}: {given}"
 
 
 def test_the_tables_are_as_they_are_written_down() -> None:

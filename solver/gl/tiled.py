@@ -69,7 +69,7 @@ class SavedTiles:
 
     kind: Kind
     tiles: np.ndarray
-    blank: float = 0.0
+    blank: float
 
     @classmethod
     def nothing(cls, kind: Kind, blank: float = 0.0) -> SavedTiles:
