@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import Cancelled, UserError
-from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, Part
+from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, FrameRange
 from app.media.codecs import pillow, tiff
 from app.media.codecs.decoding import decoding, head_of
 from app.media.formats import kind_of
@@ -39,11 +39,11 @@ class Pages(Clip):
     places: tuple[int, ...]
     max_pixels: int
 
-    def check(self, part: Part) -> None:
+    def check(self, part: FrameRange) -> None:
         """Raise `UserError` if the part begins after the last frame."""
         if part[0] >= len(self.places):
-            told = f"it has the frames 0-{len(self.places) - 1}, and none from {part[0]} on"
-            raise UserError(f"Cannot read {self.path}: {told}; give --frames.")
+            lacks = f"it has the frames 0-{len(self.places) - 1}, and none from {part[0]} on"
+            raise UserError(f"Cannot read {self.path}: {lacks}; give --frames.")
 
     def moment(self, number: int) -> int:
         """See `Clip`."""
@@ -55,7 +55,7 @@ class Pages(Clip):
 
     def pictures(
         self,
-        part: Part = WHOLE,
+        part: FrameRange = WHOLE,
         is_kept: Callable[[int], bool] = lambda number: False,
         cancel: Callable[[], bool] = never,
         notice: Callable[[str], None] = lambda said: None,

@@ -17,7 +17,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.clip import HIGH, WHOLE, Clip, Colours, Part
+from app.media.clip import HIGH, WHOLE, Clip, Colours, FrameRange
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.losses import lost, not_kept
 from app.media.record import digest_of_file
@@ -60,7 +60,7 @@ class Video(Clip):
 
     def pictures(
         self,
-        part: Part = WHOLE,
+        part: FrameRange = WHOLE,
         is_kept: Callable[[int], bool] = lambda number: False,
         cancel: Callable[[], bool] = never,
         notice: Callable[[str], None] = lambda said: None,
