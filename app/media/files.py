@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all."""
+"""Writing a file whole or not at all; and the numbered files of a sequence."""
 
 from __future__ import annotations
 

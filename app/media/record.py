@@ -1,4 +1,4 @@
-"""What the files of a sequence were made of, kept beside them, so that those that are whole need not be made again."""
+"""For `--resume`: what the files of a sequence were made of, kept beside them, so that none that is whole is made again."""
 
 from __future__ import annotations
 
