@@ -1,4 +1,4 @@
-"""For `--resume`: what the files of a sequence were made of, kept beside them, so that none that is whole is made again."""
+"""For `--resume`: what the files of a sequence were made of, kept beside them, so that none is made twice."""
 
 from __future__ import annotations
 
