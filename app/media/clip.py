@@ -6,8 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
+from app.media.record import digest_of_file
 from app.model.picture import Picture
 from app.progress import never
 
@@ -131,3 +133,16 @@ class Clip(ABC):
     @abstractmethod
     def digest(self, number: int) -> str:
         """What a frame is made of: the bytes of its file. Raises `UserError` or `OSError`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileClip(Clip):
+    """A clip whose frames are all in one file, which may be large, and is read for a digest once."""
+
+    @cached_property
+    def _digest(self) -> str:
+        return digest_of_file(self.path)
+
+    def digest(self, number: int) -> str:
+        """See `Clip`."""
+        return self._digest
