@@ -6,7 +6,12 @@ import numpy as np
 
 
 def connected_components(root: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """For each vertex the smallest number it is connected to, as in `root` before and by the edges `one` to `other`."""
+    """For each vertex the smallest number among those that it is connected with.
+
+    Args:
+        root: (n,), what is known already: of each vertex one that it is connected with, itself if none.
+        one, other: (m,), the vertices at both ends of each edge.
+    """
     while True:
         a, b = root[one], root[other]
         apart = a != b

@@ -84,7 +84,7 @@ class PaperFluid(Scheme):
             self.velocity.swap()
 
     def diffuse(self, dt: float) -> None:
-        """Appendix A."""
+        """w3 from w2 by the viscous term of Appendix A, implicit, in `sweeps` Jacobi sweeps."""
         dt = check_step(dt)
         with self.device.stage("diffuse"):
             self._before.copy_from(self.velocity.read)

@@ -12,8 +12,8 @@ from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.grid import Grid
 from solver.params import Walls
 
-# In each part of the way the largest gradient of the velocity, times the time that it takes, is this at most. Below 1
-# ways do not cross (Smolarkiewicz and Pudykiewicz), and below .73 neither do those of the midpoint rule.
+# In each part of the trace the largest gradient of the velocity, times the time of the part, is this at most. Below 1
+# trajectories do not cross (Smolarkiewicz and Pudykiewicz), and below .73 neither do those of the midpoint rule.
 STRAIN = 0.5
 MOST_PARTS = 16  # a bound on the cost only
 

@@ -6,15 +6,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
+from app.media.record import digest_of_file
 from app.model.picture import Picture
 from app.progress import never
 
-Part = tuple[int, int | None]
+FrameRange = tuple[int, int | None]
 """The first and the last number of the frames that are wanted; None is to the end."""
 
-WHOLE: Part = (0, None)
+WHOLE: FrameRange = (0, None)
 
 SHALLOW, DEEP = ("gray", "ya8", "rgb24", "rgba"), ("gray16le", "ya16le", "rgb48le", "rgba64le")
 """ffmpeg's names of frames of 8 bits and of more, by channels."""
@@ -92,7 +94,7 @@ class Clip(ABC):
         """Of its frames, in steps of 1 / fps."""
         return min(self.durations or [1])
 
-    def lengths(self, part: Part) -> list[int] | None:
+    def lengths(self, part: FrameRange) -> list[int] | None:
         """The durations of the frames of a part, where they differ."""
         if self.durations is None:
             return None
@@ -112,13 +114,13 @@ class Clip(ABC):
         seconds, frames = divmod(count, base)
         return f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}{mark}{frames:02d}"
 
-    def check(self, part: Part) -> None:  # noqa: B027 - as a rule nothing is
+    def check(self, part: FrameRange) -> None:  # noqa: B027 - as a rule nothing is
         """Raise `UserError` if it is known beforehand that the frames of a part are not all there."""
 
     @abstractmethod
     def pictures(
         self,
-        part: Part = WHOLE,
+        part: FrameRange = WHOLE,
         is_kept: Callable[[int], bool] = lambda number: False,
         cancel: Callable[[], bool] = never,
         notice: Callable[[str], None] = lambda said: None,
@@ -131,3 +133,16 @@ class Clip(ABC):
     @abstractmethod
     def digest(self, number: int) -> str:
         """What a frame is made of: the bytes of its file. Raises `UserError` or `OSError`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileClip(Clip):
+    """A clip whose frames are all in one file, which may be large, and is read for a digest once."""
+
+    @cached_property
+    def _digest(self) -> str:
+        return digest_of_file(self.path)
+
+    def digest(self, number: int) -> str:
+        """See `Clip`."""
+        return self._digest

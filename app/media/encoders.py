@@ -93,8 +93,8 @@ def lossless(stream: Stream) -> list[str]:
     kinds = {(False, 8): "bgr0", (True, 8): "bgra", (False, 16): "gbrp16le", (True, 16): "gbrap16le"}
     kind, colours = kinds[stream.alpha, stream.bits], stream.colours
     transfer = "iec61966-2-1" if colours.transfer == "bt709" else colours.transfer
-    told = f"setparams=color_primaries={colours.primaries}:color_trc={transfer}"
-    return ["-vf", told, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
+    tags = f"setparams=color_primaries={colours.primaries}:color_trc={transfer}"
+    return ["-vf", tags, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
 
 
 def _prores(stream: Stream) -> list[str]:

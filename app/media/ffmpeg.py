@@ -35,10 +35,10 @@ def executable() -> str:
 @functools.cache
 def encoders() -> frozenset[str]:
     """Names of the encoders that this ffmpeg has."""
-    told = subprocess.run(
+    listed = subprocess.run(
         [executable(), "-hide_banner", "-encoders"], capture_output=True, text=True, check=False
     ).stdout
-    return frozenset(re.findall(r"^ [VAS][A-Z.]{5} (\S+)", told, re.MULTILINE))
+    return frozenset(re.findall(r"^ [VAS][A-Z.]{5} (\S+)", listed, re.MULTILINE))
 
 
 class Ffmpeg:

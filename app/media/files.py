@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all."""
+"""Writing a file whole or not at all; and the numbered files of a sequence."""
 
 from __future__ import annotations
 
@@ -131,10 +131,10 @@ def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wante
         return
     runs = [[number for _, number in run] for _, run in groupby(enumerate(missing), lambda at: at[1] - at[0])]
     named = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
-    told = ", ".join(named[:MOST_RUNS]) + (f" and others, {len(missing)} in all" if len(named) > MOST_RUNS else "")
+    listed = ", ".join(named[:MOST_RUNS]) + (f" and others, {len(missing)} in all" if len(named) > MOST_RUNS else "")
     wants = f"{wanted[0]}-{wanted[-1]}" if len(wanted) > 1 else f"{wanted[0]}"
     frames = "frames" if len(missing) > 1 else "frame"
-    raise UserError(f"Cannot read {pattern}: of {wants} it lacks the {frames} {told}; make them, or give --frames.")
+    raise UserError(f"Cannot read {pattern}: of {wants} it lacks the {frames} {listed}; make them, or give --frames.")
 
 
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:

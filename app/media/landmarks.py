@@ -56,22 +56,22 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
     Raises:
         UserError: naming the file and the line, or if they are not two sets of as many landmarks.
     """
-    told = " and ".join(str(path) for path in paths)
+    files = " and ".join(str(path) for path in paths)
     if len(paths) == 1 and check_ending(paths[0]) == ".csv":
         pixels, curves = _read_csv(paths[0], _lines(paths[0]), SPACING * max(size))
         if not len(pixels):
-            raise UserError(f"{told} has no pairs")
+            raise UserError(f"{files} has no pairs")
         return Pairs(pixels / size, curves)
     sets: list[np.ndarray] = []
     for path in paths:
         sets += _read(path, size)
     if len(sets) != 2:
         found = f"{len(sets)} sets of landmarks" if len(sets) != 1 else "one set of landmarks"
-        raise UserError(f"{told} has {found}; pairs need two, where the points are and where they should be")
+        raise UserError(f"{files} has {found}; pairs need two, where the points are and where they should be")
     if len(sets[0]) != len(sets[1]):
-        raise UserError(f"{told}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}")
+        raise UserError(f"{files}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}")
     if not len(sets[0]):
-        raise UserError(f"{told} has no pairs")
+        raise UserError(f"{files} has no pairs")
     return Pairs.points(np.stack(sets, axis=1) / size)
 
 

@@ -100,13 +100,13 @@ def _started() -> float:
 @cache
 def _here() -> tuple[str, str]:
     """This host; and its start, with the processes that are seen from here."""
-    start = _told(PROC / "sys/kernel/random/boot_id")
+    start = _text_of(PROC / "sys/kernel/random/boot_id")
     with suppress(OSError):
         start += os.readlink(PROC / "self/ns/pid")
-    return _digest(platform.node() + _told(Path("/etc/machine-id"))), _digest(start)
+    return _digest(platform.node() + _text_of(Path("/etc/machine-id"))), _digest(start)
 
 
-def _told(path: Path) -> str:
+def _text_of(path: Path) -> str:
     try:
         return path.read_text("utf-8", "replace")
     except OSError:

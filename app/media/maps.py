@@ -230,19 +230,19 @@ def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Ki
                     stream.write(np.where(np.isnan(offsets), FLO_UNKNOWN, offsets).data)
             return
         values = to_st(displacement) if kind == "st" else to_offsets(displacement, up=True)
-        told = {
+        metadata = {
             "map": kind,
             "grid": "centres",
             "direction": "forward" if displacement.forward else "inverse",
             "overscan": str(displacement.overscan),
         }
         if suffix == ".exr":
-            attributes = {f"fluidwarp/{key}": value for key, value in told.items()}
+            attributes = {f"fluidwarp/{key}": value for key, value in metadata.items()}
             attributes["comments"] = CONVENTIONS[kind]
             channels = {"R": values[..., 0], "G": values[..., 1], "B": _third(values)}
             exr.write_channels(temporary, channels, attributes, displacement.overscan)
         else:
-            _write_tiff(temporary, values, {"fluidwarp": told, "convention": CONVENTIONS[kind]})
+            _write_tiff(temporary, values, {"fluidwarp": metadata, "convention": CONVENTIONS[kind]})
 
 
 def cropped(displacement: Displacement) -> Displacement:
@@ -257,7 +257,7 @@ def _third(values: np.ndarray) -> np.ndarray:
     return np.ones(values.shape[:2], np.float32)
 
 
-def _write_tiff(temporary: Path, values: np.ndarray, told: dict[str, Any]) -> None:
+def _write_tiff(temporary: Path, values: np.ndarray, metadata: dict[str, Any]) -> None:
     import tifffile
 
     tifffile.imwrite(
@@ -266,7 +266,7 @@ def _write_tiff(temporary: Path, values: np.ndarray, told: dict[str, Any]) -> No
         photometric="rgb",
         compression="zlib",
         predictor=True,
-        description=json.dumps(told),
+        description=json.dumps(metadata),
         metadata=None,
         software=False,
     )
@@ -309,10 +309,10 @@ def read_map(
     suffix = Path(path).suffix.lower()
     if suffix in (".flo", ".npy"):
         values = _read_flo(Path(path), max_pixels) if suffix == ".flo" else _read_npy(Path(path), max_pixels)
-        told, edge = {}, 0
+        metadata, edge = {}, 0
     else:
         read = _read_exr if suffix == ".exr" else _read_tiff
-        values, told, edge = read(Path(path), max_pixels)
+        values, metadata, edge = read(Path(path), max_pixels)
     values = _known(path, values)
     edge = edge if overscan is None else overscan
     if edge < 0 or 2 * edge >= min(values.shape[:2]):
@@ -323,12 +323,12 @@ def read_map(
         return Displacement(values, edge)
     if suffix == ".flo":
         return from_offsets(values, up=False, overscan=edge)
-    if (kind or told.get("map", "st")) == "offsets":
+    if (kind or metadata.get("map", "st")) == "offsets":
         read = from_offsets(values, up=True, overscan=edge)
     else:
-        named = grid or told.get("grid", "centres")
+        named = grid or metadata.get("grid", "centres")
         read = from_st(values, named if named in ("corners", "pixels") else "centres", edge)
-    return Displacement(read.values, edge, forward=told.get("direction") == "forward")
+    return Displacement(read.values, edge, forward=metadata.get("direction") == "forward")
 
 
 def _known(path: str | os.PathLike[str], values: np.ndarray) -> np.ndarray:
@@ -403,7 +403,7 @@ def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], 
             break
     else:
         raise UserError(f"Cannot read {file}: its channels {' '.join(channels)} are no map; it needs R and G.")
-    told = {key.removeprefix("fluidwarp/"): value for key, value in header.items() if key.startswith("fluidwarp/")}
+    metadata = {key.removeprefix("fluidwarp/"): value for key, value in header.items() if key.startswith("fluidwarp/")}
     (left, top), (right, bottom) = ((int(x), int(y)) for x, y in header["dataWindow"])
     (first_x, first_y), (last_x, last_y) = ((int(x), int(y)) for x, y in header["displayWindow"])
     # as much overscan as all four sides have
@@ -411,7 +411,7 @@ def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], 
     width, height = last_x - first_x + 1 + 2 * edge, last_y - first_y + 1 + 2 * edge
     shown = np.full((height, width, 2), np.nan, np.float32)
     exr.place_window(values, (left - first_x + edge, top - first_y + edge), shown)
-    return shown, told, edge
+    return shown, metadata, edge
 
 
 def _read_tiff(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
@@ -421,11 +421,11 @@ def _read_tiff(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str],
     if pixels.shape[2] < 2 or pixels.dtype == np.uint8:
         raise UserError(f"Cannot read {file}: a map needs two channels of 16 or 32 bits; write it as 32-bit float.")
     values = pixels[..., :2] if pixels.dtype == np.float32 else pixels[..., :2] / np.float64(65535)
-    told: dict[str, str] = {}
+    metadata: dict[str, str] = {}
     with tifffile.TiffFile(file) as tiff:
         try:
-            told = json.loads(tiff.pages.first.description)["fluidwarp"]
-            edge = int(told["overscan"])
+            metadata = json.loads(tiff.pages.first.description)["fluidwarp"]
+            edge = int(metadata["overscan"])
         except (ValueError, TypeError, KeyError, OverflowError, RecursionError):  # made elsewhere
             edge = 0
-    return values, told, edge
+    return values, metadata, edge

@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from app.errors import Cancelled, UserError
-from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, Part
+from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange
 from app.media.codecs import pillow, tiff
 from app.media.codecs.decoding import decoding, head_of
 from app.media.formats import kind_of
 from app.media.inputs import MAX_PIXELS
 from app.media.losses import lost
-from app.media.record import digest_of_file
 from app.model.picture import Picture
 from app.progress import never
 
@@ -29,7 +28,7 @@ UNTOLD = 100  # milliseconds of a frame of no length, as browsers show it
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pages(Clip):
+class Pages(FileClip):
     """The frames or pages of a file, all of one size.
 
     kind: of the file, as in the table of formats. places: of the frames in the file, without what is none.
@@ -39,11 +38,11 @@ class Pages(Clip):
     places: tuple[int, ...]
     max_pixels: int
 
-    def check(self, part: Part) -> None:
+    def check(self, part: FrameRange) -> None:
         """Raise `UserError` if the part begins after the last frame."""
         if part[0] >= len(self.places):
-            told = f"it has the frames 0-{len(self.places) - 1}, and none from {part[0]} on"
-            raise UserError(f"Cannot read {self.path}: {told}; give --frames.")
+            lacks = f"it has the frames 0-{len(self.places) - 1}, and none from {part[0]} on"
+            raise UserError(f"Cannot read {self.path}: {lacks}; give --frames.")
 
     def moment(self, number: int) -> int:
         """See `Clip`."""
@@ -55,7 +54,7 @@ class Pages(Clip):
 
     def pictures(
         self,
-        part: Part = WHOLE,
+        part: FrameRange = WHOLE,
         is_kept: Callable[[int], bool] = lambda number: False,
         cancel: Callable[[], bool] = never,
         notice: Callable[[str], None] = lambda said: None,
@@ -83,14 +82,6 @@ class Pages(Clip):
         with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:
             image.seek(place)
             return Picture(_pixels(image, self.alpha))
-
-    @cached_property
-    def _digest(self) -> str:
-        return digest_of_file(self.path)
-
-    def digest(self, number: int) -> str:
-        """See `Clip`."""
-        return self._digest
 
 
 def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Pages | None:

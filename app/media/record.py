@@ -1,4 +1,4 @@
-"""What the files of a sequence were made of, kept beside them, so that those that are whole need not be made again."""
+"""For `--resume`: what the files of a sequence were made of, kept beside them, so that none is made twice."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class Record:
         """Whether the file of this number is there, byte for byte as it was made of what it would be made of now."""
         if self._lines is None:
             self._lines = dict(self._read())
-        told = self._lines.get(number)
+        line = self._lines.get(number)
         with suppress(OSError, UserError):
-            return told is not None and told == self._line(number)
+            return line is not None and line == self._line(number)
         return False
 
     def add(self, number: int) -> None:
@@ -73,26 +73,26 @@ class Record:
         if not self._path.exists():
             return
         for line in read_input(self._path, "record", MOST).decode("ascii", "replace").splitlines():
-            number, _, told = line.partition(" ")
+            number, _, made_of = line.partition(" ")
             if number.isdecimal() and len(number) < 19:
-                yield int(number), told
+                yield int(number), made_of
 
 
 def digest_of_file(path: Path) -> str:
     """A digest of the bytes of a file. Raises `UserError` or `OSError`."""
-    told = hashlib.sha256()
+    digest = hashlib.sha256()
     with open_input(path) as stream:
         while block := stream.read(2**20):
-            told.update(block)
-    return told.hexdigest()
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def digest_of(*parts: Any) -> str:
     """A digest of values: arrays by their elements, what has parts by these, all else by how it is shown."""
-    told = hashlib.sha256()
+    digest = hashlib.sha256()
     for part in parts:
-        told.update(_bytes_of(part))
-    return told.hexdigest()
+        digest.update(_bytes_of(part))
+    return digest.hexdigest()
 
 
 def _bytes_of(part: Any) -> bytes:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.errors import Cancelled, UserError
-from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, Part
+from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, FrameRange
 from app.media.files import check_numbers, numbered_files
 from app.media.inputs import MAX_PIXELS
 from app.media.pictures import read_picture
@@ -28,7 +28,7 @@ class PictureSequence(Clip):
     channels: int
     max_pixels: int
 
-    def check(self, part: Part) -> None:
+    def check(self, part: FrameRange) -> None:
         """Raise `UserError`, naming them, if files of the part are missing."""
         if part != WHOLE and part[0] > max(self.files):
             raise UserError(
@@ -36,19 +36,19 @@ class PictureSequence(Clip):
             )
         check_numbers(self.path, self.files, self._numbers(part))
 
-    def _numbers(self, part: Part) -> range:
+    def _numbers(self, part: FrameRange) -> range:
         first, last = part
         return range(self.start if part == WHOLE else first, (max(self.files) if last is None else last) + 1)
 
     def pictures(
         self,
-        part: Part = WHOLE,
+        part: FrameRange = WHOLE,
         is_kept: Callable[[int], bool] = lambda number: False,
         cancel: Callable[[], bool] = never,
         notice: Callable[[str], None] = lambda said: None,
     ) -> Generator[tuple[int, Picture], None, None]:
         """See `Clip`."""
-        told = {_said(self.note)}
+        reported = {_without_name(self.note)}
         for number in self._numbers(part):
             if cancel():
                 raise Cancelled
@@ -56,8 +56,8 @@ class PictureSequence(Clip):
                 continue
             picture = read_picture(self.files[number], self.max_pixels)
             self._check_alike(self.files[number], picture)
-            if picture.note and _said(picture.note) not in told:  # what is lost of every frame is told once
-                told.add(_said(picture.note))
+            if picture.note and _without_name(picture.note) not in reported:  # once, if each has lost it
+                reported.add(_without_name(picture.note))
                 notice(picture.note)
             yield number, picture
 
@@ -65,7 +65,7 @@ class PictureSequence(Clip):
         mine, wanted = _shape(picture), (self.width, self.height, self.bits, self.channels)
         if mine != wanted:
             raise UserError(
-                f"Cannot read {file}: it has {_told(*mine)}, and the first of its sequence {_told(*wanted)}; "
+                f"Cannot read {file}: it has {_described(*mine)}, and the first of its sequence {_described(*wanted)}; "
                 "make them alike."
             )
 
@@ -103,8 +103,8 @@ def read_sequence(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) ->
     return clip, first
 
 
-def _said(note: str) -> str:
-    """What is said of a file, without its name."""
+def _without_name(note: str) -> str:
+    """A note about a file, without the file's name."""
     return note.partition(": ")[2]
 
 
@@ -112,5 +112,5 @@ def _shape(picture: Picture) -> tuple[int, int, int, int]:
     return picture.width, picture.height, picture.bits, picture.pixels.shape[2]
 
 
-def _told(width: int, height: int, bits: int, channels: int) -> str:
+def _described(width: int, height: int, bits: int, channels: int) -> str:
     return f"{width} x {height} pixels of {channels} x {bits} bits"

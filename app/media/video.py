@@ -9,7 +9,6 @@ from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
@@ -17,10 +16,9 @@ import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.clip import HIGH, WHOLE, Clip, Colours, Part
+from app.media.clip import HIGH, WHOLE, Colours, FileClip, FrameRange
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.losses import lost, not_kept
-from app.media.record import digest_of_file
 from app.model.picture import Picture
 from app.progress import never
 
@@ -44,7 +42,7 @@ TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULT
 
 
 @dataclass(frozen=True, kw_only=True)
-class Video(Clip):
+class Video(FileClip):
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
     frames: by its duration. bits: 8, or 16 for what has more than 8.
@@ -60,7 +58,7 @@ class Video(Clip):
 
     def pictures(
         self,
-        part: Part = WHOLE,
+        part: FrameRange = WHOLE,
         is_kept: Callable[[int], bool] = lambda number: False,
         cancel: Callable[[], bool] = never,
         notice: Callable[[str], None] = lambda said: None,
@@ -73,14 +71,6 @@ class Video(Clip):
                     yield number, Picture(frame)
         if 0 <= number < first:
             raise UserError(f"the clip has the frames 0-{number}, and none from {first} on")
-
-    @cached_property
-    def _digest(self) -> str:
-        return digest_of_file(self.path)
-
-    def digest(self, number: int) -> str:
-        """See `Clip`; its file is large, and is read for this once."""
-        return self._digest
 
     def read_frames(
         self, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None

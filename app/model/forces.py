@@ -382,7 +382,7 @@ class BuiltForce:
 
 
 def build(forces: Sequence[Force], grid: Grid, pictures: NamedPictures, duration: float) -> list[BuiltForce]:
-    """The recipe's forces on a grid, without those that are muted.
+    """The recipe's forces on a grid, without those that are muted, for a simulation of `duration` seconds.
 
     Raises:
         UserError: naming the force by its index and name, and what is wrong with it.

@@ -22,7 +22,7 @@ MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
 
-Part = TypeVar("Part")
+T = TypeVar("T")
 Seconds = Annotated[float, Field(ge=0, le=100_000)]
 
 
@@ -379,7 +379,7 @@ class Recipe(Model):
         return self.picture, self.map, self.mode, self.density, self.fluid, *layers
 
 
-def _differing(mine: tuple[Part, ...], theirs: tuple[Part, ...]) -> Iterator[tuple[Part | None, Part | None]]:
+def _differing(mine: tuple[T, ...], theirs: tuple[T, ...]) -> Iterator[tuple[T | None, T | None]]:
     """The parts that are not the same, in pairs from where they first differ; what both end with is left out."""
     if mine is theirs:
         return

@@ -169,7 +169,7 @@ def _resized(values: np.ndarray, n: int, axis: int) -> np.ndarray:
 
 
 def blurred(values: np.ndarray, radius: float, grid: Grid) -> np.ndarray:
-    """(ny, nx) values blurred by a Gaussian whose standard deviation is half of `radius`, mirrored at the edges."""
+    """(ny, nx) values blurred by a Gaussian of deviation `radius` / 2, longer sides, mirrored at the edges."""
     hx, hy = grid.spacing
     rows, columns = (_blur_matrix(n, radius / 2 / h) for n, h in zip(values.shape, (hy, hx), strict=True))
     return rows @ values @ columns.T

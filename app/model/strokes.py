@@ -88,7 +88,7 @@ class BrushPath(Model):
         return all(sample[1:3] == self.samples[0][1:3] for sample in self.samples)
 
     def with_sample(self, tick: int, x: float, y: float, pressure: float) -> Self:
-        """The stroke, one sample longer; the sample is trusted to be in order."""
+        """The stroke with one `Sample` more, which is trusted to be in order."""
         return self.model_copy(update={"samples": (*self.samples, (tick, x, y, pressure))})
 
     def at(self, tick: int) -> tuple[Dab, ...]:

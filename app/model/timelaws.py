@@ -31,7 +31,7 @@ class Law(Protocol):
         ...
 
     def check(self, duration: float) -> str | None:
-        """What the user should hear of, if between 0 and `duration` it never acts; raises ValueError where it fails."""
+        """What the user should know if it never acts within `duration` seconds; raises ValueError where it fails."""
         ...
 
 

@@ -100,7 +100,7 @@ ANIMATIONS = (
     ),
     FileKind("WebM", "For web pages.", (Variant("VP9, with alpha", ".webm"), Variant("AV1", ".webm", "av1"))),
     FileKind("MKV", "Every frame exact, with alpha; large.", _as_it_is(".mkv")),
-    FileKind("GIF", "256 colours a frame, at most 50 frames a second.", _as_it_is(".gif")),
+    FileKind("GIF", "256 colours in all, at most 50 frames a second.", _as_it_is(".gif")),
     FileKind("WebP", "A moving picture of all colours, with alpha; for web pages.", _as_it_is(".webp", True)),
     FileKind("APNG", "A moving picture, exact, with alpha.", _as_it_is(".apng")),
     FileKind(
@@ -114,7 +114,7 @@ MAPS = (
     FileKind("EXR", "ST map or offsets, for Nuke and its like.", _as_it_is(".exr")),
     FileKind("TIFF", "The same values.", _as_it_is(".tif")),
     FileKind("FLO", "Offsets in pixels, as optical flow has them.", _as_it_is(".flo")),
-    FileKind("NPY", "Offsets in pixels, for NumPy.", _as_it_is(".npy")),
+    FileKind("NPY", "Offsets in longer sides of the picture, for NumPy.", _as_it_is(".npy")),
 )
 KINDS = (("Picture", PICTURES), ("Animation", ANIMATIONS), ("Warp map", MAPS))
 PICTURE, ANIMATION, MAP = range(3)

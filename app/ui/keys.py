@@ -1,4 +1,4 @@
-"""Which key does what: as it comes with fluidwarp, and what the person has changed of that."""
+"""Which key does what: as `actions.py` has it, and what the person has changed of that."""
 
 from __future__ import annotations
 

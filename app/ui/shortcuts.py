@@ -1,4 +1,4 @@
-"""The sheet of all keys, on which each can be changed."""
+"""The sheet on F1: all keys, each of which can be changed there. What they are by default is in `actions.py`."""
 
 from __future__ import annotations
 

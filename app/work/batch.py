@@ -9,23 +9,21 @@ from collections.abc import Callable, Sequence
 from app.progress import Progress
 from app.work.cluster import run_on_cluster
 from app.work.tasks import Piece
-from app.work.worker import ATTEMPTS, DIED, LOOK, Heard, Outcome, Part, Worker, perform
-
-Report = Callable[[Outcome], None]
+from app.work.worker import ATTEMPTS, DIED, LOOK, Outcome, Reply, Status, Worker, perform
 
 
 def run_batch(
     tasks: Sequence[Piece],
-    report: Report,
+    report: Callable[[Outcome], None],
     progress: Progress,
     jobs: int = 1,
     cluster: str | None = None,
     notice: Callable[[str], None] = lambda said: None,
 ) -> int:
-    """Do all tasks, whatever becomes of any; `report` hears of each as it ends. Says how many failed.
+    """Do all tasks, whatever becomes of any; `report` is called with each outcome. Says how many failed.
 
-    jobs: processes on this machine. cluster: the address of a Dask scheduler, which decides instead. notice: hears what
-    is waited for.
+    jobs: processes on this machine. cluster: the address of a Dask scheduler, which decides instead. notice: is told
+    what is waited for.
 
     Raises:
         UserError: if there is no such scheduler, or it goes; how many are written is said.
@@ -34,27 +32,27 @@ def run_batch(
     failures = 0
     progress.total = len(tasks)
 
-    def heard(outcome: Outcome) -> None:
+    def count(outcome: Outcome) -> None:
         nonlocal failures
         failures += bool(outcome.error)
         report(outcome)
         progress.advance()
 
     if cluster is not None:
-        run_on_cluster(tasks, cluster, heard, progress, notice)
+        run_on_cluster(tasks, cluster, count, progress, notice)
     elif min(jobs, len(tasks)) > 1:
-        _run_in_processes(tasks, min(jobs, len(tasks)), heard, progress)
+        _run_in_processes(tasks, min(jobs, len(tasks)), count, progress)
     else:
         for task in tasks:
-            heard(perform(task, Progress(cancel=progress.cancel)))
+            count(perform(task, Progress(cancel=progress.cancel)))
     return failures
 
 
-def _run_in_processes(tasks: Sequence[Piece], jobs: int, report: Report, progress: Progress) -> None:
+def _run_in_processes(tasks: Sequence[Piece], jobs: int, report: Callable[[Outcome], None], progress: Progress) -> None:
     waiting = deque((task, 1) for task in tasks)
     busy: dict[Worker, tuple[Piece, int]] = {}
     idle: list[Worker] = []
-    inbox: queue.SimpleQueue[tuple[Worker, Heard]] = queue.SimpleQueue()
+    inbox: queue.SimpleQueue[tuple[Worker, Reply]] = queue.SimpleQueue()
     try:
         while waiting or busy:
             # One that has died is tried again when all others are done, alone, with all the memory there is.
@@ -67,21 +65,21 @@ def _run_in_processes(tasks: Sequence[Piece], jobs: int, report: Report, progres
                 worker.begin(task)
             progress.check()
             try:
-                worker, heard = inbox.get(timeout=LOOK)
+                worker, message = inbox.get(timeout=LOOK)
             except queue.Empty:
                 continue
-            if isinstance(heard, Part) or worker not in busy:
+            if isinstance(message, Status) or worker not in busy:
                 continue
             task, attempt = busy.pop(worker)
-            if heard is not None:
+            if message is not None:
                 idle.append(worker)
             else:
                 worker.end()
                 if attempt < ATTEMPTS:
                     waiting.append((task, attempt + 1))
                     continue
-                heard = Outcome(task.label, DIED)
-            report(heard)
+                message = Outcome(task.label, DIED)
+            report(message)
     finally:
         for worker in (*busy, *idle):
             worker.end()

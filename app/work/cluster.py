@@ -15,7 +15,7 @@ from typing import Any
 from app.errors import Cancelled, UserError
 from app.progress import Progress
 from app.work.tasks import Piece
-from app.work.worker import ATTEMPTS, DIED, LOOK, Heard, Outcome, Part, Worker, in_a_line
+from app.work.worker import ATTEMPTS, DIED, LOOK, Outcome, Reply, Status, Worker, in_a_line
 
 CONNECTING = 10  # seconds that a scheduler has to answer
 WATCHING = 5  # seconds between two looks at whether a scheduler has any worker
@@ -26,7 +26,7 @@ class _Here(threading.local):
     """What a thread of a Dask worker has of its own: the process that does its work, and what that says."""
 
     worker: Worker | None = None
-    inbox: queue.SimpleQueue[tuple[Worker, Heard]]
+    inbox: queue.SimpleQueue[tuple[Worker, Reply]]
 
 
 _here = _Here()
@@ -63,13 +63,13 @@ def _perform_on_worker(task: Piece) -> Outcome:
     return Outcome(task.label, DIED)
 
 
-def _outcome_of(inbox: queue.SimpleQueue[tuple[Worker, Heard]], forgotten: Callable[[], bool]) -> Outcome | None:
+def _outcome_of(inbox: queue.SimpleQueue[tuple[Worker, Reply]], forgotten: Callable[[], bool]) -> Outcome | None:
     """What becomes of the task; None if the worker dies of it. Raises `Cancelled` once nobody wants it."""
     while True:
         with suppress(queue.Empty):
-            _, heard = inbox.get(timeout=LOOK)
-            if not isinstance(heard, Part):
-                return heard
+            _, message = inbox.get(timeout=LOOK)
+            if not isinstance(message, Status):
+                return message
         if forgotten():
             raise Cancelled
 
@@ -87,8 +87,8 @@ def run_on_cluster(
     progress: Progress,
     notice: Callable[[str], None],
 ) -> None:
-    """Do all tasks where a Dask scheduler sends them; `report` hears of each as it ends, `notice` of what is waited
-    for.
+    """Do all tasks where a Dask scheduler sends them; `report` is called with each outcome, `notice` with what
+    is waited for.
 
     Raises:
         UserError: if there is no such scheduler, or it goes; how many are written is said.
@@ -96,7 +96,7 @@ def run_on_cluster(
     """
     ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
     before = {task: _stamps(task) for task in tasks}
-    heard: set[Piece] = set()
+    reported: set[Piece] = set()
     watched, idle = time.monotonic(), False
     with _client(address) as client:
         # Dask gives the tasks of a worker that dies to the others, as often as its allowed-failures says.
@@ -104,7 +104,7 @@ def run_on_cluster(
         for future in futures:
             future.add_done_callback(ended.put)
         try:
-            while len(heard) < len(tasks):
+            while len(reported) < len(tasks):
                 progress.check()
                 try:
                     future = ended.get(timeout=LOOK)
@@ -116,7 +116,7 @@ def run_on_cluster(
                             notice(f"the Dask scheduler at {address} has no worker, and is waited for; {mend}")
                     continue
                 report(_outcome(future, futures[future]))
-                heard.add(futures[future])
+                reported.add(futures[future])
         except _Gone:
             # What is written appears whole, so that it can be told by its files alone.
             written = sum(_are_new(_stamps(task), before[task]) for task in tasks)

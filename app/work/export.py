@@ -262,7 +262,7 @@ class _Export:
         numbered = self._frames(((numbers[at], at, picture) for at in distinct), take_map)
         made = (frame for _, frame in numbered if isinstance(frame, np.ndarray))
         goes_back = any(later < earlier for earlier, later in pairwise(order))
-        frames = reordered(made, order, self.outputs.file.parent) if goes_back else held(made, order)
+        frames = reordered(made, order, self.outputs.file.parent) if goes_back else repeated(made, order)
         return zip((number for number, _ in wanted), frames, strict=True)
 
     def _writer(self, first: int, records: dict[Path, Record]) -> AbstractContextManager[FrameWriter]:
@@ -321,12 +321,12 @@ class _Export:
         self.replay.seek(position)
         self._position = position
 
-    def _frame(self, picture: Picture, heard: Callable[[int], None] | None = None) -> np.ndarray:
-        """The pixels warped by the map as it is; for `heard` see `Target`."""
-        heard = heard or (lambda rows: self.progress.check())
+    def _frame(self, picture: Picture, on_rows: Callable[[int], None] | None = None) -> np.ndarray:
+        """The pixels warped by the map as it is; for `on_rows` see `Target`."""
+        on_rows = on_rows or (lambda rows: self.progress.check())
         if self.replay.density is not None:
             frame = self._density_frame(self.replay.density.get())
-            heard(len(frame))
+            on_rows(len(frame))
             return frame
         # The frames of an animation are all of one kind, and most of its formats have no alpha.
         file = self.outputs.file
@@ -334,7 +334,7 @@ class _Export:
         with self.device.stage("sample picture"):
             how = replace(self._how, premultiplied=picture.premultiplied)
             try:
-                target = Target(self.size, how, heard, alpha)
+                target = Target(self.size, how, on_rows, alpha)
                 return looked_up(self.sampler, self.replay.seen, picture.pixels, target)
             except SamplingError as error:
                 raise UserError(f"The map cannot be applied: {error}.") from None
@@ -497,7 +497,7 @@ def write_all(
     return count
 
 
-def held(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]:
+def repeated(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]:
     """Frames in an `order` that never goes back, each as often as it is in it."""
     for frame, (_, repeats) in zip(frames, groupby(order), strict=True):
         for _ in repeats:
@@ -552,13 +552,13 @@ def displacement(
 class Target:
     """What pixels that are looked up become.
 
-    size: (width, height). heard: called with the number of rows in every band; may raise, as `Progress.check` does.
+    size: (width, height). on_rows: called with the number of rows in every band; may raise, as `Progress.check` does.
     alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
     """
 
     size: tuple[int, int]
     how: Sampling
-    heard: Callable[[int], None]
+    on_rows: Callable[[int], None]
     alpha: bool = False
 
 
@@ -568,11 +568,11 @@ def looked_up(sampler: Sampler, warp: Map, pixels: np.ndarray, target: Target) -
     result = np.empty((size[1], size[0], pixels.shape[2]), pixels.dtype)
     if not target.alpha or pixels.shape[2] in (2, 4) or how.edges != "transparent":
         for band in sampler.bands(warp, pixels, size, how, result):
-            target.heard(len(band))
+            target.on_rows(len(band))
         return result
     top = 0
     for band in sampler.bands(warp, with_alpha(pixels), size, how):
-        target.heard(len(band))
+        target.on_rows(len(band))
         if result.shape[2] == pixels.shape[2] and (band[..., -1] < opaque_value(band)).any():
             result = with_alpha(result)
         result[top : top + len(band)] = band[..., : result.shape[2]]

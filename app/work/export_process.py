@@ -7,7 +7,7 @@ import threading
 
 from app.work.fit_job import Fit
 from app.work.jobs import Job
-from app.work.worker import Heard, Outcome, Part, Work, Worker
+from app.work.worker import Outcome, Reply, Status, Work, Worker
 
 
 class WorkProcess:
@@ -32,7 +32,7 @@ class WorkProcess:
         self.error = ""
         self.outcome = Outcome("")
         self._died = died
-        self._inbox: queue.SimpleQueue[tuple[Worker, Heard]] = queue.SimpleQueue()
+        self._inbox: queue.SimpleQueue[tuple[Worker, Reply]] = queue.SimpleQueue()
         self._worker = Worker(self._inbox)
         # A picture is more than a pipe holds: the window would wait until the other is awake.
         threading.Thread(target=self._worker.begin, args=(work,), daemon=True).start()
@@ -46,7 +46,7 @@ class WorkProcess:
         """Hear how far it is."""
         while not self.is_done and not self._inbox.empty():
             match self._inbox.get()[1]:
-                case Part(done, state):
+                case Status(done, state):
                     self.part, self.state = done, state
                 case Outcome() as outcome:
                     self.is_done, self.error, self.outcome = True, outcome.in_window, outcome

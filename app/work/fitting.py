@@ -56,7 +56,7 @@ class Trial:
 
     @property
     def excess(self) -> float:
-        """How far all pairs together are beyond `ARRIVED`."""
+        """How far all pairs together are beyond `ARRIVED`, longer sides."""
         return float(np.maximum(self.residuals - ARRIVED, 0).sum())
 
     @property
@@ -261,7 +261,7 @@ class _Search:
         self.start = np.clip((first - self.low) / np.maximum(self.high - self.low, 1e-9), 0, 1)
 
     def run(self, stage: _Stage, origin: np.ndarray, groups: np.ndarray, reach: float, budget: int) -> np.ndarray:
-        """The best point found from `origin` along `groups`, as far as `reach` at first, with so many replays."""
+        """The best point found from `origin` along `groups`: `budget` replays, at first `reach` of the cube apart."""
         from scipy.optimize import NonlinearConstraint, minimize
 
         tried: dict[bytes, Trial] = {}

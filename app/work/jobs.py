@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.clip import WHOLE, Clip, Part
+from app.media.clip import WHOLE, Clip, FrameRange
 from app.media.encoders import check_colours, check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
 from app.media.inputs import MAX_PIXELS
@@ -66,7 +66,7 @@ class Outputs:
     file: Path | None
     stats: Path | None = None
     maps: MapOutput | None = None
-    part: Part = WHOLE
+    part: FrameRange = WHOLE
     animated: bool = False
     bits: int | None = None
     strip: bool = False

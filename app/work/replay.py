@@ -297,7 +297,7 @@ class Replay:
         return sorted((each for each in led if each[1].takes_hold), key=lambda each: isinstance(each[1], RecipeHandle))
 
     def unmet(self, within: float) -> Iterator[str]:
-        """Which handles are farther than `within` from where they are led at this moment, and how far."""
+        """Which handles are farther than `within` longer sides from where they are led at this moment, and how far."""
         if not self.handles.handles:
             return
         solid = self.fluid.solid.get()

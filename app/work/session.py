@@ -154,10 +154,12 @@ class Session:
 
     @property
     def dt(self) -> float:
+        """Seconds a tick."""
         return self._live.fluid.dt
 
     @property
     def extent(self) -> tuple[float, float]:
+        """(width, height) of the picture, the longer of them 1."""
         return self.replay.grid.extent
 
     @property
@@ -246,7 +248,7 @@ class Session:
         self._hear(next(self._gesture))
 
     def move(self, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
-        """The pointer moved; every sample counts."""
+        """The pointer moved to (x, y), fractions of the picture; every sample counts."""
         if self._gesture is None:
             return
         self._touch = Touch(self._pen, *self._string.pull(*self._inside(x, y)), pressure, shift)
@@ -556,7 +558,7 @@ class Session:
         self.changes += 1
 
     def settle(self, patience: float = 600.0) -> None:
-        """Let everything that moves come to rest, at once: for saving, for tests."""
+        """Let everything that moves come to rest, at once, within `patience` seconds: for saving, for tests."""
         deadline = time.perf_counter() + patience
         self._arrive()
         while self.coasting and time.perf_counter() < deadline:
@@ -795,7 +797,7 @@ class Session:
             self.edit(name, fluid=self._live.fluid.model_copy(update={"grid": cells}))
 
     def prepare_grid(self, cells: int, seconds: float) -> bool:
-        """Simulate all that has been done on another grid too, for a while; True once that has taken this one's place.
+        """Simulate on another grid too, for about `seconds`; True once it has come as far and taken this one's place.
 
         Until then everything stays as it is, and also then it is no edit.
         """

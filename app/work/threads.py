@@ -59,14 +59,14 @@ def prefetch(items: Iterator[T]) -> Iterator[Iterator[T]]:
 
     When the block ends before the items do, `items` is closed if it is a generator.
     """
-    reader = _Ahead(items)
+    reader = _Prefetched(items)
     try:
         yield reader
     finally:
         reader.close()
 
 
-class _Ahead(Generic[T]):
+class _Prefetched(Generic[T]):
     def __init__(self, items: Iterator[T]) -> None:
         self._items = items
         self._ready: queue.Queue[object] = queue.Queue(DEPTH)

@@ -57,14 +57,14 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Part:
+class Status:
     """How much of a piece of work is done, 0 to 1, and what is being done beside the work itself, as "writing"."""
 
     done: float
     state: str
 
 
-Heard = Part | Outcome | None
+Reply = Status | Outcome | None
 """What a worker says; None once it has died."""
 
 
@@ -115,7 +115,7 @@ class Worker:
         inbox: gets what it says, each with the worker itself; an `Outcome` ends a piece of work, None the worker.
     """
 
-    def __init__(self, inbox: queue.SimpleQueue[tuple[Worker, Heard]]) -> None:
+    def __init__(self, inbox: queue.SimpleQueue[tuple[Worker, Reply]]) -> None:
         with _deaf_children():
             self._process = subprocess.Popen(
                 [sys.executable, "-c", SERVING],
@@ -152,7 +152,7 @@ class Worker:
             self._process.kill()
             self._process.wait()
 
-    def _listen(self, inbox: queue.SimpleQueue[tuple[Worker, Heard]]) -> None:
+    def _listen(self, inbox: queue.SimpleQueue[tuple[Worker, Reply]]) -> None:
         said = self._process.stdout
         assert said is not None
         with said, suppress(EOFError, pickle.UnpicklingError):
@@ -184,7 +184,7 @@ def serve(do: Callable[[Work, Progress], Outcome] = perform) -> None:
     os.dup2(2, 1)  # nothing else may get among what is said
     waiting, finish = queue.SimpleQueue[Work](), threading.Event()
 
-    def say(word: Heard) -> None:
+    def say(word: Reply) -> None:
         pickle.dump(word, said)
         said.flush()
 
@@ -195,18 +195,18 @@ def serve(do: Callable[[Work, Progress], Outcome] = perform) -> None:
     _end_now()
 
 
-def _told(say: Callable[[Heard], None], cancel: Callable[[], bool]) -> Progress:
+def _told(say: Callable[[Reply], None], cancel: Callable[[], bool]) -> Progress:
     """The progress of a piece of work, said to whoever gave it."""
-    now = Part(0.0, "")
+    now = Status(0.0, "")
 
     def report(done: int, total: int | None) -> None:
         nonlocal now
-        now = Part(done / total if total else 0.0, now.state)
+        now = Status(done / total if total else 0.0, now.state)
         say(now)
 
     def tell(state: str) -> None:
         nonlocal now
-        now = Part(now.done, state)
+        now = Status(now.done, state)
         say(now)
 
     return Progress(None, report, cancel, tell)

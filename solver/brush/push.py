@@ -52,7 +52,7 @@ AROUND = 2 * (FINE + 1) + 1
 
 
 def coasting(tip: Tip, dt: float, drag: float, viscosity: float) -> float:
-    """Radii that the fluid goes on at the tip's speed without the brush."""
+    """Radii that the fluid goes on without the brush, from the tip's speed: seconds, 1 / s, lengths^2 / s."""
     speed = math.hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1]) / dt
     slowing = drag + SQUARED_WAVENUMBER * viscosity / tip.radius**2
     return speed / max(slowing, 1 / LONGEST_COASTING) / tip.radius

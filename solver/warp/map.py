@@ -101,7 +101,7 @@ class WarpMap:
     # -- moving it --------------------------------------------------------------------------------------------------
 
     def follow(self, fluid: Fluid, dt: float) -> None:
-        """Carry the map one step by a fluid, along the trace that the fluid's own next step follows too."""
+        """Carry the map `dt` seconds by a fluid, along the trace that the fluid's own next step follows too."""
         check_type("what the map is to follow", fluid, Fluid)
         if fluid.grid != self.grid:
             raise ValueError(f"a map on {self.grid} cannot follow a fluid on {fluid.grid}; `move_to` takes it there")

@@ -22,7 +22,7 @@ class Submap(DoubleField):
         grid: the cells.
 
     Attributes:
-        trace: how far back the fluid came from, in cells, for who has no trace of his own.
+        trace: how far back the fluid came from, in cells, for a caller without a trace of its own.
     """
 
     def __init__(self, device: Device, grid: Grid) -> None:

@@ -65,14 +65,14 @@ def _colours_lost(chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]
         return [f"its colours are {colours} (cICP), which a PNG keeps, and are mixed as if sRGB"] if colours else []
     if has_profile or b"sRGB" in chunks:
         return []
-    told = []
+    kept = []
     if b"gAMA" in chunks and (value := int.from_bytes(chunks[b"gAMA"], "big")) not in USUAL_GAMMA:
-        told.append(f"gamma of {value / 100000:g} (gAMA)")
+        kept.append(f"gamma of {value / 100000:g} (gAMA)")
     if b"cHRM" in chunks:
         x_y = np.frombuffer(chunks[b"cHRM"], ">u4") / 100000
         if not np.allclose(np.roll(x_y, -2), REC709, atol=2e-3):
-            told.append("primaries (cHRM)")
-    return [f"a PNG alone keeps its {' and '.join(told)}, and its colours are mixed as if sRGB"] if told else []
+            kept.append("primaries (cHRM)")
+    return [f"a PNG alone keeps its {' and '.join(kept)}, and its colours are mixed as if sRGB"] if kept else []
 
 
 def write(path: Path, picture: Picture, quality: int) -> None:
