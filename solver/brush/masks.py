@@ -104,7 +104,7 @@ class Masks:
         self._paint("frozen", tip, "brush/freeze.frag", "mix", towards=towards, amount=amount)
 
     def smooth(self, tip: Tip, strength: float) -> None:
-        """Smooth both masks under the tip."""
+        """Smooth both masks under the tip, whichever sign the strength has."""
         check_finite("a smoothing", strength)
         left, top, width, height = self._region(tip)
         if not (width and height):
