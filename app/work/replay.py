@@ -528,7 +528,7 @@ class Replay:
             case "thaw":
                 self.masks.freeze(tip, -amount)
             case "smooth":
-                self.masks.smooth(tip, abs(amount))
+                self.masks.smooth(tip, amount)
 
     def _tip(self, stroke: BrushPath, dab: Dab) -> Tip:
         width, height = self.grid.extent

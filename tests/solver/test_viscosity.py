@@ -432,3 +432,14 @@ def test_fluid_at_rest_stays_so_at_no_iteration(device: Device) -> None:
     assert step(vortices(40, 60)).any()
     assert not step(np.zeros((40, 60, 2), np.float32)).any()
     assert not any(field.get().any() for field in step.solver.state())
+
+
+def test_what_is_solid_does_not_say_how_the_rest_is_solved(device: Device) -> None:
+    solid = np.zeros((48, 64), bool)
+    solid[10:20, 30:50] = True
+    plans = []
+    for inside in (5.0, 1e-6, 1e6):
+        step = Step(device, np.where(solid, inside, 5.0), solid=solid)
+        plans.append(step.solver.plan)
+    assert plans[1:] == plans[:1] * 2
+    assert plans[0].method == "cg"

@@ -91,10 +91,8 @@ def differences(found: list[str], wanted: list[str]) -> list[str]:
     """The lines of one that the other has not, numbers compared with a tolerance."""
     if len(found) == len(wanted):
         return [f"{one}    not    {other}" for one, other in zip(found, wanted, strict=True) if not _alike(one, other)]
-    return [
-        *(f"+ {line}" for line in found if line not in wanted),
-        *(f"- {line}" for line in wanted if line not in found),
-    ]
+    more, less = new_in(found, Counter(wanted)), new_in(wanted, Counter(found))
+    return [*(f"+ {line}" for line in more), *(f"- {line}" for line in less)]
 
 
 def _alike(one: str, other: str) -> bool:
