@@ -1266,6 +1266,13 @@ def automatic(device: Device, tmp_path: Path) -> Iterator[Robot]:
     robot.close()
 
 
+@pytest.fixture
+def measured(automatic: Robot) -> Robot:
+    """As if it had measured a machine that is quick enough for any grid."""
+    automatic.editor.quality.speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
+    return automatic
+
+
 def test_the_grid_is_chosen_from_the_machine_measured(automatic: Robot) -> None:
     automatic.until(lambda: not automatic.editor.quality.is_measuring)
     assert automatic.editor.session.recipe.fluid.grid in GRIDS
@@ -1299,13 +1306,6 @@ def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> No
     automatic.key("ctrl+shift+z")
     assert names(automatic) == ["Open", "Push"]
     assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
-
-
-@pytest.fixture
-def measured(automatic: Robot) -> Robot:
-    """As if it had measured a machine that is quick enough for any grid."""
-    automatic.editor.quality.speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
-    return automatic
 
 
 def paint_at(robot: Robot, dt: float, seconds: float = PATIENCE + 0.3) -> None:
