@@ -1255,6 +1255,9 @@ def test_shortcuts_of_files_work_while_a_number_is_typed_and_undo_stays_the_fiel
 # Automatic quality ----------------------------------------------------------------------------------------------------
 
 
+ENOUGH = PATIENCE + 0.3  # seconds of painting to be judged by
+
+
 @pytest.fixture
 def automatic(device: Device, tmp_path: Path) -> Iterator[Robot]:
     """An editor that has just been opened, and has not measured the machine yet."""
@@ -1308,7 +1311,7 @@ def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> No
     assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
 
 
-def paint_at(robot: Robot, dt: float, seconds: float = PATIENCE + 0.3) -> None:
+def paint_at(robot: Robot, dt: float, seconds: float = 2.5) -> None:
     """A stroke on a machine that takes `dt` seconds for a frame."""
     robot.move(*robot.at(0.4, 0.5))
     robot.press()
@@ -1340,7 +1343,7 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(measured: 
     measured.drag((0.4, 0.3), (0.5, 0.3))
     measured.editor.session.settle()
     seen = measured.warp()
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     measured.key("ctrl+z")
     until_on(measured, 96)
     assert "below 30 frames a second" in measured.editor.messages.shown[-1].text
@@ -1363,9 +1366,9 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(measured: 
 
 def test_the_grid_is_finer_again_where_there_is_time(measured: Robot) -> None:
     measured.editor.session.begin_with(grid=128, dt=1 / 60, viscosity=0.3, drag=0.0)  # which halts with the brush
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     until_on(measured, 96)
-    paint_at(measured, 1 / 60)
+    paint_at(measured, 1 / 60, ENOUGH)
     until_on(measured, 128)
     assert names(measured) == ["Open", "Push", "Push"]
 
@@ -1374,7 +1377,7 @@ def test_a_grid_that_was_chosen_stays(measured: Robot) -> None:
     quality, session = measured.editor.quality, measured.editor.session
     session.begin_with(grid=160)
     session.set_grid(128, "Grid of 128")
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     measured.frame(count=20)
     assert session.recipe.fluid.grid == 128
     assert names(measured)[-2:] == ["Grid of 128", "Push"]
@@ -1389,7 +1392,7 @@ def test_the_grid_of_saved_work_stays(measured: Robot, tmp_path: Path) -> None:
     """What is exported is what the command line makes of the file, also if another grid was about to be taken."""
     session = measured.editor.session
     session.begin_with(grid=128)
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     assert measured.editor.files.save_as(tmp_path / "work.fluidwarp")
     measured.frame(count=200, dt=0.02)
     assert session.recipe.fluid.grid == 128
@@ -1397,7 +1400,7 @@ def test_the_grid_of_saved_work_stays(measured: Robot, tmp_path: Path) -> None:
 
 def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
     with Robot(device, small_project(tmp_path, 128), preferences=Preferences(auto_quality=True)) as robot:
-        paint_at(robot, 0.1)
+        paint_at(robot, 0.1, ENOUGH)
         robot.frame(count=20)
         assert robot.editor.session.recipe.fluid.grid == 128
 
