@@ -36,8 +36,7 @@ class Desk:
     Args:
         folder: for the files of the screen, of the editor and of the test.
         size: of the screen, in pixels.
-        threads: llvmpipe draws in threads of its own, as for most who use it; handing small passes to them costs half
-            as much again, while the tests' processes keep the cores busy anyway.
+        threads: llvmpipe draws in threads of its own, as for most who use it; what that costs is told in conftest.py.
     """
 
     def __init__(self, folder: Path, size: tuple[int, int] = (1280, 800), threads: bool = False) -> None:
