@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from Xlib import X, display
-from Xlib.error import BadWindow
 
 NEEDED = ("Xvfb", "xdotool")
 PATIENCE = 90.0
@@ -38,8 +36,7 @@ class Desk:
     Args:
         folder: for the files of the screen, of the editor and of the test.
         size: of the screen, in pixels.
-        threads: llvmpipe draws in threads of its own, as for most who use it; handing small passes to them costs half
-            as much again, while the tests' processes keep the cores busy anyway.
+        threads: llvmpipe draws in threads of its own, as for most who use it; what that costs is told in conftest.py.
     """
 
     def __init__(self, folder: Path, size: tuple[int, int] = (1280, 800), threads: bool = False) -> None:
@@ -94,25 +91,22 @@ class Desk:
 
     def _titles(self) -> dict[str, str]:
         """What stands on the windows that are to be seen, by their numbers."""
-        found = dict[str, str]()
+        from Xlib import X
+        from Xlib.error import BadWindow
+
+        found, name = dict[str, str](), self._x.intern_atom("_NET_WM_NAME")
         for window in self._x.screen().root.query_tree().children:
             with suppress(BadWindow):  # it has just been closed
-                if window.get_attributes().map_state == X.IsViewable and (title := self._title(window.id)):
-                    found[str(window.id)] = title
-        return found
-
-    def _title(self, window: int) -> str:
-        name = self._x.create_resource_object("window", window).get_full_text_property(self._name)
-        return name or ""
+                if window.get_attributes().map_state == X.IsViewable:
+                    found[str(window.id)] = window.get_full_text_property(name) or ""
+        return {number: title for number, title in found.items() if "fluidwarp" in title}
 
     @cached_property
     def _x(self) -> Any:
         """A connection to the screen: a process for each look at it would cost more than what is looked at."""
-        return display.Display(self.env["DISPLAY"])
+        from Xlib import display  # which others than Linux need not have
 
-    @cached_property
-    def _name(self) -> int:
-        return self._x.intern_atom("_NET_WM_NAME")
+        return display.Display(self.env["DISPLAY"])
 
     def seen(self) -> np.ndarray:
         """The screen as it is now, (h, w, 3) uint8, from the file in which the server keeps it."""
@@ -124,9 +118,7 @@ class Desk:
         return rows[:, : 4 * width].reshape(height, width, 4)[..., 2::-1]
 
     def title(self) -> str:
-        with suppress(BadWindow):
-            return self._title(int(self.window))
-        return ""
+        return self._titles().get(self.window, "")
 
     def do(self, *words: str) -> str:
         return subprocess.run(["xdotool", *words], env=self.env, capture_output=True, text=True).stdout

@@ -1274,6 +1274,9 @@ def test_shortcuts_of_files_work_while_a_number_is_typed_and_undo_stays_the_fiel
 # Automatic quality ----------------------------------------------------------------------------------------------------
 
 
+ENOUGH = PATIENCE + 0.3  # seconds of painting to be judged by
+
+
 @pytest.fixture
 def automatic(device: Device, tmp_path: Path) -> Iterator[Robot]:
     """An editor that has just been opened, and has not measured the machine yet."""
@@ -1283,6 +1286,13 @@ def automatic(device: Device, tmp_path: Path) -> Iterator[Robot]:
     assert robot.editor.quality.is_measuring
     yield robot
     robot.close()
+
+
+@pytest.fixture
+def measured(automatic: Robot) -> Robot:
+    """As if it had measured a machine that is quick enough for any grid."""
+    automatic.editor.quality.speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
+    return automatic
 
 
 def test_the_grid_is_chosen_from_the_machine_measured(automatic: Robot) -> None:
@@ -1324,21 +1334,14 @@ def test_a_recipe_with_a_force_that_no_map_can_follow_is_told_of_while_the_machi
     automatic: Robot, tmp_path: Path
 ) -> None:
     force = '[[force]]\nkind = "vortex"\npoint = [0.5, 0.5]\nradius = 0.2\nstrength = 1e6\n'
-    (tmp_path / "r.toml").write_text(f'picture = "pattern.png"\n[fluid]\ngrid = 48\n{force}')
+    (tmp_path / "r.toml").write_text(f'picture = "pattern.png"\n{force}')
     automatic.drop(tmp_path / "r.toml")
     automatic.until(lambda: not automatic.editor.quality.is_measuring)
     assert "throws the fluid" in automatic.editor.messages.shown[-1].text
     assert not automatic.editor.session.is_moving
 
 
-@pytest.fixture
-def measured(automatic: Robot) -> Robot:
-    """As if it had measured a machine that is quick enough for any grid."""
-    automatic.editor.quality.speed = Speed(fixed=1.0, growing=6.0, drawing=5.0)
-    return automatic
-
-
-def paint_at(robot: Robot, dt: float, seconds: float = PATIENCE + 0.3) -> None:
+def paint_at(robot: Robot, dt: float, seconds: float = 2.5) -> None:
     """A stroke on a machine that takes `dt` seconds for a frame."""
     robot.move(*robot.at(0.4, 0.5))
     robot.press()
@@ -1370,7 +1373,7 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(measured: 
     measured.drag((0.4, 0.3), (0.5, 0.3))
     measured.editor.session.settle()
     seen = measured.warp()
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     measured.key("ctrl+z")
     until_on(measured, 96)
     assert "below 30 frames a second" in measured.editor.messages.shown[-1].text
@@ -1393,9 +1396,9 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(measured: 
 
 def test_the_grid_is_finer_again_where_there_is_time(measured: Robot) -> None:
     measured.editor.session.begin_with(grid=128, dt=1 / 60, viscosity=0.3, drag=0.0)  # which halts with the brush
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     until_on(measured, 96)
-    paint_at(measured, 1 / 60)
+    paint_at(measured, 1 / 60, ENOUGH)
     until_on(measured, 128)
     assert names(measured) == ["Open", "Push", "Push"]
 
@@ -1404,7 +1407,7 @@ def test_a_grid_that_was_chosen_stays(measured: Robot) -> None:
     quality, session = measured.editor.quality, measured.editor.session
     session.begin_with(grid=160)
     session.set_grid(128, "Grid of 128")
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     measured.frame(count=20)
     assert session.recipe.fluid.grid == 128
     assert names(measured)[-2:] == ["Grid of 128", "Push"]
@@ -1419,7 +1422,7 @@ def test_the_grid_of_saved_work_stays(measured: Robot, tmp_path: Path) -> None:
     """What is exported is what the command line makes of the file, also if another grid was about to be taken."""
     session = measured.editor.session
     session.begin_with(grid=128)
-    paint_at(measured, 0.1)
+    paint_at(measured, 0.1, ENOUGH)
     assert measured.editor.files.save_as(tmp_path / "work.fluidwarp")
     measured.frame(count=200, dt=0.02)
     assert session.recipe.fluid.grid == 128
@@ -1427,7 +1430,7 @@ def test_the_grid_of_saved_work_stays(measured: Robot, tmp_path: Path) -> None:
 
 def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
     with Robot(device, small_project(tmp_path, 128), preferences=Preferences(auto_quality=True)) as robot:
-        paint_at(robot, 0.1)
+        paint_at(robot, 0.1, ENOUGH)
         robot.frame(count=20)
         assert robot.editor.session.recipe.fluid.grid == 128
 
