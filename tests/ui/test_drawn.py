@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ from app.ui.events import Mods
 from app.ui.exporting import ANIMATION, MAP, ExportDialog
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
+from app.work import session
 from solver.gl.device import Device
 from support.drawn import Drawn, differences, new_in
 from support.editing import Robot, small_project
@@ -201,11 +203,12 @@ def dialogs(robot: Robot) -> Iterator[str]:
         editor.dialogs.shown[-1].close()
         robot.frame(count=2)
     project, do = editor.session.project, lambda *_: None
+    short = replace(project, folder=Path("pictures"))  # words are broken by how long they are
     shown = (
         Unsaved(editor.workspace, "quit", do, do),
         PictureOrMap("a.exr", do, do),
-        SaveDialog(project, Path("folder/a.fluidwarp"), Preferences(), editor.chooser, do, None),
-        SaveDialog(project, Path("folder/a.fluidwarp"), Preferences(embed=False), editor.chooser, do, None),
+        SaveDialog(short, Path("folder/a.fluidwarp"), Preferences(), editor.chooser, do, None),
+        SaveDialog(short, Path("folder/a.fluidwarp"), Preferences(embed=False), editor.chooser, do, None),
         Browser("Open", project.folder, (".png",), do),
         Browser("Save the mask", project.folder, (".png",), do, "mask.png"),
     )
@@ -236,6 +239,7 @@ def panels(robot: Robot) -> Iterator[str]:
     yield "a slider under the pointer"
     state.mask = "thickness"
     editor.session.undo()
+    robot.rest()
     yield "another mask, and an edit taken back"
     robot.key("ctrl+l")
     yield "light"
@@ -265,6 +269,13 @@ def golden() -> Iterator[dict[str, list[str]]]:
     if WRITES:
         lines = [line for name, found in scenes.items() for line in (f"== {name}", *found)]
         FILE.write_text("\n".join([imgui.get_version(), *lines]) + "\n", "utf-8")
+
+
+@pytest.fixture(autouse=True)
+def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However fast the machine is."""
+    monkeypatch.setattr(session, "QUICK", 0.0)
+    monkeypatch.setattr(session, "PATIENCE", 0.0)
 
 
 @pytest.mark.parametrize("tour", TOURS, ids=lambda tour: tour.__name__)
