@@ -110,6 +110,9 @@ def test_a_grid_is_laid_over_a_picture() -> None:
             Grid.for_picture(*wrong)
     with pytest.raises(ValueError, match="below 8 x 8"):
         Grid(8, 7)
+    assert Grid(8, 8, (1.0, 1 / 1024)).h == 0.125
+    with pytest.raises(ValueError, match="sides are more than 1024 to 1"):
+        Grid(8, 8, (1.0, 1 / 1025))
 
 
 SPEED = (1.0, 2.0, 3.0, 4.0)
