@@ -11,6 +11,8 @@ from solver.limits import check_type, numbers
 
 SMALLEST_GRID = 8
 ROUNDING = 1e-9  # longer sides
+# A cell's longer side over its shorter one: its links count 1 and the square of that, and float32 has 24 bits for both.
+LARGEST_ASPECT = 1024
 MOST_ALONG = 4096  # cells that a narrow picture gets along it: twice as many texels of the map a GL must have
 
 
@@ -27,7 +29,8 @@ class Grid:
         picture: (width, height) of the picture, the longer of them 1; by default the cells cover all of it.
 
     Raises:
-        ValueError: on fewer cells, a picture whose longer side is not 1, or a window that reaches beyond it.
+        ValueError: on fewer cells, ones far longer than wide, a picture whose longer side is not 1, or a window that
+            reaches beyond it.
     """
 
     nx: int
@@ -60,6 +63,10 @@ class Grid:
         )
         if not all(within):
             raise ValueError(f"a window of {self.extent} at {self.origin} is not within a picture of {self.picture}")
+
+        longer, shorter = max(self.spacing), min(self.spacing)
+        if longer > LARGEST_ASPECT * shorter:
+            raise ValueError(f"cells of {longer:.4g} x {shorter:.4g}: their sides are more than {LARGEST_ASPECT} to 1")
 
     @classmethod
     def for_picture(cls, width: int, height: int, cells: int) -> Grid:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from numbers import Integral
 
 import moderngl
@@ -28,7 +29,7 @@ class Field:
     """
 
     def __init__(self, device: Context, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
-        if np.shape(size) != (2,) or not all(isinstance(side, Integral) for side in size):
+        if not (isinstance(size, Sized) and len(size) == 2 and all(isinstance(side, Integral) for side in size)):
             raise FieldError(f"{label}: a size of {size!r} was given, (width, height) in whole texels is wanted")
         width, height = size
         limit = device.limits.max_texture_size

@@ -245,6 +245,7 @@ def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
         lambda warp: ForwardMap(warp).at(np.zeros((3, 3))),
         lambda warp: warp.read((40.5, 24)),
         lambda warp: warp.statistics("all"),
+        lambda warp: warp.statistics([[1], [1, 2]]),
     ],
     ids=[
         "transposed",
@@ -264,6 +265,7 @@ def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
         "places of the forward map",
         "half a pixel",
         "size of a word",
+        "size of unequal rows",
     ],
 )
 def test_a_map_refuses_what_does_not_fit(device: Device, act: Callable[[WarpMap], object]) -> None:
