@@ -29,15 +29,13 @@ EDGED = 0.25
 # Softest kappa of a mask up to which one sweep before and after the coarser levels does as well as two, and costs three
 # fifths, if a contrast beyond `MODERATE` leaves more. Of one viscosity there are two, both after the coarser levels.
 ONE_SWEEP = 4.0
-# Conjugate gradients end when the error is reckoned to be less than this part (README.md): of one viscosity (with .017
-# noise was 1.8 % off); of masks where it varies so much at most, for 1 %; and beyond, for 5 %, where the error is at
-# least 1.6 times less than reckoned (151 masks).
+# Conjugate gradients end when less than this part, squared, is left (README.md): the error is below 1 % where the
+# viscosity varies so much at most, and below 5 % beyond. With .017 noise of one viscosity was 1.8 % off.
 MODERATE = 300.0
 TOLERANCE = 0.008
-TOLERANCE_MODERATE = 0.01
 TOLERANCE_STIFF = 0.07
 # On a grid of so few cells an iteration costs next to nothing, and what all steps leave adds up to more of it: there a
-# third of the tolerance is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
+# third of `TOLERANCE` is asked for. A moderate mask of 27 x 27 cells with walls was .22 cells off its turned set-up
 # after 60 steps that moved 12, and is .06.
 SMALL = 64 * 64
 # Of one viscosity a cycle leaves so much of the energy of an error at most: .72^2. By power iteration on 40 x 31 and
@@ -115,7 +113,7 @@ def plan_for(least: float, largest: float, cells: int, is_one: bool, is_sharp: b
     rigid = is_sharp and varies
     count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
-    tolerance = TOLERANCE_STIFF if varies else share * TOLERANCE_MODERATE
+    tolerance = TOLERANCE_STIFF if varies else share * TOLERANCE
     full = least > ONE_SWEEP and not rigid
     if largest <= stiff:
         return Plan("cg", count, tolerance, full=full)
