@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, isfinite
+from math import inf, isfinite, sqrt
 from typing import Any
 
 from solver.gl.device import Device
@@ -34,7 +34,7 @@ class ConjugateGradients:
         names = "solution", "residual", "direction", "A p"
         self._x, self._r, self._p, self._ap = (DoublePackedFaces(device, ringed, f"viscous {name}") for name in names)
         self._az = PackedFaces(device, ringed, "viscous A z")
-        self._products, self._norms = (device.field(ringed, n, "viscous products") for n in (4, 2))
+        self._products = device.field(ringed, 4, "viscous products")
         self._sum = Reduction(device, ringed, 4, "sum")
         # Of the guess, with the strains on the far walls, which lie in the ring.
         self._guess_products = device.field(ringed, 4, "viscous products of the guess")
@@ -80,21 +80,17 @@ class ConjugateGradients:
             if cycle_leaves * rr <= tolerance**2 * found:
                 self.iterations = 1
                 return self._finish(change, iterate, precondition(self._r.read), 1.0)
-        curvature, gained_before, pp, smoothest = 0.0, inf, 0.0, 0.0
+        curvature, gained_before = 0.0, inf
         while True:
             self.iterations += 1
             z = precondition(self._r.read)
-            rz, z_az, z_ap, xx, zz, zp = self._apply_operator(z, iterate)
-            alpha, beta, curvature = cg_coefficients(rz, z_az, z_ap, curvature)
-            iterate["beta"] = beta
+            rz, z_az, z_ap, xx = self._apply_operator(z, iterate)
+            alpha, iterate["beta"], curvature = cg_coefficients(rz, z_az, z_ap, curvature)
             gained = alpha**2 * curvature
             found += gained
             left = max(gained, _series(gained, gained_before))
-            if not self._is_one:
-                pp = zz + beta * (2.0 * zp + beta * pp)
-                smoothest = max(smoothest, pp / curvature) if alpha else inf
-                left *= smoothest
-            if not alpha or self.iterations == most or left <= tolerance**2 * (found if self._is_one else xx):
+            size = found if cycle_leaves < inf else sqrt(max(found * xx, 0.0))
+            if not alpha or self.iterations == most or left <= tolerance**2 * size:
                 # What has been spoiled may be no number.
                 return self._finish(change, iterate, z if alpha else self._r.read, alpha)
             gained_before = gained
@@ -109,14 +105,12 @@ class ConjugateGradients:
         draw(targets, region=(x, y, width + 1, height + 1), **guess, **rhs.inputs("rhs_"), **self.level.operator)
 
     def _apply_operator(self, z: PackedFaces, iterate: dict[str, Any]) -> list[float]:
-        """A z, and r . z, z . A z, z . A p, x . x, z . z, z . p; at first 0 with p, of one viscosity the last three."""
-        first = _first(iterate)
-        targets = *self._az.fields, self._products, *(() if self._is_one else (self._norms,))
+        """A z, and r . z, z . A z, z . A p (at first 0) and x . x (of one viscosity 0)."""
+        first, targets = _first(iterate), (*self._az.fields, self._products)
         draw = self.device.pass_("viscosity/apply_operator.frag", **first, **self.level.defines)
         draw(targets, region=self.level.region, **iterate, **z.inputs("z_"), **self._r.read.inputs("r_"),
              **({} if first else self._ap.read.inputs("ap_")), **self.level.operator)  # fmt: skip
-        more = [0.0, 0.0] if self._is_one else self._sum_of_more(self._norms).tolist()
-        return self._sum(self._products).tolist() + more
+        return self._sum(self._products).tolist()
 
     def _update(self, iterate: dict[str, Any], z: PackedFaces, alpha: float) -> None:
         """p = z + beta p, A p likewise, x + alpha p, r - alpha A p."""
@@ -136,23 +130,11 @@ class ConjugateGradients:
         change.swap()
         return self._x.write
 
-    @property
-    def _is_one(self) -> bool:
-        """True if there is but one viscosity."""
-        return "UNIFORM" in self.level.defines
-
     def release(self) -> None:
         """Free the textures."""
         for item in (self._x, self._r, self._p, self._ap, self._az):
             item.release()
-        for item in (
-            self._products,
-            self._norms,
-            self._sum,
-            self._guess_products,
-            self._more_products,
-            self._sum_of_more,
-        ):
+        for item in (self._products, self._sum, self._guess_products, self._more_products, self._sum_of_more):
             item.release()
 
 
