@@ -183,7 +183,7 @@ class Handles:
         slower = self.slower(listed)
         for each in rows:
             slower[each] = slower[each].min()  # what is led as a whole goes as slowly as the slowest of it
-        wanted, growths = self._wanted(active, rows, slower, time, dt)
+        wanted, growths, led = self._wanted(active, rows, slower, time, dt)
         rings, loops, is_pushed = list[Ring](), list[slice](), np.ones(len(listed), bool)
         for number, each, growth in zip(active, rows, growths, strict=True):
             shape, local = self._shapes[number], self._shapes[number].handle.local
@@ -201,7 +201,8 @@ class Handles:
         pushed = np.flatnonzero(is_pushed)
         share = self._local[listed][pushed]
         self._calm(places[pushed], radii[pushed], 1 - slower[pushed])
-        beside = _beside(places, radii, np.repeat(np.arange(len(rows)), self._counts[in_force]))[pushed]
+        numbers = np.repeat(np.arange(len(rows)), self._counts[in_force])
+        beside = _beside(places, radii, numbers, np.array(led)[numbers])[pushed]
         many, side = np.flatnonzero(beside), min(self._fluid.grid.picture)
         drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
         reaches = np.concatenate([radii[pushed], np.maximum(np.minimum(WIDE * radii, side), radii)[pushed[many]]])
@@ -349,12 +350,16 @@ class Handles:
 
     def _wanted(
         self, active: list[int], rows: list[slice], slower: np.ndarray, time: float, dt: float
-    ) -> tuple[np.ndarray, list[float]]:
-        """How the points of these handles shall move in this step, longer sides / s, and areas within grow, 1 / s."""
-        wanted, growths, back = np.zeros((len(slower), 2)), [], -math.expm1(-RATE * dt)
+    ) -> tuple[np.ndarray, list[float], list[bool]]:
+        """How the points of these handles shall move in this step, longer sides / s, and areas within grow, 1 / s.
+
+        Then which of them shall not be where they began.
+        """
+        wanted, growths, led, back = np.zeros((len(slower), 2)), list[float](), list[bool](), -math.expm1(-RATE * dt)
         for number, each in zip(active, rows, strict=True):
             shape, here = self._shapes[number], self._places[self._rows[number]]
             now, then = (shape.wanted(self._starts[self._rows[number]], at, dt) for at in (time, time + dt))
+            led.append(bool(np.abs(then - self._starts[self._rows[number]]).max() > FOUND))
             step = slower[each, None] * (then - now + back * (now - here))
             most, far = FARTHEST_STEP * shape.handle.reach, float(np.hypot(*step.T).max())
             part = min(1.0, most / max(far, 1e-30))
@@ -364,7 +369,7 @@ class Handles:
             if min(areas) > 0 or max(areas) < 0:
                 growth = math.log(areas[2] / areas[1]) + back * math.log(areas[1] / areas[0])
             growths.append(float(slower[each.start]) * part * growth / dt)
-        return wanted, growths
+        return wanted, growths, led
 
     def slower(self, numbers: np.ndarray) -> np.ndarray:
         """The part of its speed, 0-1, that the map around each of these points still allows.
@@ -535,10 +540,10 @@ def _solved(
     return back @ np.linalg.solve(influence @ back + np.diag(soft), wanted)
 
 
-def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray) -> np.ndarray:
-    """How much of others lies within reach of each, 0-1: 1 - product of 1 - (1 - q^2)^3, q in sums of both radii."""
+def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.ndarray) -> np.ndarray:
+    """How much of others led too lies within reach, 0-1: 1 - product of 1 - (1 - q^2)^3, q in sums of radii."""
     far = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) / (radii[:, None] + radii)
-    near = np.maximum(1 - far**2, 0.0) ** 3 * (handles[:, None] != handles)
+    near = np.maximum(1 - far**2, 0.0) ** 3 * (handles[:, None] != handles) * (led[:, None] & led)
     return 1 - (1 - near).prod(axis=1)
 
 
