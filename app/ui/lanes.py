@@ -12,6 +12,7 @@ from app.model.bars import (
     Actor,
     Bar,
     Changed,
+    Kind,
     Which,
     bar_of,
     bars_of,
@@ -114,7 +115,7 @@ class Lanes:
 
         So they are packed anew only where a recording has become twice as long, and stay where they are meanwhile.
         """
-        kinds = [kind for kind in KINDS if kind != "stroke"]
+        kinds: list[Kind] = [kind for kind in KINDS if kind != "stroke"]
         others = [several_of(recipe, kind) for kind in kinds]
         wide = 2.0 ** ceil(log2(least))
         made_of = recipe.stroke, *others, ticks if any(others) else 0, wide

@@ -420,8 +420,7 @@ class Session:
 
     def _can_take(self, led: RecipeHandle | RecipePin) -> bool:
         """True if it is still there, and has begun where what is done next begins."""
-        tick = self.target if self._went_back else self.end
-        return led in (*self._live.handle, *self._live.pin) and led.first_tick(self.dt) < tick
+        return led in (*self._live.handle, *self._live.pin) and led.first_tick(self.dt) < self._next
 
     def _take(self, led: RecipeHandle | RecipePin) -> RecipeHandle:
         """Take a handle in hand; a pin becomes one, for good if it is led."""
@@ -896,12 +895,14 @@ class Session:
         self._send(min(tick, self.end))
         self.changes += 1
 
-    def _go_on(self) -> int:
-        """The tick at which what is done next begins: behind all that is recorded, or where the playhead was sent back.
+    @property
+    def _next(self) -> int:
+        """The tick at which what is done next begins: behind all that is recorded, or where the playhead was sent back."""
+        return self.target if self._went_back else self.end
 
-        There, what was recorded after it is left to undo.
-        """
-        tick = self.target if self._went_back else self.end
+    def _go_on(self) -> int:
+        """Go where what is done next begins, and tell the tick; what was recorded after it is left to undo."""
+        tick = self._next
         self.replay.head_for(tick)
         if tick < self.end:
             self._cut(tick)

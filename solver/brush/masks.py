@@ -104,7 +104,10 @@ class Masks:
         self._paint("frozen", tip, "brush/freeze.frag", "mix", towards=towards, amount=amount)
 
     def smooth(self, tip: Tip, strength: float) -> None:
-        """Smooth both masks under the tip; `strength` 1 leaves means over squares with sides of `SMOOTHED` radii, whichever its sign."""
+        """Smooth both masks under the tip; `strength` 1 leaves means over squares with sides of `SMOOTHED` radii.
+
+        The sign of the strength does not count.
+        """
         check_finite("a smoothing", strength)
         left, top, width, height = self._region(tip)
         if not (width and height):
