@@ -897,7 +897,7 @@ class Session:
 
     @property
     def _next(self) -> int:
-        """The tick at which what is done next begins: behind all that is recorded, or where the playhead was sent back."""
+        """The tick at which the next thing begins: behind all that is recorded, or where the playhead was sent back."""
         return self.target if self._went_back else self.end
 
     def _go_on(self) -> int:
