@@ -121,7 +121,6 @@ class Handles:
         self._brush = Brush(fluid.device)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
-        self._begun_with = np.zeros((0, 3))  # what the map bore around them by then: see `_borne`
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
         self.replace(handles)
@@ -142,9 +141,7 @@ class Handles:
         )
         ridges = np.repeat([RIDGE_OF_LINES if handle.points else RIDGE for handle in handles], self._counts)
         self._soft = 1 / stiffness - 1 + ridges
-        self._places, self._starts, self._begun_with = (
-            self._fitted(kept, before) for kept in (self._places, self._starts, self._begun_with)
-        )
+        self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -169,11 +166,6 @@ class Handles:
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
             self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
-            # What it is counted against: all that it may come to, where none of it is better than in the original.
-            borne = self._borne(np.flatnonzero(new), 2.0)
-            self._begun_with[new] = np.stack(
-                [np.minimum(borne[:, 0], 1), np.maximum(borne[:, 1], 1), np.minimum(borne[:, 2], 1)], axis=-1
-            )
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
         if not active:
             self._lead = None
@@ -285,7 +277,7 @@ class Handles:
 
     def save(self) -> State:
         """A copy of this moment."""
-        kept = {"places": self._places, "starts": self._starts, "begun with": self._begun_with, "counts": self._counts}
+        kept = {"places": self._places, "starts": self._starts, "counts": self._counts}
         return State({}, {name: values.copy() for name, values in kept.items()})
 
     def restore(self, state: State) -> None:
@@ -298,12 +290,11 @@ class Handles:
         counts = state.values.get("counts")
         if counts is None or counts.dtype != self._counts.dtype or counts.ndim != 1 or (counts < 1).any():
             raise ValueError("the state of handles is missing")
-        columns = {"places": 2, "starts": 2, "begun with": 3}
-        for name, wide in columns.items():
+        for name in ("places", "starts"):
             kept = state.values.get(name)
-            if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), wide):
+            if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), 2):
                 raise ValueError("the state of handles is missing")
-        self._places, self._starts, self._begun_with = (self._fitted(state.values[name], counts) for name in columns)
+        self._places, self._starts = (self._fitted(state.values[name], counts) for name in ("places", "starts"))
         self._lead = None
 
     def release(self) -> None:
@@ -315,7 +306,7 @@ class Handles:
 
     def _fitted(self, kept: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """What was kept of handles with so many points, for those of now; one that has others has not begun yet."""
-        rows = np.full((self._counts.sum(), kept.shape[1]), np.nan)
+        rows = np.full((self._counts.sum(), 2), np.nan)
         parts = np.split(kept, np.cumsum(counts))
         for here, part in zip(self._rows, parts, strict=False):
             if here.stop - here.start == len(part):
@@ -372,16 +363,10 @@ class Handles:
         return wanted, growths, led
 
     def slower(self, numbers: np.ndarray) -> np.ndarray:
-        """The part of its speed, 0-1, that the map around each of these points still allows.
-
-        Against what it was when they began: J of maps one after the other is the product of theirs.
-        """
+        """The part of its speed, 0-1, that the map around each of these points still allows."""
         if not len(numbers):
             return np.zeros(0)
-        borne, before = self._borne(numbers), self._begun_with[numbers]
-        least, most, triangle = (borne / np.where(before > 0, before, 1.0)).T
-        # Where strokes have brought forth a map that no remap would keep, its triangles tell nothing more.
-        triangle[(before[:, 2] < STOPPED_LOCAL) & (before[:, 0] > SLOWING_LOCAL)] = 1.0
+        least, most, triangle = self._borne(numbers).T
         grown, local = self._grown(), self._locality(numbers)
         least, triangle = least * grown, triangle * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
@@ -396,10 +381,10 @@ class Handles:
         meet = np.hypot(apart[..., 0], apart[..., 1]) < self._radii[numbers, None] + self._radii[begun]
         return np.where(meet, self._local[begun], 0.0).max(axis=1)
 
-    def _borne(self, numbers: np.ndarray, times: float = 1.0) -> np.ndarray:
-        """Of the map within so many radii of each of these points: the least det J, the largest stretch, the least area
-        of triangles, (n, 3); see `_distorted`."""
-        extent, radii = np.array(self._warp.extent), times * self._radii[numbers]
+    def _borne(self, numbers: np.ndarray) -> np.ndarray:
+        """Of the map within a radius of each of these points: the least det J, the largest stretch, the least area of
+        triangles, (n, 3); see `_distorted`."""
+        extent, radii = np.array(self._warp.extent), self._radii[numbers]
         count = np.maximum(self._fluid.grid.size, PLACES * extent / extent.max()).astype(int)
         columns, rows = ((np.arange(n) + 0.5) * side / n for n, side in zip(count, extent, strict=True))
         low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)

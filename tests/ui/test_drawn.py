@@ -375,8 +375,8 @@ def test_every_action_does_what_is_written_down(device: Device, tmp_path: Path, 
             after = summary(robot)
             told = (f"{key} {value}" for key, value in after.items() if value != before[key])
             found.append(f"{name}: {'; '.join(told)}".replace(str(tmp_path), "FOLDER"))
+            editor.session.settle()  # or it would pause half-way, the sooner the more checkpoints there are
             editor.session.pause()
-            editor.session.settle()
             while editor.dialogs.shown:
                 editor.dialogs.shown[-1].close()
                 robot.frame(count=2)

@@ -50,7 +50,7 @@ def arrived(device: Device, recipe: Recipe, points: np.ndarray) -> tuple[np.ndar
 
 
 def test_the_written_recipe_brings_the_points_there_with_less_work_and_no_fold(device: Device):
-    once, found = (fit(device, PAIRS, evaluations) for evaluations in (1, 8))
+    once, found = (fit(device, PAIRS, evaluations) for evaluations in (1, 32))
     recipe = Recipe.parse(found.trial.recipe.text())
     places, displacement, folds = arrived(device, recipe, PAIRS[:, 0])
     assert np.hypot(*((places - PAIRS[:, 1]) * EXTENT).T).max() * 64 < 0.1

@@ -153,21 +153,6 @@ def test_a_fluid_handle_beside_local_ones_arrives(device: Device):
     assert warp.statistics().folds == 0
 
 
-def test_a_handle_goes_its_way_through_what_strokes_have_stirred(device: Device):
-    strokes = [
-        {"tool": "push", "radius": 0.12, "samples": [[tick, *start, 1.0], [tick + 15, *end, 1.0]]}
-        for tick, start, end in ((0, (0.3, 0.5), (0.5, 0.5)), (18, (0.6, 0.3), (0.5, 0.45)))
-    ]
-    later = {"at": [0.42, 0.5], "start": 0.7, "keys": [[0.7, 0.5, 0.5], [1.1, 0.56, 0.42]]}
-    water = {"grid": 64, "viscosity": 0.0065}
-    large = np.zeros((384, 512, 3), np.uint8)
-    replay = replay_of(device, large, handle=[later], stroke=strokes, fluid=water, duration=1.4)
-    replay.seek(84)
-    assert replay.handles.away[0] * PIXELS < 0.5
-    assert replay.warp.statistics().folds == 0
-    replay.release()
-
-
 def test_what_is_local_moves_nothing_beside_it(device: Device):
     grid = Grid(64, 64)
     fluid, warp = Fluid(device, grid), WarpMap(device, grid)
