@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -236,14 +235,9 @@ def wait_until(true: Callable[[], object]) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.parametrize(
-    ("moment", "number"),
-    [
-        *product(("starting", "working"), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)),
-        ("a worker was killed", signal.SIGINT),
-    ],
-)
-def test_stopping_all_processes_at_once(folder: Path, moment: str, number: signal.Signals):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("moment", ["starting", "working", "a worker was killed"])
+def test_stopping_all_processes_at_once(folder: Path, number: signal.Signals, moment: str):
     """As Ctrl+C, a scheduler and a closed terminal do, at any time: one line, and nothing half-written."""
     job = at_work(folder)
     before = {*contents(folder)}
