@@ -10,12 +10,15 @@ import moderngl
 import numpy as np
 
 from app.media.project import Project, from_picture
+from app.model.bars import Which
+from app.model.forces import VortexForce
 from app.model.picture import Picture
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
 from app.ui.exporting import ExportDialog
 from app.ui.files import fresh_recipe
 from app.ui.preferences import Preferences
+from app.work.session import Session
 from solver.gl.device import Device
 
 SIZE = (1280, 800)
@@ -37,6 +40,16 @@ def small_project(folder: Path, grid: int = 48) -> Project:
     write_picture(folder / "pattern.png", pattern())
     recipe = fresh_recipe()
     return from_picture(folder / "pattern.png", recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": grid})))
+
+
+def add_bars(session: Session) -> None:
+    """For three strokes: forces with a name and with a formula; a stroke is muted and one repeats."""
+    whirl = VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1, name="Whirl", during=(0.5, 1.8))
+    session.edit("Forces", force=(whirl, whirl.edited(during=None, formula="t", name="")))
+    edits: dict[Which, dict[str, object]]
+    edits = {("stroke", 2): {"muted": True}, ("stroke", 1): {"repeat": 3, "every": 30}}
+    for which, keys in edits.items():
+        session.edit_bars("Bar", {which}, lambda one, keys=keys: one.model_copy(update=keys))
 
 
 def write_foreign_map(path: Path, width: int, height: int, names: str = "RGB") -> None:

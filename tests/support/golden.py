@@ -7,10 +7,15 @@ goes into the commit.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pytest
+
+from solver.gl.device import Device
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 WRITES = os.environ.get("FLUIDWARP_GOLDEN") == "write"
@@ -31,6 +36,16 @@ class Golden:
         self._path = GOLDEN / name
         lines = [] if WRITES else self._path.read_text("utf-8").splitlines()
         self._rows = {key: [float(n) for n in row.split()] for key, row in (line.split(": ") for line in lines)}
+
+    @classmethod
+    @contextmanager
+    def of_software(cls, device: Device, name: str) -> Iterator[Self]:
+        """Those of the software rasteriser, written in the end if that is wanted; elsewhere the test is skipped."""
+        if not device.limits.is_software:
+            pytest.skip("what is written down is of the software rasteriser")
+        golden = cls(name)
+        yield golden
+        golden.close()
 
     def compare(self, name: str, numbers: list[float], close: float | None = None) -> None:
         """Assert that these are the numbers of a row: to `CLOSE` of the first, or to `close`."""

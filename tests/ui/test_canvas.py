@@ -68,11 +68,8 @@ def test_squares_shine_through_as_far_as_the_picture_is_transparent(device: Devi
 
 @pytest.fixture(scope="module")
 def golden(shared_device: Device) -> Iterator[Golden]:
-    if not shared_device.limits.is_software:
-        pytest.skip("what is written down is of the software rasteriser")
-    golden = Golden("canvas.txt")
-    yield golden
-    golden.close()
+    with Golden.of_software(shared_device, "canvas.txt") as golden:
+        yield golden
 
 
 @pytest.mark.parametrize("name", ["grid", "viscosity", "frozen", "arrows", "forces", "selected"])

@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 from imgui_bundle import imgui
 
-from app.model.bars import Which
 from app.model.forces import PointForce, VortexForce
 from app.model.handles import RecipeHandle, RecipePin
 from app.model.strokes import Change, Stroke, Tool
@@ -30,7 +29,7 @@ from app.ui.saving import SaveDialog
 from app.work import session
 from solver.gl.device import Device
 from support.drawn import Drawn, differences, new_in
-from support.editing import Robot, small_project
+from support.editing import Robot, add_bars, small_project
 from support.golden import GOLDEN, WRITES
 
 FILE = GOLDEN / "drawn.txt"
@@ -130,12 +129,7 @@ def time(robot: Robot) -> Iterator[str]:
     """The timeline and its bars."""
     session, state = robot.editor.session, robot.editor.state
     begin_with_strokes(robot)
-    whirl = VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1, name="Whirl", during=(0.5, 1.8))
-    session.edit("Forces", force=(whirl, whirl.edited(during=None, formula="t", name="")))
-    edits: dict[Which, dict[str, object]]
-    edits = {("stroke", 2): {"muted": True}, ("stroke", 1): {"repeat": 3, "every": 30}}
-    for which, keys in edits.items():
-        session.edit_bars("Bar", {which}, lambda one, keys=keys: one.model_copy(update=keys))
+    add_bars(session)
     session.edit("Change", change=(Change(tick=9, drag=1.0),))
     session.seek(session.end // 2)
     session.settle()

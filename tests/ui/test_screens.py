@@ -13,12 +13,10 @@ import numpy as np
 import pytest
 
 from app.media.pictures import read_picture, write_picture
-from app.model.bars import Which
-from app.model.forces import VortexForce
 from app.model.picture import Picture
 from app.ui.events import Mods
 from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import Robot, add_bars, small_project
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 SIZE = (960, 600)
@@ -104,12 +102,7 @@ def lanes(robot: Robot) -> None:
         robot.drag(start, end, steps=14)
         robot.rest()
     session = robot.editor.session
-    whirl = VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1, name="Whirl", during=(0.5, 1.8))
-    session.edit("Forces", force=(whirl, whirl.edited(during=None, formula="t", name="")))
-    edits: dict[Which, dict[str, object]]
-    edits = {("stroke", 2): {"muted": True}, ("stroke", 1): {"repeat": 3, "every": 30}}
-    for which, keys in edits.items():
-        session.edit_bars("Bar", {which}, lambda one, keys=keys: one.model_copy(update=keys))
+    add_bars(session)
     robot.rest()
     session.seek(session.end // 2)
     robot.key("l")

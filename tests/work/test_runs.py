@@ -36,11 +36,8 @@ def picture(width: int = 60, height: int = 45, channels: int = 3) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def golden(shared_device: Device) -> Iterator[Golden]:
-    if not shared_device.limits.is_software:
-        pytest.skip("what is written down is of the software rasteriser")
-    golden = Golden("runs.txt")
-    yield golden
-    golden.close()
+    with Golden.of_software(shared_device, "runs.txt") as golden:
+        yield golden
 
 
 @pytest.mark.parametrize("name", RUNS)
