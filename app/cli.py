@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
 
+def _is_sequence(name: str) -> bool:
+    from app.media.files import is_sequence
+
+    return is_sequence(name)
+
+
 class CommandOrFile(TyperGroup):
     """The commands; what is none of them is a file, which the editor opens."""
 
@@ -30,10 +36,10 @@ class CommandOrFile(TyperGroup):
         # A command stays one whatever lies in the folder: a file of that name is ./render.
         if name in self.commands or name.startswith("-"):
             return super().resolve_command(ctx, args)
-        if os.path.exists(name):
+        if os.path.exists(name) or _is_sequence(name):
             return super().resolve_command(ctx, ["edit", *args])
         if Path(name).suffix or Path(name).name != name:
-            raise UserError(f"{name} does not exist; check the name of the picture, recipe or project")
+            raise UserError(f"{name} does not exist; check the name of the picture, clip, recipe or project")
         raise UserError(f"{name} is neither a file nor a command; the commands are {', '.join(self.commands)}", 2)
 
 
@@ -96,7 +102,7 @@ def start(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
 ) -> None:
-    """Without a command, opens the editor; with a picture, a recipe or a project alone, on that."""
+    """Without a command, opens the editor; with a picture, a clip, a recipe or a project alone, on that."""
     if version:
         from importlib.metadata import version as installed
 
@@ -108,7 +114,10 @@ def start(
 
 @cli.command()
 def edit(
-    file: Annotated[Path | None, typer.Argument(help="A picture, a recipe or a project.", readable=False)] = None,
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="A picture, a clip (f.%04d.png: numbered files), a recipe or a project.", readable=False),
+    ] = None,
 ) -> None:
     """Open the editor and push the picture about with the mouse."""
     try:

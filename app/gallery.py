@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from app.media.animation import animation_writer
+from app.media.animation import AnimationOptions, animation_writer
 from app.media.auxiliary import Pictures
 from app.media.depth import to_bits
 from app.media.files import make_folder
@@ -152,8 +152,8 @@ class Studio:
         """Write a small animation that stands still at both ends, and goes on without one."""
         lasting = [1] * (2 * len(frames) - 2)
         lasting[0] = lasting[len(frames) - 1] = STILL
-        path = self.folder / name
-        with animation_writer(path, FPS / 2, quality=60, durations=lasting, cancel=self.progress.cancel) as write:
+        path, how = self.folder / name, AnimationOptions(quality=60, durations=lasting)
+        with animation_writer(path, FPS / 2, how, cancel=self.progress.cancel) as write:
             for frame in (*frames, *frames[-2:0:-1]):
                 write(frame)
 

@@ -30,14 +30,14 @@ from app.errors import UserError  # noqa: E402
 from app.media.animation import animation_writer  # noqa: E402
 from app.media.landmarks import Pairs, read_pairs, write_pairs  # noqa: E402
 from app.media.maps import Displacement, read_map, write_map  # noqa: E402
-from app.media.opening import open_source  # noqa: E402
 from app.media.pictures import write_picture  # noqa: E402
 from app.media.project import from_picture, load, save  # noqa: E402
 from app.media.recipes import read_recipe  # noqa: E402
-from app.model.history import History  # noqa: E402
+from app.media.source import open_source  # noqa: E402
 from app.model.picture import Picture  # noqa: E402
 from app.model.recipe import Recipe  # noqa: E402
 from app.model.strokes import Stroke  # noqa: E402
+from app.model.undo import History  # noqa: E402
 from app.work import journal  # noqa: E402
 
 LONGEST = 5.0  # seconds

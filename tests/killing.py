@@ -30,8 +30,8 @@ sys.path[:0] = [path for path in (str(ROOT), str(ROOT / "tests")) if path not in
 import numpy as np  # noqa: E402
 
 from app.media.pictures import write_picture  # noqa: E402
-from app.model.history import Entry  # noqa: E402
 from app.model.recipe import Recipe  # noqa: E402
+from app.model.undo import Entry  # noqa: E402
 from app.work.recovery import find  # noqa: E402
 
 

@@ -19,11 +19,12 @@ ROOMS = {
     "assets": set[str](),
     "solver.limits": set[str](),
     "solver.components": set[str](),
+    "solver.course": set[str](),
     "solver.grid": {"solver.limits"},
-    "solver": {"shaders", "solver.limits", "solver.components", "solver.grid"},
+    "solver": {"shaders", "solver.limits", "solver.components", "solver.course", "solver.grid"},
     "app.errors": set[str](),
     "app.progress": {"app.errors"},
-    "app.model": {"app.errors", "app.progress", "solver.limits", "solver.components", "solver.grid"},
+    "app.model": {"app.errors", "app.progress", "solver.limits", "solver.components", "solver.course", "solver.grid"},
     "app.media": {"app.errors", "app.progress", "solver.grid", "app.model"},
     "app.work": {"app.errors", "app.progress", "solver", "solver.components", "solver.grid", "app.model", "app.media"},
     "app.ui": {"app.errors", "app.progress", "solver", "solver.grid", "app.model", "app.media", "app.work", "assets"},
@@ -43,6 +44,7 @@ ROOMS = {
 SOLVER = {
     "gl": set[str](),
     "components": set[str](),
+    "course": set[str](),
     "limits": set[str](),
     "grid": {"limits"},
     "params": {"limits"},
@@ -62,7 +64,7 @@ SOLVER = {
     },
     "warp": {"gl", "limits", "grid", "state", "faces", "scheme", "fluid"},
     "paper": {"gl", "limits", "grid", "params", "faces", "scheme", "warp"},
-    "brush": {"gl", "limits", "grid", "state", "faces", "scheme", "warp"},
+    "brush": {"gl", "course", "limits", "grid", "state", "faces", "scheme", "warp"},
     "resample": {"gl", "warp"},
 }
 TOOLKITS = {"glfw", "imgui_bundle"}

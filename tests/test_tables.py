@@ -15,7 +15,7 @@ from typing import Any
 import solver
 from app.media import clip, encoders, formats
 from app.model import presets, tools
-from app.ui import actions, editor_state, exporting, shortcuts
+from app.ui import actions, editor_state, exporting, key_sheet
 from app.ui.preferences import Preferences
 from app.work.jobs import MapOutput, Outputs
 from support.golden import GOLDEN, WRITES
@@ -64,7 +64,7 @@ def rows() -> Iterator[str]:
     yield f"rated: {exporting.RATED}"
     yield f"brush: {told(tools.BrushSettings())} {told(editor_state.LIMITS)}"
     yield f"window: {told(Preferences())} {told(editor_state.overlays())}"
-    yield from (f"mouse: {line}" for line in shortcuts.MOUSE)
+    yield from (f"mouse: {line}" for line in key_sheet.MOUSE)
     yield f"outputs: {told(Outputs(None))} {told(MapOutput(Path('m.exr')))}"
     for name in sorted(solver.__all__):
         one = getattr(solver, name)

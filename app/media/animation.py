@@ -42,54 +42,66 @@ class NumberedWriter(Protocol[T_contra]):
 FrameWriter = NumberedWriter[Frame]
 
 
+@dataclass(frozen=True)
+class AnimationOptions:
+    """How an animation is written; what its format has no use for is passed over.
+
+    Attributes:
+        codec: one of the container's; None is its first.
+        quality: 1-100 of a video with losses or of a sequence's pictures; None is what is usual for the codec.
+        bits: of a sequence's pictures; see `write_picture`.
+        loops: GIF, APNG, WebP; 0 is for ever.
+        durations: of the frames, in steps of 1 / fps; None is 1 for each.
+        sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
+        colours, timecode: what a video is told to have, the latter of its first frame.
+        like: the picture whose profile and metadata the pictures of a sequence get; whether its alpha is premultiplied,
+            so that of the frames is.
+        resumed: it may be that no file of a sequence is left to write.
+    """
+
+    codec: str | None = None
+    quality: int | None = None
+    bits: int | None = None
+    loops: int = 0
+    durations: Sequence[int] | None = None
+    sound: Path | None = None
+    sound_from: float = 0.0
+    frames: int | None = None
+    colours: Colours = USUAL
+    timecode: str | None = None
+    like: Picture | None = None
+    resumed: bool = False
+
+
 @contextmanager
 def animation_writer(
     path: str | os.PathLike[str],
     fps: float | Fraction = 30,
+    options: AnimationOptions = AnimationOptions(),
     *,
-    codec: str | None = None,
-    quality: int | None = None,
-    bits: int | None = None,
-    loops: int = 0,
-    sound: str | os.PathLike[str] | None = None,
-    sound_from: float = 0.0,
-    frames: int | None = None,
-    first: int = 0,
-    resumed: bool = False,
-    durations: Sequence[int] | None = None,
-    colours: Colours = USUAL,
-    timecode: str | None = None,
-    like: Picture | None = None,
     cancel: Callable[[], bool] = never,
     passed: Callable[[int], None] = lambda frames: None,
     written: Callable[[int], None] = lambda number: None,
 ) -> Iterator[FrameWriter]:
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
-    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures from `first` on, each of
-        which appears as soon as it is written, and stays.
-    codec: one of the container's; None is its first.
-    quality: 1-100 of a video with losses or of a sequence's pictures; None is what is usual for the codec.
-    loops: GIF, APNG, WebP; 0 is for ever. durations: of the frames, in steps of 1 / fps; None is 1 for each.
-    colours, timecode: what a video is told to have, the latter of its first frame.
-    bits: of a sequence's pictures; see `write_picture`.
-    sound: a file whose sound is carried over, from the second `sound_from`, cut to the length of `frames`.
-    like: the picture whose profile and metadata the pictures of a sequence get; whether its alpha is premultiplied, so
-        that of the frames is.
+    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures, each of which appears as
+        soon as it is written, and stays.
     cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
     passed: hears of frames that a later pass has gone through, after all were given, in formats that have `passes`.
-    written: hears of each file of a sequence, by its number. resumed: it may be that none of them is left to write.
+    written: hears of each file of a sequence, by its number.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
     """
-    check_animation(path, fps / min(durations or [1]), codec)
+    check_animation(path, fps / min(options.durations or [1]), options.codec)
+    like, quality = options.like, 95 if options.quality is None else options.quality
     if is_sequence(path):
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
         def write_one(file: Path, frame: Frame) -> None:
             picture = frame if isinstance(frame, Picture) else template.with_pixels(frame)
-            write_picture(file, picture, bits=bits, quality=95 if quality is None else quality, codec=codec)
+            write_picture(file, picture, bits=options.bits, quality=quality, codec=options.codec)
 
-        with sequence_writer(path, write_one, first, cancel, written, resumed) as write:
+        with sequence_writer(path, write_one, cancel, written, options.resumed) as write:
             yield write
         return
 
@@ -102,29 +114,18 @@ def animation_writer(
     rate = Fraction(fps).limit_denominator(100_000)
     with replacing(path) as temporary:
         if container.name == "GIF":
-            with _gif_writer(temporary, str(path), rate, loops, durations, cancel, passed) as write:
+            with _gif_writer(temporary, str(path), rate, options, cancel, passed) as write:
                 yield lambda frame, number=None: write(straight(frame))
             return
-        given, options = _sound(container, sound, rate, frames, sound_from)
-        if timecode is not None and container.even | (container.name == "FFV1"):
-            options = [*options, "-metadata", f"timecode={timecode}"]
-        with _Video(
-            temporary,
-            str(path),
-            container.encoding(codec),
-            rate,
-            container.even,
-            quality,
-            loops,
-            (given, options),
-            cancel,
-            durations,
-            colours,
-        ) as video:
+        given, sound = _sound(container, options, rate)
+        if options.timecode is not None and container.even | (container.name == "FFV1"):
+            sound = [*sound, "-metadata", f"timecode={options.timecode}"]
+        encoding = container.encoding(options.codec)
+        with _Video(temporary, str(path), encoding, rate, container.even, options, (given, sound), cancel) as video:
             yield lambda frame, number=None: video.write(straight(frame))
             video.finish()
-        if container.name == "animated WebP" and durations:
-            _end_webp(temporary, round(sum(durations) * 1000 / rate))
+        if container.name == "animated WebP" and options.durations:
+            _end_webp(temporary, round(sum(options.durations) * 1000 / rate))
 
 
 @dataclass
@@ -136,12 +137,9 @@ class _Video:
     encoding: Encoding
     rate: Fraction
     even: bool = False
-    quality: int | None = None
-    loops: int = 0
+    options: AnimationOptions = AnimationOptions()
     sound: tuple[Sequence[str], Sequence[str]] = (), ()
     cancel: Callable[[], bool] = never
-    durations: Sequence[int] | None = None
-    colours: Colours = USUAL
     _process: ffmpeg.Ffmpeg | None = field(default=None, init=False)
     _kind: tuple[tuple[int, ...], np.dtype] | None = field(default=None, init=False)
 
@@ -172,12 +170,13 @@ class _Video:
         if self.even:
             height, width = height + height % 2, width + width % 2
         bits = 8 if frame.dtype == np.uint8 else 16
+        how, alpha = self.options, channels in (2, 4)
         names = ("gray", "ya8", "rgb24", "rgba") if bits == 8 else ("gray16le", "ya16le", "rgb48le", "rgba64le")
         return ffmpeg.Ffmpeg(
             [
                 *["-f", "rawvideo", "-pix_fmt", names[channels - 1], "-s", f"{width}x{height}", "-r", str(self.rate)],
                 *["-i", "-", *self.sound[0], "-map", "0:v:0"],
-                *self._timed(self.encoding(Stream(channels in (2, 4), bits, self.quality, self.loops, self.colours))),
+                *self._timed(self.encoding(Stream(alpha, bits, how.quality, how.loops, how.colours))),
                 *self.sound[1],
                 f"file:{self.temporary}",
             ],
@@ -187,14 +186,15 @@ class _Video:
 
     def _timed(self, options: list[str]) -> list[str]:
         """The options, for frames that are shown for as long as they are to be."""
-        if self.durations is None:
+        durations = self.options.durations
+        if durations is None:
             return options
-        options, filters = [*options], [shown_for(self.durations)]
+        options, filters = [*options], [shown_for(durations)]
         if "-vf" in options:
             place = options.index("-vf")
             filters.append(options[place + 1])
             del options[place : place + 2]
-        last = ["-final_delay", str(self.durations[-1] / self.rate)] if "apng" in options else []
+        last = ["-final_delay", str(durations[-1] / self.rate)] if "apng" in options else []
         return ["-vf", ",".join(filters), "-fps_mode", "passthrough", *options, *last]
 
     def finish(self) -> None:
@@ -230,17 +230,16 @@ def _end_webp(file: Path, total: int) -> None:
             stream.write(min(max(1, total - before + own), 2**24 - 1).to_bytes(3, "little"))
 
 
-def _sound(
-    container: Container, sound: str | os.PathLike[str] | None, rate: Fraction, frames: int | None, start: float = 0.0
-) -> tuple[list[str], list[str]]:
+def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple[list[str], list[str]]:
     """ffmpeg's input and output options that carry the sound of a file over."""
+    sound, start = how.sound, how.sound_from
     if sound is None or not container.sound:
         return [], []
     tracks = [(track, codec) for track, codec in enumerate(sound_codecs(sound)) if codec != "none"]
     if not tracks:
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
-    length = [] if frames is None else ["-t", f"{float(frames / rate):.6f}"]
+    length = [] if how.frames is None else ["-t", f"{float(how.frames / rate):.6f}"]
     options: list[str] = []
     for number, (track, codec) in enumerate(tracks):
         # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
@@ -256,12 +255,12 @@ def _gif_writer(
     temporary: Path,
     label: str,
     rate: Fraction,
-    loops: int,
-    durations: Sequence[int] | None,
+    options: AnimationOptions,
     cancel: Callable[[], bool],
     passed: Callable[[int], None],
 ) -> Iterator[Callable[[np.ndarray], None]]:
     """Frames into a lossless file first: a palette of all colours needs all frames, which may not fit in memory."""
+    loops, durations = options.loops, options.durations
     name = temporary_beside(temporary.with_suffix(".mkv"))
     with temporary_file(name) as spool, temporary_file(name.with_suffix(".png")) as palette:
 
@@ -288,17 +287,16 @@ def _gif_writer(
 def sequence_writer(
     path: str | os.PathLike[str],
     write_one: Callable[[Path, T], None],
-    first: int = 0,
     cancel: Callable[[], bool] = never,
     written: Callable[[int], None] = lambda number: None,
     resumed: bool = False,
 ) -> Iterator[NumberedWriter[T]]:
     """Yield a function that writes one numbered file by `write_one`, which lets it appear whole.
 
-    path: such as `name.%04d.png`; first: the first number; written: hears of each; resumed: there may be none left to
-    write. Raises `UserError`.
+    path: such as `name.%04d.png`, numbered from 0 where no number is given; written: hears of each; resumed: there may
+    be none left to write. Raises `UserError`.
     """
-    last = first - 1
+    last = -1
 
     def write(item: T, number: int | None = None, /) -> None:
         nonlocal last
@@ -309,7 +307,7 @@ def sequence_writer(
         written(last)
 
     yield write
-    if last == first - 1 and not resumed:
+    if last == -1 and not resumed:
         raise UserError(f"Cannot write {path}: the animation has no frame.")
 
 

@@ -64,6 +64,8 @@ class Clip(ABC):
     durations: of the frames, in steps of 1 / fps, where they differ. loops: how often it is played, 0 for ever.
     colours: what they are. timecode: of the first frame, as 01:00:00:00; None where there is none.
     is_whole: each frame is a picture of its own, with all that belongs to it.
+    is_linked: a project refers to it, and does not keep it.
+    is_steady: any frame can be come to without those before it.
     note: what of it is lost, in a sentence; "" if nothing.
     """
 
@@ -83,11 +85,17 @@ class Clip(ABC):
     is_whole: bool = False
     colours: Colours = USUAL
     timecode: str | None = None
+    is_linked: bool = True
+    is_steady: bool = True
     note: str = ""
 
     def moment(self, number: int) -> int:
         """When a frame is shown, in steps of 1 / fps after the first."""
         return number - self.start
+
+    def number_at(self, moment: int) -> int:
+        """The number of the frame that is shown at a moment, if the clip is that long; see `moment`."""
+        return self.start + moment
 
     @property
     def shortest(self) -> int:
@@ -129,6 +137,12 @@ class Clip(ABC):
 
         cancel: asked with each; true raises `Cancelled`. notice: hears of what is lost. Raises `UserError`.
         """
+
+    def pictures_from(
+        self, number: int, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
+    ) -> Generator[tuple[int, Picture], None, None]:
+        """As `pictures` from a frame on, which comes as soon as may be: for looking at."""
+        return self.pictures((number, None), cancel=cancel, notice=notice)
 
     @abstractmethod
     def digest(self, number: int) -> str:

@@ -124,6 +124,18 @@ def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
     return {number: folder / name for number, name in found}
 
 
+def sequence_of(file: Path) -> Path:
+    """The sequence that a file is of, by the last number in its name. Raises `UserError` if there is none in it."""
+    found = re.search(r"[0-9]+(?=[^0-9]*$)", file.stem)
+    if found is None:
+        raise UserError(f"There is no number in the name {file.name}; choose one of several numbered files.")
+    before, after = file.name[: found.start()], file.name[found.end() :]
+    patterns = [file.with_name(f"{before}{number}{after}") for number in (f"%0{len(found[0])}d", "%d")]
+    return max(
+        patterns, key=lambda pattern: sum(number_in(pattern, name) is not None for name in os.listdir(file.parent))
+    )
+
+
 def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wanted: range) -> None:
     """Raise `UserError`, naming the numbers, if some of the `wanted` files of a sequence are not there."""
     missing = [number for number in wanted if number not in there]

@@ -276,7 +276,6 @@ def map_writer(
     path: str | os.PathLike[str],
     kind: Kind = "st",
     *,
-    first: int = 0,
     cancel: Callable[[], bool] = never,
     written: Callable[[int], None] = lambda number: None,
     resumed: bool = False,
@@ -287,7 +286,7 @@ def map_writer(
     def write_one(file: Path, displacement: Displacement) -> None:
         write_map(file, displacement, kind)
 
-    return sequence_writer(path, write_one, first, cancel, written, resumed)
+    return sequence_writer(path, write_one, cancel, written, resumed)
 
 
 def read_map(

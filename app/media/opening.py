@@ -3,60 +3,20 @@
 from __future__ import annotations
 
 import os
-from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.clip import Clip, coded
-from app.media.files import is_sequence
-from app.media.formats import ENDINGS
 from app.media.inputs import MAX_PIXELS
-from app.media.pages import read_pages
-from app.media.pictures import read_picture
 from app.media.project import Project, is_project, load
 from app.media.recipes import read_recipe
-from app.media.sequence import read_sequence
-from app.media.video import read_clip
+from app.media.source import CLIP_ENDINGS, PICTURE_ENDINGS, Source, open_source
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from solver.grid import MOST_ALONG, SMALLEST_GRID
 
 SMALLEST_SIDE = 8  # pixels
-PICTURE_ENDINGS = tuple(ENDINGS)
-CLIP_ENDINGS = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".ogv", ".wmv")
-
-
-@dataclass(frozen=True)
-class Source:
-    """What is warped: a picture, or a clip and its first frame."""
-
-    picture: Picture
-    clip: Clip | None = None
-
-
-def open_source(path: Path, max_pixels: int = MAX_PIXELS, animated: bool = True) -> Source:
-    """The picture or, by its ending, the clip in a file; or the clip whose frames are the files `name.%04d.png`.
-
-    animated: whether an animation is made; if not, no more than the first of a file's or a sequence's pictures is read.
-
-    Raises:
-        UserError: if it cannot be read.
-    """
-    if is_sequence(path) and not os.path.lexists(path):
-        clip, picture = read_sequence(path, max_pixels)
-        return Source(picture, clip if animated else None)
-    if path.suffix.lower() not in CLIP_ENDINGS:
-        picture = read_picture(path, max_pixels)
-        clip = read_pages(path, picture, max_pixels) if animated else None
-        return Source(picture if clip is None else replace(picture, note=clip.note), clip)
-    clip = read_clip(path, max_pixels)
-    with closing(clip.read_frames()) as frames:
-        first = next(frames, None)
-    if first is None:
-        raise UserError(f"Cannot read {path}: it has no frame that can be decoded; get it again.")
-    return Source(Picture(first, note=clip.note, chunks=coded(clip.colours)), clip)
 
 
 def check_picture(picture: Picture, name: str = "the picture") -> None:
@@ -106,7 +66,7 @@ class Opened:
         if file is not None:
             return open_source(file, max_pixels, animated)
         assert self.project is not None
-        return Source(self.project.picture)
+        return Source(self.project.picture, self.project.clip if animated else None)
 
 
 def shipped_recipes() -> dict[str, Path]:

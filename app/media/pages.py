@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -47,6 +48,10 @@ class Pages(FileClip):
     def moment(self, number: int) -> int:
         """See `Clip`."""
         return self._moments[min(number, len(self.places) - 1)]
+
+    def number_at(self, moment: int) -> int:
+        """See `Clip`."""
+        return min(bisect_right(self._moments, moment), len(self.places)) - 1
 
     @cached_property
     def _moments(self) -> list[int]:
@@ -111,6 +116,7 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
         durations=steps if steps and len(set(steps)) > 1 else None,
         loops=loops,
         is_whole=kind.name == "TIFF",
+        is_linked=False,
         note=lost(path, ["its 16 bits a channel become 8"] if first.bits > bits else []),
         kind=kind.name,
         places=tuple(places),

@@ -1,7 +1,8 @@
-"""Projects: one file that holds a recipe and its pictures, so that the work opens again anywhere."""
+"""Projects: one file that holds a recipe and its pictures, so that the work opens again anywhere, but for clips."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
 import zipfile
@@ -10,11 +11,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.errors import UserError, printable, shown
-from app.media.files import replacing
+from app.media.clip import WHOLE, Clip
+from app.media.files import is_sequence, numbered_files, replacing
 from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, open_input, read_input
 from app.media.leftovers import temporary_folder
-from app.media.pictures import read_picture
 from app.media.recipes import read_recipe
+from app.media.source import Source, open_source
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import plain
@@ -32,8 +34,10 @@ class Project:
 
     Attributes:
         recipe: its names of pictures start from `folder`.
-        picture: the one that is warped.
-        data: the bytes of the file it was read from, so that it can be saved when that file is gone.
+        picture: the one that is warped; of a clip, its first frame.
+        data: the bytes of the file it was read from, so that it can be saved when that file is gone; of a clip that is
+            only referred to, what it is known again by.
+        clip: what is warped, where it moves.
         folder: where the recipe's names start from; a temporary one for a project that holds its pictures.
         path: the project's own file, if it has one.
         embedded: pictures are kept in the project and not referred to.
@@ -47,6 +51,12 @@ class Project:
     path: Path | None = None
     embedded: bool = True
     keeper: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False)
+    clip: Clip | None = field(default=None, repr=False)
+
+    @property
+    def is_linked(self) -> bool:
+        """Its clip is always referred to: a video, or the files of a sequence, is never kept in it."""
+        return self.clip is not None and self.clip.is_linked
 
     @property
     def name(self) -> str:
@@ -66,18 +76,19 @@ def is_project(path: str | os.PathLike[str]) -> bool:
 
 
 def from_picture(path: str | os.PathLike[str], recipe: Recipe | None = None) -> Project:
-    """A new project for a picture, or for another picture than the recipe was made on.
+    """A new project for a picture or a clip, or for another one than the recipe was made on.
 
     Raises:
         UserError: if it cannot be read.
     """
     path = Path(path)
-    picture = read_picture(path)
-    return Project((recipe or Recipe()).edited(picture=path.name), picture, picture_bytes(path), path.parent)
+    source, data = read_source(path)
+    recipe = (recipe or Recipe()).edited(picture=path.name)
+    return Project(recipe, source.picture, data, path.parent, clip=source.clip)
 
 
 def from_recipe(path: str | os.PathLike[str]) -> Project:
-    """A new project from a recipe's TOML file and the picture it names.
+    """A new project from a recipe's TOML file and the picture or clip it names.
 
     Raises:
         UserError: if one of them cannot be read.
@@ -86,8 +97,8 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
     recipe = read_recipe(path)
     if recipe.picture is None:
         raise UserError(f"{path} names no picture; open a picture first, then apply the recipe to it")
-    source = path.parent / recipe.picture
-    return Project(recipe, read_picture(source), picture_bytes(source), path.parent)
+    source, data = read_source(path.parent / recipe.picture)
+    return Project(recipe, source.picture, data, path.parent, clip=source.clip)
 
 
 def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
@@ -114,7 +125,7 @@ def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) 
     Raises:
         UserError: if it cannot be written, or a picture that belongs in it is gone.
     """
-    path = Path(path)
+    path, embedded = Path(path), embedded and not project.is_linked
     recipe, files = _packed(project) if embedded else (_referring(project, path), {})
     with (
         replacing(path, backup_of(path)) as temporary,
@@ -138,6 +149,19 @@ def picture_bytes(file: Path) -> bytes:
     return read_input(file, "picture", MOST_BYTES)
 
 
+def read_source(file: Path, max_pixels: int = MAX_PIXELS) -> tuple[Source, bytes]:
+    """A picture or a clip, and the `data` that a project has of it. Raises `UserError`."""
+    source = open_source(file, max_pixels)
+    clip, picture = source.clip, source.picture
+    if clip is None or not clip.is_linked:
+        return source, picture_bytes(file)
+    clip.check(WHOLE)
+    if clip.frames is None:
+        clip = replace(clip, frames=sum(1 for _ in clip.pictures()))
+    known = repr((clip.fps, clip.frames, picture.pixels.shape)).encode() + picture.pixels.tobytes()
+    return Source(picture, clip), hashlib.sha256(known).digest()
+
+
 def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     names = set(archive.namelist())
     if max(archive.getinfo(name).file_size for name in (FORMAT, RECIPE)) > MOST_TEXT:
@@ -156,9 +180,8 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     held = [name for name in picture_names(recipe) if name in names]
     embedded = recipe.picture in names
     if not embedded:
-        source = path.parent / recipe.picture
-        picture = read_picture(source, max_pixels)
-        return Project(recipe, picture, picture_bytes(source), path.parent, path, embedded=False)
+        source, data = read_source(path.parent / recipe.picture, max_pixels)
+        return Project(recipe, source.picture, data, path.parent, path, embedded=False, clip=source.clip)
     if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
         raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")
     keeper = temporary_folder()
@@ -166,12 +189,12 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     for name in held:
         archive.unpack(name, folder)
     data = archive.member(recipe.picture)
-    source = folder / recipe.picture
+    file = folder / recipe.picture
     try:
-        picture = read_picture(source, max_pixels)
+        source = open_source(file, max_pixels)
     except UserError as error:  # the temporary folder is nobody's business
-        raise UserError(str(error).replace(shown(str(source)), f"{recipe.picture} in {path}")) from None
-    return Project(recipe, picture, data, folder, path, keeper=keeper)
+        raise UserError(str(error).replace(shown(str(file)), f"{recipe.picture} in {path}")) from None
+    return Project(recipe, source.picture, data, folder, path, keeper=keeper, clip=source.clip)
 
 
 def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
@@ -200,8 +223,9 @@ def _referring(project: Project, path: Path) -> Recipe:
     names = {}
     for name in picture_names(project.recipe):
         target = (project.folder / name).resolve()
-        if not os.path.exists(target):
-            raise UserError(f"Cannot refer to {target}: it is gone; keep the picture in the project instead")
+        if not os.path.exists(target) and not (is_sequence(target) and numbered_files(target)):
+            mend = "put it back" if project.is_linked else "keep the picture in the project instead"
+            raise UserError(f"Cannot refer to {target}: it is gone; {mend}")
         try:
             names[name] = os.path.relpath(target, path.resolve().parent)
         except ValueError:  # another drive

@@ -22,6 +22,7 @@ from app.media.losses import lost, not_kept
 from app.model.picture import Picture
 from app.progress import never
 
+SEEKABLE = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi")
 CHANGED = 65  # exit status when a clip changes under the job
 
 # What ffmpeg calls colours that are BT.709 or sRGB, or nearly; and the others' usual names.
@@ -72,24 +73,45 @@ class Video(FileClip):
         if 0 <= number < first:
             raise UserError(f"the clip has the frames 0-{number}, and none from {first} on")
 
+    def pictures_from(
+        self, number: int, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
+    ) -> Generator[tuple[int, Picture], None, None]:
+        """See `Clip`: what comes before is not decoded, where the frames can be found by their times."""
+        if not number or not self.is_steady:
+            yield from self.pictures((number, None), cancel=cancel, notice=notice)
+            return
+        with closing(self.read_frames(cancel, notice, number)) as frames:
+            for at, frame in enumerate(frames, number):
+                yield at, Picture(frame)
+
     def read_frames(
-        self, cancel: Callable[[], bool] = never, notice: Callable[[str], None] = lambda said: None
+        self,
+        cancel: Callable[[], bool] = never,
+        notice: Callable[[str], None] = lambda said: None,
+        first: int = 0,
     ) -> Generator[np.ndarray, None, None]:
         """Yield each frame (h, w, 3 or 4), uint8 or uint16, top row first; memory holds one at a time.
 
+        first: of a steady clip, where to begin.
         notice: hears, at the end, what was damaged or missing in a clip that could be read all the same.
         Raises `UserError`, with a status of its own if the file was cut or written anew meanwhile.
         """
         channels = 4 if self.alpha else 3
         kind = {(False, 8): "rgb24", (True, 8): "rgba", (False, 16): "rgb48le", (True, 16): "rgba64le"}
+        seek, filters = [], self.filters
+        if first:
+            # A quarter of a frame early: no rounding of times leaves it out, and none is shown twice to fill the gap.
+            seek = ["-ss", f"{self.late + (first - 0.25) / self.fps:.6f}"]
+            filters = filters.removeprefix(_delayed(self.late))
         arguments = [
-            *[*self.decoder, "-i", f"file:{self.path}", "-map", "0:v:0", "-vf", self.filters, "-r", str(self.fps)],
+            *[*self.decoder, *seek, "-i", f"file:{self.path}", "-map", "0:v:0", "-vf", filters, "-r", str(self.fps)],
             *["-f", "rawvideo", "-pix_fmt", kind[self.alpha, self.bits], "-"],
         ]
+        self._check_unchanged(begins=True)
         dtype = np.dtype(np.uint8 if self.bits == 8 else np.uint16)
         shape = self.height, self.width, channels
         with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel) as process:
-            count = 0
+            count = first
             try:
                 for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
                     yield np.frombuffer(block, dtype).reshape(shape)
@@ -103,20 +125,23 @@ class Video(FileClip):
             elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
                 notice(f"{self.path} should have about {self.frames} frames by its length, and has {count}")
 
-    def _check_unchanged(self) -> None:
+    def _check_unchanged(self, begins: bool = False) -> None:
         """Raise `UserError` if the file is not as it was: the frames would be fewer, or some of another clip.
 
-        One that was deleted or replaced by another is still read to its end, as it was opened before.
+        One that was deleted or replaced by another since reading began is still read to its end.
         """
         try:
             now = self.path.stat()
         except OSError:
             return
-        if (now.st_dev, now.st_ino) == self.inode and (now.st_size, now.st_mtime_ns) != (self.file_size, self.written):
+        is_same = (now.st_dev, now.st_ino) == self.inode
+        if (is_same or begins) and (is_same, now.st_size, now.st_mtime_ns) != (True, self.file_size, self.written):
             sizes = f", from {self.file_size} to {now.st_size} bytes" if now.st_size != self.file_size else ""
+            said = f"Cannot read {self.path}: it changed while it was read{sizes}"
             raise UserError(
-                f"Cannot read {self.path}: it changed while it was read{sizes}; start again when it is written whole.",
+                f"{said}; start again when it is written whole.",
                 CHANGED,
+                in_window=f"Cannot read {self.path}: it is not as it was{sizes}; open it again when that is finished.",
             )
 
 
@@ -139,7 +164,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     filters = f"scale={'iw' if square else 'iw*sar'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
     late = _late(told, video)
     if late:  # or the first frame would be shown from the sound's start on
-        filters = f"setpts=PTS-{late}/TB,{filters}"
+        filters = _delayed(late) + filters
     width, height, fps = _shown(file, filters)
     check_size(file, width, height, max_pixels)
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
@@ -157,6 +182,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         alpha=alpha,
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
+        is_steady=abs(_shortest(video) - 1) < 0.02 and file.suffix.lower() in SEEKABLE,
         note=lost(file, _losses(told, video, fps)),
         colours=_colours(video),
         timecode=found[1] if (found := TIMECODE.search(told)) else None,
@@ -164,6 +190,11 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         inode=(seen.st_dev, seen.st_ino),
         written=seen.st_mtime_ns,
     )
+
+
+def _delayed(late: float) -> str:
+    """The filter that lets frames begin `late` seconds earlier."""
+    return f"setpts=PTS-{late}/TB,"
 
 
 def _losses(told: str, video: str, fps: Fraction) -> list[str]:
@@ -180,10 +211,8 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
         losses.append(f"its colours are {named} and are {'mixed as if' if kept else 'treated as'} BT.709")
     if any(word.startswith(("top", "bottom")) for word in words):
         losses.append("it is interlaced, and its fields are treated as whole frames")
-    if rates := re.search(r", ([\d.]+) fps, ([\d.]+)(k?) tbr", video):  # on average, and of the shortest frames
-        times = float(rates[2]) * (1000 if rates[3] else 1) / float(rates[1])
-        if min(abs(times - 1), abs(times - 2)) > 0.02:  # 2: of fields
-            losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
+    if min(abs(_shortest(video) - 1), abs(_shortest(video) - 2)) > 0.02:  # 2: of fields
+        losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
     count = sum("attached pic" not in line for line in re.findall(r"Stream #0.*: Video: .*", told))
     if count > 1:
         losses.append(f"of its {count} video tracks only the first is used")
@@ -192,6 +221,12 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     if tags := [tag for tag in re.findall(r"^    (\S+)\s*: ", head, re.MULTILINE) if tag.lower() not in OWN_TAGS]:
         losses.append(not_kept("tag", tags))
     return losses
+
+
+def _shortest(video: str) -> float:
+    """How many of a stream's shortest frames make one as long as they are on average; 1 where it is not told."""
+    rates = re.search(r", ([\d.]+) fps, ([\d.]+)(k?) tbr", video)
+    return float(rates[2]) * (1000 if rates[3] else 1) / float(rates[1]) if rates else 1.0
 
 
 def _named_colours(video: str) -> tuple[str, str, str]:

@@ -142,6 +142,7 @@ def with_changed(recipe: Recipe, which: Collection[Which], changed: Changed) -> 
     """The parts of a recipe with others in the place of some, and its duration.
 
     The recording ends as long after its last stroke as it did; where forces or handles act, it does not end sooner.
+    What is led has as long to arrive as what was led last.
 
     Raises:
         UserError: if it would be longer than a recipe may be.
@@ -159,13 +160,15 @@ def with_changed(recipe: Recipe, which: Collection[Which], changed: Changed) -> 
     ticks, dt = recipe.ticks + after - before, recipe.fluid.dt
     if recipe.force or recipe.leads:
         ticks = max(ticks, recipe.ticks)
-    spans = [
-        one.span
+    others = [
+        one
         for kind in KINDS
         for one in parts.get(kind, ())
         if not isinstance(one, Stroke) and one not in several_of(recipe, kind)
     ]
-    ends = [span[1] / dt for span in spans if span is not None and span[1] < inf]
+    ends = [one.span[1] / dt for one in others if one.span is not None and one.span[1] < inf]
+    last = max([before + 1, *(handle.last / dt for handle in recipe.handle)])
+    ends += [one.last / dt + max(recipe.ticks - last, 0) for one in others if isinstance(one, RecipeHandle)]
     here = [after, *(change.tick for change in recipe.change), *(edit.tick - 1 for edit in recipe.mask)]
     ticks = max(ticks, 1 + max(here), *(ceil(end - 1e-6) for end in ends), 1)
     if ticks > MOST_TICKS:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.model.history import DEFAULT_BUDGET, History
 from app.model.picture import Picture
 from app.model.recipe import Recipe
+from app.model.undo import DEFAULT_BUDGET, History
 
 
 class Document:

@@ -12,34 +12,36 @@ from pydantic import Field, model_validator
 
 from app.model.sampling import Point
 from app.model.schema import Fraction01, Model, Place, Several, label_of
-from solver.limits import LARGEST_LEAD, LONGEST_LINE
+from solver.course import SAME_TIME, Course
+from solver.limits import LARGEST_LEAD, LEAST_SCALE, LEAST_STIFFNESS, LONGEST_LINE, MOST_SCALE, MOST_TURNED
 
 MOST_HANDLES = 64  # with the pins
 MOST_LINES = 16  # of them; of each up to 41 points are led
+MOST_OBJECTIONS = 12  # to them that are told
 ARRIVED = 0.001  # longer sides: half a pixel of 512
 # Radii that two places are apart at which they are the same; how many times farther apart, or nearer, neighbours may be
 # led.
 SAME, MOST_STRETCH = 0.05, 4.0
 
-SAME_TIME = 1e-6  # ticks between two times that are the same but for their rounding
-
 Time = Annotated[float, Field(ge=0, le=1_000_000)]
 Line = Annotated[Several[Point], Field(max_length=500)]
 Key = tuple[Time, Place, Place]
 """(seconds, x, y): when a handle shall be where, as fractions of the picture's width and height."""
-Degrees = Annotated[float, Field(ge=-720, le=720)]
-Scale = Annotated[float, Field(ge=0.1, le=10)]
+Degrees = Annotated[float, Field(ge=-MOST_TURNED, le=MOST_TURNED)]
+Scale = Annotated[float, Field(ge=LEAST_SCALE, le=MOST_SCALE)]
 Turn = tuple[Time, Degrees, Scale]
 """(seconds, degrees, scale): when a handle shall be turned how far, clockwise, and how many times as large."""
 
 
 def _middle(line: Any) -> Point | None:
-    """The mean of the corners of a line, if it is one."""
-    try:
-        across, down = np.asarray(line, np.float64).T
-    except (TypeError, ValueError, OverflowError):
+    """The mean of the corners of a line, if it has any; of what is no line any place: that is told of the line."""
+    if not line:
         return None
-    return (float(across.mean()), float(down.mean())) if len(across) else None
+    try:
+        across, down = np.clip(np.nan_to_num(np.asarray(line, np.float64)), -10, 10).T
+    except (TypeError, ValueError, OverflowError):
+        return 0.5, 0.5
+    return float(across.mean()), float(down.mean())
 
 
 class _Led(Model):
@@ -65,7 +67,7 @@ class _Led(Model):
     radius: Annotated[float, Field(ge=0.001, le=1)] = 0.25
     start: Time = 0.0
     end: Time | None = None
-    stiffness: Annotated[float, Field(ge=0.001, le=1)] = 1.0
+    stiffness: Annotated[float, Field(ge=LEAST_STIFFNESS, le=1)] = 1.0
 
     @model_validator(mode="before")
     @classmethod
@@ -121,7 +123,7 @@ class _Led(Model):
         return next((tick for tick in (near - 1, near) if tick >= 0 and self.start <= tick * dt + dt / 2), near + 1)
 
 
-class RecipeHandle(_Led):
+class RecipeHandle(_Led, Course):
     """A point of the picture that is led to other places, and stays at the last.
 
     Attributes:
@@ -161,21 +163,6 @@ class RecipeHandle(_Led):
                     f"the times of '{name}' must not go backwards, nor begin before its other way has ended"
                 )
         return self
-
-    @property
-    def ready(self) -> float:
-        """The seconds at which it has gone its first way, and its keys may begin."""
-        return self.start if self.to is None else self.start + self.duration
-
-    @property
-    def turns(self) -> bool:
-        """True if it is told how it is turned or scaled."""
-        return self.rotate is not None or self.scale is not None or bool(self.turned)
-
-    @property
-    def upright(self) -> float:
-        """The seconds at which it has made its first turn, and `turned` may begin."""
-        return self.start if self.rotate is None and self.scale is None else self.start + self.duration
 
     @property
     def last(self) -> float:
@@ -286,7 +273,7 @@ def objections(
     for way in led:
         outside, beyond = (((places < 0) | (places > extent)).any(axis=1) for places in (way.before, way.after))
         if outside.all():
-            yield f"{way.label} takes hold of nothing: {_shown(way.led.at)} is outside the picture"
+            yield f"{way.label} takes hold of nothing: {_shown(way.led.corners[0])} is outside the picture"
             continue
         if outside.any():
             yield f"{way.label} reaches out of the picture: what is outside is not led"

@@ -14,8 +14,9 @@ from app.model.forces import Force
 from app.model.handles import MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin
 from app.model.mask_edits import MaskEdit, remaining
 from app.model.masks import FreezeLayer, ViscosityLayer
-from app.model.schema import FileName, Model, Place, Radius, Several, complaint, frozen, plain
+from app.model.schema import FileName, Model, Place, Radius, Several, frozen, plain
 from app.model.strokes import Change, Stroke
+from app.model.validation import complaint
 
 VERSION = 5
 MOST_TICKS = 1_000_000
@@ -283,6 +284,15 @@ class Recipe(Model):
         """Ticks in which something is done; 0 where nothing has been yet."""
         acts = self.stroke or self.change or self.force or self.handle
         return self.ticks if acts or any(edit.tick for edit in self.mask) else 0
+
+    @property
+    def begins(self) -> int:
+        """The first tick at which anything is done: up to it, fluid and picture are as they were."""
+        if self.force or self.freeze or self.map is not None or self.mode == "density":
+            return 0
+        led = (one.first_tick(self.fluid.dt) for one in (*self.handle, *self.pin))
+        strokes = (stroke.first_tick for stroke in self.stroke if not stroke.muted)
+        return min([*led, *strokes, *(one.tick for one in (*self.change, *self.mask))], default=MOST_TICKS)
 
     @property
     def pushes(self) -> bool:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from math import floor
 
 from app.errors import UserError
 from app.model.recipe import Playback, Recipe, Stop
 
 MOST_FRAMES = 1_000_000
+NEARLY = 1e-6  # of a frame: what rounding of times may lack
 
 
 @dataclass(frozen=True)
@@ -52,9 +54,7 @@ def frame_positions(timeline: Timeline, playback: Playback, fps: float) -> list[
     Raises:
         UserError: if the animation would have more than a million frames.
     """
-    start = timeline.tick_at(playback.start)
-    end = timeline.ticks if playback.end is None else max(timeline.tick_at(playback.end), start)
-    wanted = timeline.time_of(end - start) / playback.speed * fps
+    start, end, wanted = _part(timeline, playback, fps)
     if wanted + (playback.hold_first + playback.hold_last) * fps > MOST_FRAMES:
         raise UserError(
             f"the animation would have more than {MOST_FRAMES} frames; raise 'time.speed' or lower 'output.fps'"
@@ -63,6 +63,28 @@ def frame_positions(timeline: Timeline, playback: Playback, fps: float) -> list[
         return [Fraction(start)]
     count = max(1, round(wanted))
     return [start + Fraction((end - start) * frame, count) for frame in range(count + 1)]
+
+
+def moment_at(timeline: Timeline, playback: Playback, fps: float, tick: int) -> int:
+    """Which frame of an animation is seen at a tick, on its way there: 0 is the first, and after a reversal the last.
+
+    It is the last one that begins at the tick or before it, by `frame_positions`. Past the end of the timeline, time
+    goes on as it does for a clip that is longer: frame after frame, at its rate.
+    """
+    start, end, wanted = _part(timeline, playback, fps)
+    count = max(1, round(wanted)) if end > start else 0
+    within = min(max(tick, start), end)
+    shown = (within - start) * count // (end - start) if count else 0
+    later = max(tick - max(end, timeline.ticks), 0)
+    held = round(playback.hold_first * fps)
+    return held + (count - shown if playback.reverse else shown) + floor(timeline.time_of(later) * fps + NEARLY)
+
+
+def _part(timeline: Timeline, playback: Playback, fps: float) -> tuple[int, int, float]:
+    """The first and the last tick of what is played, and how many frames lie between them."""
+    start = timeline.tick_at(playback.start)
+    end = timeline.ticks if playback.end is None else max(timeline.tick_at(playback.end), start)
+    return start, end, timeline.time_of(end - start) / playback.speed * fps
 
 
 @dataclass(frozen=True)

@@ -310,8 +310,11 @@ def _lead(press: Press, first: Touch) -> Gesture:
             return None
         length = sum(_apart(press, one, other) for one, other in pairwise(touches))
         corners = [(touch.x, touch.y) for touch in touches[:: ceil(len(touches) / MOST_CORNERS)]]
-        closed = len(corners) > 2 and _apart(press, touches[0], touches[-1]) < CLOSED * length
-        return _held(press, touches[-1].tick, points=tuple(press.under(corners)), closed=closed)
+        points = tuple(press.under(corners))
+        if (different := len(set(points))) < 2:
+            return None
+        closed = different > 2 and _apart(press, touches[0], touches[-1]) < CLOSED * length
+        return _held(press, touches[-1].tick, points=points, closed=closed)
     if handle is None:
         handle = _held(press, first.tick, at=press.at)
     place, moved = rests, False

@@ -1,4 +1,4 @@
-"""Everything a person can do with a key: one table for the shortcuts, the menu, the tooltips and the sheet on F1."""
+"""Everything a person can do, and by which key: one table for the keys, the menu, the tooltips and the sheet on F1."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from app.model.tools import TOOLS
 from app.ui.commands import Commands
 from app.ui.editor_state import overlays
-from app.ui.keys import Keyed
+from app.ui.keymap import Keyed
 
 Do = Callable[[str], None]
 """Does the action of a name."""
@@ -34,6 +34,7 @@ def _table() -> list[Action]:
         made.append(Action(name, label, group, tuple(keys.split()), run, **more))  # pyright: ignore[reportArgumentType]
 
     add("File", "open", "Open ...", "ctrl+o", lambda c: c.files.ask_open())
+    add("File", "open_frames", "Open numbered files ...", "", lambda c: c.files.ask_frames())
     add("File", "save", "Save", "ctrl+s", lambda c: c.files.save())
     add("File", "save_as", "Save as ...", "ctrl+shift+s", lambda c: c.files.ask_save())
     add("File", "apply_to", "Apply to another picture ...", "ctrl+shift+o", lambda c: c.files.ask_apply())
@@ -100,7 +101,7 @@ def _table() -> list[Action]:
     add("Time", "back", "One step back", ",", lambda c: c.step_back(), repeats=True)
     add("Time", "repeat", "Play once, in a loop, or there and back", "", lambda c: c.repeat())
     add("Time", "start", "To the start", "home", lambda c: c.workspace.session.seek(0))
-    add("Time", "end", "To the end", "end", lambda c: c.workspace.session.seek(c.workspace.session.end))
+    add("Time", "end", "To the end", "end", lambda c: c.workspace.session.seek(c.workspace.session.length))
 
     add("Time", "lanes", "Strokes, forces and handles as bars", "l", lambda c: c.toggle_lanes())
     add("Time", "bars_earlier", "Bars a step earlier", "left", lambda c: c.nudge(-1), repeats=True)

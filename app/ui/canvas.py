@@ -53,6 +53,7 @@ class Canvas:
         self._texture = device.ctx.texture((width, height), 4, pixels.tobytes())
         self._texture.repeat_x = self._texture.repeat_y = False
         self._texture.build_mipmaps()
+        self._is_reduced = True  # the smaller versions of the texture are of what is in it
         self._still = device.field((1, 1), 2, "no displacement")
         self._fields = FieldPool(device, "canvas")
         self._drawn: object = None  # what the displacement was found for
@@ -68,6 +69,11 @@ class Canvas:
     def largest(self) -> int:
         """Pixels along a side of the picture that are shown."""
         return min(LARGEST, self.device.limits.max_texture_size)
+
+    def show(self, pixels: np.ndarray) -> None:
+        """Show another frame from now on, as `shown_pixels` makes it of a picture of the same size."""
+        self._texture.write(pixels)
+        self._is_reduced = False
 
     def draw(
         self,
@@ -94,7 +100,7 @@ class Canvas:
             texture = replay.density.values.texture
         elif not state.before:
             displacement, shown = self._seen(session, state, viewport, seen)
-        self._filter(viewport)
+        self._filter(viewport, session.is_moving)
         defines: dict[str, object] = {"EDGES": EDGES[session.recipe.edges]}
         inputs: dict[str, object] = {
             "picture": texture,
@@ -134,6 +140,7 @@ class Canvas:
             texture, displacement = density.values.texture, self._still
         else:
             session.seen.draw(displacement, (0.0, 0.0), displacement.texel)
+        self._reduce()
         self._texture.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
         self.device.pass_("view/canvas.frag", EDGES=EDGES[session.recipe.edges]).draw_into(
             target,
@@ -226,9 +233,19 @@ class Canvas:
         assert self._selected is not None
         return self._selected
 
-    def _filter(self, viewport: Viewport) -> None:
+    def _reduce(self) -> None:
+        """Make the smaller versions of what is shown, if they are not made yet."""
+        if not self._is_reduced:
+            self._texture.build_mipmaps()
+            self._is_reduced = True
+
+    def _filter(self, viewport: Viewport, moves: bool) -> None:
         zoom = viewport.scale * viewport.density / self._shrunk
-        small = moderngl.LINEAR_MIPMAP_NEAREST if zoom < 0.75 else moderngl.LINEAR
+        small = moderngl.LINEAR
+        # Of a clip that runs, each frame would have to be reduced: up to a half nobody misses it.
+        if zoom < (0.5 if moves and not self._is_reduced else 0.75):
+            self._reduce()
+            small = moderngl.LINEAR_MIPMAP_NEAREST
         self._texture.filter = (small, moderngl.NEAREST if zoom >= 6 else moderngl.LINEAR)
 
     def _add_overlays(

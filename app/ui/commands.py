@@ -15,12 +15,12 @@ from app.ui.editor_state import EditorState
 from app.ui.exporting import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
 from app.ui.fitting import Fits
-from app.ui.keys import Keys
+from app.ui.key_sheet import KeySheet
+from app.ui.keymap import Keymap
 from app.ui.messages import Messages
 from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.selecting import Selecting
-from app.ui.shortcuts import Shortcuts
 from app.ui.workspace import Workspace
 
 
@@ -44,7 +44,7 @@ class Commands:
     messages: Messages
     preferences: Preferences
     selecting: Selecting
-    keys: Keys
+    keys: Keymap
     clipboard: Callable[[str], None] = imgui.set_clipboard_text
     closed: bool = False
 
@@ -56,13 +56,13 @@ class Commands:
         self.workspace.view = view.zoomed(zoom, *view.canvas.middle)
 
     def step_back(self) -> None:
-        self.workspace.session.seek(self.workspace.session.target - 1)
+        self.workspace.session.seek(self.workspace.session.moment - 1)
 
     def repeat(self) -> None:
-        """Play once, then over and over, then there and back again, then once."""
+        """Play once, then over and over, then there and back again but for a clip, then once."""
         session = self.workspace.session
         returns = session.recipe.time.ping_pong
-        session.repeat(not session.loops and not returns, session.loops and not returns)
+        session.repeat(not session.loops and not returns, session.loops and not (returns or session.project.clip))
 
     @property
     def bars_selected(self) -> bool:
@@ -153,7 +153,7 @@ class Commands:
         self.messages.done("The recipe is on the clipboard, as TOML.")
 
     def ask_shortcuts(self) -> None:
-        self.dialogs.show(Shortcuts(self.keys))
+        self.dialogs.show(KeySheet(self.keys))
 
     def ask_preferences(self) -> None:
         self.dialogs.show(Preferring(self.preferences, self.state))

@@ -28,7 +28,7 @@ from app.ui.files import Files
 from app.ui.fitting import Fits
 from app.ui.imgui_backend import ImGuiBackend
 from app.ui.journals import Journals
-from app.ui.keys import Keys
+from app.ui.keymap import Keymap
 from app.ui.layout import NARROW, Layout
 from app.ui.messages import Messages
 from app.ui.numbers import Numbers
@@ -45,6 +45,7 @@ from app.work.recovery import Found
 from app.work.session import Session
 from solver.gl.device import Device
 
+AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
 BELOW = 64.0  # points that what is told of a fit lies below what is told of an export
 
 
@@ -67,7 +68,7 @@ class Editor:
     ) -> None:
         self.preferences = likes = preferences or Preferences()
         self.state = EditorState.recalled(likes)
-        self.keys = Keys(ACTIONS.values(), likes.keys, likes.save)
+        self.keys = Keymap(ACTIONS.values(), likes.keys, likes.save)
         self._device = device
         self.backend = ImGuiBackend(device)
         self.ui = Ui(theme.PALETTES[likes.theme], self.backend.fonts, likes.scale, chord=self.keys.now)
@@ -123,6 +124,7 @@ class Editor:
         """Work on another project; see `Workspace.open`."""
         self.workspace.open(project, pixels, found)
         self.quality.opened(found)
+        self.clock.stir()
 
     def do(self, name: str) -> None:
         """Do one of the actions."""
@@ -171,6 +173,7 @@ class Editor:
             scale: of the interface, as the screen asks for; the preferences' own comes on top.
         """
         begun = time.perf_counter()
+        self.workspace.release_left()
         self.clock.elapse(dt)
         self.messages.elapse(dt)
         self.pointer.elapse(dt)
@@ -183,6 +186,8 @@ class Editor:
             self.workspace.keep()
             with self.clock.measure("simulate"):
                 self._advance(dt)
+            for said in self.workspace.look():
+                self.messages.warn(said)
             self.quality.look(dt)
             self.selecting.look()
             self.canvas.thumbnails.look(self.session)
@@ -202,6 +207,8 @@ class Editor:
             return 0.0
         if self.clock.hovering and self.backend.is_hovering:
             return PACE
+        if self.workspace.awaits_frame:
+            return AWAITING
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
         working = self.exports.is_running or self.fits.is_running
         elsewhere = working or self.chooser.is_waiting or self.files.is_loading or self.recovery.is_busy

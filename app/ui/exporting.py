@@ -7,6 +7,8 @@ import tempfile
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import floor
 from pathlib import Path
 
 import moderngl
@@ -14,8 +16,11 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError, printable
+from app.media.clip import WHOLE, FrameRange
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
+from app.model.recipe import Recipe
+from app.model.timeline import NEARLY, frame_rate
 from app.ui.canvas import shown_pixels
 from app.ui.chooser import FileChooser
 from app.ui.clipboard import Giving, check
@@ -159,14 +164,16 @@ class ExportDialog(Dialog):
         self.format = [0 for _ in KINDS]
         self.variant = [[0 for _ in files] for _, files in KINDS]
         self._take_up(preferences.export_as)
+        if session.project.clip is not None:
+            self.kind = ANIMATION
         self.returns = session.recipe.time.ping_pong
         self.forward = self.offsets = False
         self.picture = replace(session.project.picture, note="")  # it was told when the picture was opened
         self.size = max(self.picture.width, self.picture.height)
         self.quality = session.recipe.output.quality
         self.fps = session.recipe.output.fps
-        seconds = session.end * session.dt
-        self.start, self.end = 0.0, seconds
+        self.clip = session.project.clip
+        self.start, self.end = 0.0, session.length * session.dt
         self.finer = 0
         self.folder = preferences.export_to
         self.name = f"{session.project.name} warped"
@@ -243,10 +250,9 @@ class ExportDialog(Dialog):
         """What the person has asked for."""
         session = self.session
         recipe = session.document.recipe
-        tick = max(session.target, 1)
         if not self.animation:
             # The picture that is seen: the warp at the playhead.
-            recipe = recipe.edited(duration=tick * recipe.fluid.dt)
+            recipe = recipe.edited(duration=max(session.target, 1) * recipe.fluid.dt)
         grid = min(recipe.fluid.grid * FINER[self.finer][1], 1024)
         own = max(self.picture.width, self.picture.height)
         output = recipe.output.model_copy(
@@ -257,7 +263,7 @@ class ExportDialog(Dialog):
         )
         recipe = recipe.edited(
             output=output,
-            time=part if self.animation else recipe.time,
+            time=part if self.animation and self.clip is None else recipe.time,
             fluid=recipe.fluid if grid == recipe.fluid.grid else recipe.fluid.model_copy(update={"grid": grid}),
         )
         if self.kind == MAP:
@@ -265,7 +271,34 @@ class ExportDialog(Dialog):
             return Job(recipe, self.picture, session.project.folder, Outputs(None, maps=maps))
         how = self.how
         outputs = Outputs(self.output, animated=how.animated, bits=how.bits, codec=how.codec, recorded=False)
-        return Job(recipe, self.picture, session.project.folder, outputs)
+        if self.animation:
+            outputs = replace(outputs, part=self._frames)
+        return self._of_seen(recipe, outputs)
+
+    def _of_seen(self, recipe: Recipe, outputs: Outputs) -> Job:
+        """What is done to the clip, or to the picture that is seen."""
+        folder, frame = self.session.project.folder, self.session.still
+        if self.animation:
+            return Job(recipe, self.picture, folder, outputs, self.clip)
+        return Job(recipe, self.picture, folder, outputs, frame=frame)
+
+    @property
+    def _frames(self) -> FrameRange:
+        """The frames of the clip between the two ends that are chosen."""
+        if self.clip is None or (self.start <= 0 and self.end >= self._seconds):
+            return WHOLE
+        first, last = (floor(at * float(self._rate) + NEARLY) for at in (self.start, max(self.end, self.start)))
+        return self.clip.number_at(first), self.clip.number_at(last)
+
+    @property
+    def _seconds(self) -> float:
+        """That there is something to see of."""
+        return self.session.length * self.session.dt
+
+    @property
+    def _rate(self) -> Fraction:
+        """Frames a second of what is written."""
+        return (self.clip and self.clip.fps) or frame_rate(self.fps)
 
     def body(self, ui: Ui) -> bool:
         imgui.align_text_to_frame_padding()
@@ -293,13 +326,19 @@ class ExportDialog(Dialog):
         if self.kind == MAP:
             self._ask_about_map(ui)
         if self.animation:
-            seconds = self.session.end * self.session.dt
-            slid = ui.slider("fps", "Frames a second", self.fps, 1, 60, default=30)
-            self.fps = float(round(slid.value))
+            seconds, clip = self._seconds, self.clip
+            if clip is None or clip.fps is None:
+                slid = ui.slider("fps", "Frames a second", self.fps, 1, 60, default=30)
+                self.fps = float(round(slid.value))
             if seconds > 0:
                 self.start = ui.slider("from", "From", self.start, 0, seconds, SECONDS, 0.0).value
                 self.end = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds).value
-            self.returns = ui.check("There and back again", self.returns)
+            if clip is None:
+                self.returns = ui.check("There and back again", self.returns)
+            else:
+                kept = [word for word, has in (("sound", clip.sound), ("time code", clip.timecode)) if has]
+                pace = f"{float(self._rate):.5g} frames a second" if clip.durations is None else "own pace"
+                ui.dim(f"The clip warped, at its {pace}{', with its ' * bool(kept)}{' and '.join(kept)}.")
         ui.dim("Simulate on the grid")
         self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
         if self.finer and self.kind != MAP:
@@ -350,10 +389,9 @@ class ExportDialog(Dialog):
             if self._image is None and ui.button("Preview", width=96, height=30):
                 job, folder = self.job(), temporary_folder()
                 small = job.recipe.output.model_copy(update={"size": min(PREVIEW, self.size)})
-                recipe = job.recipe.edited(output=small)
                 self._folder = folder
                 outputs = Outputs(Path(folder.name) / "preview.png")
-                self._preview = ExportProcess(Job(recipe, job.picture, job.folder, outputs))
+                self._preview = ExportProcess(replace(job, recipe=job.recipe.edited(output=small), outputs=outputs))
         else:
             process.poll()
             ui.dim(f"Making a preview: {process.part:.0%}")
@@ -484,7 +522,7 @@ class Exports:
         folder = tempfile.TemporaryDirectory(prefix="fluidwarp-", ignore_cleanup_errors=True)
         outputs = Outputs(Path(folder.name) / "the picture.png", bits=8, recorded=False)
         picture = replace(session.project.picture, note="")
-        self.start(Job(recipe, picture, session.project.folder, outputs))
+        self.start(Job(recipe, picture, session.project.folder, outputs, frame=session.still))
         self._copied = folder
 
     def cancel(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,17 @@ from imgui_bundle import imgui
 
 from app.errors import UserError
 from app.media import project as projects
+from app.media.files import sequence_of
 from app.media.maps import MAP_ENDINGS, holds
-from app.media.opening import PICTURE_ENDINGS, check_picture
+from app.media.opening import check_picture
 from app.media.pictures import write_picture
 from app.media.project import SUFFIX, Project
+from app.media.source import CLIP_ENDINGS, PICTURE_ENDINGS
 from app.model.mask_edits import MASKS, UNITS, MaskName, PictureMask, as_grey
 from app.model.picture import Picture
 from app.model.presets import DEFAULT
 from app.model.recipe import FluidSettings, Recipe
+from app.model.timeline import frame_rate
 from app.ui import clipboard
 from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialogs, PictureOrMap, Unsaved
@@ -33,7 +37,8 @@ from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.recovery import Found
 
-OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS)))
+OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, *CLIP_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS)))
+TICK = 1 / 30  # seconds
 AT_ONCE = 0.15  # seconds that opening may take without a word about it
 
 
@@ -58,8 +63,15 @@ class Files:
     def ask_open(self) -> None:
         self.chooser.ask_which("Open", self.preferences.open_from, OPENABLE, self.open)
 
+    def ask_frames(self) -> None:
+        def load(path: Path) -> None:
+            self.open_work(sequence_of(path))
+
+        self.chooser.ask_which("Open numbered files, by one of them", self.preferences.open_from, PICTURE_ENDINGS, load)
+
     def ask_apply(self) -> None:
-        self.chooser.ask_which("Apply this project to", self.preferences.open_from, PICTURE_ENDINGS, self.apply)
+        endings = (*PICTURE_ENDINGS, *CLIP_ENDINGS)
+        self.chooser.ask_which("Apply this project to", self.preferences.open_from, endings, self.apply)
 
     def ask_map(self) -> None:
         self.chooser.ask_which("Start from a warp map", self.preferences.open_from, MAP_ENDINGS, self.start_from_map)
@@ -292,9 +304,9 @@ class Files:
 
 
 def load_any(path: Path, fluid: dict[str, Any] | None = None) -> Project:
-    """The project behind a picture, a recipe or a project file.
+    """The project behind a picture, a clip, a recipe or a project file.
 
-    `fluid`: settings with which the work on a picture begins.
+    `fluid`: settings with which the work on a picture or clip begins.
 
     Raises:
         UserError: if it is none of them, or cannot be read.
@@ -305,8 +317,17 @@ def load_any(path: Path, fluid: dict[str, Any] | None = None) -> Project:
         project = projects.load(path)
     else:
         project = projects.from_picture(path, fresh_recipe(fluid))
+        if project.clip is not None:
+            recipe = fresh_recipe(fluid, tick_for(project.clip.fps or frame_rate(project.recipe.output.fps)))
+            project = replace(project, recipe=recipe.edited(picture=project.recipe.picture))
     check_picture(project.picture, path.name)
     return project
+
+
+def tick_for(rate: Fraction) -> float:
+    """Seconds of a tick for a clip: a whole number of its frames, or the other way round, and nearest to `TICK`."""
+    frames = TICK * float(rate)
+    return float(round(frames) / rate if frames > 1 else 1 / (rate * round(1 / frames)))
 
 
 def settings_of(fluid: FluidSettings) -> dict[str, Any]:
@@ -314,8 +335,8 @@ def settings_of(fluid: FluidSettings) -> dict[str, Any]:
     return {name: getattr(fluid, name) for name in ("viscosity", "drag", "walls")}
 
 
-def fresh_recipe(settings: dict[str, Any] | None = None) -> Recipe:
+def fresh_recipe(settings: dict[str, Any] | None = None, dt: float = TICK) -> Recipe:
     """What a picture that is newly opened starts with: the default, and what of the fluid the person has set."""
-    fluid = FluidSettings(dt=1 / 30, viscosity=DEFAULT.viscosity, drag=DEFAULT.drag)
+    fluid = FluidSettings(dt=dt, viscosity=DEFAULT.viscosity, drag=DEFAULT.drag)
     fluid = fluid.model_copy(update=settings or {})
     return Recipe(duration=fluid.dt, fluid=fluid, edges="clamp")

@@ -184,7 +184,7 @@ class Lanes:
         return None if one is None else (which, one)
 
     def press(self, bar: Bar, part: Part, at: float, x: float, adds: bool, end: int) -> None:
-        """The pointer went down on a bar, at a tick and a place; `end`: ticks recorded."""
+        """The pointer went down on a bar, at a tick and a place; `end`: ticks that are seen."""
         if not adds and bar.which not in self.selected:
             self.selected = {bar.which}
         if part == "end" and bar.end == inf:

@@ -110,7 +110,7 @@ class Quality:
         """Something new is open; of an untouched picture, nobody has chosen the grid. `found`: what was restored."""
         session = self.workspace.session
         recipe = session.recipe
-        fresh = recipe.edited(picture=None) == fresh_recipe(settings_of(recipe.fluid))
+        fresh = recipe.edited(picture=None) == fresh_recipe(settings_of(recipe.fluid), recipe.fluid.dt)
         session.is_grid_automatic = fresh if found is None else found.work.is_grid_automatic
         self._begin()
 
@@ -122,7 +122,8 @@ class Quality:
             return
         # Who has undone everything may want it back: what can be redone was made with the ticks as they are.
         if session.end == 0 and len(session.document.history.entries) == 1:
-            session.begin_with(grid=self.grid, dt=1 / 60 if self.speed.tick(self.grid) < FAST else 1 / 30)
+            dt = 1 / 60 if self.speed.tick(self.grid) < FAST else 1 / 30
+            session.begin_with(grid=self.grid, dt=session.dt if session.project.clip else dt)
         elif session.recipe.fluid.grid != self.grid:
             self._wanted = self.grid
 

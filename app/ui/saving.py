@@ -45,8 +45,9 @@ class SaveDialog(Dialog):
         self.folder = path.parent
         self.name = printable(path.name).removesuffix(SUFFIX)
         # A picture that is only inside a project has no file to refer to.
-        self.must_embed = project.keeper is not None or project.folder == pasted_folder()
-        self.embed = self.must_embed or preferences.embed
+        self.must_embed = not project.is_linked and (project.keeper is not None or project.folder == pasted_folder())
+        self.must_link = project.is_linked
+        self.embed = self.must_embed or (preferences.embed and not self.must_link)
         self._picture = project.folder / (project.recipe.picture or "")
         self._bytes = len(project.data)
         self._own = project.path
@@ -74,10 +75,12 @@ class SaveDialog(Dialog):
         if os.path.exists(self.path) and self.path != self._own:
             ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(2)))
-        with ui.enabled(not self.must_embed):
+        with ui.enabled(not (self.must_embed or self.must_link)):
             self.embed = ui.check("Keep the picture inside the project", self.embed)
         if self.must_embed:
             about = "The picture is only in the project, and stays there."
+        elif self.must_link:
+            about = f"A clip is never kept inside: the project needs {self._picture} to stay where it is."
         elif self.embed:
             about = f"One file that opens anywhere, with {_size(self._bytes)} of picture in it."
         else:
@@ -94,7 +97,7 @@ class SaveDialog(Dialog):
         return True
 
     def _save(self) -> bool:
-        if not self.must_embed:
+        if not (self.must_embed or self.must_link):
             self._preferences.embed = self.embed
         saved = self.attempt(lambda: self._write(self.path, self.embed))
         if saved and self._then is not None:

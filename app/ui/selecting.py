@@ -133,7 +133,7 @@ class Selecting:
     def _colours(self) -> np.ndarray:
         """The picture as it is seen at this moment, small, (h, w, 3) uint8."""
         replay = self.workspace.session.replay
-        picture = replay.small_pictures.load(SOURCE)
+        picture = self.workspace.shown_picture or replay.small_pictures.load(SOURCE)
         grid = Grid.for_picture(picture.width, picture.height, min(SHOWN, max(picture.width, picture.height)))
         colours = np.stack([to_grid(channel, grid) for channel in np.moveaxis(channels(picture)[0], 2, 0)], axis=-1)
         return np.rint(255 * replay.as_seen(colours, grid)).astype(np.uint8)
@@ -185,7 +185,10 @@ class Selecting:
             return ""
         if self.is_busy:
             return "Looking for the subject ..."
-        return "" if self.state.selection else SELECT_BY[self.state.select_by]
+        by = self.state.select_by
+        of_clip = self.workspace.session.project.clip is not None and by in ("colour", "brightness")
+        first = " Of a clip, that is looked for in its first frame." if of_clip else ""
+        return "" if self.state.selection else SELECT_BY[by] + first
 
     def look(self) -> None:
         """See whether a subject has been found, and whether what is selected is still where it was."""

@@ -15,6 +15,7 @@ import glfw
 import moderngl
 
 from app.errors import UserError
+from app.media.files import is_sequence
 from app.ui.editor import Editor
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
 from app.ui.files import load_any
@@ -253,7 +254,7 @@ def run(file: Path | None = None) -> None:
     Raises:
         UserError: if there is no window to be had (status 2), or no such file.
     """
-    if file is not None and not os.path.exists(file):
+    if file is not None and not (os.path.exists(file) or is_sequence(file)):
         load_any(file)
     likes = Preferences.load()
     window = GlfwWindow(likes.window)

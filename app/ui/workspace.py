@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from app.media.project import Project
-from app.ui.canvas import Canvas
+from app.media.reel import Reel
+from app.model.picture import Picture
+from app.ui.canvas import Canvas, shown_pixels
 from app.ui.journals import Journals
 from app.ui.viewport import Viewport
 from app.work.recovery import Found
@@ -25,6 +28,16 @@ class Work:
 
     session: Session
     canvas: Canvas | None
+    reel: Reel | None = None
+    frame: int = field(init=False)  # of the clip, that the canvas shows
+    pixels: np.ndarray | None = field(init=False)  # of that frame, where it is not the first
+
+    def __post_init__(self) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
+        clip = self.session.project.clip
+        self.frame, self.pixels = clip.start if clip else 0, None
 
     def wake(self, device: Device) -> Canvas:
         """What draws it; it is played again if it was asleep."""
@@ -33,12 +46,39 @@ class Work:
             self.session.wake()
         return self.canvas
 
-    def sleep(self) -> None:
-        """Keep only what makes it."""
-        if self.canvas is not None:
+    def look(self) -> list[str]:
+        """Let the canvas show the frame of the clip that belongs to the playhead; what there is to say of it.
+
+        It is shown as soon as it is there, and while time goes on the newest one that is there in time.
+        """
+        session, clip, canvas = self.session, self.session.project.clip, self.canvas
+        if clip is None or canvas is None or (self.reel is None and session.frame == clip.start):
+            return []
+        if self.reel is None:
+            self.reel = Reel(clip, partial(shown_pixels, largest=canvas.largest))
+            self._begin()
+        self.reel.want(session.frame, session.is_moving)
+        if (found := self.reel.best()) is not None and found[0] != self.frame:
+            self.frame, self.pixels = found
+            canvas.show(self.pixels)
+        if self.reel.end is not None:
+            session.clip_frames = self.reel.end - clip.start
+        return self.reel.take_words()
+
+    @property
+    def awaits_frame(self) -> bool:
+        """A frame of the clip is still to be shown."""
+        return self.reel is not None and self.reel.awaits(self.frame)
+
+    def sleep(self) -> Canvas | None:
+        """Keep only what makes it; what drew it is to be released."""
+        if self.reel is not None:
+            self.reel.close()
+            self.reel = None
+        canvas, self.canvas = self.canvas, None
+        if canvas is not None:
             self.session.release_gpu()
-            self.canvas.release()
-            self.canvas = None
+        return canvas
 
 
 class Workspace:
@@ -62,6 +102,7 @@ class Workspace:
         self._device = device
         self._journals = journals
         self._works: list[Work] = []
+        self._left: list[Canvas] = []  # whose pictures the frame that is being drawn may still hold
         self._index = -1
 
     @property
@@ -129,6 +170,26 @@ class Workspace:
         if self.session.end or settings.keys() <= {"viscosity", "drag", "walls"}:
             self.session.change(name, **settings)
 
+    def look(self) -> list[str]:
+        """See `Work`."""
+        return self._works[self._index].look()
+
+    @property
+    def awaits_frame(self) -> bool:
+        """See `Work`."""
+        return self._works[self._index].awaits_frame
+
+    @property
+    def shown_frame(self) -> int:
+        """The number of the clip's frame that the canvas shows; 0 of a picture."""
+        return self._works[self._index].frame
+
+    @property
+    def shown_picture(self) -> Picture | None:
+        """That frame, as the canvas shows it, if it is not the first."""
+        pixels = self._works[self._index].pixels
+        return None if pixels is None else Picture(pixels[..., :3])
+
     def give_up(self, session: Session) -> None:
         """Nobody wants a work back that has been left, unless Undo comes back to it: no crash brings it up again."""
         if session is not self.session:
@@ -141,6 +202,17 @@ class Workspace:
     def release(self) -> None:
         for work in self._works:
             self._close(work)
+        self.release_left()
+
+    def release_left(self) -> None:
+        """Free what drew works that have been left; before a frame is drawn."""
+        for canvas in self._left:
+            canvas.release()
+        self._left.clear()
+
+    def _put_to_sleep(self, work: Work) -> None:
+        if (canvas := work.sleep()) is not None:
+            self._left.append(canvas)
 
     def _leave(self) -> None:
         if self._index >= 0:
@@ -152,9 +224,9 @@ class Workspace:
         self._index = index
         for place, work in enumerate(self._works):
             if abs(place - index) > 1:
-                work.sleep()
+                self._put_to_sleep(work)
         self.view = Viewport(self.view.canvas, self.canvas.size, self.view.density)
 
     def _close(self, work: Work) -> None:
         self._journals.close(work.session)
-        work.sleep()
+        self._put_to_sleep(work)

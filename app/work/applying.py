@@ -15,15 +15,15 @@ import numpy as np
 from app.errors import UserError
 from app.media import maps
 from app.media.animation import Frame, animation_writer
-from app.media.clip import USUAL, WHOLE
+from app.media.clip import WHOLE
 from app.media.encoders import check_colours, check_output, passes, unheld_of_clip
 from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, writable
 from app.media.formats import picture_format, unheld
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Displacement, Kind, cropped, folds, read_map
-from app.media.opening import Source, open_source
 from app.media.pictures import write_picture
 from app.media.record import Record, digest_of, digest_of_file
+from app.media.source import Source, open_source
 from app.model.picture import Picture
 from app.model.timeline import frame_rate
 from app.progress import Progress
@@ -234,18 +234,7 @@ class _Applying:
             writer = animation_writer(
                 self.output,
                 rate,
-                codec=outputs.codec,
-                quality=order.quality,
-                bits=outputs.bits,
-                sound=clip.path if clip and clip.sound else None,
-                sound_from=float((first - start) / rate) + clip.late if clip else 0.0,
-                frames=None if last is None else last + 1 - first,
-                resumed=outputs.resume,
-                durations=clip.lengths(outputs.part) if clip else None,
-                loops=clip.loops if clip else 0,
-                colours=clip.colours if clip else USUAL,
-                timecode=clip.timecode_at(first) if clip else None,
-                like=self.source.picture.stripped() if outputs.strip else self.source.picture,
+                outputs.animation(first, rate, order.quality, self.source.picture, clip),
                 cancel=progress.cancel,
                 passed=progress.advance,
                 written=record.add if record else lambda number: None,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -21,7 +21,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.animation import Frame, FrameWriter, NumberedWriter, animation_writer, frame_order, reordered
 from app.media.auxiliary import Pictures
-from app.media.clip import USUAL
+from app.media.clip import Clip, coded
 from app.media.encoders import passes, unheld_of_clip
 from app.media.files import is_sequence, replacing
 from app.media.formats import picture_format, unheld
@@ -35,7 +35,9 @@ from app.model.timeline import Sentinel, Timeline, frame_positions
 from app.progress import Progress
 from app.work.along import along, widened
 from app.work.checkpoints import DEFAULT_BUDGET
+from app.work.held import unmet
 from app.work.jobs import Job, MapOutput, longer_side, result_size
+from app.work.observing import observe
 from app.work.replay import Replay
 from app.work.states import StoredStates, code
 from app.work.threads import prefetch, write_behind
@@ -102,7 +104,8 @@ class _Export:
         self.sampler = Sampler(device)
         self.size = result_size(job.recipe, job.picture)
         # What the results belong to; densities are straight, whatever the picture is.
-        self.like = replace(job.picture, premultiplied=False) if job.recipe.mode == "density" else job.picture
+        like = job.picture if job.frame is None else frame_of(*job.frame)
+        self.like = replace(like, premultiplied=False) if job.recipe.mode == "density" else like
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.numbers: list[dict[str, Any]] = []
         self._position: Fraction | None = None
@@ -166,7 +169,7 @@ class _Export:
         """What the user should know of the last warp, and of what the output cannot hold."""
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
-        for said in self.replay.unmet(ARRIVED):
+        for said in unmet(self.replay, ARRIVED):
             self.pictures.notice(said)
         output, clip = self.outputs.file, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture, **self._along)):
@@ -186,7 +189,7 @@ class _Export:
         """Simulate until a stop condition fires, or to the end; says which fired."""
         for _ in range(self.recipe.ticks):
             self._advance()
-            if verdict := self.sentinel.verdict(self.replay.tick, self.replay.observe(self.sentinel)):
+            if verdict := self.sentinel.verdict(self.replay.tick, observe(self.replay, self.sentinel)):
                 return verdict
         return None
 
@@ -266,23 +269,12 @@ class _Export:
         return zip((number for number, _ in wanted), frames, strict=True)
 
     def _writer(self, first: int, records: dict[Path, Record]) -> AbstractContextManager[FrameWriter]:
-        job, output, file, last = self.job, self.recipe.output, self.outputs.file, self.outputs.part[1]
+        job, file = self.job, self.outputs.file
         assert file is not None
         return animation_writer(
             file,
             job.rate,
-            codec=self.outputs.codec,
-            quality=output.quality,
-            bits=self.outputs.bits,
-            sound=job.clip.path if job.clip and job.clip.sound else None,
-            sound_from=float(first / job.rate) + job.clip.late if job.clip else 0,
-            frames=None if last is None else last + 1 - first,
-            resumed=self.outputs.resume,
-            durations=job.clip.lengths(self.outputs.part) if job.clip else None,
-            loops=job.clip.loops if job.clip else 0,
-            colours=job.clip.colours if job.clip else USUAL,
-            timecode=job.clip.timecode_at(first) if job.clip else None,
-            like=self.like.stripped() if self.outputs.strip else self.like,
+            self.outputs.animation(first, job.rate, self.recipe.output.quality, self.like, job.clip),
             cancel=self.progress.cancel,
             passed=self.progress.advance,
             written=noting(records, file),
@@ -449,6 +441,15 @@ class _Export:
             "stopped": verdict,
             "frames": self.numbers,
         }
+
+
+def frame_of(clip: Clip, number: int) -> Picture:
+    """One frame of a clip. Raises `UserError`."""
+    with closing(clip.pictures_from(number)) as pictures:
+        found = next(pictures, None)
+    if found is None:
+        raise UserError(f"Cannot read {clip.path}: it has no frame {number}; choose an earlier moment.")
+    return replace(found[1], chunks={**found[1].chunks, **coded(clip.colours)})
 
 
 def noting(records: dict[Path, Record], path: Path) -> Callable[[int], None]:

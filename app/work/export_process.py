@@ -75,6 +75,10 @@ class FitProcess(WorkProcess):
         self.fit = fit
         super().__init__(fit, "The fit stopped unexpectedly, perhaps for want of memory.")
 
+    def stop(self) -> None:
+        """End it at once; it writes nothing that would have to be taken away."""
+        self._worker.kill()
+
     def finish(self) -> None:
         """Let it end with the best that it has."""
         threading.Thread(target=self._worker.finish, daemon=True).start()

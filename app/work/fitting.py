@@ -11,7 +11,16 @@ import numpy as np
 from app.errors import Cancelled, UserError
 from app.media.auxiliary import Pictures
 from app.media.landmarks import Pairs
-from app.model.handles import ARRIVED, LARGEST_LEAD, MOST_HANDLES, RecipeHandle, RecipePin, labelled, objections
+from app.model.handles import (
+    ARRIVED,
+    LARGEST_LEAD,
+    MOST_HANDLES,
+    MOST_OBJECTIONS,
+    RecipeHandle,
+    RecipePin,
+    labelled,
+    objections,
+)
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
@@ -30,7 +39,6 @@ DURATION = 1.0, 2.0  # seconds, from and to, for a recipe's own handles: a hand 
 DECIMALS = 8  # of places: those in a file of pairs are no more exact, and the same are to give the same
 NAME = "pair"  # and a number: what a fitted handle is called
 HALVINGS = 4  # of the way, where nothing else keeps it from folding
-MOST_NOTICES = 12
 
 
 @dataclass(frozen=True)
@@ -114,7 +122,7 @@ def fitted(
 
     Args:
         folder: where the names of the recipe's other pictures start from.
-        pairs: None are those of the recipe's own handles, which are replaced; those that stay become pins.
+        pairs: None are those of the recipe's own handles, which are replaced; those that stay as they are become pins.
         evaluations: replays on the coarse grid.
         local: of all handles; None is 1 where there are curves, 0 of points, and the recipe's own keep theirs.
 
@@ -178,12 +186,13 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
         end = np.round(handle.goal or start, DECIMALS)
         if handle.muted:
             continue
-        if np.hypot(*((end - handle.at) * extent)) > ARRIVED:
+        if handle.turns or np.hypot(*((end - handle.at) * extent)) > ARRIVED:
             led.append(handle)
             begins.append(start)
             places.append((np.round(handle.at, DECIMALS), end))
         else:
-            pins.append(RecipePin(name=handle.name, at=handle.at, radius=handle.radius, stiffness=handle.stiffness))
+            pin = RecipePin.model_validate({name: getattr(handle, name) for name in RecipePin.model_fields})
+            pins.append(pin if _has_times(recipe) else pin.model_copy(update={"start": 0.0, "end": None}))
     if not led:
         raise UserError("no handle of the recipe leads anywhere; give --pairs, or [[handle]]s with a place to go to")
     base = recipe.edited(handle=muted, pin=tuple(pins))
@@ -311,7 +320,7 @@ class _Search:
             if not errors[number] <= ARRIVED * self.longer:
                 self.notices.append(f"{self._label(number)} ends {errors[number]:.3g} pixels from where it should be")
         said = objections(trial.recipe.handle, trial.recipe.pin, (self.extent[0], self.extent[1]))
-        self.notices += list(islice(said, MOST_NOTICES))
+        self.notices += list(islice(said, MOST_OBJECTIONS))
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
         return Fitted(trial, pairs, errors, stopped, tuple(self.notices))
@@ -343,6 +352,9 @@ class _Search:
                 "stiffness": min(values[count + row], 1.0),
                 "duration": _rounded(values[2 * count + row] * max(base.duration - handle.start, 0.0)),
             }
+            if handle.turned:
+                _, values_of["rotate"], values_of["scale"] = handle.turned[-1]
+                values_of["turned"] = ()
             handles.append(handle.model_copy(update=values_of))
         fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
         return base.edited(handle=(*base.handle, *handles), fluid=fluid)

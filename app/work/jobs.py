@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from app.errors import UserError
+from app.media.animation import AnimationOptions
 from app.media.clip import WHOLE, Clip, FrameRange
 from app.media.encoders import check_colours, check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
@@ -98,6 +99,31 @@ class Outputs:
         if self.part != WHOLE and not self.has_frames:
             raise UserError(f"--frames is for an animation, and {self.file} is a picture; write f.%04d.png or .mp4")
 
+    def animation(
+        self, first: int, rate: Fraction, quality: int | None, like: Picture, clip: Clip | None
+    ) -> AnimationOptions:
+        """How the animation is written from its frame `first` on: with the sound, times and colours of a clip."""
+        last = self.part[1]
+        how = AnimationOptions(
+            codec=self.codec,
+            quality=quality,
+            bits=self.bits,
+            frames=None if last is None else last + 1 - first,
+            like=like.stripped() if self.strip else like,
+            resumed=self.resume,
+        )
+        if clip is None:
+            return how
+        return replace(
+            how,
+            loops=clip.loops,
+            durations=clip.lengths(self.part),
+            sound=clip.path if clip.sound else None,
+            sound_from=float((first - clip.start) / rate) + clip.late,
+            colours=clip.colours,
+            timecode=clip.timecode_at(first),
+        )
+
     def renamed(self, name: Callable[[Path], Path]) -> Outputs:
         """The same written to other files, each as `name` says."""
         file, stats, states = (path and name(path) for path in (self.file, self.stats, self.states))
@@ -115,6 +141,7 @@ class Job:
         folder: where the names of auxiliary pictures in the recipe start from.
         outputs: what is written.
         clip: the source, where it moves: its frames are warped by W_t at its own rate, its sound is carried over.
+        frame: of a picture, the frame of a clip that is warped, by its number, where it is not `picture`.
     """
 
     recipe: Recipe
@@ -122,6 +149,7 @@ class Job:
     folder: Path
     outputs: Outputs
     clip: Clip | None = None
+    frame: tuple[Clip, int] | None = None
 
     @property
     def target(self) -> Path:

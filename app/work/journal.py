@@ -21,12 +21,11 @@ from pydantic import TypeAdapter
 
 from app.errors import UserError
 from app.media import project as projects
-from app.media.pictures import read_picture
 from app.media.project import Project
-from app.model.history import Entry, History
 from app.model.recipe import VERSION as RECIPE_VERSION
 from app.model.recipe import Recipe
 from app.model.schema import frozen, plain
+from app.model.undo import Entry, History
 
 VERSION = 1
 _HEAD = "fluidwarp journal"
@@ -274,8 +273,8 @@ def project_of(origin: Origin, recipe: Recipe) -> Project:
     if not origin.inside:
         source = picture_file(origin, recipe)
         try:
-            picture, data = read_picture(source), projects.picture_bytes(source)
-            return Project(recipe, picture, data, Path(origin.folder), path, origin.embedded)
+            found, data = projects.read_source(source)
+            return Project(recipe, found.picture, data, Path(origin.folder), path, origin.embedded, clip=found.clip)
         except (UserError, OSError):
             # A picture that was put into the project when it was saved is there still.
             if path is None or not origin.embedded or not path.exists():

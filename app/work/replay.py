@@ -1,39 +1,35 @@
 """Driving the solver by a recipe: the one way to a warp, for the window and for the command line.
 
-One long class: a step, and going back by a checkpoint, need all parts of the simulation.
+One long class: a step, and going back by a checkpoint, need all parts of the simulation. What strokes, forces and
+handles do in a step is in `brushwork.py`, `loaded_forces.py` and `leading.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from math import ceil, hypot
-from typing import Any
+from itertools import islice
+from math import ceil
 
 import numpy as np
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
-from app.model.forces import BuiltForce, build
-from app.model.handles import RecipeHandle, RecipePin, labelled, objections
+from app.model.forces import build
+from app.model.handles import MOST_OBJECTIONS, RecipeHandle, RecipePin, labelled, objections
 from app.model.mask_edits import ClearMask, MaskStroke, edited, remaining
 from app.model.masks import solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import FINEST, SmallPictures, channels
-from app.model.strokes import FINEST_DETAIL, Act, BrushPath, Change, Dab
-from app.model.timelaws import Feedback, Law
-from app.model.timeline import Observation, Sentinel
+from app.model.strokes import FINEST_DETAIL, Act, Change
 from app.model.windows import FLOWING, Window, may_have_windows
+from app.work.brushwork import Brushwork, Scene
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
-from solver.brush.brush import Brush, Motion
+from app.work.leading import handles_of
+from app.work.loaded_forces import LoadedForce, acting
 from solver.brush.handle import Handle
 from solver.brush.handles import Handles
 from solver.brush.masks import Masks
-from solver.brush.push import Push, coasting, gain_compensation, slip_factor, strain_limit
-from solver.brush.tip import Tip
-from solver.brush.twirl import Twirl
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field
@@ -47,61 +43,8 @@ from solver.warp.map import WarpMap
 from solver.warp.scaled import ScaledMap
 
 CHECKPOINT_EVERY = 16  # ticks
-FINER = 3  # times finer than the simulation's grid a point is sought
-
-# What a tool of strength 1 does under a brush at full pressure.
-TWIRL = 4.0  # radians per second
-GROWTH = 2.0  # of area, per second
-BLOW = 0.5  # longer sides per second along a curve
-THICKENING = 4.0  # decades of viscosity per second
-RESTORING = 6.0  # per second, the part of the displacement that is taken away
-
-# What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
-FARTHEST = 2.0
-WIDEST = 3.0
 
 SOLVERS = {"mac": (Fluid, WarpMap), "paper": (PaperFluid, PaperWarpMap)}
-
-
-@dataclass(frozen=True)
-class LoadedForce:
-    """A force on the GPU, and the largest values in its fields."""
-
-    label: str
-    law: Law
-    faces: Field | None
-    divergence: Field | None
-    motion: Field | None
-    strongest: float
-    widest: float
-    fastest: float
-
-    @classmethod
-    def of(cls, device: Device, force: BuiltForce) -> LoadedForce:
-        arrays = force.faces, force.divergence, force.motion
-        faces, divergence, motion = (None if a is None else device.upload(a, force.label) for a in arrays)
-        strongest, widest, fastest = (0.0 if a is None else float(np.abs(a).max()) for a in arrays)
-        return cls(force.label, force.law, faces, divergence, motion, strongest, widest, fastest)
-
-    def acts_within(self, start: float, end: float) -> bool:
-        """True if it is at work between two times, in seconds; one that is fed back always may be."""
-        return isinstance(self.law, Feedback) or self.law.impulse(start, end) != 0
-
-    def check(self, impulse: float, dt: float, time: float) -> None:
-        """Make sure that the force is one that a step can follow.
-
-        Raises:
-            UserError: if it throws the fluid farther than the picture, or swells it out of all measure, within a tick.
-        """
-        mend = "make its 'strength' or 'fluid.dt' smaller"
-        if (thrown := (self.strongest * dt + self.fastest) * abs(impulse)) > FARTHEST:
-            raise UserError(
-                f"{self.label}: at t = {time:.3g} s it throws the fluid {thrown:.3g} times the picture's size within "
-                f"one tick; {mend}"
-            )
-        if (swollen := self.widest * abs(impulse)) > WIDEST:
-            grown = f"makes areas e^{swollen:.3g} times as large within one tick"
-            raise UserError(f"{self.label}: at t = {time:.3g} s it {grown}; {mend}")
 
 
 class Replay:
@@ -135,10 +78,8 @@ class Replay:
         self.small_pictures = SmallPictures(pictures)
         self.tick = self.steps = 0
         self.checkpoints = Checkpoints(budget)
-        self._brush = Brush(device)
+        self._brushwork = Brushwork(device)
         self._passing: Moment | None = None
-        self._leading: list[Motion] = []
-        self._motions: list[tuple[Field, float]] = []  # of forces, and their part in this tick
         self._build()
 
     # -- going through time -----------------------------------------------------------------------------------------
@@ -159,6 +100,11 @@ class Replay:
             raise
         self.tick += 1
         self._edit_masks()
+
+    def pass_time(self, tick: int) -> None:
+        """Go on to a tick as long as nothing has been done yet, which takes no steps."""
+        while self.tick < min(tick, self.recipe.begins):
+            self.advance()
 
     def seek(self, position: int | Fraction) -> None:
         """Go to a tick, or between two: there the step from the earlier one is made, with the map carried on only by
@@ -188,9 +134,10 @@ class Replay:
         """
         self._leave_passing()
         before, self.recipe = self.recipe, recipe
+        leads_as_before = (recipe.handle, recipe.pin) == (before.handle, before.pin)
         if recipe.force != before.force and recipe.is_set_up_as(before):
             self._release_forces()
-            self.forces = self._loaded_forces()
+            self._load_forces()
         if not recipe.is_set_up_as(before):
             self._release_simulation()
             self.checkpoints.clear()
@@ -201,11 +148,13 @@ class Replay:
             if keep:
                 self._keep(before)
             tick = self.tick
-            self.handles.replace(self._handles_in_picture())
+            if not leads_as_before:
+                self.handles.replace(self._handles())
             self._load(self.checkpoints.nearest(recipe, tick))
             self.seek(tick)
         else:
-            self.handles.replace(self._handles_in_picture())
+            if not leads_as_before:
+                self.handles.replace(self._handles())
             self._edit_masks(before)
 
     def check_forces(self, recipe: Recipe) -> None:
@@ -256,7 +205,7 @@ class Replay:
         self._leave_passing()
         self.checkpoints.clear()
         self._release_simulation()
-        self._brush.release()
+        self._brushwork.release()
 
     # -- what it looks at -------------------------------------------------------------------------------------------
 
@@ -276,55 +225,11 @@ class Replay:
         """The fluid's settings as they are in force at this tick."""
         return self.recipe.fluid_at(self.tick)
 
-    def observe(self, sentinel: Sentinel) -> Observation:
-        """What the sentinel asks for, at this moment; reads back from the GPU."""
-        motion = self.fluid.motion() if sentinel.needs_motion else None
-        distortion = self.warp.statistics() if sentinel.needs_map else None
-        return Observation(
-            energy=motion and motion.kinetic_energy,
-            speed=motion and motion.largest_speed,
-            displacement=distortion and distortion.displacement_max,
-            det=distortion and distortion.det_min,
-            away=self._farthest_handle() if sentinel.needs_handles else None,
-            points=tuple(self.whereabouts(watch.point) for watch in sentinel.stop.watch),
-            extent=self.grid.extent,
-        )
-
     @property
     def led(self) -> list[tuple[str, RecipeHandle | RecipePin]]:
         """The recipe's pins and handles that take hold of something, with what messages call them; pins come first."""
         led = labelled(self.recipe.handle, self.recipe.pin)
         return sorted((each for each in led if each[1].takes_hold), key=lambda each: isinstance(each[1], RecipeHandle))
-
-    def unmet(self, within: float) -> Iterator[str]:
-        """Which handles are farther than `within` longer sides from where they are led at this moment, and how far."""
-        if not self.handles.handles:
-            return
-        solid = self.fluid.solid.get()
-        for (label, led), far, points in zip(self.led, self.handles.away, self.handles.shapes, strict=True):
-            if not far <= within:
-                held = points if led.points else points[:1]
-                columns, rows = np.clip(held / self.grid.spacing, 0, np.array(self.grid.size) - 1).astype(int).T
-                why = ": what it holds is frozen" if (solid[rows, columns] == 255).any() else ""
-                pixels = far * max(self.pictures.source.width, self.pictures.source.height)
-                yield f"{label} is {far:.3g} longer sides ({pixels:.3g} pixels) away from where it is led{why}"
-
-    def whereabouts(self, point: tuple[float, float]) -> tuple[float, float]:
-        """Where a point of the original (fractions of width and height) is now, in longer sides.
-
-        The place that is looked up nearest to it, and from there one step of Newton's method: exact to second order.
-        """
-        fine = self.grid.refined(FINER)
-        (hx, hy), (x, y) = fine.spacing, fine.centres()
-        looked_up = self.warp.read(fine.size).astype(np.float64) + np.stack([x, y], axis=-1)
-        wanted = np.multiply(point, self.grid.extent)
-        j, i = np.unravel_index(((looked_up - wanted) ** 2).sum(axis=-1).argmin(), x.shape)
-        around = looked_up[max(j - 1, 0) : j + 2, max(i - 1, 0) : i + 2]
-        slopes = np.gradient(around, hx, axis=1), np.gradient(around, hy, axis=0)
-        jacobian = np.stack([slope.mean(axis=(0, 1)) for slope in slopes], axis=-1)
-        step = np.linalg.lstsq(jacobian, wanted - looked_up[j, i], rcond=None)[0]
-        at_x, at_y = np.array([x[j, i], y[j, i]]) + np.clip(step, (-hx, -hy), (hx, hy))
-        return float(at_x), float(at_y)
 
     def as_seen(self, values: np.ndarray, grid: Grid) -> np.ndarray:
         """Values of the original's cells, (ny, nx) or (ny, nx, c), where the warp shows them at this moment."""
@@ -339,6 +244,9 @@ class Replay:
     def _step(self, part: float) -> None:
         """Everything at this tick; the warp is carried on by `part` of the step."""
         dt = self.recipe.fluid.dt
+        if self.tick < self.recipe.begins:
+            self.fluid.time += dt
+            return
         self.steps += 1
         for change in self.recipe.change:
             if change.tick == self.tick:
@@ -347,22 +255,37 @@ class Replay:
         acts = [act for stroke in self.recipe.stroke for act in stroke.acts(self.tick)]
         self._follow([act for act in acts if act.stroke.tool in FLOWING], leads)
         self._set_parameters(self.settings)
-        painted = False
-        self._leading.clear()
+        scene, brushwork, painted = self._scene(part), self._brushwork, False
+        brushwork.begin()
         with self.device.stage("brush"):
             for act in acts:
-                painted |= self._draw(act.stroke, act.tick, act.dabs, dt, part)
+                painted |= brushwork.draw(scene, act.stroke, act.tick, act.dabs)
             if painted:
                 self._apply_masks()
             if leads:
                 self.handles.lead(dt, self.tick * dt)
-        steer = (lambda velocity: self._steer(velocity, leads)) if self._leading or leads else None
-        self.fluid.step(dt, self._forces(dt), steer)
-        self._carry(leads)
+
+        def steer(velocity: Field) -> None:
+            with self.device.stage("brush"):
+                brushwork.make_up(scene, velocity)
+                if leads:
+                    self.handles.make_up(velocity)
+
+        pushes, motions = acting(self.forces, self.fluid, self.tick * dt, dt, self)
+        self.fluid.step(dt, pushes, steer if brushwork.is_leading or leads else None)
+        with self.device.stage("brush"):  # what is local carries the picture besides the fluid
+            brushwork.carry(scene)
+            if leads:
+                self.handles.carry()
+            for field, amount in motions:
+                self.fluid.add_local(field, amount)
         with self.device.stage("warp map"):
             self.warp.follow(self.fluid, dt * part)
         if self.density is not None:
             self.density.advance(self.fluid.carrier(), self.grid, dt * part)
+
+    def _scene(self, part: float = 1.0) -> Scene:
+        return Scene(self.fluid, self.warp, self.masks, self.settings, self.grid.extent, part)
 
     def _change(self, change: Change) -> None:
         if change.clear_velocity:
@@ -433,108 +356,6 @@ class Replay:
         if taken := self.masks.take_frozen():
             self.warp.hold(*taken)
 
-    def _forces(self, dt: float) -> list[tuple[Field, float]]:
-        """The force fields and their impulses in this tick; sources go into the fluid's own, motions are kept."""
-        start, pushes = self.tick * dt, []
-        self._motions.clear()
-        for force in self.forces:
-            impulse = force.law.impulse(start, start + dt, self)
-            force.check(impulse, dt, start)
-            if impulse and force.faces is not None:
-                pushes.append((force.faces, impulse))
-            if impulse and force.divergence is not None:
-                # The velocity that holds during this tick has to make all the room that the tick shall make.
-                self.fluid.add_source(force.divergence, impulse / dt)
-            if impulse and force.motion is not None:
-                self._motions.append((force.motion, impulse / dt))
-        return pushes
-
-    def _draw(self, stroke: BrushPath, tick: int, dabs: tuple[Dab, ...], dt: float, part: float) -> bool:
-        """Let a stroke act, with its images, at one of its own ticks; True if it painted on the masks."""
-        painted = False
-        far = stroke.travelled(tick, self.grid.extent) / stroke.radius if stroke.tool == "push" else 0.0
-        for image, mirrored in stroke.images(dabs, self.grid.extent):
-            painted |= self._draw_image(stroke, far, image, mirrored, dt, part)
-        return painted
-
-    def _draw_image(
-        self, stroke: BrushPath, far: float, dabs: tuple[Dab, ...], mirrored: bool, dt: float, part: float
-    ) -> bool:
-        reverse = stroke.reverse != (mirrored and stroke.tool == "twirl")
-        strength = -stroke.strength if reverse else stroke.strength
-        tips = [(self._tip(stroke, dab), strength * dab.pressure) for dab in dabs]
-        # Several samples in one tick: the fluid is carried by the whole way, a mask is painted piece by piece.
-        whole = replace(tips[0][0], end=tips[-1][0].end)
-        pressed = sum(amount for _, amount in tips) / len(tips)
-        match stroke.tool:
-            case "push":
-                fluid = self.settings
-                on = coasting(whole, dt, fluid.drag, fluid.viscosity)
-                self._lead(Push(whole, dt, pressed, slip_factor(far, on), strain_limit(far, on), stroke.local))
-            case "curve":
-                for tip, amount in tips:
-                    length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
-                    if length:
-                        self._brush.push(self.fluid, tip, length / BLOW, amount)
-            case "twirl":
-                self._lead(Twirl(whole, TWIRL * pressed))
-            case "bloat":
-                self._brush.expand(self.fluid, whole, GROWTH * pressed)
-            case "pinch":
-                self._brush.expand(self.fluid, whole, -GROWTH * pressed)
-            case "restore":
-                for tip, amount in tips:
-                    share = 1 - np.exp(-RESTORING * abs(amount) * dt * part / len(tips))
-                    self.warp.restore_under(tip.end, tip.radius, tip.hardness, float(share))
-            case _:
-                for tip, amount in tips:
-                    self._paint(stroke, tip, amount, dt / len(tips))
-                return True
-        return False
-
-    def _lead(self, motion: Motion) -> None:
-        """Let a brush lead the fluid: with what viscosity and drag will take of it, and again once they have."""
-        fluid = self.settings
-        gain = gain_compensation(motion.tip.radius, fluid.dt, fluid.drag, fluid.viscosity)
-        self._brush.lead(self.fluid, motion, gain, self.warp)
-        self._leading.append(motion)
-
-    def _steer(self, velocity: Field, leads: bool) -> None:
-        with self.device.stage("brush"):
-            for motion in self._leading:
-                self._brush.make_up(self.fluid, motion, velocity, self.warp)
-            if leads:
-                self.handles.make_up(velocity)
-
-    def _carry(self, leads: bool) -> None:
-        """Let what is local of brushes and forces carry the picture besides the fluid."""
-        with self.device.stage("brush"):
-            for motion in self._leading:
-                if isinstance(motion, Push):
-                    self._brush.carry(self.fluid, motion, self.warp)
-            if leads:
-                self.handles.carry()
-            for field, amount in self._motions:
-                self.fluid.add_local(field, amount)
-
-    def _paint(self, stroke: BrushPath, tip: Tip, amount: float, dt: float) -> None:
-        match stroke.tool:
-            case "thicken":
-                self.masks.thicken(tip, THICKENING * amount * dt)
-            case "thin":
-                self.masks.thicken(tip, -THICKENING * amount * dt)
-            case "freeze":
-                self.masks.freeze(tip, amount)
-            case "thaw":
-                self.masks.freeze(tip, -amount)
-            case "smooth":
-                self.masks.smooth(tip, amount)
-
-    def _tip(self, stroke: BrushPath, dab: Dab) -> Tip:
-        width, height = self.grid.extent
-        start, end = (dab.x0 * width, dab.y0 * height), (dab.x1 * width, dab.y1 * height)
-        return Tip(start, end, stroke.radius, stroke.hardness, near=stroke.detail > 0)
-
     def _edit_masks(self, before: Recipe | None = None) -> None:
         """Do what is done to the masks at this tick in no time, but for what was done of `before`."""
         here, canvas, pictures = self.recipe.masks_at(self.tick), self.masks.canvas, self.small_pictures
@@ -543,7 +364,7 @@ class Replay:
         for edit, first in left:
             if isinstance(edit, MaskStroke):
                 for hand in range(first, edit.last_tick + 1):
-                    self._draw(edit, hand, edit.at(hand), self.recipe.fluid.dt, 1.0)
+                    self._brushwork.draw(self._scene(), edit, hand, edit.at(hand))
             elif isinstance(edit, ClearMask):
                 self.masks.take_off(edit.of)
             else:
@@ -578,52 +399,26 @@ class Replay:
         self.masks = Masks(self.device, canvas)
         if recipe.freeze:
             self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
-        for said in objections(recipe.handle, recipe.pin, self.grid.extent):
+        for said in islice(objections(recipe.handle, recipe.pin, self.grid.extent), MOST_OBJECTIONS):
             self.pictures.notice(said)
-        self.handles = Handles(self.fluid, self.warp, self._handles_in_picture())
+        self.handles = Handles(self.fluid, self.warp, self._handles())
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
-        self.forces = self._loaded_forces()
+        self._load_forces()
         self._viscosity = lru_cache(4)(lambda base, grid: viscosity(recipe.viscosity, base, grid, self.pictures))
         self._set_parameters(recipe.fluid)  # changes come with the tick
         self._edit_masks()
 
-    def _loaded_forces(self) -> list[LoadedForce]:
+    def _load_forces(self) -> None:
         built = build(self.recipe.force, self.grid, self.pictures, self.recipe.duration)
-        return [LoadedForce.of(self.device, force) for force in built]
+        self.forces = [LoadedForce.of(self.device, force) for force in built]
 
     def _release_forces(self) -> None:
         for force in self.forces:
-            for field in (force.faces, force.divergence, force.motion):
-                if field is not None:
-                    field.release()
+            force.release()
 
-    def _handles_in_picture(self) -> list[Handle]:
-        made, extent = [], self.grid.extent
-        for _, led in self.led:
-            at = led.at[0] * extent[0], led.at[1] * extent[1]
-            way: dict[str, Any] = {
-                "points": np.multiply(led.points, extent) if led.points else (),
-                "closed": led.closed,
-            }
-            if isinstance(led, RecipeHandle):
-                way |= {"duration": led.duration, "local": led.local, "rotate": led.rotate, "scale": led.scale}
-                way |= {"turned": led.turned}
-                way |= {"to": led.to and self._in_longer_sides(led.to)}
-                way |= {"keys": tuple((time, *self._in_longer_sides((x, y))) for time, x, y in led.keys or ())}
-                way |= {"goals": np.multiply(led.goals, extent) if led.goals else ()}
-            made.append(Handle(at, radius=led.radius, start=led.start, end=led.let_go, stiffness=led.stiffness, **way))
-        return made
-
-    def _in_longer_sides(self, place: tuple[float, float]) -> tuple[float, float]:
-        """A place in fractions of the picture, within it."""
-        x, y = (min(max(part, 0.0), 1.0) * side for part, side in zip(place, self.grid.extent, strict=True))
-        return x, y
-
-    def _farthest_handle(self) -> float | None:
-        """How far the handle that is farthest from where it is led is from there; None if there is none."""
-        led = [isinstance(led, RecipeHandle) for _, led in self.led]
-        return float(self.handles.away[led].max()) if any(led) else None
+    def _handles(self) -> list[Handle]:
+        return handles_of((led for _, led in self.led), self.grid.extent)
 
     def _begin_with(self, name: str) -> None:
         try:

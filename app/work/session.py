@@ -1,31 +1,37 @@
 """Working on a document live: gestures become strokes, time goes on while something moves, every edit is kept.
 
 Knows the solver and no window; the clock comes in from outside, as ticks. One long class: gestures, time and edits
-all move the playhead.
+all move the playhead. What a gesture makes is in `gesture.py`, what edits make of a recipe in `app/model/edits.py`.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
-from math import ceil, hypot
+from collections.abc import Collection
+from dataclasses import replace
+from fractions import Fraction
+from math import ceil
 from typing import Any
 
 import numpy as np
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
+from app.media.clip import Clip
 from app.media.project import Project
 from app.model.bars import Changed, Which, with_changed
 from app.model.document import Document
-from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin, is_inside, labelled
+from app.model.edits import TIMED, check_room, cut_off, with_change, with_led, with_made, with_taken
+from app.model.handles import RecipeHandle, RecipePin, is_inside
 from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.recipe import Recipe
 from app.model.sampling import Point
-from app.model.strokes import Change, Stroke
-from app.model.tools import LINE_SPEED, Gesture, Made, Press, PulledString, Tool, Touch
+from app.model.strokes import Stroke
+from app.model.timeline import NEARLY, Timeline, frame_rate, moment_at
+from app.model.tools import Made, Press, Tool, Touch
 from app.model.windows import detail_for
+from app.work.gesture import OpenGesture, kept_near
+from app.work.held import Held, held_in
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.map import WarpMap
@@ -38,29 +44,6 @@ MOST_COASTING = 60.0  # seconds
 BUDGET = 400 * 2**20  # bytes of texture memory for checkpoints
 PATIENCE = 0.05  # seconds of a frame for getting to where the playhead was sent
 QUICK = 0.01  # seconds a tick may take for another one in the same frame: rather a slower fluid than fewer frames
-
-
-@dataclass(frozen=True)
-class Held:
-    """A handle or a pin that is in force at the playhead; places as fractions of the picture.
-
-    Attributes:
-        led: as the recipe has it.
-        label: what messages call it.
-        start, now, target: where it was when it began, is, and shall be.
-        line: where the points of its line are, the first again at the end of a closed one; none of a point.
-    """
-
-    led: RecipeHandle | RecipePin
-    label: str
-    start: Point
-    now: Point
-    target: Point
-    line: tuple[Point, ...] = ()
-
-    def is_away(self, extent: Point) -> bool:
-        """True if it is not where it is led."""
-        return hypot(*(np.subtract(self.now, self.target) * extent)) > ARRIVED
 
 
 class Session:
@@ -77,12 +60,11 @@ class Session:
         playing: the recording is being played.
         loops: the recording begins anew where it ends, as it does there and back again with its `time.ping_pong`.
         coasting: time goes on because the fluid still moves.
-        path: where the gesture that is under way has been, as fractions of the picture.
-        made: the stroke that is open, or the handle in hand.
         is_rebuilding: all is made again on another grid; what is seen in between is of no interest.
         notice: something the person should hear of, for the window to take.
         is_grid_automatic: nobody has chosen the grid, and it may follow the machine.
         changes: grows with everything that changes what is seen.
+        clip_frames: how many the clip has, as far as is known.
     """
 
     def __init__(self, device: Device, project: Project) -> None:
@@ -94,32 +76,25 @@ class Session:
         self.playing = False
         self.loops = False
         self.coasting = False
-        self.path: list[tuple[float, float]] = []
-        self.made: Made | None = None
         self.notice: str | None = None
         self.changes = 0
         self.is_rebuilding = False
         self.is_grid_automatic = False
         self.last_place: tuple[float, float] | None = None
-        self._gesture: Gesture | None = None
-        # The tick that the gesture is recorded at: ahead of the simulation while strokes before it are still waiting.
-        # While a mask is painted in no time, it counts the hand's.
-        self._pen = 0
+        self._gesture: OpenGesture | None = None
         # The person has sent the playhead back, and what is done next takes the place of what comes after it.
         self._went_back = False
         self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
-        self._tool: Tool | None = None
-        self._taken: int | None = None  # the number of the handle in hand, if there was one where it was pressed
-        self._touch: Touch | None = None
-        self._string = PulledString(0.0, self.replay.grid.extent, (0.0, 0.0))
-        # Where the playhead was sent back to, if a push that stays where it is does nothing there.
-        self._idles_at: int | None = None
         self._held: tuple[object, list[Held]] = (None, [])
         # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
         self._base = project.recipe
         self._live = project.recipe
         self._target: int | None = self.end or None
         self._backwards = False  # it is played from its end to its start
+        self.clip_frames = max((project.clip and project.clip.frames) or 1, 1)
+        # Ticks from the recording's end to the playhead: a clip that is longer goes on with the last warp.
+        self._beyond = 0
+        self._plays_on = False  # a clip that was being played is played again once all has come to rest
         self._coasted = 0
         # The state that the next joined edit goes on from, and the bars that it is of.
         self._joined: tuple[Recipe, frozenset[Which]] | None = None
@@ -148,6 +123,47 @@ class Session:
         return self._live.recorded
 
     @property
+    def length(self) -> int:
+        """Ticks that there is something to see of: the recording's, or the clip's if that is longer."""
+        return max(self.end, self._clip_ticks)
+
+    @property
+    def moment(self) -> int:
+        """Where the playhead is or is going: `target`, or after the recording's end in a clip."""
+        return self.target + self._beyond
+
+    @property
+    def clip_rate(self) -> Fraction:
+        """Frames a second of the clip, or of an animation."""
+        clip = self.project.clip
+        return (clip and clip.fps) or frame_rate(self._live.output.fps)
+
+    @property
+    def frame(self) -> int:
+        """The number of the clip's frame that belongs to the playhead; 0 of a picture."""
+        clip = self.project.clip
+        if clip is None:
+            return 0
+        timeline = Timeline.of(self._live) if self.end else Timeline(0, self.dt)
+        moment = moment_at(timeline, self._live.time, float(self.clip_rate), self.moment)
+        return min(clip.number_at(moment), clip.start + self.clip_frames - 1)
+
+    @property
+    def still(self) -> tuple[Clip, int] | None:
+        """The clip and the number of its frame that belongs to the playhead; None of a picture."""
+        clip = self.project.clip
+        return None if clip is None else (clip, self.frame)
+
+    @property
+    def _clip_ticks(self) -> int:
+        """Up to the clip's last frame."""
+        clip = self.project.clip
+        if clip is None:
+            return 0
+        last = clip.moment(clip.start + self.clip_frames - 1)
+        return ceil(last / float(self.clip_rate) / self.dt - NEARLY)
+
+    @property
     def has_begun(self) -> bool:
         """Something has been done."""
         return self.end > 0 or bool(self._live.mask)
@@ -167,6 +183,16 @@ class Session:
         return self._gesture is not None
 
     @property
+    def path(self) -> list[Point]:
+        """Where the gesture that is under way has been, as fractions of the picture."""
+        return self._gesture.path if self._gesture else []
+
+    @property
+    def made(self) -> Made | None:
+        """The stroke that is open, or the handle in hand."""
+        return self._gesture and self._gesture.made
+
+    @property
     def is_moving(self) -> bool:
         """True while time goes on."""
         return self.playing or self.coasting or self.is_painting or self.is_behind
@@ -181,8 +207,8 @@ class Session:
         """Where the playhead is or is going."""
         if self._target is not None:
             return self._target
-        if self.is_painting and not self._is_timeless:
-            return self._pen
+        if self._gesture is not None and not self._is_timeless:
+            return self._gesture.pen
         return self.end if self.coasting else self.tick
 
     @property
@@ -223,77 +249,62 @@ class Session:
         if tool.gesture is None:
             return
         self.release()
-        self._taken = None
         if held is not None and not self._can_take(held.led):
             return
         if tool.name == "handle" and held is None:
-            self._check_room(line=shift)
+            check_room(self._base, line=shift)
             press = replace(press, at=self._under(x, y), under=self._original)
-        stands, came_from = not self.is_moving, self.target
+        stands, came_from = not self.is_moving, self.moment
+        self._plays_on = self.project.clip is not None and (self.playing or (self.coasting and self._plays_on))
         self.playing = False
-        self._pen = self._go_on()
-        stands &= self._pen == self.tick
-        self._idles_at = came_from if tool.name == "push" and stands and self._is_at_rest() else None
+        pen, taken = self._go_on(), None
+        stands &= pen == self.tick
+        idles_at = came_from if tool.name == "push" and stands and self._is_at_rest() else None
         press = replace(press, timeless=tool.masks and stands)
         if held is not None:
-            press = replace(press, held=self._take(held.led), rests=held.target)
+            self._base, taken = with_taken(self._base, held.led, pen)
+            press = replace(press, held=self._base.handle[taken], rests=held.target)
         self._target = None
-        self._tool = tool
-        self._touch = Touch(self._pen, *self._inside(x, y), pressure, shift)
-        self.path = [self._touch[1:3]]
-        self._string = PulledString(press.string, self.extent, self.path[0])
-        detail = detail_for(press.brush.radius, self._base, self._base.fluid_at(self._pen))
-        self._gesture = tool.gesture(replace(press, last=self.last_place, detail=detail), self._touch)
+        detail = detail_for(press.brush.radius, self._base, self._base.fluid_at(pen))
+        press = replace(press, last=self.last_place, detail=detail)
+        touch = Touch(pen, *kept_near(x, y), pressure, shift)
+        self._gesture = OpenGesture(tool, press, touch, self.extent, taken, idles_at)
         self.replay.checkpoint()
-        self._hear(next(self._gesture))
+        self._gesture.begin()
+        self._hear(self._gesture)
 
     def move(self, x: float, y: float, pressure: float = 1.0, shift: bool = False) -> None:
         """The pointer moved to (x, y), fractions of the picture; every sample counts."""
-        if self._gesture is None:
-            return
-        self._touch = Touch(self._pen, *self._string.pull(*self._inside(x, y)), pressure, shift)
-        self.path.append(self._touch[1:3])
-        self._hear(self._gesture.send(self._touch))
-
-    def _catch_up(self, gesture: Gesture) -> None:
-        """The brush comes to where the pen was lifted, as calmly as a straight stroke is drawn."""
-        assert self._touch is not None
-        for place in self._string.catch_up(LINE_SPEED * self.dt):
-            self._touch = Touch(self._pen, *place, *self._touch[3:])
-            self.path.append(place)
-            self._hear(gesture.send(self._touch))
-            self._pen += 1
+        if self._gesture is not None:
+            self._gesture.move(x, y, pressure, shift)
+            self._hear(self._gesture)
 
     def release(self) -> None:
         """The pointer went up: the gesture becomes an entry of the history, and the fluid comes to rest by itself."""
         if self._gesture is None:
             return
-        self._catch_up(self._gesture)
+        for _ in self._gesture.catch_up(self.dt):
+            self._hear(self._gesture)
         gesture, self._gesture = self._gesture, None
-        made = self.made
-        try:
-            gesture.send(None)
-        except StopIteration as finished:
-            made = finished.value
-        self.made, path, self.path = None, self.path, []
-        if self._idles_at is not None and isinstance(made, Stroke) and made.stays:
-            made, self.last_place = None, path[-1]
+        made = gesture.end()
+        if gesture.idles_at is not None and isinstance(made, Stroke) and made.stays:
+            made, self.last_place = None, gesture.path[-1]
         if made is None:
             if not self.coasting:
                 self._show(self.document.recipe)
-            if self._idles_at is not None:
-                self.seek(self._idles_at)
+            if gesture.idles_at is not None:
+                self.seek(gesture.idles_at)
             return
         if isinstance(made, (Stroke, MaskStroke)):
-            self.last_place, last = path[-1], made.last_tick
+            self.last_place, last = gesture.path[-1], made.last_tick
         else:
             last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
         if isinstance(made, MaskStroke):
-            self._keep_masks(self._label(made), made)
+            self._keep_masks(gesture.label_of(made), made)
             return
-        self._live = self._with(made, max(self._pen, last + 1))
+        self._live = with_made(self._base, made, max(gesture.pen, last + 1), gesture.taken)
         self.replay.use(self._live)
-        self.commit(self._label(made))
+        self.commit(gesture.label_of(made))
         self._coast()
 
     def cancel(self) -> None:
@@ -301,68 +312,27 @@ class Session:
         if self._gesture is None:
             return
         self._gesture.close()
-        self._gesture = self.made = None
-        self.path, coasting = [], self.coasting
+        self._gesture, coasting = None, self.coasting
         self._show(self.document.recipe)
         if coasting:
             self._coast()
 
-    def _hear(self, made: Made | None) -> None:
-        self.made = made
-        if made is not None:
-            self._live = self._with(made, self._pen + 1)
+    def _hear(self, gesture: OpenGesture) -> None:
+        if gesture.made is not None:
+            self._live = with_made(self._base, gesture.made, gesture.pen + 1, gesture.taken)
             if not self._is_timeless:
                 self.replay.use(self._live)
         self.changes += 1
-
-    def _with(self, made: Made, ticks: int) -> Recipe:
-        """What is made now with a gesture's, and so many ticks."""
-        base, duration = self._base, ticks * self.dt
-        if isinstance(made, MaskStroke):
-            return base.edited(mask=(*base.mask, made))
-        if isinstance(made, Stroke):
-            return base.edited(stroke=(*base.stroke, made), duration=duration)
-        at = len(base.handle) if self._taken is None else self._taken
-        return base.edited(handle=(*base.handle[:at], made, *base.handle[at + 1 :]), duration=duration)
-
-    def _label(self, made: Made) -> str:
-        if isinstance(made, RecipeHandle):
-            if self._taken is not None:
-                return "Lead on"
-            return "Line" if made.points else "Handle" if made.keys else "Pin"
-        stroke = made
-        if self._tool is None:
-            return stroke.tool.capitalize()
-        if (self._tool.directions and self._tool.masks) or stroke.tool in ("bloat", "pinch"):
-            return stroke.tool.capitalize()
-        return self._tool.label
-
-    def _inside(self, x: float, y: float) -> tuple[float, float]:
-        """Places are kept within half a picture of it, and with as many digits as a recipe needs."""
-        return round(min(max(x, -0.5), 1.5), 5), round(min(max(y, -0.5), 1.5), 5)
 
     # -- handles ----------------------------------------------------------------------------------------------------
 
     @property
     def held(self) -> list[Held]:
         """The handles and pins in force at the playhead; looking reads back from the GPU where something has moved."""
-        replay, tick, dt = self.replay, self.replay.tick, self.dt
-        seen = replay, replay.recipe, tick, replay.warp.version
+        replay = self.replay
+        seen = replay, replay.recipe, replay.tick, replay.warp.version
         if self._held[0] != seen:
-            found, extent = [], replay.grid.extent
-            if any(led.is_in_force(tick, dt) for _, led in replay.led):
-                handles = replay.handles
-                shapes = handles.shapes
-                for (label, led), handle, shape, now, start in zip(
-                    replay.led, handles.handles, shapes, handles.middles(shapes), handles.starts, strict=True
-                ):
-                    if led.is_in_force(tick, dt):
-                        start = now if np.isnan(start[0]) else start
-                        target = handle.wanted(start, max(replay.time, handle.ready), dt) if handle.goal else start
-                        places = ((float(x), float(y)) for x, y in (start / extent, now / extent, target / extent))
-                        line = [(float(x), float(y)) for x, y in shape / extent] if led.points else []
-                        found.append(Held(led, label, *places, line=(*line, *line[: led.closed])))
-            self._held = seen, found
+            self._held = seen, held_in(replay)
         return self._held[1]
 
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:
@@ -370,7 +340,7 @@ class Session:
 
         `commit`: as an entry of the history; not while a slider is dragged.
         """
-        parts = self._with_led(label, lambda led: (led.model_copy(update=settings),))
+        parts = with_led(self._live, label, lambda led: led.model_copy(update=settings))
         last = max((handle.last for handle in parts["handle"] if handle.turns), default=0.0)
         if lasts := last > self._base.duration:
             parts["duration"] = (ceil(last / self.dt) + 1) * self.dt
@@ -385,19 +355,10 @@ class Session:
     def let_go(self, label: str) -> None:
         """Take a handle or a pin away, as if it had never been."""
         self.release()
-        parts = self._with_led(label, lambda _: ())
+        parts = with_led(self._live, label, lambda _: None)
         if not parts["handle"]:
             parts["stop"] = self._base.stop.model_copy(update={"handles_within": None})
         self.edit(f"Remove {label.partition('[')[0]}", **parts)
-
-    def _with_led(
-        self, label: str, changed: Callable[[RecipeHandle | RecipePin], tuple[RecipeHandle | RecipePin, ...]]
-    ) -> dict[str, Any]:
-        """The handles and pins of now, with others in the place of one."""
-        recipe, parts = self._live, dict[str, Any](handle=(), pin=())
-        for name, led in labelled(recipe.handle, recipe.pin):
-            parts[led.kind] = *parts[led.kind], *(changed(led) if name == label else (led,))
-        return parts
 
     def _under(self, x: float, y: float) -> Point:
         """The place in the original of what is seen at a place."""
@@ -411,30 +372,9 @@ class Session:
         moved = np.array(seen) + self.replay.warp.at(np.multiply(seen, self.extent)) / self.extent
         return [(round(float(x), 6), round(float(y), 6)) for x, y in moved]
 
-    def _check_room(self, line: bool) -> None:
-        led = (*self._base.handle, *self._base.pin)
-        if len(led) >= MOST_HANDLES:
-            raise UserError(f"There are {MOST_HANDLES} handles and pins already; remove one to set another.")
-        if line and sum(bool(each.points) for each in led) >= MOST_LINES:
-            raise UserError(f"There are {MOST_LINES} lines already; remove one to set another.")
-
     def _can_take(self, led: RecipeHandle | RecipePin) -> bool:
         """True if it is still there, and has begun where what is done next begins."""
         return led in (*self._live.handle, *self._live.pin) and led.first_tick(self.dt) < self._next
-
-    def _take(self, led: RecipeHandle | RecipePin) -> RecipeHandle:
-        """Take a handle in hand; a pin becomes one, for good if it is led."""
-        base = self._base
-        if isinstance(led, RecipePin):
-            handle = RecipeHandle.model_validate(led.model_dump() | {"keys": ()})
-            pins = tuple(pin for pin in base.pin if pin != led)
-            self._base = base.edited(pin=pins, handle=(*base.handle, handle))
-        else:
-            # What comes after this moment has been cut off, if the playhead was sent back here.
-            cut = led.before(self._pen, self.dt)
-            handle = cut if cut is not None and cut in base.handle else led
-        self._taken = self._base.handle.index(handle)
-        return handle
 
     # -- time -------------------------------------------------------------------------------------------------------
 
@@ -467,7 +407,7 @@ class Session:
             elif self.coasting:
                 self._record()
                 self._look_for_rest()
-            elif self.playing and (self.tick < self.end or self._repeats):
+            elif self.playing and (self.moment < self.length or self._repeats):
                 self._play_on()
             else:
                 self.playing = False
@@ -485,27 +425,36 @@ class Session:
             self.pause()
         elif not self._went_back and self.tick < self.end:
             self._finish()
-        elif self.end and self.target >= self.end and self._is_fast() and not self._repeats:
+        elif self.end and self.moment == self.end and self._is_fast() and not self._repeats:
+            self._plays_on = self.project.clip is not None
             self._coast()
-        elif self.end:
+        elif self.length:
             self._backwards = False
-            if self.target >= self.end:
+            if self.moment >= self.length:
                 self.seek(0)
             self.playing = True
 
     @property
     def _repeats(self) -> bool:
-        return self.end > 0 and (self.loops or self._live.time.ping_pong)
+        return self.length > 0 and (self.loops or self._returns)
+
+    @property
+    def _returns(self) -> bool:
+        """It is played there and back again, as no clip is."""
+        return self._live.time.ping_pong and self.project.clip is None
 
     def _play_on(self) -> None:
         """A tick of the recording, on or back; after its end it begins anew, or turns."""
-        goes_back = self._live.time.ping_pong
+        goes_back = self._returns
         self._backwards = goes_back and (self.tick >= self.end or (self._backwards and self.tick > 0))
         if self._backwards:
             self.replay.seek(self.tick - 1)
         elif self.tick < self.end:
             self._step()
+        elif self.moment < self.length:
+            self._beyond += 1
         else:
+            self._beyond = 0
             self.replay.seek(0)
         self._went_back = self.tick < self.end
         self.changes += 1
@@ -539,6 +488,8 @@ class Session:
         self._arrive()
         if self.tick < self.end:
             self._step()
+        elif self.moment < self.length:
+            self._beyond += 1
         elif self.end:
             self._record()
 
@@ -551,8 +502,9 @@ class Session:
         """Send the playhead to a tick of the recording; it arrives over the next frames."""
         self.release()
         self.playing = self.coasting = False
-        tick = min(max(tick, 0), self.end)
-        self._went_back = tick < self.end
+        moment = min(max(tick, 0), self.length)
+        tick = min(moment, self.end)
+        self._beyond, self._went_back = moment - tick, tick < self.end
         self._send(tick)
         self.changes += 1
 
@@ -580,7 +532,7 @@ class Session:
         While strokes are waiting, a gesture is recorded as it would be without them: a tick for every step.
         """
         self._hold()
-        ticks = self._pen if self.is_painting else self.tick + 1
+        ticks = self._gesture.pen if self._gesture is not None else self.tick + 1
         if self._live.ticks < ticks:
             self._live = self._live.edited(duration=ticks * self.dt)
             self.replay.use(self._live)
@@ -592,18 +544,17 @@ class Session:
     def _hold(self) -> None:
         """A tick of the hand: the open stroke stays where the pointer is."""
         if self._gesture is not None:
-            assert self._touch is not None
-            if not isinstance(self.made, (Stroke, MaskStroke)) or self.made.last_tick < self._pen:
-                self._touch = self._touch._replace(tick=self._pen)
-                self._hear(self._gesture.send(self._touch))
-            self._pen += 1
+            if self._gesture.hold():
+                self._hear(self._gesture)
+            self._gesture.pen += 1
 
     def _paint_masks(self) -> None:
         """A tick of the hand, in which no time goes on: what it has painted is seen."""
         self._hold()
-        assert isinstance(self.made, MaskStroke)
-        if painted := self.made.before(self._pen):
-            self.replay.use(self._with(painted, 0))
+        assert self._gesture is not None
+        assert isinstance(self._gesture.made, MaskStroke)
+        if painted := self._gesture.made.before(self._gesture.pen):
+            self.replay.use(with_made(self._base, painted, 0))
 
     def _step(self) -> None:
         self.replay.advance()
@@ -616,7 +567,7 @@ class Session:
         if self._coasted % LOOK_EVERY:
             return
         if not self._is_fast() or self._coasted * self.dt > MOST_COASTING:
-            self.coasting = False
+            self.coasting, self.playing = False, self._plays_on
             self.replay.checkpoint()
             self.changes += 1
 
@@ -704,17 +655,7 @@ class Session:
             return
         tick = self._go_on()
         self.playing = self.coasting = False
-        base = self._base
-        before = [change for change in base.change if change.tick != tick]
-        here = [change for change in base.change if change.tick == tick]
-        made = (here[-1] if here else Change(tick=tick)).model_copy(update=settings)
-        if settings.get("reset_warp"):  # what holds the picture lets go of it
-            now = tick * self.dt
-            handles, pins = (tuple(_ended(led, now) for led in all_) for all_ in (base.handle, base.pin))
-            base = base.edited(handle=handles, pin=pins)
-        # What is done at once needs a tick to be done in.
-        duration = base.duration if lasts else (tick + 1) * self.dt
-        self._use(base.edited(change=(*before, made), duration=duration))
+        self._use(with_change(self._base, tick, settings, lasts))
         self._send(self.end)
 
     def preview(self, **parts: Any) -> None:
@@ -869,10 +810,12 @@ class Session:
 
     def _show(self, recipe: Recipe) -> None:
         """Another state of the work, with the playhead at its end."""
+        moment = self.moment
         self.playing = self.coasting = self._went_back = False
         self.replay.checkpoint()
         self._base = recipe
         self._use(recipe)
+        self._beyond = max(min(moment, self.length) - self.end, 0)
         self._target = self.end
         self._approach(time.perf_counter() + 0.08)
 
@@ -897,8 +840,8 @@ class Session:
 
     @property
     def _next(self) -> int:
-        """The tick at which the next thing begins: behind all that is recorded, or where the playhead was sent back."""
-        return self.target if self._went_back else self.end
+        """The tick at which the next thing begins: behind all that is recorded, or where the playhead was sent to."""
+        return self.target if self._went_back else self.end + self._beyond
 
     def _go_on(self) -> int:
         """Go where what is done next begins, and tell the tick; what was recorded after it is left to undo."""
@@ -906,22 +849,17 @@ class Session:
         self.replay.head_for(tick)
         if tick < self.end:
             self._cut(tick)
-        self._went_back = False
+        elif self._beyond:
+            self._base = self._live = self._base.edited(duration=tick * self.dt)
+            self.replay.use(self._base)
+            self.replay.pass_time(tick)
+            self._target = None if self.tick == tick else tick
+        self._beyond, self._went_back = 0, False
         return tick
 
     def _cut(self, tick: int) -> None:
-        base = self._base
-        handles = (handle.before(tick, self.dt) for handle in base.handle)
-        cut = base.edited(
-            stroke=tuple(part for stroke in base.stroke for part in stroke.cut(tick)),
-            handle=tuple(handle for handle in handles if handle is not None),
-            pin=tuple(pin for pin in base.pin if pin.first_tick(self.dt) < tick),
-            change=tuple(change for change in base.change if change.tick < tick),
-            mask=tuple(edit for edit in base.mask if edit.tick <= tick),
-            duration=max(tick, 1) * self.dt,
-        )
-        parts = ("stroke", "handle", "pin", "change", "mask")
-        if any(getattr(cut, part) != getattr(base, part) for part in parts):
+        before, cut = self._base, cut_off(self._base, tick)
+        if any(getattr(cut, part) != getattr(before, part) for part in TIMED):
             self.notice = f"Going on from {tick * self.dt:.1f} s. What came after it is one Undo away."
         self._base = self._live = cut
         self.replay.use(cut)
@@ -952,9 +890,3 @@ class Session:
         self._send(tick)
         self.is_rebuilding = self._target is not None
         self.changes += 1
-
-
-def _ended(led: RecipeHandle | RecipePin, time: float) -> RecipeHandle | RecipePin:
-    """A handle or a pin that lets go at a time, unless it has before."""
-    ends = led.end is not None and led.end <= time
-    return led if ends else led.model_copy(update={"end": max(time, led.start)})

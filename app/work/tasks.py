@@ -15,8 +15,9 @@ from app.media.encoders import ANIMATIONS
 from app.media.files import check_kept, is_sequence, make_folder, takes_place, unnumbered
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
-from app.media.opening import CLIP_ENDINGS, Opened, open_recipe
+from app.media.opening import Opened, open_recipe
 from app.media.project import picture_names
+from app.media.source import CLIP_ENDINGS
 from app.model.recipe import Recipe
 from app.progress import Progress
 from app.work.export import Report, run

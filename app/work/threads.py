@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Generic, TypeVar
 
+from app.errors import UserError
+
 T = TypeVar("T")
 
 DEPTH = 2  # items that wait: enough to even out a slow one, and the memory stays bounded
@@ -18,8 +20,8 @@ _END = object()
 def write_behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
     """Yield a function that hands an item to `write` in another thread, and waits once `DEPTH` items lie there.
 
-    What `write` raises is raised by the next call, or when the block ends; all has been written once it has ended well.
-    What is handed over must not be changed afterwards.
+    What `write` raises is raised by the next call, or when the block ends; all has been written once it has ended, well
+    or with a `UserError`. What is handed over must not be changed afterwards.
     """
     waiting: queue.Queue[object] = queue.Queue(DEPTH)
     failed: list[BaseException] = []
@@ -43,6 +45,8 @@ def write_behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
     thread.start()
     try:
         yield put
+    except UserError:
+        raise  # a fault of what comes next: what has been handed over is written
     except BaseException:
         stopped.set()
         raise

@@ -152,6 +152,11 @@ class Worker:
             self._process.kill()
             self._process.wait()
 
+    def kill(self) -> None:
+        """End it without waiting for what it does, or for it to awake."""
+        self._process.kill()
+        self.end()
+
     def _listen(self, inbox: queue.SimpleQueue[tuple[Worker, Reply]]) -> None:
         said = self._process.stdout
         assert said is not None

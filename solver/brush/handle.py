@@ -11,20 +11,29 @@ from itertools import pairwise
 import numpy as np
 
 from solver.brush.tip import FARTHEST, Point
-from solver.limits import LARGEST_LEAD, LONGEST_LINE, check_type, numbers, places
+from solver.course import SAME_TIME, Course
+from solver.limits import (
+    LARGEST_LEAD,
+    LEAST_SCALE,
+    LEAST_STIFFNESS,
+    LONGEST_LINE,
+    MOST_SCALE,
+    MOST_TURNED,
+    check_type,
+    numbers,
+    places,
+)
 
-SAME_TIME = 1e-6  # steps between two times that are the same but for their rounding
-SAME = 1e-9  # and points
+SAME = 1e-9  # of the way from one led point of a line to the next: what a length is off by its rounding
 # What is led as a whole has so many times as wide a push (H2), which turns round as far beside its middle as a stroke's
 # of the handle's radius, 1 / sqrt(7) of it: what lies between its points goes along.
 WIDER = 1.6
 APART = 1 / 8  # radii between the points of a line that are led
 RING = 1 / 4  # radii between a point that is turned or scaled and what tells how it is
-MOST_TURNED, LEAST_SCALE, MOST_SCALE = 720.0, 0.1, 10.0  # degrees, and times as large
 
 
 @dataclass(frozen=True)
-class Handle:
+class Handle(Course):
     """A point of the picture on its way, or a line of points; longer sides and seconds, y down.
 
     Attributes:
@@ -84,8 +93,9 @@ class Handle:
             raise ValueError(f"a handle of radius {self.radius} was given; it must be from 1e-06 to 1")
         if not (0 <= self.start < math.inf and 0 <= self.duration < math.inf and self.start <= self.end):
             raise ValueError("a handle's start and duration must be finite and not negative, and its end not before")
-        if not 0.001 <= self.stiffness <= 1:
-            raise ValueError(f"a handle of stiffness {self.stiffness} was given; it must be from 0.001 to 1")
+        if not LEAST_STIFFNESS <= self.stiffness <= 1:
+            given = f"a handle of stiffness {self.stiffness} was given"
+            raise ValueError(f"{given}; it must be from {LEAST_STIFFNESS} to 1")
         if not 0 <= self.local <= 1:
             raise ValueError("the local part of a handle must be from 0 to 1")
         if not all(
@@ -118,21 +128,6 @@ class Handle:
                 raise ValueError(
                     f"a handle's scale of {size} was given; it must be from {LEAST_SCALE} to {MOST_SCALE:g}"
                 )
-
-    @property
-    def ready(self) -> float:
-        """When it has gone its first way, and its keys may begin."""
-        return self.start if self.to is None else self.start + self.duration
-
-    @property
-    def turns(self) -> bool:
-        """True if it is told how it is turned or scaled."""
-        return self.rotate is not None or self.scale is not None or bool(self.turned)
-
-    @property
-    def upright(self) -> float:
-        """When it has made its first turn, and `turned` may begin."""
-        return self.start if self.rotate is None and self.scale is None else self.start + self.duration
 
     @property
     def goal(self) -> Point | None:
@@ -247,7 +242,7 @@ class Shape:
 
     def middle(self, places: np.ndarray) -> np.ndarray:
         """Where `at` of the handle is while its points are at these places, (2,)."""
-        if self.is_ring:
+        if not self.handle.points:
             return places[0]
         return places.mean(axis=0) + (self.handle.at - self.led.mean(axis=0))
 

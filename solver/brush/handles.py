@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise, product
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.brush.brush import Brush
 from solver.brush.handle import Handle, Shape, area, spun
+from solver.brush.listed import draw_listed
+from solver.brush.pushes import Pushes
 from solver.brush.tip import SMALLEST, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
-from solver.grid import Grid
 from solver.limits import check_step, check_type
 from solver.scheme import Scheme
 from solver.state import State
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
+from solver.warp.strain import Strain
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
 # Radii that a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
@@ -32,16 +34,12 @@ RIDGE, RIDGE_OF_LINES = 1e-3, 1e-4
 # Where handles lie beside one another each has a push so many times as wide, too, which counts so much in the squares:
 # what they have in common is cheaper by it, and would else flow back between them.
 WIDE, WIDE_SHARE = 3.0, 0.2
-# Of the map around a handle: det J, which a flow keeps at 1 as long as the map resolves it, and what is local does not;
-# what becomes of the area of triangles of texels, as the local one, since a remap keeps what is at its texels only;
-# and how many times farther apart in the original two neighbours on a lattice lie. From the first of
-# each on it goes slower, at the second it stops: before anything folds.
+# Of the map around a handle (`Strain`): det J, which a flow keeps at 1 as long as the map resolves it, and what is
+# local does not; triangles, as the local one; and the stretch. From the first of each on it goes slower, at the second
+# it stops: before anything folds.
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 8.0, 12.0
-PLACES = 256  # along the longer side of the picture where that is looked at, or as many as there are cells
-RINGS = (1 / 64, 1 / 32, 1 / 16)  # radii of rings of `AROUND` places around its middle, likewise: what two handles that
-AROUND = 16  # nearly meet lead apart is less than that far across
 CORE = 0.5  # of the radius of what turns or swells, where it does so evenly
 # Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
 FOUND, LOST = 1e-7, 1e-4
@@ -75,7 +73,8 @@ class Lead(NamedTuple):
     Attributes:
         places, radii: of all of them, (n, 2) and (n,).
         pushed: the numbers of those that are pushed, p of them.
-        drawn, reaches: of each push the number of its point, and how far it reaches, (m,): the p, and some wide ones.
+        pushes: m of them, one at each that is pushed, and some wide ones.
+        drawn: of each push the number of its point, (m,).
         rings: r of them.
         loops: which of them are closed lines.
         influence: what the pushes and the turns of rings do to the pushed and to rings, (2 p + r, 2 m + r).
@@ -88,8 +87,8 @@ class Lead(NamedTuple):
     places: np.ndarray
     radii: np.ndarray
     pushed: np.ndarray
+    pushes: Pushes
     drawn: np.ndarray
-    reaches: np.ndarray
     rings: list[Ring]
     loops: list[slice]
     influence: np.ndarray
@@ -115,14 +114,16 @@ class Handles:
         check_type("what handles look at", warp, WarpMap)
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
+        self._thickest = fluid.device.field(self._stream.size, 1, "viscosity at the nodes")
         self._one = fluid.device.field((1, 1), 1, "a factor of handles")
         self._one.clear(1.0)
         self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
-        self._brush = Brush(fluid.device)
+        self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
+        self._seen: tuple[int, np.ndarray] | None = None  # where they are in a version of the map
         self.replace(handles)
 
     def replace(self, handles: Sequence[Handle]) -> None:
@@ -142,6 +143,7 @@ class Handles:
         ridges = np.repeat([RIDGE_OF_LINES if handle.points else RIDGE for handle in handles], self._counts)
         self._soft = 1 / stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
+        self._seen = None
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -162,7 +164,7 @@ class Handles:
             raise ValueError("to lead a handle takes some time")
         begun = np.array([handle.start <= time + dt / 2 for handle in self.handles], bool)
         in_force = begun & np.array([time + dt / 2 < handle.end for handle in self.handles], bool)
-        self._places = self._located()
+        self._places, self._seen = self._located(), None
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
             self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
@@ -199,17 +201,19 @@ class Handles:
         drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
         reaches = np.concatenate([radii[pushed], np.maximum(np.minimum(WIDE * radii, side), radii)[pushed[many]]])
         shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
-        push, local = self._influences(places, places[drawn], reaches)
-        local = local[:, : len(pushed)]
-        # What is local is shared out first: the fluid would else do all of it, going on by itself.
-        both = (1 - share[:, None, None]) * push[:, : len(pushed)] + share[:, None, None] * local
+        pushes = Pushes(self._fluid.grid, places[drawn], reaches)
+        push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
         soft = np.repeat(self._soft[listed][pushed], 2)
-        carried = share[:, None] * _solved(_matrix(both[pushed]), wanted[pushed].ravel(), soft).reshape(-1, 2)
-        wanted = wanted - np.einsum("ijab,jb->ia", local, carried)
+        if share.any():  # what is local is shared out first: the fluid would else do all of it, going on by itself
+            local, part = pushes.local_influence(places)[:, :, : len(pushed)], share[:, None]
+            both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
+            carried = part * _solved(both, wanted[pushed].ravel(), soft).reshape(-1, 2)
+            wanted = wanted - np.einsum("iajb,jb->ia", local, carried)
         soft = np.concatenate([soft, self._soft[listed][[ring.centre for ring in rings]]])
         shares = np.concatenate([shares, np.ones(len(rings))])
         ways = _with_rings(places, pushed, push, rings), shares, soft, wanted, carried
-        lead = self._lead = Lead(places, radii, pushed, drawn, reaches, rings, loops, *ways)
+        self._places[listed] += wanted * dt  # where to look for them
+        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, *ways)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -222,20 +226,15 @@ class Handles:
 
     def carry(self) -> None:
         """After a step: let what is local carry the picture until the fluid's next one."""
-        fluid, grid, lead = self._fluid, self._fluid.grid, self._lead
+        fluid, lead = self._fluid, self._lead
         if lead is None or not lead.local.any():
             return
-        viscosity = self._probed(lead, fluid.faces())[lead.pushed, 3]
-        shader = fluid.device.pass_("brush/carry.frag")
-        radii = lead.radii[lead.pushed].tolist()
-        for (x, y), radius, motion, here in zip(
-            lead.places[lead.pushed].tolist(), radii, lead.local, viscosity, strict=True
-        ):
-            tip = Tip((x, y), (x, y), radius)
-            self._motion.clear(0.0, 0.0, 0.0, here)
-            inputs = tip.inputs(grid) | {"brush_velocity": tuple(motion.tolist()), "viscosity": fluid.viscosity}
-            inputs |= {"motion": self._motion, "slip": self._one}
-            fluid.local.add(lambda field, i=inputs, t=tip: shader(field, add=True, region=t.region(grid), **i))
+        carry, viscosities = fluid.device.pass_("brush/handle_carry.frag"), self._probed(lead, fluid.faces())[:, 3]
+        places, radii, viscosities = (each[lead.pushed] for each in (lead.places, lead.radii, viscosities))
+        listed = places, radii, viscosities, lead.local
+        fluid.local.add(
+            lambda field: draw_listed(fluid.device, carry, field, fluid.grid, *listed, viscosity=fluid.viscosity)
+        )
 
     # -- what it looks at -------------------------------------------------------------------------------------------
 
@@ -295,11 +294,11 @@ class Handles:
             if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), 2):
                 raise ValueError("the state of handles is missing")
         self._places, self._starts = (self._fitted(state.values[name], counts) for name in ("places", "starts"))
-        self._lead = None
+        self._lead = self._seen = None
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (self._stream, self._one, self._motion, self._forward, self._brush):
+        for thing in (self._stream, self._thickest, self._one, self._motion, self._forward, self._brush, self._strain):
             thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -314,7 +313,12 @@ class Handles:
         return rows
 
     def _located(self) -> np.ndarray:
-        """Where the handles that have begun are: x with x + D(x) = at, by Newton's method from where they were."""
+        """Where the handles that have begun are: x with x + D(x) = at, by Newton's method from where they should be."""
+        if self._seen is None or self._seen[0] != self._warp.version:
+            self._seen = self._warp.version, self._sought()
+        return self._seen[1].copy()
+
+    def _sought(self) -> np.ndarray:
         places, begun = self._places.copy(), np.flatnonzero(~np.isnan(self._starts[:, 0]))
         if not len(begun):
             return places
@@ -354,7 +358,8 @@ class Handles:
             step = slower[each, None] * (then - now + back * (now - here))
             most, far = FARTHEST_STEP * shape.handle.reach, float(np.hypot(*step.T).max())
             part = min(1.0, most / max(far, 1e-30))
-            wanted[each] = step * part / dt
+            # The times of a script and of a recipe differ in their last digits, which solving would make more of.
+            wanted[each] = (step * part / dt).astype(np.float32)
             areas = [0.0] if shape.around is None else [area(places[shape.around :]) for places in (here, now, then)]
             growth = 0.0
             if min(areas) > 0 or max(areas) < 0:
@@ -366,7 +371,7 @@ class Handles:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
         if not len(numbers):
             return np.zeros(0)
-        least, most, triangle = self._borne(numbers).T
+        least, most, triangle = self._strain.around(self._places[numbers], self._radii[numbers]).T
         grown, local = self._grown(), self._locality(numbers)
         least, triangle = least * grown, triangle * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
@@ -380,31 +385,6 @@ class Handles:
         apart = self._places[numbers, None] - self._places[begun]
         meet = np.hypot(apart[..., 0], apart[..., 1]) < self._radii[numbers, None] + self._radii[begun]
         return np.where(meet, self._local[begun], 0.0).max(axis=1)
-
-    def _borne(self, numbers: np.ndarray) -> np.ndarray:
-        """Of the map within a radius of each of these points: the least det J, the largest stretch, the least area of
-        triangles, (n, 3); see `_distorted`."""
-        extent, radii = np.array(self._warp.extent), self._radii[numbers]
-        count = np.maximum(self._fluid.grid.size, PLACES * extent / extent.max()).astype(int)
-        columns, rows = ((np.arange(n) + 0.5) * side / n for n, side in zip(count, extent, strict=True))
-        low = np.clip(np.floor((self._places[numbers] - radii[:, None]) / extent * count), 0, count - 1).astype(int)
-        high = np.maximum(np.ceil((self._places[numbers] + radii[:, None]) / extent * count).astype(int), low + 1)
-        boxes = [np.s_[top:bottom, left:right] for (left, top), (right, bottom) in zip(low, high, strict=True)]
-        wanted = np.zeros((1, count[1], count[0]), bool)
-        for rows_of, columns_of in boxes:  # with the neighbours to the left and above
-            wanted[0, max(rows_of.start - 1, 0) : rows_of.stop, max(columns_of.start - 1, 0) : columns_of.stop] = True
-        over = _distorted(self._warp, np.stack(np.meshgrid(columns, rows), axis=-1)[None], wanted)[0]
-        angles = 2 * np.pi * np.arange(AROUND + 1) / AROUND
-        rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        close = self._places[numbers, None, None] + rings * radii[:, None, None, None]
-        near = _distorted(self._warp, np.clip(close, 0.0, extent)).reshape(len(numbers), -1, 3)
-        least, most = near[..., 0].min(axis=1), near[..., 1].max(axis=1)
-        triangle = near[..., 2].min(axis=1)
-        for row, box in enumerate(over[part] for part in boxes):
-            least[row] = min(least[row], box[..., 0].min())
-            most[row] = max(most[row], box[..., 1].max())
-            triangle[row] = min(triangle[row], box[..., 2].min())
-        return np.stack([least, most, triangle], axis=-1)
 
     def _grown(self) -> float:
         """How many times as large as in the original the area is that has grown most within a closed line."""
@@ -429,23 +409,6 @@ class Handles:
             lambda faces: calm(faces, add=True, handles=handles, velocity=fluid.faces(), spacing=fluid.grid.spacing)
         )
         handles.release()
-
-    def _influences(self, places: np.ndarray, pushed: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How the push and the local brush of each that is pushed move each: velocities (i, a) for forces (j, b)."""
-        push = np.zeros((len(places), len(pushed), 2, 2))
-        local = np.zeros_like(push)
-        for mirror, shift in _images(self._fluid.grid):
-            r = (places[:, None] - (mirror * pushed + shift)) / radii[:, None]
-            q = np.hypot(r[..., 0], r[..., 1])
-            far = np.maximum(1 - q, 0.0)[..., None, None]
-            across = np.stack([-r[..., 1], r[..., 0]], axis=-1)
-            # The curl of (1 - q)^5 (1 + 5 q) (F x r).
-            outer = across[..., :, None] * across[..., None, :]
-            push += (far**5 * (1 + 5 * q[..., None, None]) * np.eye(2) - 30 * far**4 * outer) * mirror
-            if mirror.sum() >= 0:  # carry.frag takes images beyond one wall, and off the component across it
-                sign = np.ones(2) if mirror.sum() > 0 else np.minimum(mirror, 0.0)
-                local += (np.maximum(1 - q**2, 0.0) ** 3)[..., None, None] * np.diag(sign)
-        return push, local
 
     def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
         """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
@@ -486,7 +449,7 @@ class Handles:
         fluid, grid = self._fluid, self._fluid.grid
         found = self._probed(lead, faces)
         lacks = lead.wanted - found[:, :2]
-        for loop in lead.loops:  # the fluid swells by itself: see `_swell`
+        for loop in lead.loops:  # the fluid swells by itself: (H4)
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             lacks[loop] -= (lacks[loop] * arms).sum() / max((arms**2).sum(), 1e-30) * arms
         told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
@@ -495,25 +458,13 @@ class Handles:
         masks: dict[str, Any] = {}
         if attenuated:
             lacking *= found[lead.drawn, 2:3]
-            masks["viscosity"] = fluid.viscosity
+            masks["thickest"] = self._thickest
+            fluid.device.pass_("brush/thickest.frag")(self._thickest, viscosity=fluid.viscosity)
         for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
             self._spin(ring, spin, faces, found[ring.centre], **attenuated)
-        draw, size = fluid.device.pass_("brush/handle_stream.frag", **attenuated), self._stream.size
         self._stream.clear()
-        for mirror, shift in _images(grid):
-            for (x, y), radius, force, here in zip(
-                lead.places[lead.drawn].tolist(), lead.reaches.tolist(), lacking, found[lead.drawn, 3], strict=True
-            ):
-                place = float(mirror[0] * x + shift[0]), float(mirror[1] * y + shift[1])
-                x0, y0, width, height = region = Tip(place, place, radius).region(grid)
-                if x0 >= size[0] or y0 >= size[1] or x0 + width <= 0 or y0 + height <= 0:
-                    continue
-                from_corner = place[0] - grid.origin[0], place[1] - grid.origin[1]
-                inputs: dict[str, Any] = {"force": tuple((mirror * force).tolist()), **masks}
-                if attenuated:
-                    inputs["tip_viscosity"] = here
-                inputs |= {"place": from_corner, "radius": radius, "spacing": grid.spacing}
-                draw(self._stream, add=True, region=region, **inputs)
+        stream = fluid.device.pass_("brush/handle_stream.frag", **attenuated)
+        lead.pushes.draw(fluid.device, stream, self._stream, found[lead.drawn, 3], lacking, **masks)
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 
@@ -534,7 +485,7 @@ def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.
 
 def _matrix(influence: np.ndarray) -> np.ndarray:
     """Velocities (i, a) for forces (j, b) as a matrix."""
-    return influence.transpose(0, 2, 1, 3).reshape(2 * influence.shape[0], -1)
+    return influence.reshape(2 * len(influence), -1)
 
 
 def _spins(motion: np.ndarray, rings: list[Ring]) -> np.ndarray:
@@ -544,7 +495,9 @@ def _spins(motion: np.ndarray, rings: list[Ring]) -> np.ndarray:
 
 def _with_rings(places: np.ndarray, pushed: np.ndarray, push: np.ndarray, rings: list[Ring]) -> np.ndarray:
     """The matrix of what pushes do to what is pushed, with what they do to rings, and turns of rings to all."""
-    columns = [push[:, number, :, axis] for number in range(push.shape[1]) for axis in (0, 1)]
+    if not rings:
+        return _matrix(push[pushed])
+    columns = [push[:, :, number, axis] for number in range(push.shape[2]) for axis in (0, 1)]
     columns += [_turned(places, ring) for ring in rings]
     return np.stack([np.concatenate([each[pushed].ravel(), _spins(each, rings)]) for each in columns], axis=-1)
 
@@ -562,31 +515,6 @@ def _tip(place: np.ndarray, radius: float) -> Tip:
     return Tip(at, at, radius, CORE / 0.9)
 
 
-def _distorted(warp: WarpMap, points: np.ndarray, wanted: np.ndarray | None = None) -> np.ndarray:
-    """At lattices of places (k, n, m, 2): det J, how many times nearer than in the original a neighbour lies, and area.
-
-    That is how many times larger in the original the triangle with the next texel to the right and below is, negative
-    where it is folded. Only where `wanted` (k, n, m) is true the map is looked at, and the second is right where it is
-    of both neighbours too.
-    """
-    chosen = slice(None) if wanted is None else np.flatnonzero(wanted)
-    listed, found, original = points.reshape(-1, 2)[chosen], np.zeros((*points.shape[:-1], 3)), points.copy()
-    texel = np.divide(warp.extent, warp.size)
-    corner = np.minimum(listed, warp.extent - texel)  # so that no triangle leaves the picture
-    places = np.concatenate([listed, corner, corner + texel * (1, 0), corner + texel * (0, 1)])
-    here, *moved = warp.at(places).astype(np.float64).reshape(4, -1, 2)
-    right, below = (np.eye(2)[axis] + (moved[1 + axis] - moved[0]) / texel[axis] for axis in (0, 1))
-    original.reshape(-1, 2)[chosen] += here
-    found.reshape(-1, 3)[chosen, 0] = warp.determinants(listed)
-    found.reshape(-1, 3)[chosen, 2] = right[:, 0] * below[:, 1] - right[:, 1] * below[:, 0]
-    for axis in (1, 2):
-        apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, points))
-        ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
-        after = [slice(None), slice(1, None)] if axis == 1 else [slice(None), slice(None), slice(1, None)]
-        found[(*after, ..., 1)] = np.maximum(found[(*after, ..., 1)], ratio)
-    return found
-
-
 def _runs(counts: np.ndarray) -> list[slice]:
     """Where each lies in a list of so many of each."""
     return [slice(first, last) for first, last in pairwise([0, *np.cumsum(counts).tolist()])]
@@ -595,15 +523,3 @@ def _runs(counts: np.ndarray) -> list[slice]:
 def _smoothstep(part: np.ndarray) -> np.ndarray:
     part = np.clip(part, 0.0, 1.0)
     return part * part * (3 - 2 * part)
-
-
-def _images(grid: Grid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The images (mirror, shift) of a brush in the picture's edges, itself first: x -> mirror x + shift.
-
-    With them no push crosses an edge, so that the projection takes nothing of it.
-    """
-    left, right, top, bottom = grid.at_edge
-    across = [(1.0, 0.0)] + [(-1.0, 0.0)] * left + [(-1.0, 2 * grid.picture[0])] * right
-    down = [(1.0, 0.0)] + [(-1.0, 0.0)] * top + [(-1.0, 2 * grid.picture[1])] * bottom
-    for (mirror_x, shift_x), (mirror_y, shift_y) in product(across, down):
-        yield np.array([mirror_x, mirror_y]), np.array([shift_x, shift_y])

@@ -139,21 +139,23 @@ class Masks:
         field = self._field(name)
         before = field.get()
         after = change(before)
-        differs = after != before
-        rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
-        if len(rows):
-            x, y, right, bottom = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-            field.set(after[y:bottom, x:right], (x, y, right - x, bottom - y))
-            self._note_change(name, (x, y, right - x, bottom - y))
+        if region := _differing(before, after):
+            x, y, width, height = region
+            field.set(after[y : y + height, x : x + width], region)
+            self._note_change(name, region)
 
     def take_off(self, name: str) -> None:
-        """Take all paint off one mask."""
+        """Take all paint off one mask; of what has none, whether it ever had, nothing changes."""
+        if name not in self._painted:
+            return
+        field = self._painted[name]
+        before = field.get()
         if name == "frozen" and self._frozen_before is not None:
-            self._field("frozen").restore(self._frozen_before)
+            field.restore(self._frozen_before)
         else:
             self._clear(name)
-        if name in self._painted:
-            self._note_change(name, (0, 0, *self.canvas.size))
+        if region := _differing(before, field.get()):
+            self._note_change(name, region)
 
     # -- what the fluid takes of them -------------------------------------------------------------------------------
 
@@ -329,3 +331,13 @@ def _around(region: Region, other: Region | None) -> Region:
         (min(region[k], other[k]), max(region[k] + region[k + 2], other[k] + other[k + 2])) for k in (0, 1)
     )
     return x, y, right - x, bottom - y
+
+
+def _differing(before: np.ndarray, after: np.ndarray) -> Region | None:
+    """The smallest region outside of which two masks are the same; None if they are everywhere."""
+    differs = before != after
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(rows):
+        return None
+    x, y = int(columns[0]), int(rows[0])
+    return x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y

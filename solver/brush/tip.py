@@ -44,7 +44,7 @@ class Tip:
 
     def __post_init__(self) -> None:
         for what, place in (("start", self.start), ("end", self.end)):
-            if not (isinstance(place, Sequence | np.ndarray) and len(place) == 2):
+            if not (isinstance(place, (tuple, Sequence, np.ndarray)) and len(place) == 2):
                 raise ValueError(f"a brush's {what} is {place!r}, a place (x, y) is wanted")
         places = (*self.start, *self.end)
         for number in (*places, self.radius, self.hardness):

@@ -6,8 +6,8 @@ import ctypes.util
 import os
 import sys
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -79,8 +79,9 @@ class Context:
         # Without threads of its own llvmpipe draws in ours, and no other holds a fence.
         has_threads = os.environ.get("LP_NUM_THREADS") != "0"
         self.fences = Fences(ctx, needed=has_threads and "llvmpipe" in self.limits.renderer.lower())
-        # By each of the textures that they hold.
-        self._targets: defaultdict[int, dict[tuple[int, ...], moderngl.Framebuffer]] = defaultdict(dict)
+        # By the textures that they hold; and which each texture is in.
+        self._targets: dict[tuple[moderngl.Texture, ...], moderngl.Framebuffer] = {}
+        self._targets_of: defaultdict[moderngl.Texture, set[tuple[moderngl.Texture, ...]]] = defaultdict(set)
         self._rest = ctx.simple_framebuffer((1, 1))
         # Reads a texture between its texels, where a look is enough.
         self.linear = ctx.sampler(repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR))
@@ -106,14 +107,13 @@ class Context:
         hint = f"; {INSTALL_HINT}" if sys.platform.startswith("linux") else ""
         raise ContextError(f"no OpenGL 3.3 without a window ({', '.join(dict.fromkeys(reasons))}){hint}")
 
-    def framebuffer(self, textures: Sequence[moderngl.Texture]) -> moderngl.Framebuffer:
+    def framebuffer(self, textures: tuple[moderngl.Texture, ...]) -> moderngl.Framebuffer:
         """The framebuffer that draws into several textures at once, kept until one of them is released."""
-        key = tuple(texture.glo for texture in textures)
-        target = self._targets[key[0]].get(key)
+        target = self._targets.get(textures)
         if target is None:
-            target = self.ctx.framebuffer(textures)
-            for name in key:
-                self._targets[name][key] = target
+            target = self._targets[textures] = self.ctx.framebuffer(textures)
+            for texture in textures:
+                self._targets_of[texture].add(textures)
         return target
 
     def forget_targets(self, texture: moderngl.Texture) -> None:
@@ -121,10 +121,10 @@ class Context:
         # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
         self.use()
         self._rest.use()
-        for key, target in self._targets.pop(texture.glo, {}).items():
-            target.release()
-            for name in set(key) - {texture.glo}:
-                del self._targets[name][key]
+        for textures in self._targets_of.pop(texture, ()):
+            self._targets.pop(textures).release()
+            for other in set(textures) - {texture}:
+                self._targets_of[other].remove(textures)
 
     def collect(self) -> None:
         """Free the GL objects that Python has dropped."""
@@ -151,11 +151,9 @@ class Context:
 
     # -- its life ---------------------------------------------------------------------------------------------------
 
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def stage(self, name: str) -> AbstractContextManager[object]:
         """Count and, when `timings.enabled`, time everything drawn inside under the stage's name."""
-        with self.timings.stage(name):
-            yield
+        return self.timings.stage(name)
 
     def release(self) -> None:
         """Give the context back, if it is ours; nothing made in it can be used afterwards."""

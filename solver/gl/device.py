@@ -17,7 +17,13 @@ class Device(Context):
         super().__init__(ctx, owns_context)
         self._passes: dict[tuple[str, frozenset[tuple[str, object]]], Pass] = {}
 
-    def field(self, size: tuple[int, int], components: int = 1, label: str = "field", dtype: str = "f4") -> Field:
+    def field(
+        self,
+        size: tuple[int, int],
+        components: int = 1,
+        label: str = "field",
+        dtype: str = "f4",
+    ) -> Field:
         """A zeroed texture that can be drawn into; see `solver.gl.field.Field`."""
         return Field(self, size, components, label, dtype)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sized
 from numbers import Integral
+from typing import NoReturn
 
 import moderngl
 import numpy as np
@@ -28,7 +29,14 @@ class Field:
         dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1), "u4" (whole numbers) or "f2".
     """
 
-    def __init__(self, device: Context, size: tuple[int, int], components: int, label: str, dtype: str = "f4") -> None:
+    def __init__(
+        self,
+        device: Context,
+        size: tuple[int, int],
+        components: int,
+        label: str,
+        dtype: str = "f4",
+    ) -> None:
         if not (isinstance(size, Sized) and len(size) == 2 and all(isinstance(side, Integral) for side in size)):
             raise FieldError(f"{label}: a size of {size!r} was given, (width, height) in whole texels is wanted")
         width, height = size
@@ -47,21 +55,16 @@ class Field:
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         framebuffer = device.ctx.framebuffer([texture])
         texture.label = framebuffer.label = label
-        self._made: tuple[moderngl.Texture, moderngl.Framebuffer] | None = texture, framebuffer
+        # Plain attributes, until it is released: a pass asks for ten textures.
+        self.texture: moderngl.Texture = texture
+        self.framebuffer: moderngl.Framebuffer = framebuffer
+        self._is_released = False
         self.clear()
 
-    @property
-    def texture(self) -> moderngl.Texture:
-        return self._in_use()[0]
-
-    @property
-    def framebuffer(self) -> moderngl.Framebuffer:
-        return self._in_use()[1]
-
-    def _in_use(self) -> tuple[moderngl.Texture, moderngl.Framebuffer]:
-        if self._made is None:
+    def __getattr__(self, name: str) -> NoReturn:
+        if name in ("texture", "framebuffer"):
             raise FieldError(f"{self.label} was released")
-        return self._made
+        raise AttributeError(f"{type(self).__name__} has no {name}")
 
     @property
     def width(self) -> int:
@@ -149,12 +152,12 @@ class Field:
 
     def release(self) -> None:
         """Free the texture; the field can no longer be used."""
-        if self._made is not None:
-            texture, framebuffer = self._made
-            self.device.forget_targets(texture)
-            framebuffer.release()
-            texture.release()
-            self._made = None
+        if not self._is_released:
+            self._is_released = True
+            self.device.forget_targets(self.texture)
+            self.framebuffer.release()
+            self.texture.release()
+            del self.texture, self.framebuffer
 
     def __repr__(self) -> str:
         return f"Field({self.label}, {self.width} x {self.height} x {self.components} {self.dtype})"

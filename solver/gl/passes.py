@@ -71,15 +71,18 @@ class Pass:
             vertices: of the triangles, where the pass has a vertex shader of its own.
             inputs: the shader's uniforms without their `u_`.
         """
-        fields = [target] if isinstance(target, Field) else list(target)
-        self.device.use()
+        fields = (target,) if isinstance(target, Field) else tuple(target)
+        device = self.device
+        device.use()
         self._bind(inputs)
-        several = len(fields) > 1
-        framebuffer = self.device.framebuffer([f.texture for f in fields]) if several else fields[0].framebuffer
+        if len(fields) == 1:
+            framebuffer = fields[0].framebuffer
+        else:
+            framebuffer = device.framebuffer(tuple([field.texture for field in fields]))
         regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
         if not regions:
             return
-        ctx = self.device.ctx
+        ctx = device.ctx
         blend = "add" if add else blend
         if blend:
             ctx.enable_only(moderngl.BLEND)
@@ -89,19 +92,19 @@ class Pass:
             ctx.blend_func = factors
             equation = moderngl.FUNC_REVERSE_SUBTRACT if blend == "subtract" else moderngl.FUNC_ADD
             ctx.blend_equation = equation  # pyright: ignore[reportAttributeAccessIssue]
-        for x, y, width, height in regions:
+        for part in regions:
             if region is not None:
-                framebuffer.scissor = (x, y, width, height)
+                framebuffer.scissor = part
             framebuffer.use()
-            self._vertices.render(moderngl.TRIANGLES, vertices=vertices)
-            self.device.timings.count(width * height, self.reads)
+            self._vertices.render(moderngl.TRIANGLES, vertices)
+            device.timings.count(part[2] * part[3], self.reads)
             for field in fields:
-                field.drawn((x, y, width, height))
+                field.drawn(part)
         if blend:
             ctx.enable_only(moderngl.NOTHING)
         if region is not None:
             framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]
-        self.device.fences.hold()
+        device.fences.hold()
 
     def draw_into(self, framebuffer: moderngl.Framebuffer, smooth: Sequence[str] = (), **inputs: object) -> None:
         """Draw over the viewport of a framebuffer that is not a field's, such as the window's.
@@ -123,15 +126,14 @@ class Pass:
             self.device.linear.clear(unit)
 
     def _bind(self, inputs: dict[str, object]) -> None:
-        units, numbers = self._units, self._numbers
+        units, numbers, device = self._units, self._numbers, self.device
         for name, value in inputs.items():
             if name in units:
-                texture = value
                 if isinstance(value, Field):
-                    texture = value.texture
-                    if value.device is not self.device:
+                    if value.device is not device:
                         raise FieldError(f"{value} is another device's")
-                texture.use(units[name])  # pyright: ignore[reportAttributeAccessIssue]
+                    value = value.texture
+                value.use(units[name])  # pyright: ignore[reportAttributeAccessIssue]
             elif name not in self._dropped and numbers.get(name) != value:
                 self._set(name, value)
 
@@ -151,9 +153,12 @@ def _clipped(region: Region | list[Region], size: tuple[int, int]) -> list[Regio
     """The parts of one region or several that lie within a target."""
     several = region if isinstance(region, list) else [region]
     found: list[Region] = []
-    for left, top, width, height in several:
-        x, y = max(left, 0), max(top, 0)
-        right, bottom = min(left + width, size[0]), min(top + height, size[1])
-        if right > x and bottom > y:
-            found.append((x, y, right - x, bottom - y))
+    for part in several:
+        left, top, width, height = part
+        right, bottom = left + width, top + height
+        if left < 0 or top < 0 or right > size[0] or bottom > size[1]:
+            left, top, right, bottom = max(left, 0), max(top, 0), min(right, size[0]), min(bottom, size[1])
+            part = left, top, right - left, bottom - top
+        if right > left and bottom > top:
+            found.append(part)
     return found

@@ -17,16 +17,17 @@ def draw_at(
     domain: tuple[float, float],
     shader: str,
     defines: dict[str, object] | None = None,
+    components: int = 2,
     **inputs: Any,
 ) -> np.ndarray:
-    """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, 2)."""
+    """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, components)."""
     rows = max(1, -(-len(points) // _ROW))
     listed = np.zeros((rows * _ROW, 2), np.float32)
     listed[: len(points)] = points / domain
     places = device.upload(listed.reshape(rows, _ROW, 2), "points")
-    found = device.field(places.size, 2, "found at points")
+    found = device.field(places.size, components, "found at points")
     device.pass_(shader, POINTS=1, **(defines or {}))(found, points=places, **inputs)
-    values = found.get().reshape(-1, 2)[: len(points)]
+    values = found.get().reshape(-1, components)[: len(points)]
     places.release()
     found.release()
     return values

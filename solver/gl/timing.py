@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 
 import moderngl
 
@@ -20,29 +20,30 @@ class Timings:
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
         self._stage = "other"
+        self._since = 0.0
         self.enabled = False
         self.milliseconds: dict[str, float] = defaultdict(float)
         self.passes: dict[str, int] = defaultdict(int)
         self.texel_reads: dict[str, int] = defaultdict(int)
         self.texel_writes: dict[str, int] = defaultdict(int)
 
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def stage(self, name: str) -> AbstractContextManager[object]:
         """Book everything drawn inside under `name`; stages do not nest, the inner name is ignored."""
-        if self._stage != "other":
-            yield
-            return
+        return nullcontext() if self._stage != "other" else _Stage(self, name)
+
+    def begin(self, name: str) -> None:
+        """Book what is drawn from now on under `name`."""
         self._stage = name
         if self.enabled:
             self._ctx.finish()
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            if self.enabled:
-                self._ctx.finish()
-                self.milliseconds[name] += (time.perf_counter() - start) * 1e3
-            self._stage = "other"
+        self._since = time.perf_counter()
+
+    def end(self) -> None:
+        """The stage is over."""
+        if self.enabled:
+            self._ctx.finish()
+            self.milliseconds[self._stage] += (time.perf_counter() - self._since) * 1e3
+        self._stage = "other"
 
     def count(self, pixels: int, reads: int) -> None:
         """Book one pass over `pixels` texels with `reads` texel reads each."""
@@ -56,3 +57,17 @@ class Timings:
         for book in (self.milliseconds, self.passes, self.texel_reads, self.texel_writes):
             book.clear()
         return totals
+
+
+@dataclass(slots=True)
+class _Stage:
+    """A stage that is the outermost; there are twenty in a step, and a generator for each would take longer."""
+
+    timings: Timings
+    name: str
+
+    def __enter__(self) -> None:
+        self.timings.begin(self.name)
+
+    def __exit__(self, *_: object) -> None:
+        self.timings.end()

@@ -404,6 +404,16 @@ class WarpMap:
         shader, defines = "warp/distortion.frag", self._held_defines()
         return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())[:, 1]
 
+    def strain(self, points: np.ndarray) -> np.ndarray:
+        """What it does to what lies close to points (n, 2), in longer sides: float32 (n, 4); see `warp/strain.frag`."""
+        shader, defines = "warp/strain.frag", self._held_defines()
+        return draw_at(self.device, places(points), self.extent, shader, defines, components=4, **self._parts())
+
+    def draw_strain(self, target: Field, region: Region) -> None:
+        """Draw the same into a region of a field that is laid over the picture."""
+        strain = self.device.pass_("warp/strain.frag", **self._held_defines())
+        strain(target, region=region, **self._parts(), origin=(0.0, 0.0), step=target.texel)
+
     def draw(
         self,
         target: Field,

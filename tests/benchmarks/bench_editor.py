@@ -5,6 +5,8 @@ window. First the frame as it is, waiting for the GPU at its end only; then its 
 one five-point Jacobi pass on the simulation's grid in the same run. Shares and J hold when the machine's speed drifts,
 milliseconds do not; processor time counts what all threads of this process have used, and not what others have.
 
+With `--handles`, the last of so many handles is dragged in place of the stroke; the others have arrived and stay led.
+
 With `--window`, the real one under Xvfb, dragged about by xdotool: from the start of the process to its first frame,
 the load of ten seconds at rest, and the time between two frames while painting.
 """
@@ -21,7 +23,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import pairwise
+from itertools import pairwise, product
 from math import cos, sin
 from pathlib import Path
 
@@ -58,6 +60,12 @@ class Waiting(Clock):
         self.spent[name] += (time.perf_counter() - start) * 1e3
 
 
+def handles(count: int) -> list[tuple[int, int]]:
+    """Places on the canvas, points of the window, for up to 16 handles but the one that is dragged."""
+    places: list[tuple[int, int]] = [*product((270, 400, 530, 660), (150, 250, 350, 450))]
+    return places[: max(count - 1, 0)]
+
+
 def stroke(offscreen: OffscreenEditor, each: Callable[[Callable[[], None]], None]) -> None:
     """One stroke, each frame of it by `each`; then everything as before it."""
     editor, path = offscreen.editor, line((450.0, 380.0), (650.0, 310.0), -20.0)
@@ -78,6 +86,14 @@ def frames(device: Device, cells: int, options: argparse.Namespace, table: Table
         offscreen.key(key)
     for _ in range(options.zoom):
         offscreen.frame(Move(550.0, 345.0), Wheel(0.0, 1.0))
+    if options.handles:
+        offscreen.key("g")
+    for x, y in handles(options.handles):
+        offscreen.frame(Move(x, y))
+        offscreen.frame(Button(LEFT, True))
+        offscreen.frame(Move(x + 14.0, y + 8.0))
+        offscreen.frame(Button(LEFT, False))
+        offscreen.editor.session.settle()
     jacobi = Jacobi(device, offscreen.editor.session.replay.grid, pairs=1)
     walls: list[float] = []
     works: list[float] = []
@@ -182,8 +198,8 @@ def processor_time(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def window(console: Console, rounds: int, file: Path | None, keys: list[str], zoom: int) -> None:
-    """The real window's figures; with a file, keys and turns of the wheel before painting, if any."""
+def window(console: Console, rounds: int, file: Path | None, keys: list[str], zoom: int, count: int) -> None:
+    """The real window's figures; with a file, keys, turns of the wheel and a count of handles, if any."""
     screen = subprocess.Popen(
         ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"],
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
@@ -216,6 +232,11 @@ def window(console: Console, rounds: int, file: Path | None, keys: list[str], zo
             prepare = [word for key in keys for word in ("key", "--delay", "200", key, "sleep", "0.5")]
             prepare += ["mousemove", "460", "300"]
             prepare += [word for _ in range(zoom) for word in ("click", "4", "sleep", "0.3")]
+            prepare += ["key", "--delay", "200", "g", "sleep", "0.5"] if count else []
+            for x, y in handles(count):
+                there = "mousemove", f"{x + 14}", f"{y + 8}"
+                prepare += ["mousemove", f"{x}", f"{y}", "mousedown", "1", "sleep", "0.2", *there, "sleep", "0.2"]
+                prepare += ["mouseup", "1", "sleep", "2"]
             subprocess.run(["xdotool", *prepare], env=env, check=True)
             time.sleep(1)
             drag(env, 3.0)  # whatever has to be compiled
@@ -250,10 +271,11 @@ def main() -> None:
     parser.add_argument("--open", type=Path, help="a picture, recipe or project, instead of the sample picture")
     parser.add_argument("--keys", nargs="*", default=[], help="pressed before painting, as xdotool calls them")
     parser.add_argument("--zoom", type=int, default=0, help="turns of the wheel before painting")
+    parser.add_argument("--handles", type=int, default=0, help="to 16; the last is dragged instead of painting")
     args = parser.parse_args()
     console = Console(width=150)
     if args.window:
-        window(console, args.rounds, args.open, args.keys, args.zoom)
+        window(console, args.rounds, args.open, args.keys, args.zoom, args.handles)
         return
     with Device.headless() as device:
         table = Table(title=f"{device.limits.renderer}, {os.cpu_count()} cores")

@@ -26,7 +26,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from app.media.animation import animation_writer
+from app.media.animation import AnimationOptions, animation_writer
 from app.media.opening import open_recipe
 from app.media.pictures import read_picture
 from app.model.picture import Picture
@@ -43,7 +43,7 @@ ENDINGS = (".mp4", ".mov", ".%04d.png", ".webm", ".gif")
 
 def encode(path: Path, frames: Iterable[np.ndarray]) -> None:
     """Feed frames that are there already to the writer the export uses, with the export's settings."""
-    with animation_writer(path, Fraction(RATE), quality=90) as write:
+    with animation_writer(path, Fraction(RATE), AnimationOptions(quality=90)) as write:
         for frame in frames:
             write(frame)
 

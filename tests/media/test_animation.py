@@ -20,7 +20,7 @@ from PIL import Image, ImageCms
 
 from app.errors import Cancelled, UserError
 from app.media import animation, encoders, ffmpeg, files
-from app.media.animation import animation_writer, frame_order, reordered
+from app.media.animation import AnimationOptions, animation_writer, frame_order, reordered
 from app.media.clip import USUAL, Colours
 from app.media.depth import to_bits
 from app.media.encoders import check_animation, crf_of, is_animation
@@ -45,7 +45,7 @@ def frames(
 
 
 def save(path: Path, count: int = 5, fps: float | Fraction = 12, channels: int = 3, dtype: type = np.uint8, **options):
-    with animation_writer(path, fps, **options) as write:
+    with animation_writer(path, fps, AnimationOptions(**options)) as write:
         for frame in frames(count, channels, dtype=dtype):
             write(frame)
 
@@ -122,7 +122,7 @@ def test_codecs_that_are_asked_for(
 ):
     """Pixel format, tags, frames, rate and duration by ffprobe, and the frames come back."""
     path = tmp_path / f"a{ending}"
-    with animation_writer(path, Fraction(24000, 1001), codec=codec, quality=100) as write:
+    with animation_writer(path, Fraction(24000, 1001), AnimationOptions(codec=codec, quality=100)) as write:
         for frame in frames(6, channels, 64, 96, dtype):
             write(frame)
     (stream,) = probe(path)
@@ -162,7 +162,7 @@ def test_a_codec_that_does_not_fit_is_told(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(ffmpeg, "encoders", lambda: frozenset({"libx264"}))
     with (
         pytest.raises(UserError, match="has no encoder for AV1"),
-        animation_writer(tmp_path / "a.webm", codec="av1") as write,
+        animation_writer(tmp_path / "a.webm", options=AnimationOptions(codec="av1")) as write,
     ):
         write(np.zeros((64, 64, 3), np.uint8))
     assert contents(tmp_path) == []
@@ -255,7 +255,9 @@ def test_pillow_plays_animated_pictures(tmp_path: Path, ending: str, loops: int)
 )
 def test_sequences(tmp_path: Path, ending: str, dtype: type, stored: type):
     like = Picture(np.zeros((1, 1, 3), np.uint8), icc=SRGB)
-    save(tmp_path / f"a.%04d{ending}", 3, dtype=dtype, first=98, like=like)
+    with animation_writer(tmp_path / f"a.%04d{ending}", options=AnimationOptions(like=like)) as write:
+        for number, frame in enumerate(frames(3, dtype=dtype), 98):
+            write(frame, number)
     assert contents(tmp_path) == [f"a.{number:04d}{ending}" for number in (98, 99, 100)]
     *_, last = frames(3, dtype=dtype)
     read = read_picture(tmp_path / f"a.0100{ending}")
@@ -362,11 +364,11 @@ def test_the_files_of_a_sequence_appear_as_they_are_done(tmp_path: Path):
     wish = threading.Event()
 
     def work() -> None:
-        with animation_writer(tmp_path / "a.####.png", first=1001, cancel=wish.is_set) as write:
+        with animation_writer(tmp_path / "a.####.png", cancel=wish.is_set) as write:
             for number, frame in enumerate(frames(4), 1001):
                 if number == 1004:
                     wish.set()
-                write(frame)
+                write(frame, number)
                 assert contents(tmp_path) == [f"a.{done}.png" for done in range(1001, number + 1)]
                 np.testing.assert_array_equal(read_picture(tmp_path / f"a.{number}.png").pixels, frame)
 

@@ -15,8 +15,8 @@ from PIL import Image
 from app.media.depth import to_bits
 from app.media.ffmpeg import executable
 from app.media.maps import Displacement, write_map
-from app.media.opening import open_source
 from app.media.pictures import read_picture, write_picture
+from app.media.source import open_source
 from app.media.video import read_clip
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Output, Recipe

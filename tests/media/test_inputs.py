@@ -24,10 +24,10 @@ from PIL import Image
 from app.errors import MOST_SHOWN, UserError, shown
 from app.media.inputs import open_input, read_input
 from app.media.maps import holds, read_map
-from app.media.opening import open_source
 from app.media.pictures import read_picture, write_picture
 from app.media.project import is_project, load
 from app.media.recipes import read_recipe
+from app.media.source import open_source
 from app.media.video import read_clip
 from app.model import toml
 from app.model.picture import Picture
@@ -192,9 +192,9 @@ SMALL_AND_HARMFUL = {
     "spaces in a list": ("nope = [\n[" + " " * 99_000 + "\n]]", "line 1: unknown key 'nope'"),
     "texts without an end": ('a = """\\""\n' + '\\"""\\""\n' * 140_000, "is not valid TOML: Unterminated string"),
     "faulty tables": ("force = [" + "{}," * 60_000 + "]", "line 1: force[1]: 'kind' must be one of"),
-    "faulty lists": ("force = [" + "[1]," * 1_000_000 + "]", "line 1: 'force[1]' must be a table"),
+    "faulty lists": ("force = [" + "[1]," * 250_000 + "]", "line 1: 'force[1]' must be a table"),
     "faulty samples": (
-        "[[stroke]]\ntool = 'push'\nsamples = [" + "[1]," * 1_000_000 + "]",
+        "[[stroke]]\ntool = 'push'\nsamples = [" + "[1]," * 250_000 + "]",
         "line 3: stroke[1]: 'samples[1][2]' is missing",
     ),
     "tables in plenty": ("nope = [" + "{}," * 1_000_000 + "]", "line 1: the 200001th of its keys, values and brackets"),
@@ -559,7 +559,7 @@ READING = """
 import sys
 from pathlib import Path
 from app.errors import UserError
-from app.media.opening import open_source
+from app.media.source import open_source
 try:
     source = open_source(Path(sys.argv[1]))
     print("1 page" if source.clip is None and not source.picture.note else "several pages")

@@ -215,9 +215,9 @@ def test_maps_made_elsewhere(tmp_path: Path):
 
 
 def test_a_map_sequence(tmp_path: Path):
-    with map_writer(tmp_path / "m.%03d.exr", first=7) as write:
-        for amount in (0.0, 0.5, 1.0):
-            write(Displacement(swirl(8, 8).values * np.float32(amount)))
+    with map_writer(tmp_path / "m.%03d.exr") as write:
+        for number, amount in enumerate((0.0, 0.5, 1.0), 7):
+            write(Displacement(swirl(8, 8).values * np.float32(amount)), number)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["m.007.exr", "m.008.exr", "m.009.exr"]
     np.testing.assert_allclose(read_map(tmp_path / "m.009.exr").values, swirl(8, 8).values, atol=6.1e-8)
 
@@ -321,6 +321,13 @@ def test_damaged_maps(tmp_path: Path, ending: str, damage: str):
     with pytest.raises(UserError, match=f"a{ending}") as raised:
         read_map(path)
     assert "\n" not in str(raised.value)
+
+
+def test_a_flo_file_without_pixels_is_none(tmp_path: Path):
+    for sides in ((0, 3), (3, 0), (-2, 3), (3, -2)):
+        (tmp_path / "a.flo").write_bytes(b"PIEH" + np.array(sides, "<i4").tobytes())
+        with pytest.raises(UserError, match=r"it is no Middlebury \.flo file"):
+            read_map(tmp_path / "a.flo")
 
 
 def test_what_is_no_map(tmp_path: Path):

@@ -494,6 +494,7 @@ def exif_bytes(orientation: int = 1) -> bytes:
     exif[0x010F] = "A camera"
     exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
     exif.get_ifd(0x8769)[0xA002] = 9999
+    exif.get_ifd(0x8825)[1] = "N"
     return exif.tobytes()
 
 
@@ -537,6 +538,10 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
     read = read_picture(path)
     assert read.icc == SRGB
     assert read.exif is not None
+    again = Image.Exif()
+    again.load(read.exif)
+    assert again.get_ifd(0x8769)[0x9003] == "2020:01:02 03:04:05"
+    assert again.get_ifd(0x8825)[1] == "N"
     assert read.xmp is not None
     assert b'Orientation="1"' in read.xmp
     if ending in (".png", ".jpg", ".tif"):

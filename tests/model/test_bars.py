@@ -14,9 +14,9 @@ from app.errors import UserError
 from app.model.bars import Actor, Bar, Which, bars, lanes, moved, stretched, with_changed
 from app.model.forces import Force, PointForce, VortexForce
 from app.model.handles import RecipeHandle, RecipePin
-from app.model.history import History
 from app.model.recipe import Recipe, Stop
 from app.model.strokes import Change, Dab, Stroke
+from app.model.undo import History
 
 DT = 1 / 60
 LED = RecipeHandle, RecipePin
@@ -326,6 +326,16 @@ def test_a_recording_ends_as_long_after_its_last_stroke_as_it_did() -> None:
     assert edited(driven, ("force", 0), lambda one: moved(one, 99, DT)).ticks == 99
     with pytest.raises(UserError, match="at most 1000000 ticks"):
         edited(recipe, ("stroke", 1), lambda one: moved(one, 2_000_000, DT))
+
+
+def test_what_is_led_later_has_as_long_to_arrive_as_what_was_led_last() -> None:
+    early = RecipeHandle(at=(0.3, 0.5), to=(0.4, 0.5), duration=10 * DT)
+    late = RecipeHandle(at=(0.6, 0.5), keys=((20 * DT, 0.6, 0.5), (30 * DT, 0.7, 0.5)), start=20 * DT)
+    recipe = Recipe(handle=(early, late), duration=45 * DT)
+    ticks = [edited(recipe, ("handle", 0), lambda one, by=by: moved(one, by, DT)).ticks for by in (0, 10, 20, 35, 50)]
+    assert ticks == [45, 45, 45, 60, 75]
+    assert edited(recipe, ("handle", 1), lambda one: stretched(one, 20, 40, DT)).ticks == 55
+    assert edited(recipe, ("handle", 1), lambda one: None).ticks == 45
 
 
 def any_edit(recipe: Recipe, dice: random.Random) -> Recipe:

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from app.model.document import Document
-from app.model.history import DEFAULT_BUDGET, History
 from app.model.picture import Picture
 from app.model.recipe import Recipe
+from app.model.undo import DEFAULT_BUDGET, History
 
 
 def document(**how: object) -> Document:

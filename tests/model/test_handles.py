@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import pytest
 
+from app.errors import UserError
 from app.model.handles import RecipeHandle, RecipePin, labelled, objections
 from app.model.recipe import Recipe
 from app.model.schema import frozen
@@ -23,6 +25,12 @@ def test_a_handle_is_in_force_from_the_tick_whose_middle_comes_after_its_start()
         assert led.first_tick(0.1) == wanted[0]
 
 
+def test_what_a_handle_is_edited_to_is_checked() -> None:
+    assert handle().edited(radius=0.2).radius == 0.2
+    with pytest.raises(ValueError, match="radius"):
+        handle().edited(radius=-1.0)
+
+
 def test_where_a_handle_goes_and_when_it_is_there() -> None:
     led = handle(start=1.0, duration=0.5)
     assert (led.ready, led.last, led.goal) == (1.5, 1.5, (0.6, 0.5))
@@ -30,6 +38,21 @@ def test_where_a_handle_goes_and_when_it_is_there() -> None:
     assert (led.ready, led.last, led.goal) == (1.5, 3.0, (0.3, 0.4))
     led = handle(to=None, start=1.0, keys=[])
     assert (led.ready, led.last, led.goal) == (1.0, 1.0, None)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("points = [[nan, 0.5], [0.1, 0.1]]", "'points[1][1]' must be a finite number, not nan"),
+        ("points = [[1e308, 0.5], [1e308, 0.1]]", "'points[1][1]' must be at most 10, not 1e+308"),
+        ('points = [["a", 0.5], [0.1, 0.1]]', "'points[1][1]' must be a number, not \"a\""),
+        ("points = []", "'at' is missing"),
+        ("points = [[0.1, 0.1], [0.2, 0.2]]\ngoals = [[1e308, 0.5], [1e308, 0.1]]", "'goals[1][1]' must"),
+    ],
+)
+def test_of_a_line_that_is_none_its_own_number_is_told(line: str, said: str) -> None:
+    with pytest.raises(UserError, match=rf"handle\[1\]: {re.escape(said)}"):
+        Recipe.parse(f"[[handle]]\n{line}\nscale = 2.0\n")
 
 
 def test_the_hand_adds_a_key_and_first_one_of_where_it_rested() -> None:
@@ -107,6 +130,13 @@ def test_a_handle_goes_two_radii_at_most() -> None:
     (said,) = objections([handle(to=[0.75, 0.5])], [], (1.0, 1.0))
     assert said == "handle[1] goes only 2 of the 2.5 radii to its goal; give it a larger radius"
     assert [*objections([handle(to=[0.5, 0.75])], [], (1.0, 0.75))] == []
+
+
+def test_of_a_line_outside_a_corner_is_told_that_is_there() -> None:
+    line = handle(points=[[-1.0, -0.5], [2.0, 1.5]])
+    assert [*objections([line], [], (1.0, 1.0))] == [
+        "handle[1] takes hold of nothing: (-1, -0.5) is outside the picture"
+    ]
 
 
 def test_handles_that_are_never_in_force_together_do_not_contradict_each_other() -> None:

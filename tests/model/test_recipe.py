@@ -275,6 +275,22 @@ def test_files_that_are_none(tmp_path: Path):
 # -- strokes ----------------------------------------------------------------------------------------------------------
 
 
+SHIPPED = sorted(shipped_recipes().values())
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_fault_is_told_with_its_line_wherever_it_stands(path: Path):
+    lines = path.read_text("utf-8").splitlines()
+    keys = [number for number, line in enumerate(lines) if re.match(r"\w+ = [^\[{]*$", line)]
+    for number in keys:
+        key = lines[number].split(" = ")[0]
+        if key == "kind":  # of which the table is told
+            continue
+        broken = [*lines[:number], f"{key} = {{ nonsense = 1 }}", *lines[number + 1 :]]
+        with pytest.raises(UserError, match=rf"^a\.toml, line {number + 1}: .*'(\w+\.)*{key}'"):
+            Recipe.parse("\n".join(broken), "a.toml")
+
+
 def push(*samples: tuple[int, float, float, float], **options: object) -> Stroke:
     return Stroke.model_validate({"tool": "push", "samples": samples, **options})
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from fractions import Fraction
 from itertools import pairwise
+from math import ceil, floor
 from typing import Any
 
 import pytest
 
 from app.errors import UserError
 from app.model.recipe import Playback, Recipe, Stop, Watch
-from app.model.timeline import Observation, Sentinel, Timeline, frame_positions, frame_rate
+from app.model.timeline import Observation, Sentinel, Timeline, frame_positions, frame_rate, moment_at
 
 TEN = Timeline(10, 0.1)
 
@@ -184,3 +186,19 @@ def test_a_million_frames_with_those_that_stand_still_are_the_most():
 def test_a_time_is_the_nearest_tick_within_the_timeline():
     assert [TEN.tick_at(seconds) for seconds in (-1, 0.04, 0.06, 0.94, 0.96, 7)] == [0, 0, 1, 9, 10, 10]
     assert TEN.time_of(2.5) == 0.25
+
+
+@pytest.mark.parametrize("playback", [{}, {"speed": 2.0}, {"speed": 0.3, "start": 0.2}, {"start": 0.1, "end": 0.9}])
+@pytest.mark.parametrize("fps", [10, 25, 29.97, 60])
+def test_the_frame_at_a_tick_is_the_last_that_has_begun(playback: dict[str, float], fps: float) -> None:
+    """By the positions of all frames; past the end they go on at their rate, as those of a longer clip."""
+    timeline, how = Timeline(37, 1 / 30), Playback(**playback)  # pyright: ignore[reportArgumentType]
+    positions = frame_positions(timeline, how, fps)
+    first = ceil(positions[0])
+    for tick in range(first, floor(positions[-1]) + 1):
+        assert moment_at(timeline, how, fps, tick) == bisect_right(positions, tick) - 1
+    for later in (1, 2, 30):
+        last = len(positions) - 1 + floor(later / 30 * fps + 1e-9)
+        assert moment_at(timeline, how, fps, timeline.ticks + later) == last
+    backwards = how.model_copy(update={"reverse": True})
+    assert moment_at(timeline, backwards, fps, first) == len(positions) - 1

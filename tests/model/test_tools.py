@@ -167,6 +167,15 @@ def test_a_point_that_is_only_clicked_is_pinned_and_one_that_is_dragged_is_led()
     assert led.keys == ((pytest.approx(7 * DT), 0.5, 0.5), (pytest.approx(8 * DT), 0.5, 0.514))
 
 
+def test_a_line_there_and_back_is_open_and_one_of_a_single_place_of_the_original_is_none() -> None:
+    there_and_back = Touch(0, 0.3, 0.5, shift=True), Touch(1, 0.6, 0.5, shift=True), Touch(2, 0.3, 0.5, shift=True)
+    line = gestured("handle", Press(BrushSettings(), False, EXTENT, DT), *there_and_back)
+    assert isinstance(line, RecipeHandle)
+    assert (line.points, line.closed) == (((0.3, 0.5), (0.6, 0.5), (0.3, 0.5)), False)
+    press = Press(BrushSettings(), False, EXTENT, DT, under=lambda seen: [(0.5, 0.5)] * len(seen))
+    assert gestured("handle", press, *there_and_back) is None
+
+
 def test_a_handle_that_is_taken_again_goes_as_far_as_the_pointer_but_not_out_of_the_picture() -> None:
     held = RecipeHandle(at=(0.1, 0.1), keys=())
     press = Press(BrushSettings(), False, EXTENT, DT, held=held, rests=(0.3, 0.9))

@@ -309,6 +309,18 @@ def test_twirl_turns_clockwise_at_its_rate_and_no_faster(device: Device) -> None
     brush.release()
 
 
+def test_a_twirl_that_moves_turns_about_where_it_is(device: Device) -> None:
+    given = []
+    for start in ((0.5, 0.5), (0.4, 0.45)):
+        fluid, brush = Fluid(device, Grid(64, 64)), Brush(device)
+        brush.twirl(fluid, Tip(start, (0.5, 0.5), radius=0.2), rate=3.0)
+        given.append(fluid.impulse.field.get())
+        fluid.release()
+        brush.release()
+    assert np.abs(given[0]).max() > 0.1
+    np.testing.assert_allclose(given[1], given[0], atol=1e-6)
+
+
 def test_expand_grows_by_its_integral(device: Device) -> None:
     grid = Grid(96, 64)
     fluid, brush = Fluid(device, grid), Brush(device)

@@ -108,9 +108,13 @@ class Desk:
 
         return display.Display(self.env["DISPLAY"])
 
-    def seen(self) -> np.ndarray:
-        """The screen as it is now, (h, w, 3) uint8, from the file in which the server keeps it."""
-        data = (self.folder / "Xvfb_screen0").read_bytes()
+    def dump(self) -> bytes:
+        """The file in which the server keeps the screen, as it is now."""
+        return (self.folder / "Xvfb_screen0").read_bytes()
+
+    def seen(self, dump: bytes | None = None) -> np.ndarray:
+        """The screen as it is now, or was in a `dump`, (h, w, 3) uint8."""
+        data = self.dump() if dump is None else dump
         # The header of an X window dump: 25 numbers, then the window's name up to its own length, then the colours.
         head = np.frombuffer(data, ">u4", 25)
         start, width, height, row, colours = (int(head[at]) for at in (0, 4, 5, 12, 19))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import moderngl
 import numpy as np
+from imgui_bundle import imgui
 
 from app.media.project import Project, from_picture
 from app.model.bars import Which
@@ -82,6 +83,7 @@ class Robot:
         self.size = size = round(size[0] * density), round(size[1] * density)
         self.target = self._framebuffer((1, 1))
         self.editor = Editor(device, project, preferences or Preferences(auto_quality=False), journals)
+        imgui.get_io().config_error_recovery_enable_assert = True  # what was begun and not ended, say
         self.mods = Mods()
         self.frame()
         self.frame()
@@ -202,3 +204,27 @@ def export_dialog(robot: Robot, folder: Path) -> ExportDialog:
     """What a person who exports into a folder is asked."""
     editor = robot.editor
     return ExportDialog(editor.session, editor.exports, editor.chooser, Preferences(export_folder=str(folder)))
+
+
+def summary(robot: Robot) -> dict[str, object]:
+    """What a person has set, and what has become of the work."""
+    editor, state = robot.editor, robot.editor.state
+    session, likes, view = editor.session, editor.preferences, editor.view
+    history = session.document.history
+    return {
+        **{name: getattr(state, name) for name in ("tool_name", "brush", "mask", "select_by", "split", "statistics")},
+        "opposite": sorted(name for name, is_so in state.opposite.items() if is_so),
+        "overlays": [name for name, overlay in state.overlays.items() if overlay.shown],
+        "panels": (state.inspector, state.lanes.shown, likes.inspector, likes.lanes, likes.theme),
+        "selected": (state.selected, sorted(state.lanes.selected), len(state.selection)),
+        "history": (history.index, history.entries[-1].name),
+        "time": (session.end, session.playing, session.coasting, session.loops),
+        "playhead": None if session.playing or session.coasting else session.target,
+        "bars": [(stroke.first_tick, stroke.end_tick, stroke.muted) for stroke in session.recipe.stroke],
+        "parts": session.recipe.model_dump(include={"time", "mask", "change"}, exclude_defaults=True),
+        "handles": len(session.recipe.handle),
+        "view": tuple(round(number, 3) for number in (view.zoom or 0.0, *view.centre)),
+        "shown": [dialog.title for dialog in editor.dialogs.shown],
+        "messages": [message.text for message in editor.messages.shown],
+        "closed": editor.commands.closed,
+    }

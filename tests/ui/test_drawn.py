@@ -29,7 +29,7 @@ from app.ui.saving import SaveDialog
 from app.work import session
 from solver.gl.device import Device
 from support.drawn import Drawn, differences, new_in
-from support.editing import Robot, add_bars, small_project
+from support.editing import Robot, add_bars, small_project, summary
 from support.golden import GOLDEN, WRITES
 
 FILE = GOLDEN / "drawn.txt"
@@ -322,30 +322,6 @@ def test_imguis_own_widgets_look_as_is_written_down(name: str, scale: float, gol
     if WRITES:
         golden[f"style {name} {scale}"] = found
     assert found == golden[f"style {name} {scale}"]
-
-
-def summary(robot: Robot) -> dict[str, object]:
-    """What a person has set, and what has become of the work."""
-    editor, state = robot.editor, robot.editor.state
-    session, likes, view = editor.session, editor.preferences, editor.view
-    history = session.document.history
-    return {
-        **{name: getattr(state, name) for name in ("tool_name", "brush", "mask", "select_by", "split", "statistics")},
-        "opposite": sorted(name for name, is_so in state.opposite.items() if is_so),
-        "overlays": [name for name, overlay in state.overlays.items() if overlay.shown],
-        "panels": (state.inspector, state.lanes.shown, likes.inspector, likes.lanes, likes.theme),
-        "selected": (state.selected, sorted(state.lanes.selected), len(state.selection)),
-        "history": (history.index, history.entries[-1].name),
-        "time": (session.end, session.playing, session.coasting, session.loops),
-        "playhead": None if session.playing or session.coasting else session.target,
-        "bars": [(stroke.first_tick, stroke.end_tick, stroke.muted) for stroke in session.recipe.stroke],
-        "parts": session.recipe.model_dump(include={"time", "mask", "change"}, exclude_defaults=True),
-        "handles": len(session.recipe.handle),
-        "view": tuple(round(number, 3) for number in (view.zoom or 0.0, *view.centre)),
-        "shown": [dialog.title for dialog in editor.dialogs.shown],
-        "messages": [message.text for message in editor.messages.shown],
-        "closed": editor.commands.closed,
-    }
 
 
 def test_every_action_does_what_is_written_down(device: Device, tmp_path: Path, golden: dict[str, list[str]]) -> None:

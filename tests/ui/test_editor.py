@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from app.media import project as projects
+from app.media.codecs.cmyk import INK
 from app.media.maps import Displacement, read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import Project
@@ -31,11 +32,11 @@ from app.ui.dialogs import PictureOrMap, Preferring, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
+from app.ui.key_sheet import KeySheet
 from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS, PATIENCE, TRIALS, Speed
 from app.ui.saving import SaveDialog
-from app.ui.shortcuts import Shortcuts
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
 from solver.brush.masks import ZERO
@@ -588,7 +589,7 @@ def test_the_recipe_can_be_copied(robot: Robot) -> None:
 
 @pytest.mark.parametrize(
     ("key", "dialog"),
-    [("f1", Shortcuts), ("ctrl+,", Preferring), ("ctrl+e", ExportDialog), ("ctrl+o", Browser), ("ctrl+s", SaveDialog)],
+    [("f1", KeySheet), ("ctrl+,", Preferring), ("ctrl+e", ExportDialog), ("ctrl+o", Browser), ("ctrl+s", SaveDialog)],
 )
 def test_dialogs_open_and_close(robot: Robot, key: str, dialog: type) -> None:
     robot.see()
@@ -1110,6 +1111,21 @@ def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
     assert names(robot) == ["Open", "Push"]
 
 
+def test_what_was_read_for_long_is_seen_without_anybody_s_hand(robot: Robot, tmp_path: Path) -> None:
+    write_picture(tmp_path / "other.png", pattern(100, 60))
+    files, goes_on = robot.editor.files, Event()
+    files.read(
+        tmp_path / "other.png",
+        lambda: load_any(tmp_path / "other.png") if goes_on.wait(60) else robot.editor.session.project,
+    )
+    robot.frame(count=10)
+    assert not robot.editor.wants_frame()
+    goes_on.set()
+    while files.is_loading:
+        robot.frame()
+    assert robot.editor.wants_frame()  # this frame had been drawn before
+
+
 def test_what_is_only_there_until_a_file_has_been_read_is_replaced(robot: Robot, tmp_path: Path) -> None:
     write_picture(tmp_path / "other.png", pattern(100, 60))
     robot.editor.workspace.placeholder = robot.editor.session
@@ -1456,16 +1472,15 @@ def test_for_a_project_the_machine_is_not_measured(automatic: Robot, tmp_path: P
 def test_what_of_a_file_is_lost_is_told_when_it_is_opened_and_not_again(robot: Robot, tmp_path: Path) -> None:
     from PIL import Image
 
-    page = Image.fromarray(pattern().pixels)
-    page.save(tmp_path / "pages.tif", save_all=True, append_images=[page])
-    robot.editor.files.open(tmp_path / "pages.tif")
+    Image.fromarray(pattern().pixels).convert("CMYK").save(tmp_path / "ink.tif")
+    robot.editor.files.open(tmp_path / "ink.tif")
     robot.until(lambda: not robot.editor.files.is_loading)
-    line = "pages.tif: of its 2 pages only the first is used"
+    line = f"ink.tif: {INK}"
     assert [message.text for message in robot.editor.messages.shown] == [line]
     robot.editor.messages.shown.clear()
     robot.editor.exports.start(export_dialog(robot, tmp_path).job())
     robot.until(lambda: not robot.editor.exports.is_running)
-    assert [message.text for message in robot.editor.messages.shown] == [f"Exported pages warped.png to {tmp_path}"]
+    assert [message.text for message in robot.editor.messages.shown] == [f"Exported ink warped.png to {tmp_path}"]
 
 
 def test_what_an_export_tells_is_shown(robot: Robot, tmp_path: Path) -> None:

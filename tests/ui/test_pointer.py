@@ -162,6 +162,14 @@ def test_keys_zoom_where_the_pointer_is(robot: Robot) -> None:
     assert robot.editor.view.zoom is None
 
 
+def test_keys_zoom_in_the_middle_where_the_pointer_is_elsewhere(robot: Robot) -> None:
+    layout = robot.editor.layout
+    middle = robot.editor.view.to_picture(*layout.canvas.middle)
+    robot.move(300, layout.timebar.y + 20)
+    robot.key("=")
+    assert robot.editor.view.to_picture(*layout.canvas.middle) == pytest.approx(middle, abs=1e-6)
+
+
 @pytest.mark.parametrize("switched", [False, True])
 @pytest.mark.parametrize("alt", [False, True])
 def test_alt_is_the_other_direction_than_the_switch_says(robot: Robot, switched: bool, alt: bool) -> None:

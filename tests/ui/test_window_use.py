@@ -42,13 +42,13 @@ busy = pytest.mark.parametrize("desk", [True], indirect=True, ids=["busy"])
 
 def still(desk: Desk) -> np.ndarray:
     """What is seen once it does not change any more."""
-    before, since = desk.seen(), time.monotonic()
+    before, since = desk.dump(), time.monotonic()
     while time.monotonic() - since < RESTED:
         time.sleep(0.1)
-        seen = desk.seen()
-        if not np.array_equal(seen, before):
-            before, since = seen, time.monotonic()
-    return before
+        dump = desk.dump()
+        if dump != before:
+            before, since = dump, time.monotonic()
+    return desk.seen(before)
 
 
 def changed(seen: np.ndarray, before: np.ndarray, left: int, top: int, right: int, bottom: int) -> np.ndarray:

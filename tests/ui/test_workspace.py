@@ -3,17 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 
 from app.media.pictures import write_picture
 from app.media.project import from_picture
-from app.ui.files import fresh_recipe
+from app.ui.files import fresh_recipe, load_any
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
 from support.gl_objects import living
 
 DRAWN_WITH = "Texture", "Framebuffer", "Buffer", "Query"
+
+
+def test_what_is_left_is_still_in_the_frame_that_is_drawn(robot: Robot, tmp_path: Path) -> None:
+    """The history shows pictures of a work that a file, once it has been read, takes the place of."""
+    editor, path, device = robot.editor, tmp_path / "other.png", robot.device
+    write_picture(path, pattern(100, 80))
+    editor.workspace.placeholder = editor.session
+    robot.frame(count=2)
+    slow = Event()
+    editor.files.read(path, lambda: load_any(path) if slow.wait(60) else robot.editor.session.project, leaves=True)
+    robot.frame()
+    slow.set()
+    while editor.files.is_loading:
+        robot.frame()
+        assert device.ctx.error == "GL_NO_ERROR"
+    assert editor.session.project.name == "other"
 
 
 def test_many_works_need_no_more_of_the_gpu_than_a_few(device: Device, tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
 from app.model.timelaws import Instants
-from app.work.replay import LoadedForce, Replay
+from app.work.loaded_forces import LoadedForce
+from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
 

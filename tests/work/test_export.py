@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import time
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -21,8 +22,8 @@ from app.media import ffmpeg
 from app.media.auxiliary import Pictures
 from app.media.files import takes_place
 from app.media.maps import Displacement, cropped, read_map, to_st, write_map
-from app.media.opening import open_source
 from app.media.pictures import read_picture, write_picture
+from app.media.source import open_source
 from app.media.video import read_clip
 from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
@@ -519,6 +520,24 @@ def test_what_is_handed_over_arrives_in_order():
     assert came == list(range(100))
     with prefetch(iter(range(100))) as items:
         assert list(items) == list(range(100))
+
+
+def test_what_was_handed_over_before_a_fault_is_written():
+    came: list[int] = []
+
+    def slow(number: int) -> None:
+        time.sleep(0.05)
+        came.append(number)
+
+    def hand_over() -> None:
+        with write_behind(slow) as put:
+            put(0)
+            put(1)
+            raise UserError("the next cannot be read")
+
+    with pytest.raises(UserError, match="the next"):
+        hand_over()
+    assert came == [0, 1]
 
 
 def test_what_goes_wrong_at_one_end_is_heard_at_the_other():

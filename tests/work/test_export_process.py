@@ -11,29 +11,45 @@ from typing import Any
 
 from app.media.pictures import read_picture
 from app.model.recipe import Recipe
-from app.work.export_process import ExportProcess
+from app.work.export_process import ExportProcess, FitProcess
+from app.work.fit_job import Fit
 from app.work.jobs import Job, Outputs
 
 PICTURE = Path(__file__).parents[2] / "assets" / "pictures" / "coffee.png"
 PATIENCE = 60.0  # seconds
 
 
-class Deadly:
-    """Whoever unpickles it ends at once, as a process does that the system kills."""
+@dataclass(frozen=True)
+class Called:
+    """Whoever unpickles it calls a function first."""
 
-    def __reduce__(self) -> tuple[Callable[..., Any], tuple[int]]:
-        return signal.raise_signal, (signal.SIGKILL,)
+    what: Callable[..., Any]
+    argument: float
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[float]]:
+        return self.what, (self.argument,)
 
 
 @dataclass(frozen=True)
 class Dying(Job):
-    """A job that kills its process before all of it is read."""
+    """A job that kills its process before all of it is read, as the system does."""
 
     deadly: Any = None
     rest: bytes = b""
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return Dying, (Deadly(), self.rest)
+        return Dying, (Called(signal.raise_signal, signal.SIGKILL), self.rest)
+
+
+@dataclass(frozen=True)
+class SlowFit(Fit):
+    """A fit whose process takes its time to read it."""
+
+    slow: Any = None
+    rest: bytes = b""
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return SlowFit, (Called(time.sleep, PATIENCE), self.rest)
 
 
 def ended(process: ExportProcess) -> ExportProcess:
@@ -57,3 +73,9 @@ def test_a_picture_larger_than_a_pipe_is_exported(tmp_path: Path):
     process = ended(ExportProcess(Job(recipe, read_picture(PICTURE), tmp_path, Outputs(tmp_path / "out.png"))))
     assert process.error == ""
     assert (read_picture(tmp_path / "out.png").pixels == read_picture(PICTURE).pixels).all()
+
+
+def test_a_fit_is_stopped_at_once_also_while_its_process_is_getting_it(tmp_path: Path):
+    started = time.monotonic()
+    FitProcess(SlowFit(Recipe(), read_picture(PICTURE), tmp_path, rest=bytes(10_000_000))).stop()
+    assert time.monotonic() - started < PATIENCE / 4

@@ -134,6 +134,26 @@ def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_those_that_stay_a
         fit(device, None)
 
 
+def test_what_is_turned_is_turned_at_the_end_as_it_was_and_a_line_that_stays_is_pinned_whole(device: Device):
+    still = "[[handle]]\nat = [0.2, 0.3]\nrotate = 40.0\nturned = [[1.1, 20.0, 1.5]]\n"
+    led = "[[handle]]\nat = [0.4, 0.6]\nto = [0.46, 0.6]\nduration = 0.1\nrotate = 90.0\nturned = [[0.2, 30.0, 1.2]]\n"
+    line = "[[handle]]\npoints = [[0.7, 0.2], [0.8, 0.2], [0.8, 0.4]]\nclosed = true\nkeys = []\n"
+    recipe = fit(device, None, 2, RECIPE + still + led + line).trial.recipe
+    assert [(each.at, each.to, each.rotate, each.scale, each.turned) for each in recipe.handle] == [
+        ((0.2, 0.3), (0.2, 0.3), 20.0, 1.5, ()),
+        ((0.4, 0.6), (0.46, 0.6), 30.0, 1.2, ()),
+    ]
+    assert (recipe.pin[1].points, recipe.pin[1].closed) == (((0.7, 0.2), (0.8, 0.2), (0.8, 0.4)), True)
+
+
+def test_what_is_pinned_between_strokes_is_pinned_then(device: Device):
+    stroke = '[[stroke]]\ntool = "push"\nsamples = [[0, 0.2, 0.2, 1.0], [3, 0.3, 0.2, 1.0]]\n'
+    led = "[[handle]]\nat = [0.4, 0.6]\nto = [0.46, 0.6]\nduration = 0.1\nstart = 0.2\n"
+    pinned = "[[handle]]\nat = [0.7, 0.2]\nkeys = []\nstart = 0.2\nend = 0.36\n"
+    pin = fit(device, None, 1, RECIPE + stroke + led + pinned).trial.recipe.pin[1]
+    assert (pin.at, pin.start, pin.end) == ((0.7, 0.2), 0.2, 0.36)
+
+
 def test_what_was_pinned_after_it_had_been_moved_is_led_to_where_it_was_pinned(device: Device):
     late = "[[handle]]\nat = [0.3, 0.42]\nkeys = []\nstart = 0.35\n"
     handle = "[[handle]]\nat = [0.3, 0.4]\nto = [0.4, 0.4]\nduration = 0.25\n"

@@ -9,10 +9,11 @@ import pytest
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
-from app.model.handles import ARRIVED, objections
+from app.model.handles import ARRIVED, MOST_OBJECTIONS, objections
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
+from app.work.held import unmet
 from app.work.replay import Replay
 from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
 from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
@@ -339,7 +340,7 @@ def test_what_is_not_reached_is_told_by_number(device: Device):
     handles = [led_to([0.6, 0.6], [0.7, 0.6]), led_to([0.15, 0.17], [0.4, 0.5], name="held")]
     replay = replay_of(device, handle=handles, freeze=[frozen_disc])
     replay.seek(48)
-    (said,) = replay.unmet(ARRIVED)
+    (said,) = unmet(replay, ARRIVED)
     assert said.startswith('handle[2] "held" is 0.')
     assert said.endswith("away from where it is led: what it holds is frozen")
     assert replay.warp.statistics().folds == 0
@@ -352,7 +353,7 @@ def test_a_line_that_is_led_about_a_place_far_outside_is_told_of(device: Device)
     line = {"at": [0.5, -4.0], "points": [[0.2, 0.5], [0.6, 0.5]], "to": [0.5, -3.8], "duration": 0.1}
     replay = replay_of(device, handle=[line], freeze=[frozen_disc], duration=0.1)
     replay.seek(4)
-    (said,) = replay.unmet(ARRIVED)
+    (said,) = unmet(replay, ARRIVED)
     assert said.endswith("away from where it is led: what it holds is frozen")
     replay.release()
 
@@ -372,7 +373,7 @@ def test_what_walls_part_from_its_goal_is_told_and_folds_nothing(device: Device)
     wall = {"kind": "path", "points": ring.tolist(), "radius": 0.04, "hardness": 1.0}
     replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5], radius=0.1)], freeze=[wall], duration=1.0)
     replay.seek(60)
-    (said,) = replay.unmet(ARRIVED)
+    (said,) = unmet(replay, ARRIVED)
     assert said.startswith("handle[1] is 0.")
     found = replay.warp.statistics()
     assert found.folds == 0
@@ -418,6 +419,13 @@ def test_what_cannot_be_met_is_objected_to():
         "handle[7] and handle[8] are led 5.65 times as far apart as they lie",
         "handle[11] and handle[12] cross each other's way",
     ]
+
+
+def test_of_many_contradictions_some_are_told(device: Device):
+    recipe = Recipe.model_validate(frozen({"handle": [led_to([0.5, 0.5], [k / 9, 0.2]) for k in range(9)]}))
+    pictures = Pictures(Picture(BLACK))
+    Replay(device, recipe, pictures).release()
+    assert len(pictures.notices) == MOST_OBJECTIONS
 
 
 def test_an_arrangement_without_contradiction_is_not_objected_to():

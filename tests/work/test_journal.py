@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import pytest
 
-from app.model.history import Entry, History
 from app.model.recipe import VERSION as RECIPE_VERSION
 from app.model.recipe import Recipe
 from app.model.strokes import Change, Stroke
+from app.model.undo import Entry, History
 from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuation, read
 
 ORIGIN = Origin("Käse 1", "/pictures", None, True, False, 12, 34)

@@ -18,14 +18,15 @@ from app.media.auxiliary import Pictures
 from app.media.pictures import write_picture
 from app.media.project import Project
 from app.model.areas import Part
-from app.model.history import History
 from app.model.mask_edits import ClearMask, FeatherMask, FillMask, InvertMask, MaskStroke, PictureMask, SpreadMask
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.sampling import Segment, Window, to_grid
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
+from app.model.undo import History
 from app.work import journal
-from app.work.replay import THICKENING, Replay
+from app.work.brushwork import THICKENING
+from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -346,3 +347,21 @@ def test_brightness_set_while_the_fluid_moves_is_one_undo_away(session: Session)
     assert is_same(masks(session.replay), replayed(session))
     session.undo()
     assert session.recipe.mask == ()
+
+
+def test_to_clear_what_only_an_undone_work_had_painted_changes_no_bit(device: Device) -> None:
+    """The mask is still there on the GPU, with nothing on it."""
+    data = {"tool": "push", "radius": 0.2, "samples": ((0, 0.3, 0.5, 1.0), (6, 0.5, 0.5, 1.0))}
+    moving = Recipe.model_validate({"duration": 0.2, "fluid": {"grid": 32}, "stroke": (data,)})
+    frozen = FillMask(kind="fill", tick=3, of="frozen", amount=1.0, window=Window(box=(0.6, 0.1, 0.9, 0.4)))
+    cleared = moving.edited(mask=(ClearMask(kind="clear", tick=5, of="frozen"),))
+    found = []
+    for first in (moving, moving.edited(mask=(frozen,))):
+        replay = Replay(device, first, Pictures(Picture(np.zeros((48, 64, 3), np.uint8))))
+        replay.seek(4)
+        replay.use(cleared)
+        replay.seek(9)
+        found.append(replay.snapshot())
+        replay.release()
+    assert found[0].keys() == found[1].keys()
+    assert all(np.array_equal(found[0][name], found[1][name], equal_nan=True) for name in found[0])

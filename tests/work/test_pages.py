@@ -15,7 +15,7 @@ from PIL import Image
 
 from app.errors import UserError
 from app.media.maps import Displacement, write_map
-from app.media.opening import open_source
+from app.media.source import open_source
 from app.progress import Progress
 from app.work.applying import Application, MapSource
 from app.work.jobs import Outputs

@@ -24,10 +24,10 @@ from app.media import project as projects
 from app.media.pictures import write_picture
 from app.media.project import Project
 from app.model.document import Document
-from app.model.history import History
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
+from app.model.undo import History
 from app.ui.recovering import Offer
 from app.work import locks, recovery
 from app.work.locks import Lock

@@ -13,6 +13,7 @@ from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
+from app.work.observing import whereabouts
 from app.work.replay import Replay
 from solver.fluid import Fluid
 from solver.gl.device import Device
@@ -242,7 +243,7 @@ def test_a_point_is_followed(device: Device):
     replay = Replay(device, recipe, pictures(), budget=0)
     replay.seek(12)
     for point in ((0.5, 0.5), (0.45, 0.55), (0.6, 0.62)):
-        place = np.array(replay.whereabouts(point))
+        place = np.array(whereabouts(replay.warp, replay.grid, point))
         wanted = np.multiply(point, replay.grid.extent)
         assert np.abs(place - wanted).sum() > 0.01
         # An eighth of what the places lie apart that it is sought among.

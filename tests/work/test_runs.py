@@ -21,6 +21,7 @@ from solver.gl.device import Device
 from solver.resample.plan import Edges, GivenMap, Sampling
 from solver.resample.sampler import Sampler
 from support.golden import GOLDEN, Golden, told
+from support.passes import Passes
 
 RUNS: dict[str, Any] = tomllib.loads((GOLDEN / "runs.toml").read_text("utf-8"))
 TICKS = 9
@@ -40,10 +41,17 @@ def golden(shared_device: Device) -> Iterator[Golden]:
         yield golden
 
 
+@pytest.fixture(scope="module")
+def passes(shared_device: Device) -> Iterator[Golden]:
+    with Golden.of_software(shared_device, "passes.txt") as golden:
+        yield golden
+
+
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_gives_the_numbers_that_are_written_down(
-    device: Device, name: str, golden: Golden, tmp_path: Path
+    device: Device, name: str, golden: Golden, passes: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    noted = Passes(monkeypatch)
     write_picture(tmp_path / "field.png", Picture(picture(30, 20)))
     parts = {"duration": 1.0} | RUNS[name]
     parts["fluid"] = {"grid": 36, "dt": 0.025, "viscosity": 0.002} | parts.get("fluid", {})
@@ -77,10 +85,14 @@ def test_a_run_gives_the_numbers_that_are_written_down(
         replay.release()
     for what, numbers in found.items():
         golden.compare(f"{name} {what}", numbers, 0.1 if what.startswith("decades") else None)
+    noted.compare(passes, name)
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
-def test_pictures_are_looked_up_as_it_is_written_down(device: Device, channels: int, golden: Golden) -> None:
+def test_pictures_are_looked_up_as_it_is_written_down(
+    device: Device, channels: int, golden: Golden, passes: Golden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted = Passes(monkeypatch)
     y, x = np.mgrid[0:30, 0:40] / 40
     values = np.stack([0.2 * np.sin(9 * y) + 0.1 * x, 0.15 * np.cos(11 * x) - 0.2 * y], axis=-1).astype(np.float32)
     warp, sampler = GivenMap(device, values), Sampler(device)
@@ -105,3 +117,4 @@ def test_pictures_are_looked_up_as_it_is_written_down(device: Device, channels: 
     finally:
         sampler.release()
         warp.release()
+    noted.compare(passes, f"{channels} channels")

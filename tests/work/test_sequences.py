@@ -124,8 +124,7 @@ def test_frames_of_another_kind_are_told(folder: Path, fluidwarp: Run):
     ran = fluidwarp(folder, "render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr")
     assert ran.returncode == 1
     assert "plate.1003.exr: it has 49 x 32 pixels of 3 x 32 bits, and the first of its sequence 48 x 32" in ran.stderr
-    assert made(folder)[0] == "w.1001.exr"
-    assert "w.1003.exr" not in made(folder)
+    assert made(folder) == ["w.1001.exr", "w.1002.exr"]
 
 
 def test_files_are_not_replaced_by_their_own_results(folder: Path, fluidwarp: Run):

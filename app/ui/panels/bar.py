@@ -22,8 +22,8 @@ from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 
 MENU = (
-    "open", "recent", "paste", "import_map", "", "save", "save_as", "apply_to", "", "copy_picture", "copy_recipe",
-    "export", "", "preferences", "shortcuts", "", "quit",
+    "open", "recent", "paste", "open_frames", "import_map", "", "save", "save_as", "apply_to", "", "copy_picture",
+    "copy_recipe", "export", "", "preferences", "shortcuts", "", "quit",
 )  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         _head(ui, session, state, do)
         bar = imgui.get_style().scrollbar_size
         x0 = rect.x + ui.px(12)
-        scale = Scale(x0, max(rect.right - ui.px(14) - bar, x0 + 1.0), *lanes.span(session.end))
+        scale = Scale(x0, max(rect.right - ui.px(14) - bar, x0 + 1.0), *lanes.span(session.length))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
         if rect.height > ui.px(LOW):
             _ruler(ui, session, scale)
@@ -86,7 +86,7 @@ def _head(ui: Ui, session: Session, state: EditorState, do: Do) -> None:
     muted = lanes.is_muted(session)
     buttons = (
         ("bars_together", "together", "They begin with the first of them.", len(lanes.selected) > 1, False),
-        ("bars_mute", "mute", "It stays, and does nothing.", some, muted),
+        ("bars_mute", "mute", "" if muted else "It stays, and does nothing.", some, muted),
         ("remove", "trash", "", some, False),
     )
     size, between = 24.0, 4.0
@@ -144,9 +144,9 @@ def _ruler(ui: Ui, session: Session, scale: Scale) -> None:
     """Seconds, and the playhead, which follows the pointer that is pressed here."""
     corner, height, dt, x1 = imgui.get_cursor_screen_pos(), ui.px(RULER), session.dt, scale.x1
     imgui.invisible_button("ruler", ImVec2(max(x1 - corner.x, 1.0), height))
-    if imgui.is_item_active() and session.end:
-        tick = round(min(max(scale.tick_at(imgui.get_mouse_pos().x), 0), session.end))
-        if tick != session.target:
+    if imgui.is_item_active() and session.length:
+        tick = round(min(max(scale.tick_at(imgui.get_mouse_pos().x), 0), session.length))
+        if tick != session.moment:
             session.seek(tick)
     elif imgui.is_item_hovered():
         ui.tooltip("The recording", more="Drag to go through it. The wheel with Ctrl shows less of it, or more.")
@@ -186,8 +186,8 @@ def _bars(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
             if bar.start > scale.stop:
                 break
             _bar(ui, session, state, bar, y, scale)
-    now = scale.across(session.target)
-    if scale.x0 <= now <= scale.x1 and session.end:
+    now = scale.across(session.moment)
+    if scale.x0 <= now <= scale.x1 and session.length:
         low, high = ImVec2(now, top), ImVec2(now + ui.px(1.5), top + imgui.get_window_height())
         draw.add_rect_filled(low, high, packed(ui.palette.text))
     imgui.end_child()
@@ -261,7 +261,7 @@ def _point(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
         adds = io.key_shift or io.key_ctrl
         if found is not None:
             state.selected = _label(session, found[0])
-            lanes.press(*found, scale.tick_at(mouse.x), mouse.x, adds, session.end)
+            lanes.press(*found, scale.tick_at(mouse.x), mouse.x, adds, session.length)
         elif not adds:
             lanes.selected = set()
     elif imgui.is_item_active() and lanes.drag is not None:
@@ -271,9 +271,9 @@ def _point(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
     elif found is not None:
         _tell(ui, session, found[0])
     if hovered and io.mouse_wheel and io.key_ctrl:
-        lanes.zoom(session.end, scale.tick_at(mouse.x), 0.8**io.mouse_wheel)
+        lanes.zoom(session.length, scale.tick_at(mouse.x), 0.8**io.mouse_wheel)
     elif hovered and (io.mouse_wheel_h or (io.mouse_wheel and io.key_shift)):
-        lanes.pan(session.end, -0.1 * (io.mouse_wheel_h or io.mouse_wheel))
+        lanes.pan(session.length, -0.1 * (io.mouse_wheel_h or io.mouse_wheel))
     return let_go
 
 

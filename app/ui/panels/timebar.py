@@ -39,7 +39,7 @@ LANES = 4  # of bars of handles, one below the other
 def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> None:
     """Buttons, the time, the track, and how much of the warp is seen."""
     with ui.panel("timeline", rect, (8, 12)):
-        some = session.end > 0
+        some = session.length > 0
         if ui.icon_button("start", "back", "To the start", "home", enabled=some):
             do("start")
         imgui.same_line(0, ui.px(2))
@@ -53,6 +53,8 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         imgui.same_line(0, ui.px(2))
         returns = session.recipe.time.ping_pong
         icon, now, coming = REPEATS["returns" if returns else "loop" if session.loops else "once"]
+        if session.project.clip is not None and session.loops:
+            coming = "Click to play it once."
         if ui.icon_button("repeat", icon, now, more=coming, active=icon != "once", enabled=some):
             do("repeat")
         imgui.same_line(0, ui.px(2))
@@ -61,7 +63,7 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
             do("lanes")
         imgui.same_line(0, ui.px(10))
         if imgui.get_window_width() > ui.px(560):
-            _time(ui, session.target * session.dt, session.end * session.dt)
+            _time(ui, session.moment * session.dt, session.length * session.dt)
             imgui.same_line(0, ui.px(16))
         across = min(168, 0.3 * imgui.get_window_width() / ui.scale)
         amount = ui.px(across)
@@ -107,11 +109,11 @@ def _track(ui: Ui, session: Session, state: EditorState, width: float) -> None:
     hovered, held = imgui.is_item_hovered(), imgui.is_item_active()
     inset = ui.px(7)
     x0, x1 = corner.x + inset, corner.x + width - inset
-    end = session.end
+    end = session.length
     if held and end:
         part = min(max((imgui.get_mouse_pos().x - x0) / (x1 - x0), 0.0), 1.0)
         tick = round(part * end)
-        if tick != session.target:
+        if tick != session.moment:
             session.seek(tick)
     draw = imgui.get_window_draw_list()
     top, bottom = corner.y + ui.px(10), corner.y + ui.px(22)
@@ -124,7 +126,7 @@ def _track(ui: Ui, session: Session, state: EditorState, width: float) -> None:
         draw.add_line(ImVec2(x, top - ui.px(3)), ImVec2(x, bottom + ui.px(3)), packed(MASKS), ui.px(2))
     if not end:
         return
-    now = across(session.target)
+    now = across(session.moment)
     played = blend(palette.raised, palette.accent, 0.16)
     draw.add_rect_filled(ImVec2(x0, top), ImVec2(now, bottom), packed(played), ui.px(4))
     passed = min(session.tick, session.target)

@@ -1,4 +1,4 @@
-"""Which key does what: as `actions.py` has it, and what the person has changed of that."""
+"""Which key does what now: by default as the rows of `actions.py` have it, and what the person has changed of that."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Keyed:
         return self.keys[0] if self.keys else ""
 
 
-class Keys:
+class Keymap:
     """The chords of all actions.
 
     Args:

@@ -1,4 +1,4 @@
-"""The sheet on F1: all keys, each of which can be changed there. What they are by default is in `actions.py`."""
+"""The sheet on F1: all keys and what they do, each of which can be changed there."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.ui.dialogs import Dialog, beside
-from app.ui.keys import TAKEN, Keyed, Keys
+from app.ui.keymap import TAKEN, Keyed, Keymap
 from app.ui.theme import packed
 from app.ui.widgets import Ui, keys_shown
 
@@ -27,12 +27,12 @@ COLUMNS = (("File", "Edit", "Time", "Masks"), ("Tools", "Brush"), ("View", "Help
 ROW = 19.5  # points
 
 
-class Shortcuts(Dialog):
+class KeySheet(Dialog):
     """Shows all keys, and takes others for them."""
 
     width, height = 880, 720
 
-    def __init__(self, keys: Keys) -> None:
+    def __init__(self, keys: Keymap) -> None:
         super().__init__("Keyboard and mouse")
         self._keys = keys
         self._wanted: Keyed | None = None  # for which a key is to be pressed

@@ -6,9 +6,9 @@ import random
 
 import pytest
 
-from app.model.history import History
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
+from app.model.undo import History
 
 
 def stroke(seed: int, samples: int = 3) -> Stroke:

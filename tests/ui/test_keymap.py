@@ -9,9 +9,9 @@ import pytest
 
 from app.ui.actions import ACTIONS, BY_KEY
 from app.ui.events import Key, Mods
-from app.ui.keys import Keys
+from app.ui.key_sheet import KeySheet
+from app.ui.keymap import Keymap
 from app.ui.preferences import Preferences
-from app.ui.shortcuts import Shortcuts
 from solver.gl.device import Device
 from support.editing import Robot, small_project
 from support.widgets import Widgets
@@ -25,15 +25,15 @@ def robot(device: Device, tmp_path: Path) -> Iterator[Robot]:
 
 
 @pytest.fixture
-def sheet(robot: Robot) -> Shortcuts:
+def sheet(robot: Robot) -> KeySheet:
     robot.key("f1")
     robot.frame(count=3)
     shown = robot.editor.dialogs.shown[-1]
-    assert isinstance(shown, Shortcuts)
+    assert isinstance(shown, KeySheet)
     return shown
 
 
-def choose(robot: Robot, sheet: Shortcuts, name: str, chord: str) -> None:
+def choose(robot: Robot, sheet: KeySheet, name: str, chord: str) -> None:
     """As a click on the action's row and the key do."""
     sheet.choose(ACTIONS[name])
     robot.frame()
@@ -42,7 +42,7 @@ def choose(robot: Robot, sheet: Shortcuts, name: str, chord: str) -> None:
 
 
 def test_without_a_choice_all_is_as_it_comes() -> None:
-    keys = Keys(ACTIONS.values(), {}, lambda: None)
+    keys = Keymap(ACTIONS.values(), {}, lambda: None)
     assert {chord: keys.action(chord) for chord in BY_KEY} == {chord: action.name for chord, action in BY_KEY.items()}
     assert {name: keys.of(name) for name in ACTIONS} == {name: action.key for name, action in ACTIONS.items()}
     assert all(keys.now(chord) == chord for chord in BY_KEY)
@@ -51,7 +51,7 @@ def test_without_a_choice_all_is_as_it_comes() -> None:
 
 def test_a_chord_that_is_taken_from_another_action_is_done_by_one_alone() -> None:
     changed: dict[str, list[str]] = {}
-    keys = Keys(ACTIONS.values(), changed, lambda: None)
+    keys = Keymap(ACTIONS.values(), changed, lambda: None)
     keys.set("tool_push", "ctrl+y")
     assert (keys.action("ctrl+y"), keys.action("p"), keys.now("p")) == ("tool_push", None, "ctrl+y")
     assert keys.of("redo") == "ctrl+shift+z", "it had two"
@@ -63,12 +63,12 @@ def test_a_chord_that_is_taken_from_another_action_is_done_by_one_alone() -> Non
 
 
 def test_a_file_of_preferences_with_one_chord_twice_gives_it_to_one() -> None:
-    keys = Keys(ACTIONS.values(), {"export": ["p"], "quit": ["p"], "no such action": ["k"]}, lambda: None)
+    keys = Keymap(ACTIONS.values(), {"export": ["p"], "quit": ["p"], "no such action": ["k"]}, lambda: None)
     assert [name for name in ACTIONS if keys.of(name) == "p"] == [keys.action("p")]
     assert keys.action("k") is None
 
 
-def test_a_key_is_chosen_and_kept(robot: Robot, sheet: Shortcuts, device: Device, tmp_path: Path) -> None:
+def test_a_key_is_chosen_and_kept(robot: Robot, sheet: KeySheet, device: Device, tmp_path: Path) -> None:
     choose(robot, sheet, "tool_twirl", "k")
     assert robot.editor.state.tool_name == "push", "a key that is chosen does nothing else"
     robot.key("escape")
@@ -81,17 +81,17 @@ def test_a_key_is_chosen_and_kept(robot: Robot, sheet: Shortcuts, device: Device
     assert robot.editor.ui.shown("t") == "K", "tooltips tell it"
 
 
-def test_kept_keys_are_read_again(robot: Robot, sheet: Shortcuts, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kept_keys_are_read_again(robot: Robot, sheet: KeySheet, monkeypatch: pytest.MonkeyPatch) -> None:
     choose(robot, sheet, "play", "k")
     path = robot.editor.preferences.path
     assert path is not None
     monkeypatch.setattr("platformdirs.user_config_path", lambda name: path.parent)
     kept = Preferences.load()
     assert kept.keys == {"play": ["k"]}
-    assert Keys(ACTIONS.values(), kept.keys, kept.save).action("space") is None
+    assert Keymap(ACTIONS.values(), kept.keys, kept.save).action("space") is None
 
 
-def test_a_conflict_is_told_and_taken_or_left(robot: Robot, widgets: Widgets, sheet: Shortcuts) -> None:
+def test_a_conflict_is_told_and_taken_or_left(robot: Robot, widgets: Widgets, sheet: KeySheet) -> None:
     choose(robot, sheet, "tool_twirl", "ctrl+s")
     widgets.click("Cancel")
     assert not robot.editor.keys.are_changed
@@ -109,7 +109,7 @@ def test_a_conflict_is_told_and_taken_or_left(robot: Robot, widgets: Widgets, sh
 
 
 @pytest.mark.parametrize("chord", ["enter", "tab", "space", "down", "ctrl+shift+f5"])
-def test_any_key_can_be_chosen_and_goes_nowhere_else(robot: Robot, sheet: Shortcuts, chord: str) -> None:
+def test_any_key_can_be_chosen_and_goes_nowhere_else(robot: Robot, sheet: KeySheet, chord: str) -> None:
     choose(robot, sheet, "actual", chord)
     if chord in BY_KEY:
         robot.key("enter")  # as who presses "Take it"
@@ -119,19 +119,19 @@ def test_any_key_can_be_chosen_and_goes_nowhere_else(robot: Robot, sheet: Shortc
     assert not sheet.is_listening
 
 
-def test_escape_gives_up_choosing_and_not_the_sheet(robot: Robot, sheet: Shortcuts) -> None:
+def test_escape_gives_up_choosing_and_not_the_sheet(robot: Robot, sheet: KeySheet) -> None:
     choose(robot, sheet, "actual", "escape")
     assert (robot.editor.dialogs.shown, sheet.is_listening) == ([sheet], False)
     assert not robot.editor.keys.are_changed
 
 
-def test_a_modifier_alone_is_no_key(robot: Robot, sheet: Shortcuts) -> None:
+def test_a_modifier_alone_is_no_key(robot: Robot, sheet: KeySheet) -> None:
     sheet.choose(ACTIONS["actual"])
     robot.frame(Key("", True, Mods(ctrl=True)))
     assert sheet.is_listening
 
 
-def test_what_space_does_can_be_changed(robot: Robot, sheet: Shortcuts) -> None:
+def test_what_space_does_can_be_changed(robot: Robot, sheet: KeySheet) -> None:
     choose(robot, sheet, "tool_twirl", "space")
     robot.key("enter")
     robot.key("escape")
@@ -140,7 +140,7 @@ def test_what_space_does_can_be_changed(robot: Robot, sheet: Shortcuts) -> None:
     assert robot.editor.state.tool_name == "twirl"
 
 
-def test_space_with_a_modifier_is_a_chord_too(robot: Robot, sheet: Shortcuts) -> None:
+def test_space_with_a_modifier_is_a_chord_too(robot: Robot, sheet: KeySheet) -> None:
     choose(robot, sheet, "tool_twirl", "ctrl+space")
     robot.key("escape")
     robot.frame(count=2)
@@ -150,7 +150,7 @@ def test_space_with_a_modifier_is_a_chord_too(robot: Robot, sheet: Shortcuts) ->
     assert robot.editor.state.tool_name == "twirl"
 
 
-def test_a_row_that_is_clicked_waits_for_its_key(robot: Robot, sheet: Shortcuts) -> None:
+def test_a_row_that_is_clicked_waits_for_its_key(robot: Robot, sheet: KeySheet) -> None:
     """The first row of the first column: Open."""
     robot.click(sheet.rect.x + 60, sheet.rect.y + 88)
     assert sheet.is_listening

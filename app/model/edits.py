@@ -1,0 +1,93 @@
+"""Edits of a recipe that take several of its parts: each gives another recipe, or parts of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from app.errors import UserError
+from app.model.handles import MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin, labelled
+from app.model.mask_edits import MaskStroke
+from app.model.recipe import Recipe
+from app.model.strokes import Change, Stroke
+from app.model.tools import Made
+
+TIMED = ("stroke", "handle", "pin", "change", "mask")
+"""The parts of a recipe that are cut off where the work goes on before their end."""
+
+
+def cut_off(recipe: Recipe, tick: int) -> Recipe:
+    """What of a recipe is done before a tick, and lasts until then."""
+    dt = recipe.fluid.dt
+    handles = (handle.before(tick, dt) for handle in recipe.handle)
+    return recipe.edited(
+        stroke=tuple(part for stroke in recipe.stroke for part in stroke.cut(tick)),
+        handle=tuple(handle for handle in handles if handle is not None),
+        pin=tuple(pin for pin in recipe.pin if pin.first_tick(dt) < tick),
+        change=tuple(change for change in recipe.change if change.tick < tick),
+        mask=tuple(edit for edit in recipe.mask if edit.tick <= tick),
+        duration=max(tick, 1) * dt,
+    )
+
+
+def with_made(recipe: Recipe, made: Made, ticks: int, taken: int | None = None) -> Recipe:
+    """A recipe with what a gesture has made, and so many ticks; `taken` is the number of the handle in hand."""
+    duration = ticks * recipe.fluid.dt
+    if isinstance(made, MaskStroke):
+        return recipe.edited(mask=(*recipe.mask, made))
+    if isinstance(made, Stroke):
+        return recipe.edited(stroke=(*recipe.stroke, made), duration=duration)
+    at = len(recipe.handle) if taken is None else taken
+    return recipe.edited(handle=(*recipe.handle[:at], made, *recipe.handle[at + 1 :]), duration=duration)
+
+
+def with_taken(recipe: Recipe, led: RecipeHandle | RecipePin, tick: int) -> tuple[Recipe, int]:
+    """A recipe in which a handle can be led on, and its number; a pin becomes one, for good if it is led."""
+    if isinstance(led, RecipePin):
+        handle = RecipeHandle.model_validate(led.model_dump() | {"keys": ()})
+        pins = tuple(pin for pin in recipe.pin if pin != led)
+        recipe = recipe.edited(pin=pins, handle=(*recipe.handle, handle))
+    else:
+        # What comes after this moment has been cut off, if the playhead was sent back here.
+        cut = led.before(tick, recipe.fluid.dt)
+        handle = cut if cut is not None and cut in recipe.handle else led
+    return recipe, recipe.handle.index(handle)
+
+
+def with_led(
+    recipe: Recipe, label: str, changed: Callable[[RecipeHandle | RecipePin], RecipeHandle | RecipePin | None]
+) -> dict[str, Any]:
+    """The handles and pins of a recipe, with another, or none, in the place of the one that messages call so."""
+    parts = dict[str, Any](handle=(), pin=())
+    for name, led in labelled(recipe.handle, recipe.pin):
+        if (kept := changed(led) if name == label else led) is not None:
+            parts[led.kind] = *parts[led.kind], kept
+    return parts
+
+
+def check_room(recipe: Recipe, line: bool) -> None:
+    """Raise `UserError` if a recipe has no room for another handle, or for another line."""
+    led = (*recipe.handle, *recipe.pin)
+    if len(led) >= MOST_HANDLES:
+        raise UserError(f"There are {MOST_HANDLES} handles and pins already; remove one to set another.")
+    if line and sum(bool(each.points) for each in led) >= MOST_LINES:
+        raise UserError(f"There are {MOST_LINES} lines already; remove one to set another.")
+
+
+def with_change(recipe: Recipe, tick: int, settings: dict[str, Any], lasts: bool) -> Recipe:
+    """A recipe in which something is set at a tick; what does not last is done at once."""
+    before = [change for change in recipe.change if change.tick != tick]
+    here = [change for change in recipe.change if change.tick == tick]
+    made = (here[-1] if here else Change(tick=tick)).model_copy(update=settings)
+    dt = recipe.fluid.dt
+    if settings.get("reset_warp"):  # what holds the picture lets go of it
+        handles, pins = (tuple(_ended(led, tick * dt) for led in all_) for all_ in (recipe.handle, recipe.pin))
+        recipe = recipe.edited(handle=handles, pin=pins)
+    # What is done at once needs a tick to be done in.
+    return recipe.edited(change=(*before, made), duration=recipe.duration if lasts else (tick + 1) * dt)
+
+
+def _ended(led: RecipeHandle | RecipePin, time: float) -> RecipeHandle | RecipePin:
+    """A handle or a pin that lets go at a time, unless it has before."""
+    ends = led.end is not None and led.end <= time
+    return led if ends else led.model_copy(update={"end": max(time, led.start)})

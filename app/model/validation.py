@@ -1,0 +1,211 @@
+"""What is wrong with the keys of a recipe, in plain words; the models say what each of them takes."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from datetime import date, time
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from app.errors import UserError
+from app.model.schema import label_of, only_values
+
+
+def complaint(error: ValidationError, model: type[BaseModel], data: Any, text: str, source: str) -> UserError:
+    """The first fault that pydantic found in `data`, as one sentence for the person who wrote it.
+
+    Args:
+        error: what the validation of `data` raised.
+        model: the model that was asked for.
+        data: what was validated.
+        text: the TOML that `data` was read from, or "", to find the line in.
+        source: the file's name, as the sentence begins with it.
+    """
+    faults = error.errors(include_url=False)
+    # An unknown key is often the cause of a missing one, so that it is told first.
+    fault = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
+    path = _path_in(data, fault["loc"])
+    line = line_of(text, path)
+    where = f"{source}, line {line}: " if line else f"{source}: "
+    others = f" ({len(faults) - 1} more after this one)" if len(faults) > 1 else ""
+    return UserError(f"{where}{_sentence(fault, path, data, model)}{others}")
+
+
+def _path_in(data: Any, loc: tuple[int | str, ...]) -> list[int | str]:
+    """The keys of `loc` that are keys of the file: without the names of union members that pydantic mixes in."""
+    path: list[int | str] = []
+    tagged = False  # the kind of the table that `data` is has been passed, which may be the name of one of its keys too
+    for position, item in enumerate(loc):
+        if isinstance(data, dict) and not tagged and item == data.get("kind"):
+            tagged = True
+        elif (isinstance(data, dict) and item in data) or (isinstance(data, (list, tuple)) and isinstance(item, int)):
+            path.append(item)
+            data, tagged = _item(data, item), False
+        elif position == len(loc) - 1 and isinstance(data, dict):
+            path.append(item)
+    return path
+
+
+def named(path: list[int | str], data: Any) -> tuple[str, str]:
+    """The table and the key of `path` as a person calls them: ('force[2] "wind": ', "radius"), counted from 1."""
+    table, key = "", ""
+    for item in path:
+        data = _item(data, item)
+        if isinstance(item, int) and isinstance(data, dict):
+            table, key = f"{table}{label_of(key, item + 1, data.get('name', ''))}: ", ""
+        else:
+            key += f"[{item + 1}]" if isinstance(item, int) else f".{item}" if key else item
+    return table, key
+
+
+def _item(data: Any, item: int | str) -> Any:
+    try:
+        return data[item]
+    except (KeyError, IndexError, TypeError):
+        return None
+
+
+def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseModel]) -> str:
+    kind, context, given = fault["type"], fault.get("ctx", {}), fault["input"]
+    table, key = named(path, data)
+    if kind == "extra_forbidden":
+        known = sorted(_known_keys(model, fault["loc"][:-1]))
+        near = difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
+        return f"{table}unknown key {key!r}; {hint}"
+    if kind == "missing":
+        return f"{table}{key!r} is missing"
+    if kind in ("union_tag_not_found", "union_tag_invalid"):
+        tag = str(context["discriminator"]).strip("'")
+        choices = ", ".join(repr(tag) for tag in _tags(model, fault["loc"]))
+        return f"{table}{tag!r} must be one of {choices}" + (f", not {context['tag']!r}" if "tag" in context else "")
+    if kind == "value_error":
+        return f"{table}{key}{': ' if key else ''}{context['error']}"
+    wanted = {
+        "float_type": "a number",
+        "int_type": "a whole number",
+        "int_from_float": "a whole number",
+        "string_type": "a text in quotes",
+        "bool_type": "true or false",
+        "tuple_type": "a list",
+        "list_type": "a list",
+        "dict_type": "a table",
+        "model_type": "a table",
+        "model_attributes_type": "a table",
+        "finite_number": "a finite number",
+        "greater_than": "greater than {gt}",
+        "greater_than_equal": "at least {ge}",
+        "less_than": "less than {lt}",
+        "less_than_equal": "at most {le}",
+        "too_short": "a list of at least {min_length}",
+        "too_long": "a list of at most {max_length}",
+        "literal_error": "one of {expected}",
+        "string_too_short": "a text that is not empty",
+    }.get(kind)
+    if wanted is None:
+        return f"{table}{key}: {fault['msg']}"
+    bounds = {name: f"{bound:g}" if isinstance(bound, float) else bound for name, bound in context.items()}
+    but = f", not {_shown(given)}" if kind != "too_short" or given else ", and is empty"
+    if kind == "tuple_type" and isinstance(given, dict) and not table:
+        but += f"; begin each with [[{key}]]"
+    if kind == "literal_error" and " or " not in context["expected"]:
+        wanted = "{expected}"
+    return f"{table}{key!r} must be {wanted.format(**bounds)}{but}"
+
+
+def _shown(value: Any) -> str:
+    shown = repr(value)
+    if isinstance(value, bool):
+        shown = "true" if value else "false"
+    elif isinstance(value, str):
+        shown = f'"{value}"'
+    elif isinstance(value, (tuple, list)):
+        shown = f"a list of {len(value)}"
+    elif isinstance(value, dict):
+        shown = "a table"
+    elif isinstance(value, (date, time)):
+        shown = str(value)
+    return shown if len(shown) <= 40 else f"{shown[:37]}..."
+
+
+# -- which keys a place in the recipe knows ---------------------------------------------------------------------------
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+def _known_keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> set[str]:
+    """The keys that the table at `loc` may hold."""
+    models = [model]
+    for item in loc:
+        if isinstance(item, int):
+            continue
+        inner = [part for model in models if item in model.model_fields for part in _models_in(_field(model, item))]
+        tagged = [model for model in models if item in _literals(model) or item == model.__name__]
+        models = inner or tagged or models
+    return {key for model in models for key in model.model_fields}
+
+
+def _tags(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+    """The names by which the union at `loc` tells its members apart."""
+    models = [model]
+    for item in loc:
+        if not isinstance(item, int):
+            models = [
+                part for model in models if item in model.model_fields for part in _models_in(_field(model, item))
+            ]
+    return [tag for model in models for tag in _literals(model)[:1]]
+
+
+def _field(model: type[BaseModel], name: str) -> Any:
+    return model.model_fields[name].annotation
+
+
+def _literals(model: type[BaseModel]) -> list[str]:
+    """The values of the fields that can only have one, which is how the members of a union are told apart."""
+    choices = (only_values(field) for field in model.model_fields.values())
+    return [values[0] for values in choices if len(values) == 1]
+
+
+# -- where it stands in the file --------------------------------------------------------------------------------------
+
+# Each repetition ends where the next begins, or a line of many spaces would be tried again from each of them.
+_HEADER = re.compile(r"^\s*(\[\[?)([^\]#]+)\]")
+_KEY = re.compile(r"^\s*([A-Za-z0-9_\"'.-]+)\s*=")
+
+
+def line_of(text: str, path: list[int | str]) -> int | None:
+    """The line of `text`, a TOML file, that defines `path`, or the nearest table above it; None if there is none."""
+    counts: dict[str, int] = {}
+    here: list[int | str] = []
+    best: tuple[int, int | None] = (0, None)
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := _HEADER.match(line):
+            brackets, name = header.groups()
+            here = _indexed([part.strip(" \t\"'") for part in name.split(".")], counts, brackets == "[[")
+            found = here
+        elif key := _KEY.match(line):
+            found = here + [part.strip(" \"'") for part in key.group(1).split(".")]
+        else:
+            continue
+        if found == path[: len(found)] and len(found) > best[0]:
+            best = len(found), number
+    return best[1]
+
+
+def _indexed(names: list[str], counts: dict[str, int], repeated: bool) -> list[int | str]:
+    """The path of a header: `[[a.b]]` for the second time is ["a", "b", 1]; `[a.b]` below `[[a]]` is ["a", 0, "b"]."""
+    path: list[int | str] = []
+    for position, name in enumerate(names):
+        path.append(name)
+        key = ".".join(map(str, path))
+        if position == len(names) - 1 and repeated:
+            counts[key] = counts.get(key, -1) + 1
+        if key in counts:
+            path.append(counts[key])
+    return path

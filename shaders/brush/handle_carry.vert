@@ -1,0 +1,2 @@
+// Handle carry: see handle_carry.frag.
+#include "lib/listed.vert"

@@ -1,0 +1,2 @@
+// Handle stream: see handle_stream.frag.
+#include "lib/listed.vert"

@@ -1,0 +1,48 @@
+"""Brushes out of a list, drawn at once: beginning a draw takes a software rasteriser longer than a small one itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Pass
+from solver.grid import Grid
+
+A_ROW = 128  # brushes in a row of the texture that lists them
+
+
+def draw_listed(
+    device: Device,
+    shader: Pass,
+    target: Field,
+    grid: Grid,
+    places: np.ndarray,
+    radii: np.ndarray,
+    viscosities: np.ndarray,
+    vectors: np.ndarray,
+    **inputs: Any,
+) -> None:
+    """Add what a shader with the vertices of `lib/listed.vert` draws of brushes to a target, in their order.
+
+    Args:
+        device: where they are drawn.
+        shader: what they draw.
+        target: nodes or cells of the grid.
+        grid: whose corner places are counted from.
+        places: their middles in the picture, (n, 2), longer sides.
+        radii: how far they reach, (n,).
+        viscosities: at their tips, (n,), lengths^2 / s.
+        vectors: what they do, (n, 2), lengths / s.
+        inputs: what the shader reads besides.
+    """
+    count = len(places)
+    texels = np.zeros((-(-max(count, 1) // A_ROW) * A_ROW, 2, 4), np.float32)
+    texels[:count, 0] = np.column_stack([places - grid.origin, radii, viscosities])
+    texels[:count, 1, :2] = vectors
+    brushes = device.upload(texels.reshape(-1, 2 * A_ROW, 4), "brushes")
+    inputs |= {"brushes": brushes, "spacing": grid.spacing, "texels": target.size}
+    shader(target, add=True, vertices=6 * count, **inputs)
+    brushes.release()

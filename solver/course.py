@@ -1,0 +1,34 @@
+"""When a handle is where: its first way, its first turn, and the keys after them, as its numbers say it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+SAME_TIME = 1e-6  # ticks between two times that are the same but for their rounding
+
+
+class Course:
+    """What follows from the numbers of a handle, which the recipe's and the solver's both have."""
+
+    if TYPE_CHECKING:
+        start: float
+        duration: float
+        to: tuple[float, float] | None
+        rotate: float | None
+        scale: float | None
+        turned: tuple[tuple[float, float, float], ...]
+
+    @property
+    def ready(self) -> float:
+        """The seconds at which it has gone its first way, and its keys may begin."""
+        return self.start if self.to is None else self.start + self.duration
+
+    @property
+    def turns(self) -> bool:
+        """True if it is told how it is turned or scaled."""
+        return self.rotate is not None or self.scale is not None or bool(self.turned)
+
+    @property
+    def upright(self) -> float:
+        """The seconds at which it has made its first turn, and `turned` may begin."""
+        return self.start if self.rotate is None and self.scale is None else self.start + self.duration

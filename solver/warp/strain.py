@@ -1,0 +1,70 @@
+"""What a map has done to what lies around some places, so that it can be told how much more it bears."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.gl.field import FieldPool
+from solver.warp.map import WarpMap
+
+PLACES = 256  # along the longer side of the picture where it is looked at, or as many as there are cells
+RINGS = (1 / 64, 1 / 32, 1 / 16)  # radii of rings of `AROUND` places around a middle, likewise: what two handles that
+AROUND = 16  # nearly meet lead apart is less than that far across
+
+
+class Strain:
+    """Looks at a map: at places of a lattice over the picture, and on rings close to what is asked for."""
+
+    def __init__(self, warp: WarpMap) -> None:
+        self._warp = warp
+        self._fields = FieldPool(warp.device, "strain")
+
+    def around(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+        """The least det J, the largest stretch and the least triangle of the map within a radius of each place (n, 2).
+
+        The stretch is how many times farther apart in the original two neighbours of the lattice lie; the triangle,
+        what becomes of the area of one of neighbouring texels, as a remap keeps what is at its texels only.
+
+        Returns:
+            float64 (n, 3).
+        """
+        found = np.stack([self._on_lattice(places, radii), self._on_rings(places, radii)])
+        return np.stack([found[..., 0].min(axis=0), found[..., 1].max(axis=0), found[..., 2].min(axis=0)], axis=-1)
+
+    def release(self) -> None:
+        """Free the textures."""
+        self._fields.release()
+
+    def _on_lattice(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+        warp, extent = self._warp, np.array(self._warp.extent)
+        count = np.maximum(warp.grid.size, PLACES * extent / extent.max()).astype(int)
+        low = np.clip(np.floor((places - radii[:, None]) / extent * count), 0, count - 1)
+        high = np.clip(np.ceil((places + radii[:, None]) / extent * count), low + 1, count)
+        first, end = (np.maximum(low.min(axis=0) - 1, 0).astype(int), high.max(axis=0).astype(int))
+        lattice = self._fields.get("lattice", (int(count[0]), int(count[1])), 4)
+        warp.draw_strain(lattice, (*first.tolist(), *(end - first).tolist()))
+        boxes = self._fields.get("boxes", (1, len(places)), 4)
+        boxes.set(np.concatenate([low, high], axis=-1)[:, None])
+        found = self._fields.get("around", (int(count[1]), len(places)), 4)
+        region = 0, 0, int((high - low)[:, 1].max()), len(places)
+        step, last = tuple(extent / count), tuple(extent - extent / warp.size)
+        warp.device.pass_("warp/strain_around.frag")(
+            found, region=region, strain=lattice, boxes=boxes, step=step, last=last
+        )
+        rows = found.get(region).astype(np.float64)
+        return np.stack(
+            [rows[..., 0].min(axis=1), np.sqrt(rows[..., 1].max(axis=1)), rows[..., 2].min(axis=1)], axis=-1
+        )
+
+    def _on_rings(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+        warp, angles = self._warp, 2 * np.pi * np.arange(AROUND + 1) / AROUND
+        rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        last = np.subtract(warp.extent, np.divide(warp.extent, warp.size))
+        close = np.clip(places[:, None, None] + rings * radii[:, None, None, None], 0.0, last)
+        found = warp.strain(close.reshape(-1, 2)).astype(np.float64).reshape(*close.shape[:-1], 4)
+        original, most = close + found[..., :2], np.zeros(len(places))
+        for axis in (1, 2):
+            apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, close))
+            ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
+            most = np.maximum(most, ratio.max(axis=(1, 2)))
+        return np.stack([found[..., 2].min(axis=(1, 2)), most, found[..., 3].min(axis=(1, 2))], axis=-1)

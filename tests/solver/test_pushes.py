@@ -1,0 +1,40 @@
+"""What pushes out of a list do to the fluid is what they are reckoned to do to each other, images in edges too."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver import Device, Grid
+from solver.brush.listed import draw_listed
+from solver.brush.pushes import Pushes
+
+GRID = Grid(128, 96)
+PLACES = np.array([[0.05, 0.4], [0.5, 0.72], [0.98, 0.02], [0.5, 0.4]])
+RADII = np.array([0.3, 0.2, 0.25, 0.6])
+FORCES = np.array([[1.0, 0.5], [-0.3, 0.8], [0.6, -0.7], [0.2, 0.1]])
+FACES = [np.stack([side[::7, ::7].ravel() for side in faces], axis=-1) for faces in (GRID.u_faces(), GRID.v_faces())]
+
+
+def at_faces(influence: list[np.ndarray]) -> list[np.ndarray]:
+    """u at left faces and v at upper ones, of the influence on both."""
+    return [np.einsum("njb,jb->n", each[:, axis], FORCES) for axis, each in enumerate(influence)]
+
+
+def test_pushes_flow_as_they_are_reckoned_to(device: Device):
+    pushes, stream = Pushes(GRID, PLACES, RADII), device.field((129, 97), 1)
+    pushes.draw(device, device.pass_("brush/handle_stream.frag"), stream, np.ones(4), FORCES)
+    velocity = device.field(GRID.size, 2)
+    device.pass_("brush/curl.frag")(velocity, stream=stream, spacing=GRID.spacing)
+    assert np.abs(np.concatenate([stream.get()[[0, -1]].ravel(), stream.get()[:, [0, -1]].ravel()])).max() < 1e-6
+    for axis, wanted in enumerate(at_faces([pushes.influence(each) for each in FACES])):
+        np.testing.assert_allclose(velocity.get()[::7, ::7, axis].ravel(), wanted, atol=0.02)
+
+
+def test_what_is_local_of_handles_is_carried_as_it_is_reckoned(device: Device):
+    pushes, motion, viscosity = Pushes(GRID, PLACES, RADII), device.field(GRID.size, 2), device.field(GRID.size, 1)
+    viscosity.clear(0.5)
+    carry, of_each = device.pass_("brush/handle_carry.frag"), (PLACES, RADII, np.full(4, 0.5), FORCES)
+    draw_listed(device, carry, motion, GRID, *of_each, viscosity=viscosity)
+    for axis, wanted in enumerate(at_faces([pushes.local_influence(each) for each in FACES])):
+        inside = FACES[axis][:, axis] > 0  # but on the walls
+        np.testing.assert_allclose(motion.get()[::7, ::7, axis].ravel()[inside], wanted[inside], atol=2e-5)

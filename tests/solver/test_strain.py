@@ -1,0 +1,67 @@
+"""What handles are halted by: what the map has done around them, looked at on the GPU, beside the same in NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import Device, Grid, WarpMap
+from solver.warp.strain import PLACES, Strain
+
+
+def turning(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    fading = np.exp(-20 * ((x - 0.45) ** 2 + (y - 0.4) ** 2))
+    return -6 * (y - 0.4) * fading, 6 * (x - 0.45) * fading
+
+
+@pytest.mark.parametrize("steps", [3, 12])  # in the submap only, and in all levels
+def test_what_is_around_places_is_the_worst_within_their_boxes(steps: int, device: Device):
+    grid = Grid(64, 48)
+    warp, extent = WarpMap(device, grid, (256, 192)), np.array([1.0, 0.75])
+    for _ in range(steps):
+        warp.advance_prescribed(turning, 1 / 20)
+    places, radii = np.array([[0.4, 0.4], [0.98, 0.7], [0.05, 0.05]]), np.array([0.2, 0.3, 0.05])
+    strain = Strain(warp)
+    found = strain.around(places, radii)
+    strain.release()
+
+    texel, count = extent / warp.size, np.array([PLACES, PLACES * 0.75]).astype(int)
+    x, y = (
+        np.minimum((np.arange(n) + 0.5) / n * side, side - t) for n, side, t in zip(count, extent, texel, strict=True)
+    )
+    lattice = np.stack(np.meshgrid(x, y), axis=-1)
+
+    def led(points: np.ndarray) -> np.ndarray:
+        flat = points.reshape(-1, 2)
+        return (flat + warp.at(flat).astype(np.float64)).reshape(points.shape)
+
+    here = led(lattice)
+    right, below = ((led(lattice + step) - here) / step.sum() for step in (texel * (1, 0), texel * (0, 1)))
+    triangles = right[..., 0] * below[..., 1] - right[..., 1] * below[..., 0]
+    determinants = warp.determinants(lattice.reshape(-1, 2)).reshape(triangles.shape)
+    across = np.hypot(*np.moveaxis(np.diff(here, axis=1), -1, 0)) / np.diff(x)
+    down = np.hypot(*np.moveaxis(np.diff(here, axis=0), -1, 0)) / np.diff(y)[:, None]
+    for (least, most, triangle), place, radius in zip(found, places, radii, strict=True):
+        left, top = np.maximum(np.floor((place - radius) / extent * count), 0).astype(int)
+        far, low = np.minimum(np.ceil((place + radius) / extent * count), count).astype(int)
+        box = np.s_[top:low, left:far]
+        assert least == pytest.approx(determinants[box].min(), abs=2e-3)
+        stretch = max(
+            across[top:low, max(left - 1, 0) : far - 1].max(), down[max(top - 1, 0) : low - 1, left:far].max()
+        )
+        assert most == pytest.approx(stretch, rel=5e-3)
+        assert triangle == pytest.approx(triangles[box].min(), abs=2e-3)
+    assert found[0, 1] > 1.2 * found[2, 1]  # they are not all the same
+
+
+def test_a_fold_between_two_texels_is_told(device: Device):
+    """By the triangle, whatever the lattice between them sees."""
+    warp = WarpMap(device, Grid(16, 16), (32, 32))
+    displacement = np.zeros((32, 32, 2), np.float32)
+    displacement[:, 16, 0] = 1.5 / 32  # its column lies beyond the next
+    warp.set(displacement)
+    strain = Strain(warp)
+    (_, _, crossed), (_, _, plain) = strain.around(np.array([[0.5, 0.5], [0.1, 0.5]]), np.array([0.1, 0.1]))
+    strain.release()
+    assert crossed < 0
+    assert plain == pytest.approx(1, abs=1e-3)

@@ -1,0 +1,227 @@
+"""A clip in the window: the frame that belongs to the playhead, playing, painting, exporting, saving."""
+
+from __future__ import annotations
+
+import shutil
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.errors import UserError
+from app.media.animation import animation_writer
+from app.media.files import sequence_of
+from app.media.pictures import read_picture, write_picture
+from app.progress import Progress
+from app.ui.exporting import ANIMATION, ANIMATIONS, PICTURE
+from app.ui.files import tick_for
+from app.work.export import run
+from app.work.jobs import Outputs
+from app.work.journal import Origin, project_of
+from app.work.tasks import Edits, Task
+from solver.gl.device import Device
+from support.editing import Robot, export_dialog, pattern
+
+FRAMES, RATE = 20, Fraction(25)
+
+
+def frame(number: int) -> np.ndarray:
+    """The pattern, a step further to the right in each."""
+    return np.roll(pattern(96, 64).pixels, 3 * number, axis=1)
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clip that is read as it was written."""
+    path = tmp_path_factory.mktemp("film") / "film.mkv"
+    with animation_writer(path, RATE) as write:
+        for number in range(FRAMES):
+            write(frame(number))
+    return path
+
+
+@pytest.fixture
+def clip(tmp_path: Path, film: Path) -> Path:
+    return Path(shutil.copy(film, tmp_path))
+
+
+@pytest.fixture
+def viewer(robot: Robot, clip: Path) -> Robot:
+    """With the clip open, on a coarse grid."""
+    robot.drop(clip)
+    robot.editor.session.begin_with(grid=32)
+    return robot
+
+
+def shown(robot: Robot) -> np.ndarray:
+    """The frame that is looked up, unless it is the first."""
+    picture = robot.editor.workspace.shown_picture
+    assert picture is not None
+    return picture.pixels
+
+
+def go_to(robot: Robot, tick: int) -> None:
+    robot.editor.session.seek(tick)
+    robot.frame()
+    robot.until(lambda: not robot.editor.session.is_moving and not robot.editor.workspace.awaits_frame)
+
+
+def test_scrubbing_shows_the_very_frame(viewer: Robot):
+    session = viewer.editor.session
+    assert (session.length, session.dt) == (FRAMES - 1, 1 / 25)
+    for tick in (7, 3, FRAMES - 1, 0, 12):
+        go_to(viewer, tick)
+        assert session.frame == viewer.editor.workspace.shown_frame == tick
+        np.testing.assert_array_equal(shown(viewer), frame(tick))
+    viewer.see()
+    seen = viewer.canvas()
+    height, width = (side // 8 for side in seen.shape[:2])
+    places = [(7 * width // 2, 5 * height // 2), (width // 2, height // 2)]  # far from where colours change
+    rect = viewer.editor.view.rect
+    for x, y in places:
+        expected = frame(12)[int(y / rect.height * 64), int(x / rect.width * 96)].astype(int)
+        assert np.abs(seen[y, x].astype(int) - expected).max() <= 3
+
+
+def test_it_is_played_to_its_end_and_painted_on(viewer: Robot):
+    """What is painted at a moment begins there; the clip goes on while the fluid comes to rest, and after it."""
+    session = viewer.editor.session
+    go_to(viewer, 4)
+    viewer.drag((0.4, 0.5), (0.6, 0.5), steps=3)
+    viewer.rest()
+    (stroke,) = session.recipe.stroke
+    assert stroke.first_tick == 4
+    assert session.moment == session.end > stroke.last_tick
+    np.testing.assert_array_equal(session.replay.warp.read() == 0, False)
+    go_to(viewer, 0)
+    viewer.key("space")
+    viewer.until(lambda: not session.playing)
+    assert session.moment == session.length
+    viewer.until(lambda: viewer.editor.workspace.shown_frame == FRAMES - 1)
+    viewer.key("ctrl+z")
+    assert session.recipe.stroke == ()
+
+
+def test_what_is_exported_is_what_the_command_line_makes(viewer: Robot, device: Device, tmp_path: Path):
+    """Of the project and of the saved recipe: the clip in its rate; a still is the moment's frame with its warp."""
+    editor, session = viewer.editor, viewer.editor.session
+    go_to(viewer, 4)
+    viewer.drag((0.3, 0.5), (0.6, 0.5), steps=3)
+    viewer.rest()
+    go_to(viewer, 6)
+    dialog = export_dialog(viewer, tmp_path)
+    dialog.kind, dialog.name = ANIMATION, "dialog"
+    dialog.format[ANIMATION] = next(n for n, kind in enumerate(ANIMATIONS) if kind.name == "MP4")
+    run(device, dialog.job(), Progress())
+    dialog.start, dialog.end, dialog.name = 0.2, 0.24, "part"
+    run(device, dialog.job(), Progress())
+    dialog.kind, dialog.name = PICTURE, "still"
+    run(device, dialog.job(), Progress())
+    editor.files.write(tmp_path / "work.fluidwarp")
+    (tmp_path / "work.toml").write_text(session.recipe.text(), "utf-8")
+
+    def rendered(recipe: str, output: str, **options: object) -> bytes:
+        outputs = Outputs(tmp_path / output, **options)  # type: ignore[arg-type]
+        Task(recipe=str(tmp_path / recipe), edits=Edits(), picture=None, outputs=outputs).perform(
+            lambda: device, Progress()
+        )
+        return outputs.file.read_bytes() if outputs.file and outputs.file.exists() else b""
+
+    whole = (tmp_path / "dialog.mp4").read_bytes()
+    assert rendered("work.toml", "again.mp4") == rendered("work.fluidwarp", "saved.mp4") == whole
+    assert rendered("work.toml", "again.part.mp4", part=(5, 6)) == (tmp_path / "part.mp4").read_bytes()
+    rendered("work.toml", "f.%02d.png", part=(6, 6))
+    one, other = (read_picture(tmp_path / name).pixels for name in ("f.06.png", "still.png"))
+    np.testing.assert_array_equal(one, other[..., :3])
+    assert (one != frame(6)).any()
+
+
+def test_it_comes_back_with_its_project_and_is_missed_with_a_sentence(viewer: Robot, clip: Path, tmp_path: Path):
+    """A project refers to its clip; unsaved work on it outlasts a crash."""
+    editor = viewer.editor
+    viewer.drag((0.4, 0.5), (0.6, 0.5), steps=3)
+    viewer.rest()
+    editor.files.write(tmp_path / "work.fluidwarp", embed=True)
+    assert (tmp_path / "work.fluidwarp").stat().st_size < clip.stat().st_size
+    assert not editor.session.project.embedded
+    viewer.drop(tmp_path / "work.fluidwarp")
+    go_to(viewer, 15)
+    np.testing.assert_array_equal(shown(viewer), frame(15))
+    assert editor.session.length > FRAMES - 1
+    origin = Origin.of(editor.session.project)
+    again = project_of(origin, editor.session.recipe)
+    assert again.clip == editor.session.project.clip
+    assert origin.is_of(again.data)
+    clip.rename(tmp_path / "moved.mkv")
+    go_to(viewer, 3)  # it is still open
+    viewer.drop(tmp_path / "work.fluidwarp")
+    assert editor.messages.shown[-1].text == f"Cannot read {clip}: there is no such file; check the name."
+
+
+@pytest.mark.parametrize("name", ["a.gif", "a.webp", "a.tif", "s.%03d.png"])
+def test_pages_and_numbered_files_are_clips_too(robot: Robot, tmp_path: Path, name: str):
+    """Those of one file are kept in the project, as pictures are."""
+    images = [Image.fromarray(frame(number)) for number in range(5)]
+    if name == "s.%03d.png":
+        for number, image in enumerate(images, 7):
+            image.save(tmp_path / (name % number))
+    else:
+        lossless: dict[str, Any] = {"lossless": True, "exact": True} if name.endswith(".webp") else {}
+        images[0].save(tmp_path / name, save_all=True, append_images=images[1:], duration=40, **lossless)
+    robot.drop(tmp_path / name)
+    editor = robot.editor
+    editor.session.begin_with(grid=32)
+    assert editor.session.length == 4
+    for path in (None, tmp_path / "work.fluidwarp"):
+        if path is not None:
+            editor.files.write(path, embed=True)
+            robot.drop(path)
+        go_to(robot, 3)
+        assert editor.workspace.shown_frame == (10 if name.startswith("s") else 3)
+        if not name.endswith(".gif"):  # which has 256 colours
+            np.testing.assert_array_equal(shown(robot), frame(3))
+    assert editor.session.project.embedded != name.startswith("s")
+
+
+def test_a_clip_that_is_cut_short_ends_where_it_ends(robot: Robot, clip: Path):
+    """And one that is written anew is told of, and the work goes on."""
+    data = clip.read_bytes()
+    clip.write_bytes(data[: len(data) * 2 // 3])
+    robot.drop(clip)
+    editor = robot.editor
+    go_to(robot, FRAMES - 1)
+    last = editor.workspace.shown_frame
+    assert 5 < last < FRAMES - 1
+    assert editor.session.length == last
+    np.testing.assert_array_equal(shown(robot), frame(last))
+    clip.write_bytes(data[: len(data) // 2])
+    go_to(robot, 2)
+    assert f"Cannot read {clip}: it is not as it was" in editor.messages.shown[-1].text
+    assert not editor.workspace.awaits_frame
+    robot.drag((0.4, 0.5), (0.6, 0.5), steps=2)
+    assert len(editor.session.recipe.stroke) == 1
+
+
+def test_numbered_files_are_opened_by_one_of_them(robot: Robot, tmp_path: Path):
+    """Padded or not; the others of the folder are none of them."""
+    for name in ("a1_008.png", "a1_009.png", "a1_010.png", "b9.png", "b10.png", "c.png"):
+        write_picture(tmp_path / name, pattern(96, 64))
+    assert sequence_of(tmp_path / "a1_010.png").name == "a1_%03d.png"
+    assert sequence_of(tmp_path / "b10.png").name == "b%d.png"
+    with pytest.raises(UserError, match=r"There is no number in the name c\.png"):
+        sequence_of(tmp_path / "c.png")
+    robot.editor.files.open_work(sequence_of(tmp_path / "a1_009.png"))
+    robot.until(lambda: not robot.editor.files.is_loading)
+    assert robot.editor.session.frame == 8
+    assert robot.editor.session.length == 2
+
+
+@pytest.mark.parametrize(
+    ("rate", "tick"),
+    [(25, 1 / 25), (60, 1 / 30), (Fraction(24000, 1001), 1001 / 24000), (10, 1 / 30), (100, 3 / 100), (50, 1 / 25)],
+)
+def test_ticks_and_frames_begin_together(rate: int | Fraction, tick: float):
+    assert tick_for(Fraction(rate)) == pytest.approx(tick, abs=1e-12)
