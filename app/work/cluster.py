@@ -94,29 +94,25 @@ def run_on_cluster(
         UserError: if there is no such scheduler, or it goes; how many are written is said.
         Cancelled: if `progress` says so.
     """
-    ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
     before = {task: _stamps(task) for task in tasks}
-    reported: set[Piece] = set()
     watched, idle = time.monotonic(), False
     with _client(address) as client:
         # Dask gives the tasks of a worker that dies to the others, as often as its allowed-failures says.
-        futures = {client.submit(_perform_on_worker, task, pure=False): task for task in tasks}
-        for future in futures:
-            future.add_done_callback(ended.put)
+        pending = {client.submit(_perform_on_worker, task, pure=False): task for task in tasks}
         try:
-            while len(reported) < len(tasks):
+            while pending:
                 progress.check()
-                try:
-                    future = ended.get(timeout=LOOK)
-                except queue.Empty:
-                    if time.monotonic() > watched + WATCHING:
-                        watched, was_idle, idle = time.monotonic(), idle, not _has_workers(client)
-                        if idle and not was_idle:
-                            mend = f"start one with: dask worker {address}"
-                            notice(f"the Dask scheduler at {address} has no worker, and is waited for; {mend}")
-                    continue
-                report(_outcome(future, futures[future]))
-                reported.add(futures[future])
+                time.sleep(LOOK)
+                for future in [future for future in pending if future.done()]:
+                    outcome = _outcome(future, pending[future])
+                    if outcome is not None:
+                        report(outcome)
+                        del pending[future]
+                if time.monotonic() > watched + WATCHING:
+                    watched, was_idle, idle = time.monotonic(), idle, not _has_workers(client)
+                    if idle and not was_idle:
+                        mend = f"start one with: dask worker {address}"
+                        notice(f"the Dask scheduler at {address} has no worker, and is waited for; {mend}")
         except _Gone:
             # What is written appears whole, so that it can be told by its files alone.
             written = sum(_are_new(_stamps(task), before[task]) for task in tasks)
@@ -125,7 +121,7 @@ def run_on_cluster(
                 "workers may still finish what they have in hand; start it again, and then this for the others"
             ) from None
         except BaseException:
-            client.cancel(list(futures), force=True)
+            client.cancel(list(pending), force=True)
             raise
 
 
@@ -140,18 +136,20 @@ class _Gone(Exception):
     """The scheduler does not know of our tasks any more."""
 
 
-def _outcome(future: Any, task: Piece) -> Outcome:
-    if future.status == "finished":
-        try:
+def _outcome(future: Any, task: Piece) -> Outcome | None:
+    """What became of a task that has ended; None if it is done again, for a worker that died took its answer along."""
+    status = future.status
+    if status == "error":
+        error = future.exception()
+        if type(error).__name__ == "KilledWorker":
+            return Outcome(task.label, "every worker that tried it died, perhaps for want of memory")
+        return Outcome(task.label, f"it failed on the cluster ({in_a_line(error)})")
+    if status == "finished":
+        with suppress(CancelledError, OSError, TimeoutError):
             return future.result(CONNECTING)
-        except (CancelledError, OSError, TimeoutError):
-            raise _Gone from None
-    if future.status != "error":  # nobody but the client cancels, when it loses the scheduler
+    if future.cancelled():  # by nobody but the client, when it loses the scheduler
         raise _Gone
-    error = future.exception()
-    if type(error).__name__ == "KilledWorker":
-        return Outcome(task.label, "every worker that tried it died, perhaps for want of memory")
-    return Outcome(task.label, f"it failed on the cluster ({in_a_line(error)})")
+    return None
 
 
 Stamps = tuple[tuple[int, int] | None, ...]

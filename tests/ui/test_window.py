@@ -174,9 +174,8 @@ def test_the_window_comes_back_as_it_was_left(desk: Desk, tmp_path: Path) -> Non
     assert (kept["theme"], kept["inspector"]) == ("light", False)
     assert kept["brushes"]["push"]["radius"] == pytest.approx(0.15 * 1.15)
     # The bar is light, and where the inspector was is the ground around the picture.
-    seen = desk.seen()
-    assert seen[75, 400].min() > 200
-    assert (seen[400, 1030] == 0xD2).all()
+    desk.until(lambda: desk.seen()[75, 400].min() > 200, "the bar to be light")
+    assert (desk.seen()[400, 1030] == 0xD2).all()
 
 
 def test_a_minimised_window_is_closed_at_once(desk: Desk) -> None:
