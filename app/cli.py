@@ -474,12 +474,12 @@ def gallery(
     ] = False,
 ) -> None:
     """Make the paper's figures again: results, animations and contact sheets."""
-    from app import gallery, retouching
+    from app.gallery import figures, retouching
     from app.progress import on_terminal
     from solver.gl.device import Device
 
     with on_terminal("gallery", None) as progress, Device.headless() as device:
-        measured = (retouching if strokes else gallery).make(device, output, progress)
+        measured = (retouching if strokes else figures).make(device, output, progress)
     for figure, numbers in measured.items():
         print(f"{figure}: {', '.join(f'{name} {number}' for name, number in numbers.items())}")
 

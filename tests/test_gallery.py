@@ -9,9 +9,11 @@ import pytest
 from PIL import Image
 from scipy import ndimage
 
-from app import gallery
 from app.errors import UserError
-from app.gallery import Studio, arrows, at_work, contact_sheet, light, load, shades, sharpness, source_of, spline_warp
+from app.gallery.drawing import FORCE, INK, MARGIN, PANEL, WIDE, arrows, at_work, contact_sheet, marked, shades
+from app.gallery.figures import BESIDES, FIGURES, figure_1, make
+from app.gallery.measures import light, sharpness, spline_of, spline_warp, stretch_and_det
+from app.gallery.studio import Studio, load, recipes_folder, source_of
 from app.media.auxiliary import Pictures
 from app.media.landmarks import read_pairs
 from app.media.outlines import read_outlines
@@ -57,12 +59,12 @@ def test_the_parts_of_a_sheet() -> None:
     grey = shades(np.geomspace(1e-3, 1, 25 * 50).reshape(25, 50), picture)
     assert (grey.min(), grey.max(), grey.shape) == (0, 255, picture.shape)
     sheet = contact_sheet("title", [("a", picture), ("b", drawn)])
-    assert sheet.shape == (gallery.PANEL + 4 * gallery.MARGIN, 4 * gallery.PANEL + 3 * gallery.MARGIN, 3)
+    assert sheet.shape == (PANEL + 4 * MARGIN, 4 * PANEL + 3 * MARGIN, 3)
 
 
 def test_a_sheet_is_as_high_as_its_panels(studio: Studio) -> None:
     studio.sheet("one", "title", [("a", np.zeros((20, 30, 3), np.uint8))], 40)
-    assert read_picture(studio.folder / "one-sheet.png").height == 40 + 4 * gallery.MARGIN
+    assert read_picture(studio.folder / "one-sheet.png").height == 40 + 4 * MARGIN
 
 
 def test_what_is_played_ends_as_the_still_and_as_a_replay(studio: Studio) -> None:
@@ -73,20 +75,20 @@ def test_what_is_played_ends_as_the_still_and_as_a_replay(studio: Studio) -> Non
     assert np.array_equal(seen[-1], played.result)
     assert len(seen) == 2
     assert np.array_equal(played.result, studio.still(recipe.edited(**short)))
-    replay = Replay(studio.device, played.recipe, Pictures(Picture(played.source), gallery.recipes_folder()))
+    replay = Replay(studio.device, played.recipe, Pictures(Picture(played.source), recipes_folder()))
     replay.seek(2)
     size = played.source.shape[1], played.source.shape[0]
     assert np.array_equal(played.displacement, replay.warp.read(size))
     replay.release()
 
 
-@pytest.mark.parametrize("name", sorted({*gallery.RECIPES, *gallery.GUIDE} - {*gallery.HANDLES}))
+@pytest.mark.parametrize("name", sorted(name for name in {*FIGURES, *BESIDES} if not name.startswith("handles")))
 def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str) -> None:
     from app.model.forces import build
 
     recipe = load(name)
     assert recipe.picture is not None
-    pictures = Pictures(read_picture(gallery.recipes_folder() / recipe.picture), gallery.recipes_folder())
+    pictures = Pictures(read_picture(recipes_folder() / recipe.picture), recipes_folder())
     grid = Grid.for_picture(pictures.source.width, pictures.source.height, 64)
     assert build(recipe.force, grid, pictures, recipe.duration)
     assert pictures.notices == []
@@ -95,7 +97,7 @@ def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["figure-5", "figure-6"])
 def test_portraits_move_in_the_window_only(name: str, studio: Studio) -> None:
-    numbers = gallery.FIGURES[name](studio)
+    numbers = FIGURES[name](studio)
     assert float(numbers["px outside, mean"]) < 0.25
     assert float(numbers["px inside, mean"]) > 8
     assert float(numbers["frozen: px outside, most"]) == 0
@@ -111,7 +113,7 @@ def test_portraits_move_in_the_window_only(name: str, studio: Studio) -> None:
 
 
 def test_coordinates_stay_sharp_and_values_blur(studio: Studio) -> None:
-    numbers = gallery.figure_1(studio)
+    numbers = figure_1(studio)
     assert float(numbers["sharpness, coordinates"].rstrip("%")) >= 95
     assert float(numbers["sharpness, density"].rstrip("%")) < 60
 
@@ -119,7 +121,7 @@ def test_coordinates_stay_sharp_and_values_blur(studio: Studio) -> None:
 def test_a_folder_that_cannot_be_made_is_told(device: Device, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"Cannot write .*file/in"):
-        gallery.make(device, tmp_path / "file" / "in", Progress())
+        make(device, tmp_path / "file" / "in", Progress())
 
 
 def test_light_is_luminance_in_linear_light() -> None:
@@ -129,7 +131,7 @@ def test_light_is_luminance_in_linear_light() -> None:
 
 def test_the_spline_of_a_recipe_looks_its_handles_up_where_they_go() -> None:
     recipe = load("handles-smile")
-    displacement = gallery.spline_of(recipe, (600, 600))
+    displacement = spline_of(recipe, (600, 600))
     for each in (*recipe.handle, *recipe.pin):
         x, y = (getattr(each, "to", None) or each.at)[0] * 600, (getattr(each, "to", None) or each.at)[1] * 600
         near = ndimage.map_coordinates(displacement[..., 0], [[y - 0.5], [x - 0.5]], order=3)
@@ -137,7 +139,7 @@ def test_the_spline_of_a_recipe_looks_its_handles_up_where_they_go() -> None:
 
 
 def test_the_fitted_recipes_lead_the_points_of_their_files() -> None:
-    folder = gallery.recipes_folder()
+    folder = recipes_folder()
     for name, read in (
         ("handles-tree", lambda size: read_pairs([folder / "handles-tree.csv"], size).places * size),
         ("handles-logo", lambda size: read_outlines(folder / "logo-disc.png", folder / "logo-heart.png", size)[0]),
@@ -159,13 +161,13 @@ def test_handles_at_work_are_shown_where_they_are_and_shall_be(studio: Studio) -
 
     studio.play("handles-tree", watch=watch, **short)
     ways = [np.hypot(*np.subtract(handle.to or handle.at, handle.at)) for handle in recipe.handle]
-    far, scale = int(np.argmax(ways)), (gallery.WIDE, len(seen[0]))
-    assert np.abs(places[-1][far] - places[0][far]).max() * gallery.WIDE > 10
+    far, scale = int(np.argmax(ways)), (WIDE, len(seen[0]))
+    assert np.abs(places[-1][far] - places[0][far]).max() * WIDE > 10
     for frame, place in ((seen[0], places[0][far]), (seen[-1], places[-1][far])):
         x, y = (place * scale).astype(int)
-        assert np.abs(frame[y - 1 : y + 2, x - 1 : x + 2].astype(int) - gallery.FORCE).max() < 60
+        assert np.abs(frame[y - 1 : y + 2, x - 1 : x + 2].astype(int) - FORCE).max() < 60
     x, y = np.multiply(recipe.handle[far].to or (0, 0), scale).astype(int)
-    assert np.abs(seen[0][y, x - 7 : x + 8].astype(int) - gallery.INK).max(axis=-1).min() < 60, "a ring"
+    assert np.abs(seen[0][y, x - 7 : x + 8].astype(int) - INK).max(axis=-1).min() < 60, "a ring"
     studio.there_and_back("a.webp", seen[:3])
     with Image.open(studio.folder / "a.webp") as image:
         assert (image.size, getattr(image, "n_frames", 1)) == (scale, 4)
@@ -175,9 +177,9 @@ def test_folds_are_found_and_marked() -> None:
     x = (np.arange(100) + 0.5) / 100
     folded = np.zeros((50, 100, 2))
     folded[..., 0] = -5 * np.exp(-(((x - 0.5) / 0.1) ** 2)) * (x - 0.5)  # x + D turns back in the middle
-    stretch, det = gallery.stretch_and_det(folded)
+    stretch, det = stretch_and_det(folded)
     assert det[25, 50] == pytest.approx(1 - 5, rel=0.05)
     assert stretch[25, 50] == pytest.approx(4, rel=0.05)
-    shown = gallery.marked(np.full((50, 100, 3), 9, np.uint8), det)
-    assert (shown[25, 50] == gallery.FORCE).all()
+    shown = marked(np.full((50, 100, 3), 9, np.uint8), det)
+    assert (shown[25, 50] == FORCE).all()
     assert (shown[25, 5] == 9).all()

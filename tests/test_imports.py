@@ -27,6 +27,7 @@ ROOMS = {
     "app.model": {"app.errors", "app.progress", "solver.limits", "solver.components", "solver.course", "solver.grid"},
     "app.media": {"app.errors", "app.progress", "solver.grid", "app.model"},
     "app.work": {"app.errors", "app.progress", "solver", "solver.components", "solver.grid", "app.model", "app.media"},
+    "app.gallery": {"app.errors", "app.progress", "solver", "solver.grid", "app.model", "app.media", "app.work"},
     "app.ui": {"app.errors", "app.progress", "solver", "solver.grid", "app.model", "app.media", "app.work", "assets"},
     "app": {
         "app.errors",
@@ -36,6 +37,7 @@ ROOMS = {
         "app.model",
         "app.media",
         "app.work",
+        "app.gallery",
         "app.ui",
         "assets",
     },

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import retouching
-from app.gallery import Studio, load, source_of
+from app.gallery import retouching
+from app.gallery.studio import Studio, load, source_of
 from app.model.presets import PUTTY, WATER
 from app.model.strokes import Stroke
 from app.progress import Progress

@@ -14,10 +14,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from app.gallery import Studio, load
+from app.gallery.retouching import JOBS, PHOTOGRAPH
+from app.gallery.studio import Studio, load
 from app.model.recipe import Recipe
 from app.progress import Progress
-from app.retouching import JOBS, PHOTOGRAPH
 from solver.gl.device import Device
 
 MOVED = 0.05  # pixels

@@ -17,7 +17,7 @@ import pytest
 from scipy import ndimage
 
 from app.errors import Cancelled, UserError
-from app.gallery import sharpness, spline_warp
+from app.gallery.measures import sharpness, spline_warp
 from app.media import ffmpeg
 from app.media.auxiliary import Pictures
 from app.media.files import takes_place

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from app.gallery import Numbers, Studio, load, source_of
-from app.media.files import make_folder
+from app.gallery.measures import told
+from app.gallery.studio import Measured, Studio, load, made, source_of
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.recipe import Recipe
@@ -34,23 +35,15 @@ JOBS: dict[str, tuple[str, Box]] = {
 POSTERS = ("poster-terrace", "poster-tanguy", "poster-night-cafe")
 
 
-def make(device: Device, folder: Path, progress: Progress) -> dict[str, Numbers]:
-    """Play every job and poster, write what comes of them into `folder`, and return what was measured on each.
-
-    Raises:
-        UserError: if the folder cannot be written to.
-        Cancelled: if `progress` says so.
-    """
-    make_folder(folder)
-    progress.total = sum(load(name).ticks for name in (*JOBS, *POSTERS))
-    studio = Studio(device, folder, progress)
-    try:
-        return {name: retouch(studio, name) for name in JOBS} | {name: poster(studio, name) for name in POSTERS}
-    finally:
-        studio.release()
+def make(device: Device, folder: Path, progress: Progress) -> dict[str, Measured]:
+    """Play every job and poster into `folder`; see `made`."""
+    strokes = {name: partial(retouch, name=name) for name in JOBS} | {
+        name: partial(poster, name=name) for name in POSTERS
+    }
+    return made(device, folder, progress, strokes, sum(load(name).ticks for name in strokes))
 
 
-def retouch(studio: Studio, name: str, smaller: int = 1) -> Numbers:
+def retouch(studio: Studio, name: str, smaller: int = 1) -> Measured:
     """Play a job and write its sheet, cut from the whole photograph before and after.
 
     Args:
@@ -80,7 +73,7 @@ def retouch(studio: Studio, name: str, smaller: int = 1) -> Numbers:
     return numbers
 
 
-def poster(studio: Studio, name: str) -> Numbers:
+def poster(studio: Studio, name: str) -> Measured:
     """Play a poster, and write it and its sheet."""
     recipe = load(name)
     source = source_of(recipe)
@@ -122,7 +115,7 @@ def beneath(stroke: Stroke, size: tuple[int, int]) -> np.ndarray:
 
 def _played(
     studio: Studio, recipe: Recipe, source: np.ndarray, size: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray, Numbers]:
+) -> tuple[np.ndarray, np.ndarray, Measured]:
     """The result of a recipe on a picture, (h, w, 3) uint8 of `size`; how far each pixel of it is looked up from
     itself, in pixels (h, w); and what is measured on the whole map.
     """
@@ -130,9 +123,4 @@ def _played(
         result = studio.sampler.apply(replay.warp, source, size, Sampling(edges=recipe.edges))
         found = replay.warp.statistics()
         moved = np.linalg.norm(replay.warp.read(size), axis=-1) * max(size)
-    numbers = {
-        "px, most": f"{found.displacement_max * max(size):.1f}",
-        "det J": f"{found.det_min:.2f} to {found.det_max:.2f}",
-        "folds": f"{found.folds} of {found.places} places",
-    }
-    return result, moved, numbers
+    return result, moved, told(found, max(size)) | {"folds": f"{found.folds} of {found.places} places"}
