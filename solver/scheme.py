@@ -37,7 +37,7 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class Motion:
+class FlowStatistics:
     """How fast the fluid moves: what stop conditions and statistics look at."""
 
     kinetic_energy: float
@@ -237,11 +237,11 @@ class Scheme(ABC):
         """
         return np.pad(np.cumsum(self.u * np.float32(self.grid.spacing[1]), axis=0), ((1, 0), (0, 0)))
 
-    def motion(self) -> Motion:
+    def motion(self) -> FlowStatistics:
         """Kinetic energy (integral of |v|^2 / 2, summed over the faces) and largest speed at cell centres."""
         faces, (hx, hy) = self.faces().get().astype(np.float64), self.grid.spacing
         speed = np.linalg.norm(self.velocity_at_centres().astype(np.float64), axis=-1)
-        return Motion(float(0.5 * (faces**2).sum() * hx * hy), float(speed.max()))
+        return FlowStatistics(float(0.5 * (faces**2).sum() * hx * hy), float(speed.max()))
 
     def _divergence_norm(self, wanted: np.ndarray | None) -> float:
         """Root mean square of the divergence less what is wanted, 1 / s; 0 if nobody is `measuring`."""

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from app.media.record import digest_of_file
 from app.model.picture import Picture
+from app.model.timeline import frame_rate
 from app.progress import never
 
 FrameRange = tuple[int, int | None]
@@ -56,17 +57,21 @@ def coded(colours: Colours) -> dict[bytes, bytes]:
 class Clip(ABC):
     """Frames of one size and depth.
 
-    fps: frames a second; None where the recipe says it. frames: about how many; None when unknown.
-    start: the number of the first. bits, alpha: of a frame as it is read; pixel_format: ffmpeg's name of what it is
-    stored in, such as yuv420p.
-    sound: name of its first sound track's codec, None if silent. late: seconds that its frames begin after the file,
-    as a rule after its sound; 0 where an older ffmpeg does not tell.
-    durations: of the frames, in steps of 1 / fps, where they differ. loops: how often it is played, 0 for ever.
-    colours: what they are. timecode: of the first frame, as 01:00:00:00; None where there is none.
-    is_whole: each frame is a picture of its own, with all that belongs to it.
-    is_linked: a project refers to it, and does not keep it.
-    is_steady: any frame can be come to without those before it.
-    note: what of it is lost, in a sentence; "" if nothing.
+    Attributes:
+        bits, alpha: of a frame as it is read.
+        pixel_format: ffmpeg's name of what a frame is stored in, such as yuv420p.
+        fps: frames a second; None where the recipe says it.
+        frames: about how many there are; None where that is not known.
+        start: the number of the first.
+        sound: the codec of its first sound track; None if it is silent.
+        late: seconds from the file's start, as a rule its sound's, to the first frame; 0 where ffmpeg does not say.
+        durations: of the frames, in steps of 1 / fps, where they differ.
+        loops: how often it is played, 0 for ever.
+        is_whole: each frame is a picture of its own, with all that belongs to it.
+        timecode: of the first frame, as 01:00:00:00; None where there is none.
+        is_linked: a project refers to it, and does not keep it.
+        is_steady: a frame can be decoded without those before it.
+        note: what of it is lost, in a sentence; "" if nothing.
     """
 
     path: Path
@@ -147,6 +152,11 @@ class Clip(ABC):
     @abstractmethod
     def digest(self, number: int) -> str:
         """What a frame is made of: the bytes of its file. Raises `UserError` or `OSError`."""
+
+
+def rate_of(clip: Clip | None, fps: float) -> Fraction:
+    """Frames a second: the clip's own, or `fps` where it has none."""
+    return (clip and clip.fps) or frame_rate(fps)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,7 +26,7 @@ Kind = Literal["st", "offsets"]
 
 Holds = Literal["map", "picture", "either"]
 
-Grid = Literal["centres", "corners", "pixels"]
+PixelPlaces = Literal["centres", "corners", "pixels"]
 """The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
 
 FLO_MAGIC = np.float32(202021.25)
@@ -154,7 +154,7 @@ def to_st(displacement: Displacement) -> np.ndarray:
     return out
 
 
-def from_st(st: np.ndarray, grid: Grid = "centres", overscan: int = 0) -> Displacement:
+def from_st(st: np.ndarray, grid: PixelPlaces = "centres", overscan: int = 0) -> Displacement:
     """The displacement (float64) of absolute places (h, w, 2), y up, on any of the three grids."""
     width, height = st.shape[1] - 2 * overscan, st.shape[0] - 2 * overscan
     values = np.empty(st.shape, np.float64)
@@ -293,7 +293,7 @@ def read_map(
     path: str | os.PathLike[str],
     *,
     kind: Kind | None = None,
-    grid: Grid | None = None,
+    grid: PixelPlaces | None = None,
     overscan: int | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> Displacement:

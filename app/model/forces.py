@@ -352,13 +352,13 @@ class _Room(_Force):
         return (rate - rate.mean()).astype(np.float32)
 
 
-class Source(_Room):
+class SourceForce(_Room):
     """Bloat; see `_Room`."""
 
     kind: Literal["source"]
 
 
-class Sink(_Room):
+class SinkForce(_Room):
     """Pinch: the source's opposite."""
 
     kind: Literal["sink"]
@@ -366,7 +366,8 @@ class Sink(_Room):
 
 
 Force = Annotated[
-    PointForce | CurveForce | FieldForce | GradientForce | VortexForce | Source | Sink, Field(discriminator="kind")
+    PointForce | CurveForce | FieldForce | GradientForce | VortexForce | SourceForce | SinkForce,
+    Field(discriminator="kind"),
 ]
 
 

@@ -49,7 +49,7 @@ class FluidSettings(Model):
     sweeps: Annotated[int, Field(ge=1, le=10_000)] = 40
 
 
-class Density(Model):
+class DensitySettings(Model):
     """Eq. (5): the picture's values as a density that diffuses with `kappa` while `source` is fed into it.
 
     Attributes:
@@ -165,7 +165,7 @@ class Recipe(Model):
         duration: T, in simulated seconds.
         amount: how much of the warp is seen; 1 is all of it.
         edges: what lies beyond the picture's edge.
-        mode: "coordinates" warps the picture's coordinates, "density" moves its values (see `Density`).
+        mode: "coordinates" warps the picture's coordinates, "density" moves its values (see `DensitySettings`).
         viscosity, freeze, force, stroke, change: applied in the order they are written in.
         mask: what is done to the masks in no time, in this order, before all else that begins at the same tick.
         handle, pin: in force all at once.
@@ -180,7 +180,7 @@ class Recipe(Model):
     edges: Literal["transparent", "black", "clamp", "mirror", "wrap"] = "transparent"
     mode: Literal["coordinates", "density"] = "coordinates"
     fluid: FluidSettings = FluidSettings()
-    density: Density = Density()
+    density: DensitySettings = DensitySettings()
     stop: Stop = Stop()
     time: Playback = Playback()
     output: Output = Output()

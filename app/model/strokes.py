@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from app.model.schema import Fraction01, Model, Place, Several
 
-Tool = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
+ToolName = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
 Symmetry = Literal["none", "left-right", "up-down", "both", "radial"]
 FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1 / 200 of such a cell
 SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
@@ -54,7 +54,7 @@ class BrushPath(Model):
         local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 
-    tool: Tool
+    tool: ToolName
     radius: Annotated[float, Field(ge=SMALLEST_RADIUS, le=10)] = 0.08
     hardness: Fraction01 = 0.5
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0

@@ -19,7 +19,7 @@ from pydantic import Field, field_validator, model_validator
 from app.errors import UserError
 from app.model.schema import Model, Several
 
-Moment = Annotated[float, Field(ge=0, le=1_000_000)]
+Seconds = Annotated[float, Field(ge=0, le=1_000_000)]
 """Seconds since the simulation began."""
 
 
@@ -188,9 +188,9 @@ class Timed(Model):
         feedback: see `Feedback`; it cannot be written in a recipe.
     """
 
-    at: Annotated[Several[Moment], Field(min_length=1)] | None = None
-    during: tuple[Moment, Moment] | None = None
-    keys: Annotated[Several[tuple[Moment, float]], Field(min_length=1)] | None = None
+    at: Annotated[Several[Seconds], Field(min_length=1)] | None = None
+    during: tuple[Seconds, Seconds] | None = None
+    keys: Annotated[Several[tuple[Seconds, float]], Field(min_length=1)] | None = None
     interpolation: Literal["linear", "smooth", "hold"] = "linear"
     formula: str | None = None
     feedback: Callable[[Any], float] | None = Field(default=None, exclude=True, repr=False)

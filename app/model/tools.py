@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 from app.model.handles import RecipeHandle
 from app.model.mask_edits import MaskStroke
 from app.model.sampling import Point
-from app.model.strokes import BrushPath, Stroke, Symmetry
-from app.model.strokes import Tool as StrokeTool
+from app.model.strokes import BrushPath, Stroke, Symmetry, ToolName
 from app.model.windows import FLOWING
 
 FASTEST = 2.0  # longer sides per second that a brush can follow
@@ -154,7 +153,7 @@ class Tool:
     settings: tuple[str, ...] = ("radius", "hardness", "strength")
 
 
-def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> Stroke | MaskStroke:
+def _stroke(press: Press, name: ToolName, reverse: bool, *touches: Touch) -> Stroke | MaskStroke:
     brush = press.brush
     stroke = Stroke(
         tool=name,
@@ -174,7 +173,7 @@ def _stroke(press: Press, name: StrokeTool, reverse: bool, *touches: Touch) -> S
     return MaskStroke.model_validate({"kind": "stroke", **stroke.model_dump(include=set(BrushPath.model_fields))})
 
 
-def painting(forward: StrokeTool, backward: StrokeTool | None = None) -> Callable[[Press, Touch], Gesture]:
+def painting(forward: ToolName, backward: ToolName | None = None) -> Callable[[Press, Touch], Gesture]:
     """A tool that works where the pointer is: `backward` is its opposite, or else the stroke is reversed."""
 
     def gesture(press: Press, first: Touch) -> Gesture:

@@ -56,7 +56,7 @@ def may_have_windows(recipe: Recipe) -> bool:
     return not recipe.pushes and recipe.mode == "coordinates" and recipe.fluid.solver == "mac"
 
 
-class Window(NamedTuple):
+class FlowWindow(NamedTuple):
     """A part of the lattice of `detail` cells along the longer side, from cell (column, row) on; see `grid_in`."""
 
     detail: int
@@ -131,7 +131,7 @@ def _inside(place: tuple[float, float], picture: tuple[float, float]) -> tuple[f
     return x, y
 
 
-def _holds(window: Window, lattice: tuple[int, int], room: list[float], picture: tuple[float, float]) -> bool:
+def _holds(window: FlowWindow, lattice: tuple[int, int], room: list[float], picture: tuple[float, float]) -> bool:
     """True if the box `room` (left, top, right, bottom) lies in the window."""
     h = _spacing(lattice, picture)
     for axis, (first, count) in enumerate(zip(window[1:], _size(lattice), strict=True)):

@@ -114,4 +114,3 @@ def _table() -> list[Action]:
 
 
 ACTIONS = {action.name: action for action in _table()}
-BY_KEY = {key: action for action in ACTIONS.values() for key in action.keys}

@@ -16,11 +16,11 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError, printable
-from app.media.clip import WHOLE, FrameRange
+from app.media.clip import WHOLE, FrameRange, rate_of
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
 from app.model.recipe import Recipe
-from app.model.timeline import NEARLY, frame_rate
+from app.model.timeline import NEARLY
 from app.ui.canvas import shown_pixels
 from app.ui.chooser import FileChooser
 from app.ui.clipboard import Giving, check
@@ -298,7 +298,7 @@ class ExportDialog(Dialog):
     @property
     def _rate(self) -> Fraction:
         """Frames a second of what is written."""
-        return (self.clip and self.clip.fps) or frame_rate(self.fps)
+        return rate_of(self.clip, self.fps)
 
     def body(self, ui: Ui) -> bool:
         imgui.align_text_to_frame_padding()

@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 
 from app.errors import UserError
 from app.media import project as projects
+from app.media.clip import rate_of
 from app.media.files import sequence_of
 from app.media.maps import MAP_ENDINGS, holds
 from app.media.opening import check_picture
@@ -23,7 +24,6 @@ from app.model.mask_edits import MASKS, UNITS, MaskName, PictureMask, as_grey
 from app.model.picture import Picture
 from app.model.presets import DEFAULT
 from app.model.recipe import FluidSettings, Recipe
-from app.model.timeline import frame_rate
 from app.ui import clipboard
 from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialogs, PictureOrMap, Unsaved
@@ -318,7 +318,7 @@ def load_any(path: Path, fluid: dict[str, Any] | None = None) -> Project:
     else:
         project = projects.from_picture(path, fresh_recipe(fluid))
         if project.clip is not None:
-            recipe = fresh_recipe(fluid, tick_for(project.clip.fps or frame_rate(project.recipe.output.fps)))
+            recipe = fresh_recipe(fluid, tick_for(rate_of(project.clip, project.recipe.output.fps)))
             project = replace(project, recipe=recipe.edited(picture=project.recipe.picture))
     check_picture(project.picture, path.name)
     return project

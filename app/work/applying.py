@@ -15,7 +15,7 @@ import numpy as np
 from app.errors import UserError
 from app.media import maps
 from app.media.animation import Frame, animation_writer
-from app.media.clip import WHOLE
+from app.media.clip import WHOLE, rate_of
 from app.media.encoders import check_colours, check_output, passes, unheld_of_clip
 from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, writable
 from app.media.formats import picture_format, unheld
@@ -25,7 +25,6 @@ from app.media.pictures import write_picture
 from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
-from app.model.timeline import frame_rate
 from app.progress import Progress
 from app.work.along import along, widened
 from app.work.export import Kept, Report, Target, looked_up, opaque_value, steps_for, with_alpha, write_all
@@ -51,7 +50,7 @@ class MapSource:
 
     path: Path
     kind: Kind | None = None
-    grid: maps.Grid | None = None
+    grid: maps.PixelPlaces | None = None
     overscan: int | None = None
     max_pixels: int = MAX_PIXELS
 
@@ -222,7 +221,7 @@ class _Applying:
         progress.enter("")
         record = self._record() if is_sequence(self.output) else None
         kept = Kept([record] if record and outputs.resume else [])
-        rate = (clip and clip.fps) or frame_rate(order.fps)
+        rate = rate_of(clip, order.fps)
         with ExitStack() as stack:
             pictures: Iterator[tuple[int, Picture]]
             if clip:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from app.errors import UserError
 from app.media.animation import AnimationOptions
-from app.media.clip import WHOLE, Clip, FrameRange
+from app.media.clip import WHOLE, Clip, FrameRange, rate_of
 from app.media.encoders import check_colours, check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
 from app.media.inputs import MAX_PIXELS
@@ -19,7 +19,6 @@ from app.media.maps import Kind, check_map
 from app.media.opening import check_picture
 from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.timeline import frame_rate
 
 
 @dataclass(frozen=True)
@@ -176,8 +175,7 @@ class Job:
     @property
     def rate(self) -> Fraction:
         """Frames per second."""
-        own = self.clip.fps if self.clip else None
-        return own or frame_rate(self.recipe.output.fps)
+        return rate_of(self.clip, self.recipe.output.fps)
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written.

@@ -14,7 +14,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.scheme import Scheme
 
-Impulses = list[tuple[Field, float]]
+Acting = list[tuple[Field, float]]
 """Fields, and how many times each acts."""
 
 # What a force may do within a tick, and the map still follow: in longer sides, and in e-folds of area.
@@ -69,12 +69,12 @@ class LoadedForce:
             raise UserError(f"{self.label}: at t = {time:.3g} s it {grown}; {mend}")
 
 
-def acting(forces: list[LoadedForce], fluid: Scheme, start: float, dt: float, state: Any) -> tuple[Impulses, Impulses]:
+def acting(forces: list[LoadedForce], fluid: Scheme, start: float, dt: float, state: Any) -> tuple[Acting, Acting]:
     """The force fields with their impulses in this tick, and the motions; sources go into the fluid's own.
 
     state: what a feedback law looks at.
     """
-    pushes, motions = Impulses(), Impulses()
+    pushes, motions = Acting(), Acting()
     for force in forces:
         impulse = force.law.impulse(start, start + dt, state)
         force.check(impulse, dt, start)

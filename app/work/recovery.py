@@ -39,14 +39,14 @@ def default_folder() -> Path:
 
 
 @dataclass
-class Held:
+class LockedFolder:
     """The folder of a journal, locked by this process."""
 
     folder: Path
     lock: Lock
 
     @classmethod
-    def new(cls, root: Path) -> Held:
+    def new(cls, root: Path) -> LockedFolder:
         """A folder of a new name in `root`.
 
         Raises:
@@ -89,7 +89,7 @@ class Journal:
         trouble: why nothing can be written, as a sentence; for the window to take.
     """
 
-    def __init__(self, root: Path, held: Held | None = None) -> None:
+    def __init__(self, root: Path, held: LockedFolder | None = None) -> None:
         self.trouble: str | None = None
         self._root = root
         self._held = held
@@ -205,7 +205,7 @@ class Journal:
         """Write all of it into a new file, which takes the place of the one that is there."""
         self._close_file()
         if self._held is None:
-            self._held = Held.new(self._root)
+            self._held = LockedFolder.new(self._root)
         folder = self._held.folder
         path, temporary = folder / JOURNAL, folder / f"{JOURNAL}.new"
         file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o600)
@@ -261,7 +261,7 @@ class Found:
         when: the last edit was made.
     """
 
-    held: Held
+    held: LockedFolder
     origin: Origin
     work: Work
     when: datetime
@@ -312,7 +312,7 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
             continue
         if lock is None:
             continue
-        held = Held(folder, lock)
+        held = LockedFolder(folder, lock)
         try:
             one = _look_into(held)
         except Damaged:
@@ -331,7 +331,7 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
     return sorted(found, key=lambda one: one.when, reverse=True), notices
 
 
-def _look_into(held: Held) -> Found | None:
+def _look_into(held: LockedFolder) -> Found | None:
     """What is in a folder; None where nothing would be lost with it."""
     path = held.folder / JOURNAL
     if not path.is_file():

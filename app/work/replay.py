@@ -22,7 +22,7 @@ from app.model.masks import solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import FINEST, SmallPictures, channels
 from app.model.strokes import FINEST_DETAIL, Act, Change
-from app.model.windows import FLOWING, Window, may_have_windows
+from app.model.windows import FLOWING, FlowWindow, may_have_windows
 from app.work.brushwork import Brushwork, Scene
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.work.leading import handles_of
@@ -313,7 +313,7 @@ class Replay:
         Handles act on the whole picture.
         """
         if (acts or leads) and self._has_windows:
-            window = None if leads else Window.of(acts, self.window, self.grid)
+            window = None if leads else FlowWindow.of(acts, self.window, self.grid)
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
@@ -326,10 +326,10 @@ class Replay:
                     self.fluid.go_on_with(flow)
                     flow.release()
 
-    def _cells_of(self, window: Window | None) -> Grid:
+    def _cells_of(self, window: FlowWindow | None) -> Grid:
         return self.grid if window is None else window.grid_in(self.grid)
 
-    def _look_at(self, window: Window | None) -> None:
+    def _look_at(self, window: FlowWindow | None) -> None:
         """Go on in another window, with a fluid at rest that no masks have been applied to; not yet with the map."""
         if window == self.window:
             return
@@ -385,7 +385,7 @@ class Replay:
         recipe, source = self.recipe, self.pictures.source
         self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
         fluid, warp = SOLVERS[recipe.fluid.solver]
-        self.window: Window | None = None
+        self.window: FlowWindow | None = None
         self._has_windows = may_have_windows(recipe)
         self.fluid = self._on_whole = fluid(self.device, self.grid)
         self._in_window: Fluid | None = None
@@ -514,7 +514,7 @@ class Replay:
         )
 
 
-def _window(saved: np.ndarray) -> Window | None:
+def _window(saved: np.ndarray) -> FlowWindow | None:
     """The window that a state was saved in.
 
     Raises:
@@ -525,4 +525,4 @@ def _window(saved: np.ndarray) -> Window | None:
         return None
     if saved.shape != (3,) or saved.dtype != np.int64 or not 0 < numbers[0] <= FINEST_DETAIL or min(numbers) < 0:
         raise ValueError("it is of no window")
-    return Window(*numbers)
+    return FlowWindow(*numbers)

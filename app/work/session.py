@@ -17,7 +17,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
-from app.media.clip import Clip
+from app.media.clip import Clip, rate_of
 from app.media.project import Project
 from app.model.bars import Changed, Which, with_changed
 from app.model.document import Document
@@ -27,7 +27,7 @@ from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.strokes import Stroke
-from app.model.timeline import NEARLY, Timeline, frame_rate, moment_at
+from app.model.timeline import NEARLY, Timeline, moment_at
 from app.model.tools import Made, Press, Tool, Touch
 from app.model.windows import detail_for
 from app.work.gesture import OpenGesture, kept_near
@@ -135,8 +135,7 @@ class Session:
     @property
     def clip_rate(self) -> Fraction:
         """Frames a second of the clip, or of an animation."""
-        clip = self.project.clip
-        return (clip and clip.fps) or frame_rate(self._live.output.fps)
+        return rate_of(self.project.clip, self._live.output.fps)
 
     @property
     def frame(self) -> int:
@@ -492,11 +491,6 @@ class Session:
             self._beyond += 1
         elif self.end:
             self._record()
-
-    @property
-    def went_back(self) -> bool:
-        """The playhead was sent back, and what is done next begins there."""
-        return self._went_back
 
     def seek(self, tick: int) -> None:
         """Send the playhead to a tick of the recording; it arrives over the next frames."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, sqrt
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -150,11 +150,6 @@ class Projection:
         After a warm start what that step changed is a little smoother than what was subtracted; see `gradient.frag`.
         """
         return unpacked(self._last.read.get())[: self.size[1], : self.size[0]] * np.float32(self.spacing[0])
-
-    def divergence_norm(self, velocity: Field) -> float:
-        """Root mean square divergence of a MAC velocity over all cells, 1 / s; waits for the GPU."""
-        squares, *_ = self._take_divergence({"velocity": velocity})
-        return sqrt(squares / (self.size[0] * self.size[1])) / self.spacing[0]
 
     # -- its stages -------------------------------------------------------------------------------------------------
 

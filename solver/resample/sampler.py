@@ -14,7 +14,7 @@ from solver.gl.passes import Region
 from solver.resample.plan import KINDS, TARGET_COMPONENTS, Map, Plan, Sampling, SamplingError, plan_for
 from solver.resample.sample_points import SamplePoints
 from solver.resample.tiles import SMALLEST_TILE, Piece, Tiling, halves_of, overlap, piece_of, rectangles, size_of
-from solver.resample.transfer import Source, read_result
+from solver.resample.transfer import PictureTexture, read_result
 
 BLOCK = 64  # pixels along a block of the result that is drawn by a shader of its own kind; as llvmpipe's tiles
 
@@ -37,7 +37,7 @@ class Sampler:
         self.device = device
         self.tiling = Tiling(whole, tile, device.limits.max_texture_size)
         self._fields = FieldPool(device, "resample")
-        self.source = Source(device)
+        self.source = PictureTexture(device)
         self.points = SamplePoints(device)
         self._classes_for: tuple[object, ...] = ()
         self._classes = np.empty((0, 0), np.uint8)

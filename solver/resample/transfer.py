@@ -18,21 +18,19 @@ SWIZZLES = {1: "RRR1", 2: "RRRG", 3: "RGB1", 4: "RGBA"}
 WIDENED = 1 << 17  # pixels that are given a fourth value at once
 
 
-class Source:
+class PictureTexture:
     """The picture that is looked up, or a piece of it, on the GPU: as it is, and as it is best interpolated.
 
     Attributes:
         raw: the pixels as they are.
         prepared: what is interpolated, where that is something else.
         piece: what of the picture they are, (left, top, right, bottom).
-        uploads: how often pixels went to the GPU.
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.raw: moderngl.Texture | None = None
         self.piece: Piece = (0, 0, 0, 0)
-        self.uploads = 0
         self._kind: tuple[object, ...] = ()  # channels and type of the texture
         self.prepared = FieldPool(device, "picture")
         self._held: tuple[np.ndarray, bool, bool, bool] | None = None
@@ -54,7 +52,6 @@ class Source:
         self.device.use()
         self._held = None
         self.piece = piece
-        self.uploads += 1
         left, top, right, bottom = piece
         width, height = right - left, bottom - top
         if plan.is_repeated:

@@ -18,8 +18,8 @@ from app.media import files
 from app.media.codecs.exr import read_channels
 from app.media.maps import (
     Displacement,
-    Grid,
     Kind,
+    PixelPlaces,
     cropped,
     folds,
     from_offsets,
@@ -164,7 +164,7 @@ def test_converting_between_all_formats_keeps_the_map(tmp_path: Path):
 
 
 @pytest.mark.parametrize("grid", ["centres", "corners", "pixels"])
-def test_the_three_grids_all_mean_nothing_happens(tmp_path: Path, grid: Grid):
+def test_the_three_grids_all_mean_nothing_happens(tmp_path: Path, grid: PixelPlaces):
     height, width = 6, 9
     steps = {
         "centres": lambda n: (np.arange(n) + 0.5) / n,

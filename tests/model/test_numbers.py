@@ -182,7 +182,7 @@ def recipe(name: str) -> Recipe:
     )  # fmt: skip
     change = tuple(Change(tick=5 * k, viscosity=dice.random(), drag=dice.choice((None, 1.0))) for k in range(3))
     edits = tuple(mask_edits.ClearMask(kind="clear", tick=tick, of="frozen") for tick in (2, 9))
-    kinds = (forces.VortexForce, forces.Source) if dice.random() < 0.5 else ()
+    kinds = (forces.VortexForce, forces.SourceForce) if dice.random() < 0.5 else ()
     force = tuple(made(kind, f"{name} {k}") for k, kind in enumerate(kinds))
     pins = (handles.RecipePin(at=(0.2, 0.3)),) if dice.random() < 0.3 else ()
     fluid = FluidSettings(grid=48, dt=DT, viscosity=0.3)
@@ -217,7 +217,7 @@ def of_recipe(name: str) -> Iterator[Any]:
     for tick in range(32):
         acts = [act for each in one.stroke for act in each.acts(tick)]
         if acts:
-            now = windows.Window.of(acts, now, GRID)
+            now = windows.FlowWindow.of(acts, now, GRID)
             yield [now, now and now.grid_in(GRID)]
     for radius in (0.003, 0.02, 0.2):
         yield [windows.detail_for(radius, each, each.fluid_at(9)) for each in (one, other)]
@@ -291,7 +291,7 @@ def of_history(name: str) -> Iterator[Any]:
 KINDS = {
     **{kind.__name__: lambda name, kind=kind: of_force(kind, name) for kind in (
         forces.PointForce, forces.CurveForce, forces.FieldForce, forces.GradientForce, forces.VortexForce,
-        forces.Source, forces.Sink,
+        forces.SourceForce, forces.SinkForce,
     )},
     "layers": of_layers, "mask edits": of_mask_edits, "strokes": of_stroke, "laws": of_laws, "handles": of_handles,
     "recipes": of_recipe, "time": of_time, "tools": of_tools, "history": of_history,

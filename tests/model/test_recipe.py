@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from app.errors import UserError
 from app.media.opening import shipped_recipes
 from app.media.recipes import read_recipe
-from app.model.recipe import Density, FluidSettings, Output, Playback, Recipe
+from app.model.recipe import DensitySettings, FluidSettings, Output, Playback, Recipe
 from app.model.strokes import Change, Dab, Stroke
 
 FULL = """
@@ -261,7 +261,7 @@ def test_the_guide_names_what_holds_where_a_key_is_left_out():
     )
     assert own == Recipe()
     named = re.findall(r"^(\w+) = ", text, re.MULTILINE)
-    for model in (FluidSettings, Playback, Output, Density):
+    for model in (FluidSettings, Playback, Output, DensitySettings):
         assert set(model.model_fields) - {"sweeps"} <= set(named)
 
 

@@ -10,7 +10,7 @@ from app.model.picture import Picture
 from app.model.presets import HONEY, PUTTY, WATER, Feel
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Act, Dab, Stroke
-from app.model.windows import CELLS, Window, detail_for
+from app.model.windows import CELLS, FlowWindow, detail_for
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -45,15 +45,15 @@ def test_what_acts_on_the_whole_picture_has_no_window():
 
 
 def test_a_window_stays_while_the_brush_has_room_and_is_dragged_along_by_whole_cells():
-    window = Window.of([Act(stroke(), 0, at(0.5, 0.5, 0.5, 0.5))], None, WHOLE)
+    window = FlowWindow.of([Act(stroke(), 0, at(0.5, 0.5, 0.5, 0.5))], None, WHOLE)
     assert window is not None
     grid = window.grid_in(WHOLE)
     assert grid.size == (CELLS, CELLS)
     x, y = grid.centres()
     assert abs(x.mean() - 0.5) < 2 * grid.h
     assert abs(y.mean() - 0.5 * 2 / 3) < 2 * grid.h
-    assert Window.of([Act(stroke(), 0, at(0.5, 0.5, 0.51, 0.5))], window, WHOLE) == window
-    ahead = Window.of([Act(stroke(), 0, at(0.49, 0.5, 0.5, 0.5))], None, WHOLE)
+    assert FlowWindow.of([Act(stroke(), 0, at(0.5, 0.5, 0.51, 0.5))], window, WHOLE) == window
+    ahead = FlowWindow.of([Act(stroke(), 0, at(0.49, 0.5, 0.5, 0.5))], None, WHOLE)
     assert ahead is not None
     # A radius of the brush, of 12 cells, to the right of where it has come.
     assert ahead.column - window.column == pytest.approx(12, abs=1)
@@ -61,7 +61,7 @@ def test_a_window_stays_while_the_brush_has_room_and_is_dragged_along_by_whole_c
     moved, place = window, 0.5
     seen = set()
     while place < 0.99:
-        moved = Window.of([Act(stroke(), 0, at(place, 0.5, place + 0.01, 0.5))], moved, WHOLE)
+        moved = FlowWindow.of([Act(stroke(), 0, at(place, 0.5, place + 0.01, 0.5))], moved, WHOLE)
         assert moved is not None
         assert moved.row == window.row
         seen.add(moved.column)
@@ -76,23 +76,23 @@ def test_a_window_stays_while_the_brush_has_room_and_is_dragged_along_by_whole_c
 
 def test_a_stroke_that_begins_has_as_fine_cells_as_it_asks_for_and_one_that_goes_on_keeps_its_window():
     fine, here = stroke(detail=1365), at(0.5, 0.5, 0.5, 0.5)
-    coarse = Window.of([Act(stroke(detail=512), 0, here)], None, WHOLE)
+    coarse = FlowWindow.of([Act(stroke(detail=512), 0, here)], None, WHOLE)
     assert coarse is not None
-    begun = Window.of([Act(fine, 0, here)], coarse, WHOLE)
+    begun = FlowWindow.of([Act(fine, 0, here)], coarse, WHOLE)
     assert begun is not None
     assert (coarse.detail, begun.detail) == (512, 1365)
-    assert Window.of([Act(fine, 1, here)], coarse, WHOLE) == coarse
+    assert FlowWindow.of([Act(fine, 1, here)], coarse, WHOLE) == coarse
 
 
 def test_what_no_window_holds_has_a_coarser_one_or_the_whole_picture():
-    wide = Window.of([Act(stroke(), 0, at(0.4, 0.5, 0.5, 0.5))], None, WHOLE)
+    wide = FlowWindow.of([Act(stroke(), 0, at(0.4, 0.5, 0.5, 0.5))], None, WHOLE)
     assert wide is not None
     assert 256 < wide.detail < 1365
-    assert Window.of([Act(stroke(), 0, at(0.0, 0.5, 1.0, 0.5))], None, WHOLE) is None
+    assert FlowWindow.of([Act(stroke(), 0, at(0.0, 0.5, 1.0, 0.5))], None, WHOLE) is None
     here = at(0.5, 0.5, 0.5, 0.5)
-    assert Window.of([Act(stroke(), 0, here), Act(stroke(detail=0), 0, here)], None, WHOLE) is None
+    assert FlowWindow.of([Act(stroke(), 0, here), Act(stroke(detail=0), 0, here)], None, WHOLE) is None
     far = [Act(stroke(), 0, at(0.1, 0.5, 0.1, 0.5)), Act(stroke(), 0, at(0.9, 0.5, 0.9, 0.5))]
-    assert Window.of(far, None, WHOLE) is None
+    assert FlowWindow.of(far, None, WHOLE) is None
 
 
 @pytest.mark.parametrize("size", [(6000, 4000), (5000, 1), (8, 4000), (12, 12), (601, 599)])
@@ -100,7 +100,7 @@ def test_what_no_window_holds_has_a_coarser_one_or_the_whole_picture():
 def test_a_window_lies_in_any_picture(size: tuple[int, int], place: tuple[float, float]):
     whole = Grid.for_picture(*size, 64)
     for detail in (1, 100, 1365, 65536):
-        window = Window.of([Act(stroke(detail=detail), 0, at(*place, *place))], None, whole)
+        window = FlowWindow.of([Act(stroke(detail=detail), 0, at(*place, *place))], None, whole)
         if window is not None:
             window.grid_in(whole)  # which a grid beyond the picture refuses
             assert max(window.grid_in(whole).size) <= CELLS

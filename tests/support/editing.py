@@ -14,6 +14,7 @@ from app.media.project import Project, from_picture
 from app.model.bars import Which
 from app.model.forces import VortexForce
 from app.model.picture import Picture
+from app.ui.actions import ACTIONS
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
 from app.ui.exporting import ExportDialog
@@ -24,6 +25,7 @@ from solver.gl.device import Device
 
 SIZE = (1280, 800)
 TICK = 1 / 30
+BY_KEY = {key: action for action in ACTIONS.values() for key in action.keys}
 
 
 def pattern(width: int = 240, height: int = 180) -> Picture:

@@ -16,7 +16,7 @@ from imgui_bundle import imgui
 
 from app.model.forces import PointForce, VortexForce
 from app.model.handles import RecipeHandle, RecipePin
-from app.model.strokes import Change, Stroke, Tool
+from app.model.strokes import Change, Stroke, ToolName
 from app.ui import theme
 from app.ui.actions import ACTIONS
 from app.ui.browser import Browser
@@ -115,7 +115,7 @@ def handles(robot: Robot) -> Iterator[str]:
 
 def begin_with_strokes(robot: Robot) -> None:
     """Four of them, one after the other, in two seconds."""
-    ways: tuple[tuple[Tool, float, float], ...]
+    ways: tuple[tuple[ToolName, float, float], ...]
     ways = (("push", 0.3, 0.4), ("twirl", 0.6, 0.6), ("bloat", 0.5, 0.5), ("freeze", 0.8, 0.9))
     strokes = tuple(
         Stroke(tool=tool, samples=((15 * k, start, 0.5, 1.0), (15 * k + 12, end, 0.4, 1.0)))

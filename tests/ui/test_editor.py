@@ -25,7 +25,7 @@ from app.model.recipe import Recipe
 from app.model.tools import TOOLS
 from app.progress import Progress
 from app.ui import workspace
-from app.ui.actions import ACTIONS, BY_KEY
+from app.ui.actions import ACTIONS
 from app.ui.browser import Browser
 from app.ui.canvas import MOVING, shown_pixels
 from app.ui.dialogs import PictureOrMap, Preferring, Unsaved
@@ -42,7 +42,7 @@ from app.work.jobs import Job, MapOutput, Outputs
 from solver.brush.masks import ZERO
 from solver.gl.device import Device
 from support.commands import Run
-from support.editing import Robot, export_dialog, pattern, small_project, write_foreign_map
+from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project, write_foreign_map
 
 
 def names(robot: Robot) -> list[str]:
@@ -966,7 +966,6 @@ def test_an_export_can_be_cancelled(robot: Robot, tmp_path: Path) -> None:
 def test_no_two_actions_share_a_key() -> None:
     keys = [key for action in ACTIONS.values() for key in action.keys]
     assert len(keys) == len(set(keys))
-    assert set(BY_KEY) == set(keys)
     assert {tool.key for tool in TOOLS} <= set(keys)
 
 

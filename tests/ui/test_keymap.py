@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from app.ui.actions import ACTIONS, BY_KEY
+from app.ui.actions import ACTIONS
 from app.ui.events import Key, Mods
 from app.ui.key_sheet import KeySheet
 from app.ui.keymap import Keymap
 from app.ui.preferences import Preferences
 from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import BY_KEY, Robot, small_project
 from support.widgets import Widgets
 
 

@@ -466,7 +466,7 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     dice = random.Random(seed)
 
     def gesture() -> None:
-        strokes, went_back = session.recipe.stroke, session.went_back
+        strokes, session.notice = session.recipe.stroke, None
         press = Press(BrushSettings(0.12, 0.2), dice.random() < 0.2, session.extent, session.dt)
         session.press(TOOL[dice.choice(PAINTING).name], press, dice.random(), dice.random(), 1.0, dice.random() < 0.1)
         for _ in range(dice.randrange(5)):
@@ -476,7 +476,7 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
             session.cancel()
         else:
             session.release()
-        if not went_back:
+        if session.notice is None:  # else the person is told what goes
             assert session.recipe.stroke[: len(strokes)] == strokes
 
     doings = [

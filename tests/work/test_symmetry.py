@@ -8,14 +8,14 @@ import pytest
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Recipe
-from app.model.strokes import Stroke, Symmetry, Tool
+from app.model.strokes import Stroke, Symmetry, ToolName
 from app.work.replay import Replay
 from solver.gl.device import Device
 
 SQUARE = Picture(np.zeros((96, 96, 3), np.uint8))
 
 
-def displacement(device: Device, tool: Tool, symmetry: Symmetry, sectors: int = 6) -> np.ndarray:
+def displacement(device: Device, tool: ToolName, symmetry: Symmetry, sectors: int = 6) -> np.ndarray:
     samples = tuple((n, 0.25 + 0.01 * n, 0.3 + 0.005 * n, 1.0) for n in range(10))
     stroke = Stroke(tool=tool, radius=0.1, samples=samples, symmetry=symmetry, sectors=sectors)
     fluid = FluidSettings(grid=48, dt=1 / 30, viscosity=0.01)
@@ -30,7 +30,7 @@ def displacement(device: Device, tool: Tool, symmetry: Symmetry, sectors: int = 
 @pytest.mark.parametrize(
     ("symmetry", "axes"), [("left-right", [1]), ("up-down", [0]), ("both", [0, 1])], ids=["sides", "up", "both"]
 )
-def test_a_mirrored_stroke_gives_a_mirrored_map(device: Device, tool: Tool, symmetry: Symmetry, axes: list) -> None:
+def test_a_mirrored_stroke_gives_a_mirrored_map(device: Device, tool: ToolName, symmetry: Symmetry, axes: list) -> None:
     found = displacement(device, tool, symmetry)
     assert np.abs(found).max() > 0.01
     for axis in axes:
@@ -39,7 +39,7 @@ def test_a_mirrored_stroke_gives_a_mirrored_map(device: Device, tool: Tool, symm
 
 
 @pytest.mark.parametrize("tool", ["push", "twirl", "bloat"])
-def test_four_sectors_give_a_map_that_is_the_same_after_a_quarter_turn(device: Device, tool: Tool) -> None:
+def test_four_sectors_give_a_map_that_is_the_same_after_a_quarter_turn(device: Device, tool: ToolName) -> None:
     found = displacement(device, tool, "radial", 4)
     turned = np.rot90(found)[..., ::-1] * np.array([1, -1])
     assert np.abs(turned - found).max() < 1e-4 * np.abs(found).max() + 1e-5
