@@ -62,7 +62,7 @@ def real_array(what: str, values: object) -> np.ndarray:
 
 
 def viscosities(values: object, shape: tuple[int, ...] = ()) -> np.ndarray:
-    """Viscosities as float32: of all cells one number, or one each if these have a shape.
+    """Viscosities as float32 of a shape, from one number for all or an array of that shape; without a shape, of any.
 
     Raises:
         ValueError: on another shape, or if one is negative, not finite or beyond all measure.

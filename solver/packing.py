@@ -57,7 +57,7 @@ class DoublePackedFaces:
 
 
 def unpacked(texels: np.ndarray) -> np.ndarray:
-    """Cells in their places, from the texels of 2 x 2 of them."""
+    """Cells in their places, (2 h, 2 w), from texels of 2 x 2 of them, (h, w, 4)."""
     height, width = texels.shape[:2]
     return texels.reshape(height, width, 2, 2).transpose(0, 2, 1, 3).reshape(2 * height, 2 * width)
 
@@ -72,7 +72,7 @@ def packed(cells: np.ndarray) -> np.ndarray:
 
 
 def framed(values: np.ndarray, rows: tuple[int, int], columns: tuple[int, int]) -> np.ndarray:
-    """Values with so many rows and columns of zeros before and after them; five times as fast as `np.pad`."""
+    """Values (h, w) with so many rows and columns of zeros before and after; five times as fast as `np.pad`."""
     height, width = values.shape
     framed = np.zeros((height + sum(rows), width + sum(columns)), values.dtype)
     framed[rows[0] : rows[0] + height, columns[0] : columns[0] + width] = values

@@ -57,7 +57,7 @@ def arrows(background: np.ndarray, field: np.ndarray, across: int = 34, pale: fl
 
 
 def led(pixels: np.ndarray, recipe: Recipe) -> np.ndarray:
-    """A picture with the ways of a recipe's handles, and its pins as rings."""
+    """A picture (h, w, 3) uint8 with the ways of a recipe's handles, and its pins as rings."""
     height, width = pixels.shape[:2]
     image, finer = Image.fromarray(pixels), 3
     image = image.resize((width * finer, height * finer), Image.Resampling.BICUBIC)
@@ -72,7 +72,7 @@ def led(pixels: np.ndarray, recipe: Recipe) -> np.ndarray:
 
 
 def at_work(pixels: np.ndarray, replay: Replay) -> np.ndarray:
-    """A frame, `WIDE` pixels wide, with handles as dots on their ways to rings, and pins as rings with a dot."""
+    """A frame (h, w, 3) uint8 made `WIDE` pixels wide, handles as dots on their ways to rings, pins as ringed dots."""
     finer, height = 3, round(WIDE * len(pixels) / len(pixels[0]))
     image = Image.fromarray(pixels).resize((WIDE * finer, height * finer), Image.Resampling.BICUBIC)
     pen, extent = ImageDraw.Draw(image), np.array(replay.grid.extent)
@@ -87,7 +87,7 @@ def at_work(pixels: np.ndarray, replay: Replay) -> np.ndarray:
 
 
 def marked(pixels: np.ndarray, det: np.ndarray) -> np.ndarray:
-    """A picture with the pixels where its map folds in red."""
+    """A picture (h, w, 3) uint8 with the pixels in red where det J (h, w) says that its map folds."""
     return np.where((det <= 0)[..., None], np.array(FORCE, np.uint8), pixels)
 
 

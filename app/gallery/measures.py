@@ -71,7 +71,7 @@ def spline_of(recipe: Recipe, size: tuple[int, int]) -> np.ndarray:
 
 
 def stretch_and_det(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """At each pixel the larger of stretch and its inverse, and det J, by differences of pixels."""
+    """At each pixel the larger of stretch and its inverse, and det J, (h, w) each, by differences of the map."""
     h = 1 / max(displacement.shape[:2])
     slopes = [np.gradient(displacement, h, axis=axis) for axis in (1, 0)]
     jacobian = np.stack(slopes, axis=-1) + np.eye(2)
@@ -82,7 +82,7 @@ def stretch_and_det(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def beyond(displacement: np.ndarray) -> float:
-    """The part of the pixels that look up what is outside the picture, by more than half a pixel."""
+    """The part of a map's pixels (h, w, 2) that look up what is outside the picture, by more than half a pixel."""
     height, width = displacement.shape[:2]
     y, x = np.mgrid[:height, :width] + 0.5 + np.moveaxis(displacement[..., ::-1], -1, 0) * max(height, width)
     return float(((x < -0.5) | (x > width + 0.5) | (y < -0.5) | (y > height + 0.5)).mean())

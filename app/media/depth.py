@@ -44,13 +44,13 @@ def _strip_to_bits(pixels: np.ndarray, bits: int, noise: np.random.Generator | N
 
 
 def over(pixels: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:
-    """8-bit pixels with alpha laid over an opaque 8-bit RGB colour, as programs do it: in the values, not the light."""
+    """Pixels (h, w, 2 or 4) uint8 over an opaque 8-bit RGB colour, as programs do it: in the values, not the light."""
     alpha = pixels[..., -1:].astype(np.float32) / 255
     ground = np.asarray(background if pixels.shape[2] == 4 else [np.mean(background)], np.float32)
     return (pixels[..., :-1] * alpha + ground * (1 - alpha) + 0.5).astype(np.uint8)
 
 
 def as_half(values: np.ndarray) -> np.ndarray:
-    """Floats of 16 bits; what is finite stays so."""
+    """The values as float16, of any shape; what is finite stays so."""
     most = np.float32(np.finfo(np.float16).max)
     return np.where(np.isfinite(values), np.clip(values, -most, most), values).astype(np.float16)

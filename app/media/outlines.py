@@ -37,7 +37,7 @@ def paired(one: np.ndarray, other: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def resampled(line: np.ndarray, count: int) -> np.ndarray:
-    """So many points (count, 2) of a polyline, evenly along it; one that ends where it begins has that place once."""
+    """Points (count, 2) evenly along a polyline (n, 2); of one that ends where it begins that place comes once."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     closed = len(line) > 2 and bool((line[0] == line[-1]).all())
     wanted = np.linspace(0.0, along[-1], count + closed)[:count]

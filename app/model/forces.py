@@ -471,7 +471,7 @@ def _on_faces(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def pieces_of(points: np.ndarray, spline: bool, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The middles of short pieces of the curve, at most `spacing` long, their unit tangents and their lengths."""
+    """A curve through points (n, 2) in pieces of at most `spacing`: middles, unit tangents (m, 2), lengths (m,)."""
     line = [points[0]]
     for k, (a, b) in enumerate(pairwise(points)):
         pieces = max(1, math.ceil(float(np.hypot(*(b - a))) / spacing))

@@ -81,11 +81,11 @@ class Picture:
         return self.pixels.shape[2] in (2, 4)
 
     def with_pixels(self, pixels: np.ndarray) -> Picture:
-        """The same picture with other pixels, of any size, and without the layers and margins that belong to these."""
+        """The same picture with other pixels (h, w, c) of any size, and without layers and margins."""
         return replace(self, pixels=pixels, layers=(), wide=None, margins=(0, 0, 0, 0))
 
     def with_wide(self, wide: np.ndarray, layers: tuple[Layer, ...]) -> Picture:
-        """The same picture with other pixels and layers, both with its margins."""
+        """The same picture with other pixels (h, w, c) and layers, both with its margins."""
         return replace(self, pixels=np.ascontiguousarray(wide[self._inside]), wide=wide, layers=layers)
 
     def cropped(self) -> Picture:
@@ -113,17 +113,17 @@ class Picture:
 
 
 def srgb_to_linear(values: np.ndarray) -> np.ndarray:
-    """Linear light of sRGB values 0-1 (IEC 61966-2-1)."""
+    """Linear light of sRGB values 0-1 of any shape (IEC 61966-2-1)."""
     return np.where(values <= 0.04045, values / 12.92, ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def linear_to_srgb(values: np.ndarray) -> np.ndarray:
-    """sRGB values 0-1 of linear light (IEC 61966-2-1)."""
+    """sRGB values 0-1 of linear light of any shape (IEC 61966-2-1)."""
     return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
 def unpremultiplied(pixels: np.ndarray) -> np.ndarray:
-    """Straight alpha from premultiplied; colour without alpha is left as it is."""
+    """Pixels (h, w, 2 or 4) with straight alpha from premultiplied; colour where alpha is 0 is left as it is."""
     alpha = pixels[..., -1:].astype(np.float32)
     whole = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
     with np.errstate(all="ignore"):  # what is infinite or NaN stays so

@@ -185,7 +185,7 @@ def _blur_matrix(n: int, sigma: float) -> np.ndarray:
 
 
 def quantised(values: np.ndarray, levels: int) -> np.ndarray:
-    """Values in [0, 1] cut into `levels` equal steps, the lowest 0 and the highest 1."""
+    """Values in [0, 1], of any shape, cut into `levels` equal steps, the lowest 0 and the highest 1."""
     return np.minimum(np.floor(values * levels), levels - 1) / (levels - 1)
 
 
@@ -193,13 +193,13 @@ def quantised(values: np.ndarray, levels: int) -> np.ndarray:
 
 
 def smoothstep(values: np.ndarray) -> np.ndarray:
-    """0 below 0, 1 above 1, smooth in between."""
+    """0 below 0, 1 above 1, 3 s^2 - 2 s^3 in between; of any shape."""
     s = np.clip(values, 0.0, 1.0)
     return s * s * (3 - 2 * s)
 
 
 def falloff(q: np.ndarray, hardness: float = 0.0) -> np.ndarray:
-    """A brush's weight at `q` radii from its path, as `shaders/lib/brush.glsl` draws it."""
+    """A brush's weight at `q` radii, of any shape, from its path, as `shaders/lib/brush.glsl` draws it."""
     core = 0.9 * hardness
     w = 1.0 - np.clip((q - core) / (1.0 - core), 0.0, 1.0) ** 2
     return w**3
@@ -302,7 +302,7 @@ class Segment(Model):
         return self
 
     def weight(self, picture: str, grid: Grid, pictures: NamedPictures) -> np.ndarray:
-        """As `chosen`, of what has an edge.
+        """As `chosen`, (ny, nx), of what has an edge.
 
         Raises:
             ValueError: if it chooses nothing or everything.

@@ -499,7 +499,7 @@ def write_all(
 
 
 def repeated(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndarray]:
-    """Frames in an `order` that never goes back, each as often as it is in it."""
+    """Frames (h, w, c) in an `order` that never goes back, each as often as it is in it."""
     for frame, (_, repeats) in zip(frames, groupby(order), strict=True):
         for _ in repeats:
             yield frame

@@ -24,12 +24,12 @@ def links_of(closed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def even(cells: np.ndarray) -> np.ndarray:
-    """The cells with zeros up to even numbers of rows and columns."""
+    """Cells (ny, nx) with zeros up to even numbers of rows and columns."""
     return np.pad(cells, ((0, cells.shape[0] % 2), (0, cells.shape[1] % 2)))
 
 
 def has_one_piece_a_block(left: np.ndarray, up: np.ndarray) -> bool:
-    """True if the linked cells of each block of 2 x 2 are connected within it."""
+    """True if the cells of each block of 2 x 2 are connected within it; links as of `links_of`, (ny, nx) each."""
     left, up = even(left) > 0.0, even(up) > 0.0
     linked = left | up
     linked[:, :-1] |= left[:, 1:]
@@ -40,7 +40,7 @@ def has_one_piece_a_block(left: np.ndarray, up: np.ndarray) -> bool:
 
 
 def coarsen_links(left: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The links between blocks of 2 x 2 cells."""
+    """The links between blocks of 2 x 2 cells, (ny / 2, nx / 2) each, rounded up: the mean of the finer ones."""
     left, up = even(left), even(up)
     return 0.5 * (left[::2, ::2] + left[1::2, ::2]), 0.5 * (up[::2, ::2] + up[::2, 1::2])
 
@@ -61,7 +61,7 @@ class Graph:
 
     @classmethod
     def of_cells(cls, left: np.ndarray, up: np.ndarray, aspect: float) -> Graph:
-        """The cells of a grid, row after row; its links down count `aspect` squared times their weight."""
+        """The cells of a grid, row after row, of links (ny, nx); those down weigh `aspect`^2 times as much (P3)."""
         ny, nx = left.shape
         number = np.arange(ny * nx).reshape(ny, nx)
         x, y = np.meshgrid(np.arange(nx), np.arange(ny))
@@ -71,7 +71,7 @@ class Graph:
         return cls(np.stack([x.ravel(), y.ravel()], axis=1), np.stack([here, there], axis=1), weight)
 
     def coarsen(self) -> tuple[Graph, np.ndarray]:
-        """The graph of the connected pieces of blocks, and of each unknown its piece; -1 where a piece has no links."""
+        """The graph of the connected pieces of blocks; and each unknown's piece, (n,), -1 where that has no links."""
         count, block = len(self.place), self.place // 2
         inside = (block[self.ends[:, 0]] == block[self.ends[:, 1]]).all(axis=1)
         first = connected_components(np.arange(count), *self.ends[inside].T)
@@ -86,13 +86,13 @@ class Graph:
         return Graph(block[pieces], ends, weight), piece[first]
 
     def renumber(self, order: np.ndarray) -> Graph:
-        """The same graph with the unknown `order[k]` as number k."""
+        """The same graph with the unknown `order[k]` as number k; `order` is a permutation, (n,)."""
         number = np.empty_like(order)
         number[order] = np.arange(len(order))
         return Graph(self.place[order], number[self.ends], self.weight)
 
     def neighbours(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each unknown its first neighbour in a list and their number; and the list of (neighbour, weight)."""
+        """Where in a list each unknown's neighbours begin, how many; the list (neighbour, weight), (2 m, 2)."""
         here, there = np.r_[self.ends[:, 0], self.ends[:, 1]], np.r_[self.ends[:, 1], self.ends[:, 0]]
         order = np.argsort(here, kind="stable")
         number = np.bincount(here, minlength=len(self.place))
@@ -100,9 +100,9 @@ class Graph:
         return np.cumsum(number) - number, number, listed
 
     def inverse(self) -> np.ndarray:
-        """Of the matrix A, sum of weight times difference, in float64, for right-hand sides that sum to 0 where closed.
+        """The inverse of A (P3), (n, n) float64, the mean of each component held at 0.
 
-        Each component leaves the pressure's constant open; its mean is held at 0.
+        For right-hand sides that sum to 0 in each component, as A leaves a constant open there.
         """
         count = len(self.place)
         matrix = np.zeros((count, count))
@@ -115,11 +115,11 @@ class Graph:
 
 
 def graphs_below(cells: Graph, most: int) -> tuple[list[Graph], list[np.ndarray]]:
-    """The graphs of pieces below a grid's cells, down to one of at most so many unknowns.
+    """The graphs of pieces below a grid's cells, down to one of at most `most` unknowns.
 
     Returns:
-        graphs: from the finest on; the finer ones of every unknown stand next to each other.
-        parents: for the cells and for every graph but the last, the unknowns of the next that theirs belong to, or -1.
+        graphs: from the finest on, numbered so that the finer unknowns of each coarser one stand next to each other.
+        parents: of the cells and of every graph but the last: each unknown's on the next level, (n,), or -1.
     """
     graphs, parents = [cells], []
     while len(graphs) == 1 or len(graphs[-1].place) > most:

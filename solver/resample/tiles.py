@@ -101,7 +101,7 @@ def size_of(piece: tuple[int, int, int, int]) -> tuple[int, int]:
 
 
 def edge_index(index: np.ndarray, count: int, edges: str) -> np.ndarray:
-    """The pixel of a picture of `count` that stands for pixel `index` beyond it."""
+    """The pixel, 0 to `count` - 1, that stands for each `index` along a side, also beyond it: wrapped, or mirrored."""
     if edges == "wrap":
         return index % count
     index = index % (2 * count)

@@ -41,7 +41,7 @@ class PictureTexture:
         return self.prepared["prepared"].texture if plan.is_prepared else self.raw, self.raw
 
     def hold(self, plan: Plan, picture: np.ndarray) -> None:
-        """Have all of the picture on the GPU; one that cannot be written to and is given again is still there."""
+        """Have all of the picture (h, w, c) on the GPU; it stays as long as a read-only one is given again."""
         if self._held is None or self._held[0] is not picture or self._held[1:] != plan.preparation:
             self.load(plan, (0, 0, *plan.source_size))
             # The array itself and not its id: no other can take its place in memory as long as it is held.
@@ -125,7 +125,7 @@ def read_result(field: Field, plan: Plan, target: np.ndarray) -> None:
 
 
 def write(texture: moderngl.Texture, pixels: np.ndarray) -> None:
-    """Write contiguous pixels into the top left corner of a texture of as many components, or of four for three."""
+    """Write contiguous pixels (h, w, c) into the top left corner of a texture of c components, or of four for three."""
     height, width, channels = pixels.shape
     if texture.components == channels:
         texture.write(pixels, viewport=(0, 0, width, height))

@@ -23,7 +23,7 @@ class Box(NamedTuple):
 
 
 def changed(before: np.ndarray, after: np.ndarray) -> Box | None:
-    """The smallest box with all cells that differ, None if none does."""
+    """The smallest box with all cells (ny, nx) that differ, None if none does."""
     differs = before != after
     rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
     return Box(int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1) if len(rows) else None

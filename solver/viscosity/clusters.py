@@ -96,7 +96,7 @@ class ClusterMatrix:
                 matrices[parent[k]] -= beside.T @ (inverse @ beside)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """The solution for the unknowns."""
+        """The solution for a right-hand side, (n,) both."""
         solution, rhs = np.zeros(len(rhs)), rhs.copy()
         small = np.zeros((self._count, SMALL))
         small[self._number, self._place] = rhs[self._of_small]

@@ -143,21 +143,21 @@ class CoarseSpace:
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
-        """E^-1 times the loads on the unknowns, each cluster by itself."""
+        """E^-1 times the loads on the unknowns, (n,), each cluster by itself (V5)."""
         return self._matrix.solve(loads)
 
     def coupled(self, unknowns: np.ndarray) -> np.ndarray:
-        """The loads by which other clusters hold back the unknowns, through what is less stiff."""
+        """The loads (n,) that unknowns (n,) put on other clusters: what E leaves out of Z' A Z."""
         rows, columns, values = self._between
         ends, loads = (rows, columns), (values * unknowns[columns], values * unknowns[rows])
         return np.bincount(np.concatenate(ends), np.concatenate(loads), len(unknowns))
 
     def means(self, loads: np.ndarray) -> np.ndarray:
-        """(Z' Z)^-1 times the loads on the unknowns."""
+        """(Z' Z)^-1 times the loads on the unknowns, (n,): how the parts move in the mean."""
         return loads / np.maximum(self._masses, 1e-12)
 
     def motions(self, unknowns: np.ndarray) -> np.ndarray:
-        """(a, b, turn) of all parts, u = a - turn y, v = b + turn x."""
+        """(a, b, turn) of all parts, (parts + 1, 3), part 0 at rest: u = a - turn y, v = b + turn x."""
         motions = np.zeros((self.parts.count + 1, 3))
         motions[self.part, self.motion] = unknowns
         motions[:, 0] += motions[:, 2] * self.centres[:, 1]
@@ -231,7 +231,7 @@ class Deflation:
     def correct(
         self, residual: PackedFaces, target: PackedFaces, add: bool = False, means: np.ndarray | None = None
     ) -> np.ndarray:
-        """Draw Z E^-1 Z' times the residual, or add it; the unknowns. Waits for the GPU.
+        """Draw Z E^-1 Z' times the residual (V5), or add it; returns the unknowns, (n,). Waits for the GPU.
 
         `means`: where the parts of other clusters are expected; at rest by default.
         """
@@ -250,7 +250,7 @@ class Deflation:
         return self._averaged
 
     def add_others(self, faces: PackedFaces, target: PackedFaces) -> np.ndarray:
-        """Add the faces that belong to no part to the target; how the parts move in the mean. Waits for the GPU."""
+        """Add the faces of no part to the target; returns the parts' mean motion, (n,). Waits for the GPU."""
         self._spread(target, None, add=True, others=faces)
         return self._made().means(self._gather(faces))
 

@@ -73,7 +73,10 @@ class Plan:
 
 
 def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
-    """True if coarse levels must move stiff parts as a whole, should there be any; see `RIGID_OF_SOFTEST`."""
+    """True if coarse levels must move stiff parts as a whole, should there be any; see `RIGID_OF_SOFTEST`.
+
+    `kappa`, `solid`: of the cells, (ny, nx).
+    """
     if solid.any():
         return True
     if kappa.min() <= ONE_SWEEP:

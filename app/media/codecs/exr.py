@@ -251,7 +251,7 @@ def _is_exact(name: str, dtype: np.dtype, cryptomattes: tuple[str, ...]) -> bool
 
 
 def place_window(data: np.ndarray, at: tuple[int, int], into: np.ndarray) -> None:
-    """Copy what of `data`, its corner laid at pixel `at` (x, y), falls on `into`."""
+    """Copy the part of `data` (h, w, ...), its corner laid at pixel `at` (x, y), that falls on `into` (h, w, ...)."""
     spans = []
     for start, length, room in zip(at[::-1], data.shape, into.shape, strict=False):
         first, last = max(0, int(start)), min(room, int(start) + length)

@@ -21,7 +21,7 @@ def upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:
 
 
 def upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
-    """Pixels turned and mirrored as EXIF's orientation 1-8 says (CIPA DC-008, 4.6.4)."""
+    """Pixels (h, w, ...) turned and mirrored as EXIF's orientation 1-8 says (CIPA DC-008, 4.6.4)."""
     if orientation in (5, 6, 7, 8):
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):

@@ -123,7 +123,7 @@ def _losses(tiff: Any) -> list[str]:
 
 
 def plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
-    """Samples of any kind as uint8, uint16 or float32."""
+    """Samples of any kind and shape as uint8, uint16 or float32, whole numbers by their full range."""
     kind = pixels.dtype.kind
     if kind == "b":
         return pixels.astype(np.uint8) * np.uint8(255)
