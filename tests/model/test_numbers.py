@@ -291,8 +291,8 @@ def of_history(name: str) -> Iterator[Any]:
 KINDS = {
     **{kind.__name__: lambda name, kind=kind: of_force(kind, name) for kind in (
         forces.PointForce, forces.CurveForce, forces.FieldForce, forces.GradientForce, forces.VortexForce,
+        forces.SourceForce, forces.SinkForce,
     )},
-    "Source": lambda name: of_force(forces.SourceForce, name), "Sink": lambda name: of_force(forces.SinkForce, name),
     "layers": of_layers, "mask edits": of_mask_edits, "strokes": of_stroke, "laws": of_laws, "handles": of_handles,
     "recipes": of_recipe, "time": of_time, "tools": of_tools, "history": of_history,
 }  # fmt: skip
