@@ -28,8 +28,9 @@ import numpy as np  # noqa: E402
 
 from app.errors import UserError  # noqa: E402
 from app.media.animation import animation_writer  # noqa: E402
+from app.media.displacement import Displacement  # noqa: E402
 from app.media.landmarks import Pairs, read_pairs, write_pairs  # noqa: E402
-from app.media.maps import Displacement, read_map, write_map  # noqa: E402
+from app.media.maps import read_map, write_map  # noqa: E402
 from app.media.pictures import write_picture  # noqa: E402
 from app.media.project import from_picture, load, save  # noqa: E402
 from app.media.recipes import read_recipe  # noqa: E402

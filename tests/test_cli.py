@@ -18,7 +18,8 @@ import pytest
 from PIL import Image
 
 from app import cli, doctor
-from app.media.maps import Displacement, read_map, write_map
+from app.media.displacement import Displacement
+from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import from_recipe, save
 from app.model.picture import Picture

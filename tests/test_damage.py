@@ -11,7 +11,8 @@ import pytest
 from PIL import Image
 
 from app.media.animation import animation_writer
-from app.media.maps import Displacement, write_map
+from app.media.displacement import Displacement
+from app.media.maps import write_map
 from app.media.pictures import write_picture
 from app.media.project import from_recipe, save
 from app.model.picture import Picture

@@ -85,12 +85,15 @@ def animation_writer(
 ) -> Iterator[FrameWriter]:
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
-    path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures, each of which appears as
-        soon as it is written, and stays.
-    cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises `Cancelled`.
-    passed: hears of frames that a later pass has gone through, after all were given, in formats that have `passes`.
-    written: hears of each file of a sequence, by its number.
     Frames go to the encoder at once: memory does not grow with their number. Raises `UserError`.
+
+    Args:
+        path: its ending chooses the format; `name.%04d.png` (or .tif, .exr ...) numbers pictures, each of which appears
+            as soon as it is written, and stays.
+        cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises
+            `Cancelled`.
+        passed: hears of frames that a later pass has gone through, after all were given, in formats with `passes`.
+        written: hears of each file of a sequence, by its number.
     """
     check_animation(path, fps / min(options.durations or [1]), options.codec)
     like, quality = options.like, 95 if options.quality is None else options.quality
@@ -293,8 +296,13 @@ def sequence_writer(
 ) -> Iterator[NumberedWriter[T]]:
     """Yield a function that writes one numbered file by `write_one`, which lets it appear whole.
 
-    path: such as `name.%04d.png`, numbered from 0 where no number is given; written: hears of each; resumed: there may
-    be none left to write. Raises `UserError`.
+    Args:
+        path: such as `name.%04d.png`; numbered from 0 where no number is given.
+        written: hears of each file, by its number.
+        resumed: there may be none left to write.
+
+    Raises:
+        UserError: if one cannot be written.
     """
     last = -1
 

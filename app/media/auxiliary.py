@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import UserError
-from app.media.maps import cropped, folds, read_map
+from app.media.displacement import cropped, folds
+from app.media.maps import read_map
 from app.media.pictures import read_picture
 from app.model.picture import Picture
 from app.model.sampling import SOURCE

@@ -140,7 +140,12 @@ class Clip(ABC):
     ) -> Generator[tuple[int, Picture], None, None]:
         """Yield the number and the picture of each frame of a part, but for those that are kept as they are.
 
-        cancel: asked with each; true raises `Cancelled`. notice: hears of what is lost. Raises `UserError`.
+        Args:
+            cancel: asked with each; true raises `Cancelled`.
+            notice: hears of what is lost.
+
+        Raises:
+            UserError: if one cannot be read.
         """
 
     def pictures_from(

@@ -21,11 +21,15 @@ from app.model.picture import Picture
 class Format:
     """A kind of picture file.
 
-    read: from a file, with the most pixels it may have. write: a picture with a quality of 1-100; None where we do not.
-    signature: a pattern that such a file begins with; None where the ending must tell.
-    bits: a channel of what is written, deepest last. alpha, grey: whether it has them. longest: its longest side.
-    codecs: ways to compress, the usual one first, that can be asked for.
-    keeps: the fields of a `Picture` besides its pixels that come back from a written file.
+    Attributes:
+        read: reads a file, given the most pixels it may have.
+        write: writes a picture in a quality of 1-100; None where we do not.
+        signature: a pattern that such a file begins with; None where the ending must tell.
+        bits: a channel of what is written, deepest last.
+        alpha, grey: whether it has them.
+        longest: pixels along a side at most.
+        codecs: ways to compress that can be asked for, the usual one first.
+        keeps: the fields of a `Picture` besides its pixels that come back from a written file.
     """
 
     name: str

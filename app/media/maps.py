@@ -1,13 +1,12 @@
-"""Warp maps out and in, a function for each kind: ST maps, pixel offsets, Middlebury .flo and NumPy .npy."""
+"""Files of warp maps, a function for each kind: ST maps, pixel offsets, Middlebury .flo and NumPy .npy."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +15,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.animation import NumberedWriter, sequence_writer
 from app.media.codecs import exr
+from app.media.displacement import Displacement, PixelPlaces, cropped, from_offsets, from_st, to_offsets, to_st
 from app.media.files import replacing
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.pictures import read_picture
@@ -25,9 +25,6 @@ Kind = Literal["st", "offsets"]
 """What an EXR or TIFF holds: absolute places in 0-1 from the bottom left, or pixels from here to there, y up."""
 
 Holds = Literal["map", "picture", "either"]
-
-PixelPlaces = Literal["centres", "corners", "pixels"]
-"""The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
 
 FLO_MAGIC = np.float32(202021.25)
 FLO_UNKNOWN = np.float32(1e10)  # what is written where nothing is known, beyond 1e9 (Middlebury's flowIO.h)
@@ -42,52 +39,6 @@ CONVENTIONS = {
     "st": "ST map: R = u, G = v of the place looked up, 0-1, origin bottom left, pixel centres at (x + .5) / width",
     "offsets": "R = x, G = y offset in pixels to the place looked up, x to the right, y up",
 }
-
-
-@dataclass(frozen=True)
-class Displacement:
-    """Where each pixel is looked up: at its own centre plus `values`.
-
-    values: (height + 2 overscan, width + 2 overscan, 2), x right and y down, in longer sides of width x height;
-    float32, or float64 when read from a file, so that conversions lose nothing.
-    It is NaN for what is nowhere: a pixel of the result that shows nothing.
-    overscan: pixels beyond each side of the picture.
-    forward: the other way, from places of the original to places of the result.
-    """
-
-    values: np.ndarray
-    overscan: int = 0
-    forward: bool = False
-
-    @property
-    def width(self) -> int:
-        return self.values.shape[1] - 2 * self.overscan
-
-    @property
-    def height(self) -> int:
-        return self.values.shape[0] - 2 * self.overscan
-
-    @property
-    def longest(self) -> int:
-        return max(self.width, self.height)
-
-    def fitted(self, width: int, height: int) -> Displacement:
-        """The map for a picture of width x height, its values in the longer sides of that.
-
-        Sizes may differ, proportions by no more than their rounding: raises `UserError` otherwise.
-        """
-        off = abs(height * self.width / width - self.height), abs(width * self.height / height - self.width)
-        if min(off) >= 1:
-            raise UserError(
-                f"The map is {self.width} x {self.height} and the picture {width} x {height}: "
-                "they must have the same proportions; crop the picture or make the map anew."
-            )
-        longest = max(width, height)
-        scale = self.longest / self.width * width / longest, self.longest / self.height * height / longest
-        if scale == (1, 1):
-            return self
-        values = (self.values * np.array(scale)).astype(self.values.dtype)
-        return Displacement(values, self.overscan, self.forward)
 
 
 def check_map(path: str | os.PathLike[str]) -> None:
@@ -135,77 +86,6 @@ def _tiff_holds(file: Path) -> Holds:
         return "either" if page.samplesperpixel == 3 else "picture"
 
 
-# Conversions --------------------------------------------------------------------------------------------------------
-
-
-def _centres(count: int, overscan: int) -> np.ndarray:
-    return np.arange(-overscan, count + overscan) + 0.5
-
-
-def to_st(displacement: Displacement) -> np.ndarray:
-    """Absolute places (h, w, 2) float32, 0-1 over the picture, y up, pixel centres at (x + .5) / width."""
-    map_, out = displacement, np.empty(displacement.values.shape, np.float32)
-    x, y = _centres(map_.width, map_.overscan), _centres(map_.height, map_.overscan)
-    for rows in _strips(out):
-        # float64 and rounded far below float32, so that a place of exactly 0 comes out of a round trip as 0
-        u = (x + map_.longest * map_.values[rows, :, 0].astype(np.float64)) / map_.width
-        v = 1 - (y[rows, None] + map_.longest * map_.values[rows, :, 1].astype(np.float64)) / map_.height
-        out[rows, :, 0], out[rows, :, 1] = np.round(u, 13), np.round(v, 13)
-    return out
-
-
-def from_st(st: np.ndarray, grid: PixelPlaces = "centres", overscan: int = 0) -> Displacement:
-    """The displacement (float64) of absolute places (h, w, 2), y up, on any of the three grids."""
-    width, height = st.shape[1] - 2 * overscan, st.shape[0] - 2 * overscan
-    values = np.empty(st.shape, np.float64)
-    # one step of the stored value in pixels, and the place of its zero
-    step_x, step_y = (max(1, width - 1), max(1, height - 1)) if grid == "corners" else (width, height)
-    zero = 0.0 if grid == "centres" else 0.5
-    x, y = _centres(width, overscan), _centres(height, overscan)
-    longest = max(width, height)
-    for rows in _strips(values):
-        values[rows, :, 0] = (st[rows, :, 0] * np.float64(step_x) + zero - x) / longest
-        values[rows, :, 1] = (height - zero - st[rows, :, 1] * np.float64(step_y) - y[rows, None]) / longest
-    return Displacement(values, overscan)
-
-
-def to_offsets(displacement: Displacement, *, up: bool) -> np.ndarray:
-    """Offsets in pixels of the map's own size, (h, w, 2) float32; y up or down."""
-    pixels = np.array([displacement.longest, -displacement.longest if up else displacement.longest], np.float64)
-    return (displacement.values * pixels).astype(np.float32)
-
-
-def from_offsets(offsets: np.ndarray, *, up: bool, overscan: int = 0) -> Displacement:
-    """The displacement (float64) of offsets in pixels, (h, w, 2); y up or down."""
-    longest = max(offsets.shape[0], offsets.shape[1]) - 2 * overscan
-    return Displacement(offsets / np.array([longest, -longest if up else longest], np.float64), overscan)
-
-
-def folds(values: np.ndarray) -> int:
-    """In how many pixels a map, its values (h, w, 2) in longer sides, turns the picture over: det J <= 0."""
-    height, width = values.shape[:2]
-    longest, count = max(width, height), 0
-    if min(width, height) < 2:
-        return 0
-    for rows in _strips(values):
-        # central differences, which want a row more on each side
-        low, high = max(0, rows.start - 1), min(height, rows.stop + 1)
-        down, along = np.gradient(longest * values[low:high].astype(np.float64), axis=(0, 1))
-        inner = slice(rows.start - low, min(height, rows.stop) - low)
-        down, along = down[inner], along[inner]
-        count += int(((1 + along[..., 0]) * (1 + down[..., 1]) <= along[..., 1] * down[..., 0]).sum())
-    return count
-
-
-def _strips(array: np.ndarray) -> Iterator[slice]:
-    rows = max(1, 500_000 // max(1, array[0].size))
-    for top in range(0, len(array), rows):
-        yield slice(top, top + rows)
-
-
-# Files --------------------------------------------------------------------------------------------------------------
-
-
 def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Kind = "st") -> None:
     """Write a map, whole or not at all: .exr and .tif hold `kind` in 32 bits, with the convention in the metadata.
 
@@ -243,13 +123,6 @@ def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Ki
             exr.write_channels(temporary, channels, attributes, displacement.overscan)
         else:
             _write_tiff(temporary, values, {"fluidwarp": metadata, "convention": CONVENTIONS[kind]})
-
-
-def cropped(displacement: Displacement) -> Displacement:
-    """The map without its overscan."""
-    edge = displacement.overscan
-    values = displacement.values[edge:-edge, edge:-edge] if edge else displacement.values
-    return Displacement(values, 0, displacement.forward)
 
 
 def _third(values: np.ndarray) -> np.ndarray:
@@ -299,10 +172,15 @@ def read_map(
 ) -> Displacement:
     """Read a map, also one made elsewhere.
 
-    kind, grid: what an EXR or TIFF holds; None believes its metadata, and takes it for an ST map on pixel centres when
-    there is none. overscan: None believes the metadata, and is 0 when there is none.
     What is NaN, unknown in a .flo, or not in an EXR's data window is NaN in x and y.
-    Raises `UserError` for what is no map, damaged, infinite, or NaN everywhere.
+
+    Args:
+        kind, grid: what an EXR or TIFF holds; None believes its metadata, and without any takes it for an ST map on
+            pixel centres.
+        overscan: None believes the metadata, and is 0 without any.
+
+    Raises:
+        UserError: if it is no map, damaged, infinite, or NaN everywhere.
     """
     check_map(path)
     suffix = Path(path).suffix.lower()

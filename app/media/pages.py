@@ -32,7 +32,9 @@ UNTOLD = 100  # milliseconds of a frame of no length, as browsers show it
 class Pages(FileClip):
     """The frames or pages of a file, all of one size.
 
-    kind: of the file, as in the table of formats. places: of the frames in the file, without what is none.
+    Attributes:
+        kind: of the file, as in the table of formats.
+        places: of the frames in the file, without what is none.
     """
 
     kind: str

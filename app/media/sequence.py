@@ -21,7 +21,10 @@ from app.progress import never
 class PictureSequence(Clip):
     """The files of `name.%04d.exr`, each a picture of its own with all that belongs to it.
 
-    files: those that are there, by number. channels: of each. max_pixels: larger ones are refused.
+    Attributes:
+        files: those that are there, by number.
+        channels: of each.
+        max_pixels: larger ones are refused.
     """
 
     files: Mapping[int, Path]

@@ -46,8 +46,10 @@ TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULT
 class Video(FileClip):
     """A video file as it is shown: upright, with square pixels, at a constant rate.
 
-    frames: by its duration. bits: 8, or 16 for what has more than 8.
-    file_size, inode, written: of the file when it was looked into; the last in nanoseconds.
+    Attributes:
+        frames: by its duration.
+        bits: 8, or 16 for what has more than 8.
+        file_size, inode, written: of the file when it was looked into; the last in nanoseconds.
     """
 
     fps: Fraction

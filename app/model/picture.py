@@ -13,8 +13,10 @@ import numpy as np
 class Layer:
     """A channel of an EXR beside the colours of the picture: warped along with them, unless `exact` without mixing.
 
-    values: (h, w) float16, float32 or uint32, of the picture's size with its margins. exact: ids, depths and places, a
-    mean of which is none. part: which of the file's parts it is in, from 0.
+    Attributes:
+        values: (h, w) float16, float32 or uint32, of the picture's size with its margins.
+        exact: ids, depths and places, a mean of which is none.
+        part: which of the file's parts it is in, from 0.
     """
 
     name: str
@@ -27,16 +29,21 @@ class Layer:
 class Picture:
     """Pixels, top row first, with what belongs to them.
 
-    `pixels` is (h, w, c), c = 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; uint8 and uint16 hold the whole range in the
-    transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
-    premultiplied: where there is alpha, the colours are multiplied by it, as the file has them. They stay so, since
-    dividing rounds, and since the colour where alpha is 0 (a flame, a glow) would be lost.
-    attributes: of an EXR's header by name, such as pixelAspectRatio. chunks: a PNG's, that say what its colours mean.
-    layers: an EXR's further channels; parts: the attributes of each of its parts, the colours' own without those above.
-    wide: the pixels with those that lie beyond the display window, where there are any; margins: how many more on the
-    left, at the top, on the right and at the bottom. origin: where an EXR's display window begins, x and y.
-    group: part and layer of the colours, such as (0, "beauty."). half: their floats are of 16 bits.
-    note: what of the file is lost, in a sentence that names it; "" if nothing.
+    Attributes:
+        pixels: (h, w, c), c = 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; uint8 and uint16 hold the whole range in the
+            transfer curve of `icc` (sRGB without one), float32 is linear light with white at 1.
+        premultiplied: where there is alpha, the colours are multiplied by it, as the file has them. They stay so, since
+            dividing rounds, and since the colour where alpha is 0 (a flame, a glow) would be lost.
+        attributes: of an EXR's header by name, such as pixelAspectRatio.
+        chunks: a PNG's, that say what its colours mean.
+        layers: an EXR's further channels.
+        parts: the attributes of each of an EXR's parts, the colours' own without those above.
+        wide: the pixels with those that lie beyond the display window, where there are any.
+        margins: how many more `wide` has on the left, at the top, on the right and at the bottom.
+        origin: where an EXR's display window begins, x and y.
+        group: part and layer of the colours, such as (0, "beauty.").
+        half: their floats are of 16 bits.
+        note: what of the file is lost, in a sentence that names it; "" if nothing.
     """
 
     pixels: np.ndarray

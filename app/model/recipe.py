@@ -1,4 +1,7 @@
-"""The recipe: everything that makes a warp, in one readable, versioned, validated value."""
+"""The recipe: everything that makes a warp, in one readable, versioned, validated value.
+
+Long, as its small parts stand before it; what it is made of in lists is in modules of its own.
+"""
 
 from __future__ import annotations
 

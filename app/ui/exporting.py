@@ -1,4 +1,7 @@
-"""Export from the window: asks what is wanted, and does it in a process of its own, so that the window stays usable."""
+"""Export from the window: asks what is wanted, and does it in a process of its own, so that the window stays usable.
+
+Long, as the dialog holds a row for each kind of file and setting; the export itself is `app/work/export.py`.
+"""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.media.depth import as_half
-from app.media.maps import Displacement
+from app.media.displacement import Displacement
 from app.model.picture import Layer
 from solver.resample.plan import Quality
 

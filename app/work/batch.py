@@ -22,8 +22,10 @@ def run_batch(
 ) -> int:
     """Do all tasks, whatever becomes of any; `report` is called with each outcome. Says how many failed.
 
-    jobs: processes on this machine. cluster: the address of a Dask scheduler, which decides instead. notice: is told
-    what is waited for.
+    Args:
+        jobs: processes on this machine.
+        cluster: the address of a Dask scheduler, which decides instead.
+        notice: is told what is waited for.
 
     Raises:
         UserError: if there is no such scheduler, or it goes; how many are written is said.

@@ -22,10 +22,11 @@ from app.errors import UserError
 from app.media.animation import Frame, FrameWriter, NumberedWriter, animation_writer, frame_order, reordered
 from app.media.auxiliary import Pictures
 from app.media.clip import Clip, coded
+from app.media.displacement import Displacement
 from app.media.encoders import passes, unheld_of_clip
 from app.media.files import is_sequence, replacing
 from app.media.formats import picture_format, unheld
-from app.media.maps import Displacement, map_writer, write_map
+from app.media.maps import map_writer, write_map
 from app.media.pictures import write_picture
 from app.media.record import Record, digest_of
 from app.model.handles import ARRIVED
@@ -530,7 +531,10 @@ def displacement(
     """The warp map at this moment, for a picture of `size` with `overscan` pixels more on every side.
 
     Nothing flows beyond the picture's edge: the displacement there is that of the nearest point on it.
-    forward: where the points of the original go. check: called now and then; may raise, as `Progress.check` does.
+
+    Args:
+        forward: where the points of the original go.
+        check: called now and then; may raise, as `Progress.check` does.
     """
     # A size in whole pixels has nearly the picture's aspect.
     fit = np.divide(size, max(size)) / replay.grid.extent
@@ -553,8 +557,10 @@ def displacement(
 class Target:
     """What pixels that are looked up become.
 
-    size: (width, height). on_rows: called with the number of rows in every band; may raise, as `Progress.check` does.
-    alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
+    Attributes:
+        size: (width, height).
+        on_rows: called with the number of rows in every band; may raise, as `Progress.check` does.
+        alpha: opaque pixels get an alpha channel if the map reaches beyond them, and `how.edges` wants that to be seen.
     """
 
     size: tuple[int, int]

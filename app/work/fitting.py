@@ -1,4 +1,7 @@
-"""Fitting: handles that bring points to where they should be with the least work, found by replays of a recipe."""
+"""Fitting: handles that bring points to where they should be with the least work, found by replays of a recipe.
+
+Long, as what is searched, what is tried and what is told of it share the numbering of the pairs.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Handles and pins: points of the picture that feedback leads to where they shall be, and holds there."""
+"""Handles and pins: points of the picture that feedback leads to where they shall be, and holds there.
+
+One long class: all handles are solved for together. What one leads is in `handle.py`, their pushes are in `pushes.py`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The warp map: where every point of the result is looked up in the original."""
+"""The warp map: where every point of the result is looked up in the original.
+
+One long class: all that moves the map or reads it takes its levels together; what each does is in modules beside it.
+"""
 
 from __future__ import annotations
 

@@ -12,7 +12,8 @@ import pytest
 
 from app.errors import UserError
 from app.media.codecs.exr import COMPRESSIONS
-from app.media.maps import Displacement, write_map
+from app.media.displacement import Displacement
+from app.media.maps import write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.source import open_source
 from app.model.picture import Picture

@@ -13,8 +13,9 @@ import tifffile
 from PIL import Image
 
 from app.media.depth import to_bits
+from app.media.displacement import Displacement
 from app.media.ffmpeg import executable
-from app.media.maps import Displacement, write_map
+from app.media.maps import write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.source import open_source
 from app.media.video import read_clip

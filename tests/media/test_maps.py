@@ -16,21 +16,8 @@ import tifffile
 from app.errors import UserError
 from app.media import files
 from app.media.codecs.exr import read_channels
-from app.media.maps import (
-    Displacement,
-    Kind,
-    PixelPlaces,
-    cropped,
-    folds,
-    from_offsets,
-    from_st,
-    holds,
-    map_writer,
-    read_map,
-    to_offsets,
-    to_st,
-    write_map,
-)
+from app.media.displacement import Displacement, PixelPlaces, cropped, folds, from_offsets, from_st, to_offsets, to_st
+from app.media.maps import Kind, holds, map_writer, read_map, write_map
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 

@@ -17,6 +17,7 @@ from PIL import Image
 from app.errors import UserError
 from app.media.clip import Colours, FileClip, coded
 from app.media.depth import as_half, over, to_bits
+from app.media.displacement import Displacement, cropped, folds
 from app.media.encoders import (
     ANIMATIONS,
     check_colours,
@@ -28,7 +29,7 @@ from app.media.encoders import (
 from app.media.formats import FORMATS, check_picture_output, unheld
 from app.media.landmarks import Pairs, read_pairs, write_pairs
 from app.media.losses import unusual_colours
-from app.media.maps import MAP_ENDINGS, Displacement, cropped, folds, holds, read_map, write_map
+from app.media.maps import MAP_ENDINGS, holds, read_map, write_map
 from app.media.outlines import paired, read_outlines, resampled
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Layer, Picture

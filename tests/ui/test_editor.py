@@ -16,7 +16,8 @@ import pytest
 
 from app.media import project as projects
 from app.media.codecs.cmyk import INK
-from app.media.maps import Displacement, read_map, write_map
+from app.media.displacement import Displacement
+from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import Project
 from app.model.mask_edits import MaskStroke

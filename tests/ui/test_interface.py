@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.media.maps import Displacement, write_map
+from app.media.displacement import Displacement
+from app.media.maps import write_map
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER

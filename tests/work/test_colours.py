@@ -13,7 +13,8 @@ import pytest
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.maps import Displacement, write_map
+from app.media.displacement import Displacement
+from app.media.maps import write_map
 from app.media.sequence import PictureSequence
 from app.media.video import read_clip
 from app.progress import Progress

@@ -20,8 +20,9 @@ from app.errors import Cancelled, UserError
 from app.gallery.measures import sharpness, spline_warp
 from app.media import ffmpeg
 from app.media.auxiliary import Pictures
+from app.media.displacement import Displacement, cropped, to_st
 from app.media.files import takes_place
-from app.media.maps import Displacement, cropped, read_map, to_st, write_map
+from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.source import open_source
 from app.media.video import read_clip

@@ -14,7 +14,8 @@ import tifffile
 from PIL import Image
 
 from app.errors import UserError
-from app.media.maps import Displacement, write_map
+from app.media.displacement import Displacement
+from app.media.maps import write_map
 from app.media.source import open_source
 from app.progress import Progress
 from app.work.applying import Application, MapSource

@@ -13,7 +13,8 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from app.media.maps import Displacement, write_map
+from app.media.displacement import Displacement
+from app.media.maps import write_map
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
 from support.commands import Run

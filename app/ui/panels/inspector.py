@@ -1,4 +1,7 @@
-"""The inspector on the right: the fluid, what is seen, the edits, and numbers for those who want them."""
+"""The inspector on the right: the fluid, what is seen, the edits, and numbers for those who want them.
+
+Long, as every section is a function here, and none has parts that another panel shows.
+"""
 
 from __future__ import annotations
 

@@ -1,0 +1,139 @@
+"""Looking pictures up through maps from elsewhere, which may be of any size, hold nothing in places, or be forward."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import UserError
+from app.media.displacement import Displacement, cropped, folds
+from app.media.files import is_sequence
+from app.work.along import widened
+from app.work.export import Target, looked_up, opaque_value, with_alpha
+from solver.gl.device import Device
+from solver.gl.field import FieldError
+from solver.grid import Grid
+from solver.resample.plan import Edges, GivenMap, Sampling, SamplingError
+from solver.resample.sampler import Sampler
+from solver.warp.inverse import ForwardMap
+from solver.warp.map import WarpMap
+
+MOST_CELLS = 1024  # along the longer side, for turning a map round
+REACH = 4  # pixels of a map that interpolation and the stretch reach beyond a place
+
+
+class Applier:
+    """Looks pictures up through given maps; keeps the last map on the GPU, as most stay for many frames.
+
+    Attributes:
+        how: the pictures are looked up.
+    """
+
+    def __init__(self, device: Device, edges: Edges, premultiplied: bool = False) -> None:
+        self._device = device
+        self.how = Sampling(edges=edges, premultiplied=premultiplied)
+        self._sampler = Sampler(device)
+        self._given: Displacement | None = None
+        self._map: GivenMap | None = None
+        self._outside: np.ndarray | None = None
+        self._wide: tuple[Displacement, tuple[int, int, int, int], Displacement] | None = None
+        self._folds: list[int] = []  # of the maps that fold over themselves, in how many pixels each
+
+    def __enter__(self) -> Applier:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._sampler.release()
+        if self._map is not None:
+            self._map.release()
+
+    def warped(self, given: Displacement, pixels: np.ndarray, target: Target) -> np.ndarray:
+        """Pixels (h, w, c) looked up through the map. Raises `UserError` where that cannot be."""
+        try:
+            if given is not self._given or self._map is None:
+                self._take(given, pixels)
+            assert self._map is not None
+            found = looked_up(self._sampler, self._map, pixels, target)
+        except (SamplingError, FieldError) as error:
+            raise UserError(f"The map cannot be applied: {error}.") from None
+        return found if self._outside is None else emptied(found, self._outside, target.how.edges, target.alpha)
+
+    def _take(self, given: Displacement, pixels: np.ndarray) -> None:
+        if self._map is not None:
+            self._map.release()
+        inverse = inverted(self._device, given) if given.forward else given
+        values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
+        if folded := folds(values):
+            self._folds.append(folded)
+        outside = np.asarray(np.isnan(values).any(axis=2))
+        self._outside = outside if outside.any() else None
+        self._map, self._given = GivenMap(self._device, filled(values, outside)), given
+
+    def widened(self, given: Displacement, margins: tuple[int, int, int, int]) -> Displacement:
+        """A map with margins around it; the same again where both are the same."""
+        if self._wide is None or self._wide[0] is not given or self._wide[1] != margins:
+            self._wide = given, margins, Displacement(widened(given, margins))
+        return self._wide[2]
+
+    def notices(self, path: Path) -> list[str]:
+        """What the user should hear of the maps of `path`."""
+        if not self._folds:
+            return []
+        if is_sequence(path):
+            return [
+                f"folds in {len(self._folds)} of the maps {path.name}, the worst in {max(self._folds)} of its pixels"
+            ]
+        return [f"{path.name} folds over itself in {self._folds[0]} of its pixels"]
+
+
+def inverted(device: Device, given: Displacement) -> Displacement:
+    """The map the other way round: where the points of the original go, if it told where they come from.
+
+    Raises:
+        UserError: if the map is too small, too narrow or too large to be looked up.
+    """
+    values = cropped(given).values
+    if np.isnan(values).any():
+        raise UserError("the map is NaN in places, and cannot be inverted; fill it first")
+    width, height = given.width, given.height
+    grid = Grid.for_picture(width, height, min(max(width, height), MOST_CELLS))
+    warp = WarpMap(device, grid, (width, height))
+    try:
+        warp.set(values)
+        with ForwardMap(warp) as forward:
+            found = forward.read((width, height))
+    except ValueError as error:
+        raise UserError(f"the map cannot be inverted: {error}") from None
+    finally:
+        warp.release()
+    return Displacement(found.astype(np.float32), 0, not given.forward)
+
+
+def filled(values: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """The values (h, w, 2) of a map, and where it is `outside` (h, w) those nearby, as far as a look-up reaches."""
+    if not outside.any():
+        return values
+    values, empty = np.where(outside[..., None], 0, values), outside.copy()
+    for _ in range(REACH):
+        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            there = np.roll(~empty, step, axis)
+            there[(slice(None),) * axis + (0 if step > 0 else -1,)] = False  # what was rolled round the edge
+            there &= empty
+            values[there] = np.roll(values, step, axis)[there]
+            empty &= ~there
+    return values
+
+
+def emptied(pixels: np.ndarray, outside: np.ndarray, edges: Edges, alpha: bool) -> np.ndarray:
+    """Pixels (h, w, c), nothing in those whose nearest one of the map is `outside` (h, w); `alpha` as in `Target`."""
+    if alpha and edges != "black":
+        pixels = with_alpha(pixels)
+    (height, width), (rows, columns) = pixels.shape[:2], outside.shape
+    row = (np.arange(height) * 2 + 1) * rows // (2 * height)
+    column = (np.arange(width) * 2 + 1) * columns // (2 * width)
+    here = outside[row[:, None], column]
+    pixels[here] = 0
+    if pixels.shape[2] in (2, 4) and edges == "black":
+        pixels[here, -1] = opaque_value(pixels)
+    return pixels
