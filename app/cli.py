@@ -285,20 +285,17 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
     from app.work.batch import run_batch
     from app.work.worker import Outcome
 
-    def tell(outcome: Outcome) -> None:
-        _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices, outcome.verdict) if said))
-
     written = 0
 
-    def hear(outcome: Outcome) -> None:
+    def report(outcome: Outcome) -> None:
         nonlocal written
         written += not outcome.error
-        tell(outcome)
+        _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices, outcome.verdict) if said))
 
     alone = jobs == 1 or cluster is not None  # no processes of ours, which would have to be waited for
     try:
         with on_terminal(f"{len(tasks)} pictures", len(tasks), leave if alone else None) as progress:
-            failures = run_batch(tasks, hear, progress, jobs, cluster, _tell)
+            failures = run_batch(tasks, report, progress, jobs, cluster, _tell)
     except Cancelled:
         _fail(f"cancelled; {written} of {len(tasks)} pictures are written, nothing is half-written", INTERRUPTED)
     if failures:

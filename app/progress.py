@@ -81,15 +81,15 @@ class Progress:
         self._tell(state)
 
     def parts(self, steps: int, count: int) -> Callable[[int], None]:
-        """A function that hears how many more of `count` parts are done, and advances by their share of `steps`."""
-        heard = 0
+        """A function to call with how many more of `count` parts are done: it advances by their share of `steps`."""
+        done = 0
 
-        def hear(more: int) -> None:
-            nonlocal heard
-            before, heard = heard, heard + more
-            self.advance(heard * steps // count - before * steps // count)
+        def on_progress(more: int) -> None:
+            nonlocal done
+            before, done = done, done + more
+            self.advance(done * steps // count - before * steps // count)
 
-        return hear
+        return on_progress
 
 
 def abandon() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from app.gallery.drawing import arrows, at_work, led, marked, rgb, shades
-from app.gallery.measures import beyond, light, sharpness, spline_of, spline_warp, stretch_and_det, told
+from app.gallery.measures import beyond, light, sharpness, spline_of, spline_warp, stretch_and_det, summary
 from app.gallery.studio import Measured, Studio, load, made, recipes_folder, source_of
 from app.media.auxiliary import Pictures
 from app.media.pictures import write_picture
@@ -23,7 +23,7 @@ from solver.grid import Grid
 from solver.resample.plan import GivenMap, Sampling
 
 EVERY = 4  # ticks from one frame of handles at work to the next
-COMPARED = 512  # pixels along the longer side, in which displacements are told
+COMPARED = 512  # pixels along the longer side, in which displacements are given
 
 
 def figure_1(studio: Studio) -> Measured:
@@ -48,7 +48,7 @@ def figure_1(studio: Studio) -> Measured:
     shown["density"] = density.result
     return {
         **{f"sharpness, {name}": f"{sharpness(light(pixels)) / reference:.1%}" for name, pixels in shown.items()},
-        **told(moved.statistics, COMPARED),
+        **summary(moved.statistics, COMPARED),
     }
 
 
@@ -66,7 +66,7 @@ def figure_3(studio: Studio) -> Measured:
             (f"d  after {train.recipe.duration:g} s", train.result),
         ],
     )
-    return told(train.statistics, COMPARED)
+    return summary(train.statistics, COMPARED)
 
 
 def figure_4(studio: Studio) -> Measured:
@@ -83,7 +83,7 @@ def figure_4(studio: Studio) -> Measured:
             ("d  result", hat.result),
         ],
     )
-    return told(hat.statistics, COMPARED)
+    return summary(hat.statistics, COMPARED)
 
 
 def guide_forces(studio: Studio) -> Measured:
@@ -139,8 +139,8 @@ def portrait(studio: Studio, name: str, what: str) -> Measured:
         "frozen: px outside, most": f"{moved_frozen[outside].max():.3g}",
         "frozen: pixels changed outside": f"{changed[outside].sum()}",
         "frozen: px inside, mean": f"{moved_frozen[~outside].mean():.1f}",
-        "det J": told(thick.statistics, COMPARED)["det J"],
-        "frozen: det J": told(frozen.statistics, COMPARED)["det J"],
+        "det J": summary(thick.statistics, COMPARED)["det J"],
+        "frozen: det J": summary(frozen.statistics, COMPARED)["det J"],
     }
 
 

@@ -9,7 +9,7 @@ from app.model.recipe import Recipe
 from solver.warp.distortion import MapStatistics
 
 
-def told(found: MapStatistics, longest: int) -> dict[str, str]:
+def summary(found: MapStatistics, longest: int) -> dict[str, str]:
     """How far a map moves at most, in pixels of a picture `longest` pixels long, and the range of its det J."""
     det = f"{found.det_min:.2f} to {found.det_max:.2f}"
     return {"px, most": f"{found.displacement_max * longest:.1f}", "det J": det}

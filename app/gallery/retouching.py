@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from app.gallery.measures import told
+from app.gallery.measures import summary
 from app.gallery.studio import Measured, Studio, load, made, source_of
 from app.media.pictures import write_picture
 from app.model.picture import Picture
@@ -123,4 +123,4 @@ def _played(
         result = studio.sampler.apply(replay.warp, source, size, Sampling(edges=recipe.edges))
         found = replay.warp.statistics()
         moved = np.linalg.norm(replay.warp.read(size), axis=-1) * max(size)
-    return result, moved, told(found, max(size)) | {"folds": f"{found.folds} of {found.places} places"}
+    return result, moved, summary(found, max(size)) | {"folds": f"{found.folds} of {found.places} places"}

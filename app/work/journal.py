@@ -115,9 +115,9 @@ def beginning(origin: Origin, work: Work) -> Iterator[bytes]:
     """The lines of a new journal that holds all of a work."""
     yield f"{_HEAD} {VERSION} {RECIPE_VERSION}\n".encode()
     first, *_ = work.entries
-    yield _line({"origin": asdict(origin), "add": [_told(first, Recipe())], "index": 0})
+    yield _line({"origin": asdict(origin), "add": [_described(first, Recipe())], "index": 0})
     for number, (before, entry) in enumerate(pairwise(work.entries), 1):
-        yield _line({"add": [_told(entry, before.recipe)], "index": number})
+        yield _line({"add": [_described(entry, before.recipe)], "index": number})
     # What was saved is mostly one of the entries; otherwise it is the present but for a few ticks of coming to rest.
     same = (number for number, entry in enumerate(work.entries) if entry.recipe is work.saved)
     nearest = next(same, work.index)
@@ -140,11 +140,11 @@ def continuation(work: Work, before: Work) -> bytes:
     record: dict[str, Any] = {"drop": dropped, "keep": kept, "index": work.index}
     record["automatic"] = work.is_grid_automatic
     earlier = [new[kept - 1].recipe if kept else Recipe(), *(entry.recipe for entry in new[kept:])]
-    record["add"] = [_told(entry, recipe) for entry, recipe in zip(new[kept:], earlier, strict=False)]
+    record["add"] = [_described(entry, recipe) for entry, recipe in zip(new[kept:], earlier, strict=False)]
     return _line(record)
 
 
-def _told(entry: Entry, before: Recipe) -> tuple[str, int, dict[str, Any]]:
+def _described(entry: Entry, before: Recipe) -> tuple[str, int, dict[str, Any]]:
     return entry.name, entry.nbytes, _difference(entry.recipe, before)
 
 

@@ -1,4 +1,4 @@
-"""Brushes out of a list, drawn at once: beginning a draw takes a software rasteriser longer than a small one itself."""
+"""Many brushes from a list in one draw: on a software rasteriser starting a draw costs more than a small draw."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Pass
+from solver.gl.points import in_rows
 from solver.grid import Grid
 
 A_ROW = 128  # brushes in a row of the texture that lists them
@@ -38,11 +39,10 @@ def draw_listed(
         vectors: what they do, (n, 2), lengths / s.
         inputs: what the shader reads besides.
     """
-    count = len(places)
-    texels = np.zeros((-(-max(count, 1) // A_ROW) * A_ROW, 2, 4), np.float32)
-    texels[:count, 0] = np.column_stack([places - grid.origin, radii, viscosities])
-    texels[:count, 1, :2] = vectors
-    brushes = device.upload(texels.reshape(-1, 2 * A_ROW, 4), "brushes")
+    texels = np.zeros((len(places), 2, 4))
+    texels[:, 0] = np.column_stack([places - grid.origin, radii, viscosities])
+    texels[:, 1, :2] = vectors
+    brushes = device.upload(in_rows(texels, A_ROW).reshape(-1, 2 * A_ROW, 4), "brushes")
     inputs |= {"brushes": brushes, "spacing": grid.spacing, "texels": target.size}
-    shader(target, add=True, vertices=6 * count, **inputs)
+    shader(target, add=True, vertices=6 * len(places), **inputs)
     brushes.release()

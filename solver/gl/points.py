@@ -1,4 +1,4 @@
-"""Drawing at points out of a list instead of on a lattice."""
+"""Lists in textures, and drawing at the points of a list instead of on a lattice."""
 
 from __future__ import annotations
 
@@ -11,6 +11,14 @@ from solver.gl.device import Device
 _ROW = 256  # points in a row of the texture that lists them
 
 
+def in_rows(values: np.ndarray, length: int) -> np.ndarray:
+    """A list (n, ...) in rows of a texture, (rows, length, ...) float32, filled up with zeros; one row at least."""
+    rows = max(1, -(-len(values) // length))
+    listed = np.zeros((rows * length, *values.shape[1:]), np.float32)
+    listed[: len(values)] = values
+    return listed.reshape(rows, length, *values.shape[1:])
+
+
 def draw_at(
     device: Device,
     points: np.ndarray,
@@ -21,10 +29,7 @@ def draw_at(
     **inputs: Any,
 ) -> np.ndarray:
     """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, components)."""
-    rows = max(1, -(-len(points) // _ROW))
-    listed = np.zeros((rows * _ROW, 2), np.float32)
-    listed[: len(points)] = points / domain
-    places = device.upload(listed.reshape(rows, _ROW, 2), "points")
+    places = device.upload(in_rows(points / domain, _ROW), "points")
     found = device.field(places.size, components, "found at points")
     device.pass_(shader, POINTS=1, **(defines or {}))(found, points=places, **inputs)
     values = found.get().reshape(-1, components)[: len(points)]
