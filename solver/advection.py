@@ -67,7 +67,10 @@ class Advection:
         packing: Packing,
         weights: dict[str, Any] | None = None,
     ) -> Advected:
-        """Draw w2 into `target`: each component `decay` times what it is where its own face departs."""
+        """Draw w2 into `target`: each component `decay` times what it is where its own face departs.
+
+        `weights`: the open parts of faces, see `Projection.weights`; without, all are open or closed.
+        """
         partial = {"PARTIAL": 1} if weights else {}
         advect = self.device.pass_("step/advect.frag", **packing.defines, **partial)
         targets, inputs = (*target.fields, self._energy), packing.open | (weights or {})

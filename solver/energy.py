@@ -36,6 +36,8 @@ class EnergyBound:
     ) -> PackedFaces:
         """w3, or as much of it as has the energy `before` (|w1|^2 of each texel) and of all fluid at `wall_speed`.
 
+        `weights`: the open parts of faces, by which squares count; see `Projection.weights`.
+
         Raises:
             ValueError: if either is not finite, or beyond all measure.
         """

@@ -49,7 +49,7 @@ class Trace:
     def begin(self, velocity: Field, dt: float, grid: Grid, walls: Walls, in_parts: bool = False) -> Tracing:
         """What drawing it for a velocity on MAC faces takes; from here on it is that of `dt`, until `forget`.
 
-        `in_parts`: as many as its gradient asks for, which waits for the GPU; ValueError if that is beyond all measure.
+        `in_parts`: in as many as its gradient needs, which waits for the GPU; ValueError if that is beyond all measure.
         """
         hx, hy = grid.spacing
         defines, inputs = walls.defines, {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **walls.inputs}
@@ -65,7 +65,7 @@ class Trace:
         return Tracing(self.field, defines, inputs)
 
     def forget(self) -> None:
-        """Hear that the velocity has changed."""
+        """Say that the velocity has changed."""
         self._dt = None
 
     def release(self) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from solver.brush.tip import Tip
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldPool
-from solver.gl.passes import Blend, Region
+from solver.gl.passes import Blend, Region, differing
 from solver.gl.tiled import TILE, Kind, SavedTiles, TiledField
 from solver.grid import Grid
 from solver.limits import LARGEST_VISCOSITY, as_mask, check_finite, check_type, viscosities
@@ -128,7 +128,7 @@ class Masks:
             self.take_off(name)
 
     def words(self, name: str) -> np.ndarray | None:
-        """The texels of a mask as `edit` has them; None if nothing has been painted on it."""
+        """The texels (h, w) of a mask as `edit` has them; None if nothing has been painted on it."""
         return self._painted[name].get() if name in self._painted else None
 
     def edit(self, name: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
@@ -139,7 +139,7 @@ class Masks:
         field = self._field(name)
         before = field.get()
         after = change(before)
-        if region := _differing(before, after):
+        if region := differing(before, after):
             x, y, width, height = region
             field.set(after[y : y + height, x : x + width], region)
             self._note_change(name, region)
@@ -154,7 +154,7 @@ class Masks:
             field.restore(self._frozen_before)
         else:
             self._clear(name)
-        if region := _differing(before, field.get()):
+        if region := differing(before, field.get()):
             self._note_change(name, region)
 
     # -- what the fluid takes of them -------------------------------------------------------------------------------
@@ -162,11 +162,10 @@ class Masks:
     def apply(self, fluid: Scheme) -> None:
         """Give a fluid, on the whole picture or a window, its viscosity and solid cells; the next step takes them up.
 
-        They are worked out where a mask has changed since it got them last: viscosity by the mean over a cell, what is
-        solid by its distance from what is frozen. Solid are the cells whose middles are within half a cell of what the
-        map holds, which is what is frozen and `REACH` texels more; so not even a line of single texels lets anything
-        through. Over one more cell they are closed less and less: there the map, which holds what is frozen to the bit
-        (`WarpMap.hold`), goes over into what flows.
+        They are worked out where a mask has changed since it got them last (B2): viscosity by the mean over a cell,
+        solid cells by the distance of their middles from what the map holds, which is what is frozen and `REACH` texels
+        more. Within half a cell they are solid, so not even a line of single texels lets anything through; over one
+        more cell they are closed less and less: there the map passes from what it holds to what flows.
 
         Raises:
             ValueError: for a fluid of another picture.
@@ -218,7 +217,7 @@ class Masks:
         fluid.masks_changed()
 
     def forget_fluid(self) -> None:
-        """Give the fluid everything next time: it lies elsewhere now, or is another one."""
+        """Give the fluid everything next time, as it lies elsewhere now or is another one."""
         self._applied_to = None
 
     @property
@@ -252,7 +251,7 @@ class Masks:
         return State({}, {}, tiles)
 
     def restore(self, state: State) -> None:
-        """Go back to a saved state; call `apply` after it. What is frozen then, whoever took it knows already.
+        """Go back to a saved state; call `apply` after it. `take_frozen` does not tell of it: the map goes back too.
 
         Raises:
             ValueError: if it is of another canvas.
@@ -331,13 +330,3 @@ def _around(region: Region, other: Region | None) -> Region:
         (min(region[k], other[k]), max(region[k] + region[k + 2], other[k] + other[k + 2])) for k in (0, 1)
     )
     return x, y, right - x, bottom - y
-
-
-def _differing(before: np.ndarray, after: np.ndarray) -> Region | None:
-    """The smallest region outside of which two masks are the same; None if they are everywhere."""
-    differs = before != after
-    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
-    if not len(rows):
-        return None
-    x, y = int(columns[0]), int(rows[0])
-    return x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import moderngl
+import numpy as np
 
 from solver.gl.context import Context
 from solver.gl.field import Field, FieldError
@@ -15,6 +16,7 @@ GL_SAMPLERS = 0x8B5E, 0x8DD2  # sampler2D, usampler2D
 
 Target = Field | Sequence[Field]
 Region = tuple[int, int, int, int]
+"""Texels: left, top, width, height."""
 Blend = Literal["add", "subtract", "mix"]
 
 
@@ -147,6 +149,16 @@ class Pass:
             self._dropped.add(name)
         else:
             raise ShaderError(f"shaders/{self.shader} has no uniform u_{name}")
+
+
+def differing(before: np.ndarray, after: np.ndarray) -> Region | None:
+    """The smallest region outside of which two arrays (h, w) are the same; None if they are everywhere."""
+    differs = before != after
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(rows):
+        return None
+    x, y = int(columns[0]), int(rows[0])
+    return x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y
 
 
 def _clipped(region: Region | list[Region], size: tuple[int, int]) -> list[Region]:

@@ -60,9 +60,9 @@ class ConjugateGradients:
             cycle: the preconditioner.
             residual: r at blocks.
             squares: the sum of its squares.
-            wanted: and what is wanted of it.
+            wanted: the sum of squares at which it ends.
             sweeps: of the smoother before and after each correction.
-            iterations: of them, at most.
+            iterations: at most; by default `MOST_ITERATIONS`.
 
         Returns:
             The number of iterations.

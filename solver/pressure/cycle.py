@@ -31,7 +31,7 @@ class Cycle:
         device: the device.
         size: (nx, ny) cells.
         aspect: side of a cell along x over that along y.
-        solid: (ny, nx), true where a cell is solid; None for no solids.
+        solid: the part of each cell that is closed, (ny, nx), 0-1; None for no solids.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], aspect: float, solid: np.ndarray | None) -> None:

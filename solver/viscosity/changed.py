@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.gl.passes import differing
+
 
 class Box(NamedTuple):
     """Cells of a level: rows from `top` to before `bottom`, columns from `left` to before `right`."""
@@ -24,6 +26,8 @@ class Box(NamedTuple):
 
 def changed(before: np.ndarray, after: np.ndarray) -> Box | None:
     """The smallest box with all cells (ny, nx) that differ, None if none does."""
-    differs = before != after
-    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
-    return Box(int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1) if len(rows) else None
+    region = differing(before, after)
+    if region is None:
+        return None
+    x, y, width, height = region
+    return Box(y, y + height, x, x + width)
