@@ -386,7 +386,7 @@ def test_a_large_still_says_how_far_it_is(
 ):
     """Band by band while it is looked up, and that it is being written; by a recipe and by a map."""
     monkeypatch.setattr("app.work.export.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
-    monkeypatch.setattr("app.work.applying.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
+    monkeypatch.setattr("app.work.applier.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
     maps = MapOutput(tmp_path / "m.exr", size=96)
     job = Job(
         Recipe.parse(WHIRL + "size = 1500"), read_picture(picture), tmp_path, Outputs(tmp_path / "out.png", maps=maps)
