@@ -118,13 +118,15 @@ class Commands:
         self.state.selected = ""
 
     def cancel(self) -> None:
-        """Give up what is being drawn or dragged, or what is selected."""
-        if not self.workspace.session.is_painting and self.state.lanes.shown and self.state.lanes.cancel():
-            return
-        if self.state.tool_name == "select" and not self.workspace.session.is_painting:
-            self.selecting.cancel()
-        else:
+        """Give up what is being drawn or dragged, or what is selected; or stop the fit that is under way."""
+        if self.workspace.session.is_painting:
             self.workspace.session.cancel()
+        elif self.state.lanes.shown and self.state.lanes.cancel():
+            return
+        elif self.state.tool_name == "select" and self.selecting.cancel():
+            return
+        else:
+            self.fits.finish()
 
     def clear_masks(self) -> None:
         """Take all paint off both masks."""
