@@ -121,11 +121,9 @@ class Commands:
         """Give up what is being drawn or dragged, or what is selected; or stop the fit that is under way."""
         if self.workspace.session.is_painting:
             self.workspace.session.cancel()
-        elif self.state.lanes.shown and self.state.lanes.cancel():
             return
-        elif self.state.tool_name == "select" and self.selecting.cancel():
-            return
-        else:
+        lanes, selects = self.state.lanes, self.state.tool_name == "select"
+        if not (lanes.shown and lanes.cancel()) and not (selects and self.selecting.cancel()):
             self.fits.finish()
 
     def clear_masks(self) -> None:

@@ -129,7 +129,7 @@ class Replay:
             self._step(part)
 
     def head_for(self, tick: int) -> None:
-        """Go to the last moment up to a tick that is kept, unless this one lies between the two; or where all begins."""
+        """Go to the last moment up to a tick that is kept, unless this one lies between; and to where all begins."""
         nearest = self.checkpoints.nearest(self.recipe, tick)
         if tick < self.tick or (nearest is not None and nearest.tick > self.tick):
             self.seek(nearest.tick if nearest is not None else 0)
