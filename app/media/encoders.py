@@ -54,6 +54,10 @@ Encoding = Callable[[Stream], list[str]]
 """ffmpeg's output options for a stream."""
 
 
+# A Matroska file else has numbers drawn by chance in it, and what is rendered twice would not be the same.
+SAME_AGAIN = ("-fflags", "+bitexact")
+
+
 def _mp4(stream: Stream) -> list[str]:
     quality = ["-c:v", "libx264", "-preset", "medium", *stream.crf_or(18)]
     return ["-vf", stream.on_black, "-pix_fmt", "yuv420p", *quality, "-movflags", "+faststart"]
@@ -72,8 +76,8 @@ def _h265(stream: Stream) -> list[str]:
 
 def _webm(stream: Stream) -> list[str]:
     quality = ["-c:v", "libvpx-vp9", "-b:v", "0", *stream.crf_or(24), "-row-mt", "1"]
-    speed = ["-deadline", "good", "-cpu-used", "4"]
-    return ["-vf", tagged(stream.colours), "-pix_fmt", "yuva420p" if stream.alpha else "yuv420p", *quality, *speed]
+    speed, kind = ["-deadline", "good", "-cpu-used", "4"], "yuva420p" if stream.alpha else "yuv420p"
+    return ["-vf", tagged(stream.colours), "-pix_fmt", kind, *quality, *speed, *SAME_AGAIN]
 
 
 def _av1(stream: Stream) -> list[str]:
@@ -86,7 +90,7 @@ def _av1(stream: Stream) -> list[str]:
     if encoder is None:
         raise UserError("This ffmpeg has no encoder for AV1; leave out --codec, or set IMAGEIO_FFMPEG_EXE to another.")
     kind = "yuv420p" if stream.bits == 8 else "yuv420p10le"
-    return ["-vf", stream.on_black, "-pix_fmt", kind, *speed[encoder], *quality]
+    return ["-vf", stream.on_black, "-pix_fmt", kind, *speed[encoder], *quality, *SAME_AGAIN]
 
 
 def lossless(stream: Stream) -> list[str]:
@@ -94,7 +98,7 @@ def lossless(stream: Stream) -> list[str]:
     kind, colours = kinds[stream.alpha, stream.bits], stream.colours
     transfer = "iec61966-2-1" if colours.transfer == "bt709" else colours.transfer
     tags = f"setparams=color_primaries={colours.primaries}:color_trc={transfer}"
-    return ["-vf", tags, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind]
+    return ["-vf", tags, "-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", kind, *SAME_AGAIN]
 
 
 def _prores(stream: Stream) -> list[str]:

@@ -146,7 +146,10 @@ def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wante
     listed = ", ".join(named[:MOST_RUNS]) + (f" and others, {len(missing)} in all" if len(named) > MOST_RUNS else "")
     wants = f"{wanted[0]}-{wanted[-1]}" if len(wanted) > 1 else f"{wanted[0]}"
     frames = "frames" if len(missing) > 1 else "frame"
-    raise UserError(f"Cannot read {pattern}: of {wants} it lacks the {frames} {listed}; make them, or give --frames.")
+    said = f"Cannot read {pattern}: of {wants} it lacks the {frames} {listed}"
+    raise UserError(
+        f"{said}; make them, or give --frames.", in_window=f"{said}; make them, or number the others without a gap."
+    )
 
 
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:

@@ -39,6 +39,7 @@ class Reel:
         self._wanted = clip.start
         self._runs = False
         self._end: int | None = None  # no frame has this number or a higher one
+        self._most = clip.start  # nor does one that has been decoded
         self._next = clip.start  # that the open stream gives
         self._changed = threading.Condition()
         self._is_closed = False
@@ -73,10 +74,11 @@ class Reel:
             return number != self._wanted and (not self.error or self._wanted in self._kept)
 
     @property
-    def end(self) -> int | None:
-        """No frame has this number or a higher one; None while that is not known."""
+    def frames(self) -> int:
+        """How many there are, as far as is known: a file may tell of more than it has, or of fewer."""
         with self._changed:
-            return self._end
+            told = self.clip.start + (self.clip.frames or 1)
+            return (max(told, self._most) if self._end is None else self._end) - self.clip.start
 
     def take_words(self) -> list[str]:
         """What has been lost, missed or failed since this was asked for last, in sentences."""
@@ -154,6 +156,7 @@ class Reel:
     def _keep(self, number: int, pixels: np.ndarray) -> None:
         """Keep a frame, in the place of those that are farthest from being wanted: what is ahead is nearer."""
         self._kept[number] = pixels
+        self._most = max(self._most, number + 1)
 
         def distance(other: int) -> int:
             return other - self._wanted if other >= self._wanted else 2 * (self._wanted - other)

@@ -118,13 +118,13 @@ class Commands:
         self.state.selected = ""
 
     def cancel(self) -> None:
-        """Give up what is being drawn or dragged, or what is selected."""
-        if not self.workspace.session.is_painting and self.state.lanes.shown and self.state.lanes.cancel():
-            return
-        if self.state.tool_name == "select" and not self.workspace.session.is_painting:
-            self.selecting.cancel()
-        else:
+        """Give up what is being drawn or dragged, or what is selected; or stop the fit that is under way."""
+        if self.workspace.session.is_painting:
             self.workspace.session.cancel()
+            return
+        lanes, selects = self.state.lanes, self.state.tool_name == "select"
+        if not (lanes.shown and lanes.cancel()) and not (selects and self.selecting.cancel()):
+            self.fits.finish()
 
     def clear_masks(self) -> None:
         """Take all paint off both masks."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -193,8 +192,7 @@ class ExportDialog(Dialog):
         if self._image is not None:
             self._image.release()
         if self._folder is not None:
-            # Elsewhere, since a process takes a while to stop, and nobody is kept waiting for it.
-            threading.Thread(target=_clean_up, args=(self._preview, self._folder)).start()
+            self._preview.stop(self._folder.cleanup) if self._preview is not None else self._folder.cleanup()
         self._image = self._folder = self._preview = None
 
     @property
@@ -423,12 +421,6 @@ class ExportDialog(Dialog):
         self.name = name[: -len(self.ending)] if name.endswith(self.ending) else printable(path.stem)
 
 
-def _clean_up(preview: ExportProcess | None, folder: tempfile.TemporaryDirectory[str]) -> None:
-    if preview is not None:
-        preview.stop()
-    folder.cleanup()
-
-
 def _texture(device: Device, path: Path) -> moderngl.Texture:
     pixels = shown_pixels(read_picture(path), PREVIEW)
     texture = device.ctx.texture((pixels.shape[1], pixels.shape[0]), 4, pixels.tobytes())
@@ -522,17 +514,17 @@ class Exports:
             duration=max(session.target, 1) * recipe.fluid.dt,
             output=recipe.output.model_copy(update={"size": None}),
         )
-        folder = tempfile.TemporaryDirectory(prefix="fluidwarp-", ignore_cleanup_errors=True)
+        folder = temporary_folder()
         outputs = Outputs(Path(folder.name) / "the picture.png", bits=8, recorded=False)
         picture = replace(session.project.picture, note="")
         self.start(Job(recipe, picture, session.project.folder, outputs, frame=session.still))
         self._copied = folder
 
     def cancel(self) -> None:
-        """Stop the job; nothing of it is left."""
-        self._copied = self._giving = None
+        """Stop the job; nothing of it is left once its process has ended, for which nobody waits."""
+        copied, self._copied, self._giving = self._copied, None, None
         if self._process is not None:
-            self._process.stop()
+            self._process.stop(copied.cleanup if copied is not None else lambda: None)
             self._process = None
 
     def draw(self, ui: Ui, canvas: Rect) -> None:
@@ -562,7 +554,7 @@ class Exports:
         words = f"Copying {process.job.target.stem}" if copied else f"Exporting {process.job.target.name}"
         if under_way(ui, "exporting", canvas, 0.0, words + state, process.part, "Cancel"):
             self.cancel()
-            self.messages.say("Cancelled; nothing half-written is left.")
+            self.messages.say("Cancelled; nothing half-written is kept.")
 
 
 def under_way(ui: Ui, name: str, canvas: Rect, down: float, words: str, part: float, button: str) -> bool:

@@ -53,7 +53,7 @@ class Fits:
 
     def finish(self) -> None:
         """Let it end with the best so far."""
-        if self.process is not None:
+        if self.process is not None and not self._stopping:
             self.process.finish()
             self._stopping = True
 
@@ -76,7 +76,7 @@ class Fits:
             self._take(process)
         else:
             state = "checking the best" if self._stopping else process.state or "getting ready"
-            if under_way(ui, "fitting", canvas, down, f"Fitting: {state}", process.part, "Stop") and not self._stopping:
+            if under_way(ui, "fitting", canvas, down, f"Fitting: {state}", process.part, "Stop"):
                 self.finish()
 
     def _is_still_of_use(self, recipe: Recipe) -> bool:

@@ -160,12 +160,14 @@ class Selecting:
         first = {name: getattr(parts[0], name) for name in Area.model_fields}
         return FillMask(kind="fill", tick=0, of=self.state.mask, amount=amount, then=parts[1:], **first)
 
-    def cancel(self) -> None:
-        """Give up what is being drawn or looked for, or else what is selected."""
-        if self.path or self._search is not None:
+    def cancel(self) -> bool:
+        """Give up what is being drawn or looked for, or else what is selected; True if there was something."""
+        is_made, had = bool(self.path) or self._search is not None, bool(self.state.selection)
+        if is_made:
             self.path, self._search = [], None
         else:
             self._forget()
+        return is_made or had
 
     def _forget(self) -> None:
         self._before, self._picked, self._search, self.path = (), None, None, []

@@ -61,8 +61,7 @@ class Work:
         if (found := self.reel.best()) is not None and found[0] != self.frame:
             self.frame, self.pixels = found
             canvas.show(self.pixels)
-        if self.reel.end is not None:
-            session.clip_frames = self.reel.end - clip.start
+        session.clip_frames = self.reel.frames
         return self.reel.take_words()
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+from collections.abc import Callable
 
 from app.work.fit_job import Fit
 from app.work.jobs import Job
@@ -44,6 +45,8 @@ class WorkProcess:
 
     def poll(self) -> None:
         """Hear how far it is."""
+        if self.is_done:
+            return
         while not self.is_done and not self._inbox.empty():
             match self._inbox.get()[1]:
                 case Status(done, state):
@@ -53,11 +56,17 @@ class WorkProcess:
                 case None:
                     self.is_done, self.error = True, self._died
         if self.is_done:
-            self._worker.end()
+            self.stop()
 
-    def stop(self) -> None:
-        """End it; nothing of it is left."""
-        self._worker.end()
+    def stop(self, then: Callable[[], object] = lambda: None) -> None:
+        """End it, with nothing of it left, while nobody waits; `then` is called in a thread once it has ended."""
+
+        def end() -> None:
+            self._worker.end()
+            then()
+
+        # No daemon: whoever leaves has what was half-written taken away.
+        threading.Thread(target=end).start()
 
 
 class ExportProcess(WorkProcess):
@@ -74,10 +83,6 @@ class FitProcess(WorkProcess):
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
         super().__init__(fit, "The fit stopped unexpectedly, perhaps for want of memory.")
-
-    def stop(self) -> None:
-        """End it at once; it writes nothing that would have to be taken away."""
-        self._worker.kill()
 
     def finish(self) -> None:
         """Let it end with the best that it has."""

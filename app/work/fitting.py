@@ -40,7 +40,7 @@ LEAST_DET = 0.2  # of the map, anywhere
 RANGES = (0.06, 0.5), (0.05, 1.0), (0.3, 0.9), (3e-4, 0.3)
 DURATION = 1.0, 2.0  # seconds, from and to, for a recipe's own handles: a hand leads one after the other
 DECIMALS = 8  # of places: those in a file of pairs are no more exact, and the same are to give the same
-NAME = "pair"  # and a number: what a fitted handle is called
+NAME = "pair"  # and a number: what the handle that is made for a pair is called
 HALVINGS = 4  # of the way, where nothing else keeps it from folding
 
 
@@ -158,11 +158,12 @@ def fitted(
 class _Aim:
     """What is fitted: a recipe without its handles, and what becomes of each pair, but for what is searched.
 
-    `begins`: where each handle's point is when it begins, (n, 2) in fractions.
+    `names`: what messages call each pair. `begins`: where each handle's point is when it begins, (n, 2) in fractions.
     """
 
     recipe: Recipe
     pairs: Pairs
+    names: tuple[str, ...]
     handles: tuple[RecipeHandle, ...]
     begins: np.ndarray
 
@@ -174,10 +175,12 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
         # What is local carries a curve's points between its handles along: a fluid flows back there. And all do, since
         # those that push as a fluid does halt where what is local has pressed the picture together.
         one = RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if any(pairs.curves) else 0.0)
-        made = (one,) * len(pairs.places)
+        names = tuple(f"{NAME} {number}" for number in range(1, len(pairs.places) + 1))
+        made = tuple(one.model_copy(update={"name": name}) for name in names)
         places = np.round(pairs.places, DECIMALS)
-        return _Aim(base, Pairs(places, pairs.curves), made, places[:, 0])
-    led, places, begins, pins, muted = (
+        return _Aim(base, Pairs(places, pairs.curves), names, made, places[:, 0])
+    led, names, places, begins, pins, muted = (
+        [],
         [],
         [],
         [],
@@ -185,12 +188,14 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
         tuple(handle for handle in recipe.handle if handle.muted),
     )
     extent = np.array([picture.width, picture.height]) / max(picture.width, picture.height)
-    for handle, start in zip(recipe.handle, _starts(device, recipe, picture, folder), strict=True):
+    starts = _starts(device, recipe, picture, folder)
+    for number, (handle, start) in enumerate(zip(recipe.handle, starts, strict=True), 1):
         end = np.round(handle.goal or start, DECIMALS)
         if handle.muted:
             continue
         if handle.turns or np.hypot(*((end - handle.at) * extent)) > ARRIVED:
             led.append(handle)
+            names.append(handle.name or f"{handle.kind} {number}")
             begins.append(start)
             places.append((np.round(handle.at, DECIMALS), end))
         else:
@@ -203,7 +208,7 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
     if not _has_times(base):
         base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
         led, begins = [each.model_copy(update={"start": 0.0}) for each in led], pairs.places[:, 0]
-    return _Aim(base, pairs, tuple(led), np.array(begins))
+    return _Aim(base, pairs, tuple(names), tuple(led), np.array(begins))
 
 
 def _has_times(recipe: Recipe) -> bool:
@@ -347,7 +352,6 @@ class _Search:
             to = self.aim.begins[number] + part * (np.clip(end, 0, 1) - self.aim.begins[number])
             values_of = {
                 "at": (float(at[0]), float(at[1])),
-                "name": f"{NAME} {number + 1}",
                 "to": (float(to[0]), float(to[1])),
                 "keys": None,
                 "end": None,
@@ -383,7 +387,7 @@ class _Search:
     def _label(self, number: int) -> str:
         """What messages call a pair."""
         curve = self.aim.pairs.curves[number]
-        return f"{NAME} {number + 1}" + (f' of the curve "{curve[:40]}"' if curve else "")
+        return self.aim.names[number] + (f' of the curve "{curve[:40]}"' if curve else "")
 
     def _usable(self, base: Recipe) -> np.ndarray:
         """The numbers of the pairs that get a handle; of the others it is noted why not."""

@@ -102,9 +102,15 @@ class Replay:
         self._edit_masks()
 
     def pass_time(self, tick: int) -> None:
-        """Go on to a tick as long as nothing has been done yet, which takes no steps."""
-        while self.tick < min(tick, self.recipe.begins):
-            self.advance()
+        """Go on to a tick as long as nothing has been done yet, which takes no steps, and leaves nothing to keep."""
+        self._leave_passing()
+        stop = min(tick, self.recipe.begins)
+        if self.tick >= stop:
+            return
+        for _ in range(self.tick, stop):
+            self.fluid.time += self.recipe.fluid.dt  # one by one, as steps do, for the same digits
+        self.tick = stop
+        self._edit_masks()
 
     def seek(self, position: int | Fraction) -> None:
         """Go to a tick, or between two: there the step from the earlier one is made, with the map carried on only by
@@ -115,6 +121,7 @@ class Replay:
         nearest = self.checkpoints.nearest(self.recipe, whole)
         if whole < self.tick or (nearest is not None and nearest.tick > self.tick):
             self._load(nearest)
+        self.pass_time(whole)
         while self.tick < whole:
             self.advance()
         if part:
@@ -122,10 +129,11 @@ class Replay:
             self._step(part)
 
     def head_for(self, tick: int) -> None:
-        """Go to the last moment up to a tick that is kept, unless this one lies between the two."""
+        """Go to the last moment up to a tick that is kept, unless this one lies between; and to where all begins."""
         nearest = self.checkpoints.nearest(self.recipe, tick)
         if tick < self.tick or (nearest is not None and nearest.tick > self.tick):
             self.seek(nearest.tick if nearest is not None else 0)
+        self.pass_time(tick)
 
     def use(self, recipe: Recipe, keep: bool = True) -> None:
         """Go on with another recipe at the same tick, making again what differs in its past.

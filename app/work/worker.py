@@ -142,20 +142,19 @@ class Worker:
             said.flush()
 
     def end(self) -> None:
-        """End it in the middle of whatever it does, with nothing half-written left."""
-        assert self._process.stdin is not None
-        with suppress(OSError):
-            self._process.stdin.close()
+        """End it in the middle of whatever it does, with nothing half-written left. Waits until it has ended."""
+        # The pipe is not closed before a piece of work that is still going through it has been taken or refused.
+        threading.Thread(target=self._hang_up, daemon=True).start()
         try:
             self._process.wait(10 * GRACE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
 
-    def kill(self) -> None:
-        """End it without waiting for what it does, or for it to awake."""
-        self._process.kill()
-        self.end()
+    def _hang_up(self) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):
+            self._process.stdin.close()
 
     def _listen(self, inbox: queue.SimpleQueue[tuple[Worker, Reply]]) -> None:
         said = self._process.stdout

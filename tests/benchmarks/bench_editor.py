@@ -86,6 +86,8 @@ def frames(device: Device, cells: int, options: argparse.Namespace, table: Table
         offscreen.key(key)
     for _ in range(options.zoom):
         offscreen.frame(Move(550.0, 345.0), Wheel(0.0, 1.0))
+    if options.sectors:
+        offscreen.editor.state.symmetry, offscreen.editor.state.sectors = "radial", options.sectors
     if options.handles:
         offscreen.key("g")
     for x, y in handles(options.handles):
@@ -272,6 +274,7 @@ def main() -> None:
     parser.add_argument("--keys", nargs="*", default=[], help="pressed before painting, as xdotool calls them")
     parser.add_argument("--zoom", type=int, default=0, help="turns of the wheel before painting")
     parser.add_argument("--handles", type=int, default=0, help="to 16; the last is dragged instead of painting")
+    parser.add_argument("--sectors", type=int, default=0, help="of radial symmetry, 2 to 16; not with --window")
     args = parser.parse_args()
     console = Console(width=150)
     if args.window:

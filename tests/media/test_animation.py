@@ -76,6 +76,13 @@ PIXEL_FORMATS = {  # without and with alpha
 }
 
 
+@pytest.mark.parametrize("ending", [".mkv", ".webm"])
+def test_what_is_written_twice_is_the_same(tmp_path: Path, ending: str):
+    for name in ("once", "again"):
+        save(tmp_path / (name + ending), count=1)
+    assert (tmp_path / f"once{ending}").read_bytes() == (tmp_path / f"again{ending}").read_bytes()
+
+
 @pytest.mark.parametrize("channels", [2, 3])
 @pytest.mark.parametrize(("ending", "bits"), PIXEL_FORMATS)
 def test_ffprobe_finds_what_was_asked(tmp_path: Path, ending: str, bits: int, channels: int):

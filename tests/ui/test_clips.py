@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import shutil
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,8 +16,11 @@ from PIL import Image
 
 from app.errors import UserError
 from app.media.animation import animation_writer
+from app.media.clip import WHOLE, Clip, FrameRange
 from app.media.files import sequence_of
 from app.media.pictures import read_picture, write_picture
+from app.media.reel import AHEAD, Reel
+from app.model.picture import Picture
 from app.progress import Progress
 from app.ui.exporting import ANIMATION, ANIMATIONS, PICTURE
 from app.ui.files import tick_for
@@ -203,6 +209,41 @@ def test_a_clip_that_is_cut_short_ends_where_it_ends(robot: Robot, clip: Path):
     assert not editor.workspace.awaits_frame
     robot.drag((0.4, 0.5), (0.6, 0.5), steps=2)
     assert len(editor.session.recipe.stroke) == 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Counted(Clip):
+    """A hundred frames of one grey each, of which its file would tell of five."""
+
+    def pictures(self, part: FrameRange = WHOLE, *_: Any, **others: Any) -> Generator[tuple[int, Picture], None, None]:
+        for number in range(part[0], 100):
+            yield number, Picture(np.full((2, 2, 3), number, np.uint8))
+
+    def digest(self, number: int) -> str:
+        return ""
+
+
+def test_a_clip_that_is_longer_than_its_file_tells_is_played_on():
+    """What is read ahead shows that there is more; at its end that is known."""
+    clip = Counted(path=Path("a"), width=2, height=2, bits=8, alpha=False, pixel_format="rgb24", fps=RATE, frames=5)
+    reel = Reel(clip, lambda picture: picture.pixels)
+    assert reel.frames == 5
+    for wanted, frames in ((4, 5 + AHEAD), (28, 29 + AHEAD), (90, 100)):
+        reel.want(wanted, runs=True)
+        deadline = time.monotonic() + 60
+        while reel.frames != frames and time.monotonic() < deadline:
+            time.sleep(0.001)
+        assert reel.frames == frames
+    reel.close()
+
+
+def test_numbered_files_that_are_not_all_there_are_told_of(robot: Robot, tmp_path: Path):
+    """In words of the window."""
+    for number in (1, 2, 4):
+        write_picture(tmp_path / f"f{number}.png", pattern(96, 64))
+    robot.drop(tmp_path / "f%d.png")
+    said = robot.editor.messages.shown[-1].text
+    assert said.endswith("f%d.png: of 1-4 it lacks the frame 3; make them, or number the others without a gap.")
 
 
 def test_numbered_files_are_opened_by_one_of_them(robot: Robot, tmp_path: Path):

@@ -64,6 +64,7 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
     made = session.recipe
     assert names(robot) == ["Open", "Handle", "Handle", "Fit"]
     assert [handle.start for handle in session.recipe.handle] == [0, 0]
+    assert [handle.name for handle in session.recipe.handle] == ["", ""]  # their bars are called as before
     assert [handle.at for handle in session.recipe.handle] == [handle.at for handle in before.handle]
     assert [handle.to for handle in session.recipe.handle] == [handle.goal for handle in before.handle]
     assert session.tick == session.end
@@ -83,16 +84,20 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
     for words in (["w.fluidwarp"], ["bare.fluidwarp", "--pairs", str(tmp_path / "p.csv")]):
         target = tmp_path / "f.toml"
         assert fluidwarp(tmp_path, "fit", *words, "-o", target.name, "--evaluations", "2").returncode == 0
-        assert read_recipe(target).text() == made.edited(picture=None).text()
+        fitted, of_pairs = read_recipe(target), "--pairs" in words
+        assert [handle.name for handle in fitted.handle] == (["pair 1", "pair 2"] if of_pairs else ["", ""])
+        unnamed = [handle.model_copy(update={"name": ""}) for handle in fitted.handle]
+        assert fitted.edited(handle=tuple(unnamed)).text() == made.edited(picture=None).text()
 
 
-def test_stopped_it_keeps_the_best_so_far(robot: Robot, widgets: Widgets) -> None:
+@pytest.mark.parametrize("by", ["Stop", "escape"])
+def test_stopped_it_keeps_the_best_so_far(robot: Robot, widgets: Widgets, by: str) -> None:
     robot.editor.fits.evaluations = 100_000
     widgets.click("Fit")
     process = robot.editor.fits.process
     assert process is not None
     robot.until(lambda: process.state.startswith("best so far"), PATIENCE)
-    widgets.click("Stop")
+    widgets.click(by) if by == "Stop" else robot.key(by)
     wait(robot)
     assert names(robot)[-1] == "Fit"
     assert 0 < process.part < 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,8 +12,7 @@ from typing import Any
 
 from app.media.pictures import read_picture
 from app.model.recipe import Recipe
-from app.work.export_process import ExportProcess, FitProcess
-from app.work.fit_job import Fit
+from app.work.export_process import ExportProcess
 from app.work.jobs import Job, Outputs
 
 PICTURE = Path(__file__).parents[2] / "assets" / "pictures" / "coffee.png"
@@ -42,14 +42,14 @@ class Dying(Job):
 
 
 @dataclass(frozen=True)
-class SlowFit(Fit):
-    """A fit whose process takes its time to read it."""
+class Slow(Job):
+    """A job whose process takes its time to read it."""
 
     slow: Any = None
     rest: bytes = b""
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return SlowFit, (Called(time.sleep, PATIENCE), self.rest)
+        return Slow, (Called(time.sleep, PATIENCE), self.rest)
 
 
 def ended(process: ExportProcess) -> ExportProcess:
@@ -75,7 +75,10 @@ def test_a_picture_larger_than_a_pipe_is_exported(tmp_path: Path):
     assert (read_picture(tmp_path / "out.png").pixels == read_picture(PICTURE).pixels).all()
 
 
-def test_a_fit_is_stopped_at_once_also_while_its_process_is_getting_it(tmp_path: Path):
-    started = time.monotonic()
-    FitProcess(SlowFit(Recipe(), read_picture(PICTURE), tmp_path, rest=bytes(10_000_000))).stop()
-    assert time.monotonic() - started < PATIENCE / 4
+def test_nobody_waits_for_one_that_is_stopped_also_while_its_process_is_getting_it(tmp_path: Path):
+    """Whoever stops it hears when it has ended, which is soon."""
+    job = Slow(Recipe(), read_picture(PICTURE), tmp_path, Outputs(tmp_path / "out.png"), rest=bytes(10_000_000))
+    process, has_ended, started = ExportProcess(job), threading.Event(), time.monotonic()
+    process.stop(has_ended.set)
+    assert time.monotonic() - started < 1
+    assert has_ended.wait(PATIENCE / 2)

@@ -122,7 +122,7 @@ def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_those_that_stay_a
     found = fit(device, None, 3, RECIPE + HANDLES)
     np.testing.assert_allclose(found.pairs.places[:, 0], PAIRS[:, 0])
     recipe = found.trial.recipe
-    assert [handle.name for handle in recipe.handle] == ["pair 1", "pair 2"]
+    assert [handle.name for handle in recipe.handle] == ["", "nose"]  # as they were called
     assert [(handle.at, handle.to, handle.local) for handle in recipe.handle] == [
         ((0.3, 0.4), (0.36, 0.43), 0.0),
         ((0.6, 0.5), (0.6, 0.44), 0.5),

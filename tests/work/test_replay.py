@@ -312,3 +312,20 @@ def test_quick_long_pushes_of_water_do_not_fold(seed: int, device: Device) -> No
     found = replay.warp.statistics()
     assert (found.folds, found.displacement_max > radius) == (0, True)
     replay.release()
+
+
+def test_until_anything_is_done_time_alone_passes(device: Device):
+    """A stroke an hour into a clip: no step is made for what comes before it, and no moment of that is kept."""
+    bare, found = Recipe.parse("duration = 3600.1\n[fluid]\ngrid = 16\ndt = 0.04\n"), list[np.ndarray]()
+    for first in (0, 90_000):
+        samples = (first, 0.3, 0.3, 1.0), (first + 1, 0.5, 0.4, 1.0)
+        stroke = Stroke.model_validate({"tool": "push", "samples": samples})
+        replay = Replay(device, bare.edited(stroke=(stroke,)), pictures())
+        replay.seek(first + 2)
+        assert replay.steps == 2
+        assert len(replay.checkpoints) <= 2
+        assert replay.fluid.time == pytest.approx(replay.time)
+        found.append(replay.warp.read())
+        replay.release()
+    assert found[0].any()
+    np.testing.assert_array_equal(found[0], found[1])
