@@ -13,6 +13,7 @@ sys.dont_write_bytecode = False
 
 import gc
 import subprocess
+import threading
 import warnings
 from collections.abc import Iterator
 from functools import cache
@@ -42,6 +43,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return 1 if item.get_closest_marker("long") else 2
 
     items.sort(key=turn)
+    # What reads and writes files closes them: else it is told when they are collected, where nothing can be raised.
+    for item in items:
+        if item.path.parent.name == "media":
+            item.add_marker(pytest.mark.filterwarnings("error::ResourceWarning"))
+            item.add_marker(pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning"))
 
 
 def pytest_collection_finish() -> None:
@@ -64,6 +70,24 @@ def khronos_accepts_every_program() -> Iterator[None]:
     yield
     solver.gl.passes.compile_program = compile_program
     assert not programs.complaints()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_thread_holds_up_the_end() -> Iterator[None]:
+    """Every thread that the program starts may be left where it is, but for those that take files away."""
+    start, held = threading.Thread.start, set[str]()
+
+    def noting(thread: threading.Thread) -> None:
+        target = getattr(thread, "_target", None)
+        place = f"{getattr(target, '__module__', '')}.{getattr(target, '__name__', '')}"
+        if not thread.daemon and place.startswith(("app.", "solver.")):
+            held.add(place)
+        start(thread)
+
+    threading.Thread.start = noting
+    yield
+    threading.Thread.start = start
+    assert held <= {"app.ui.exporting._clean_up"}
 
 
 @pytest.fixture(scope="session")
