@@ -13,10 +13,12 @@ sys.dont_write_bytecode = False
 
 import gc
 import subprocess
+import threading
 import warnings
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import pytest
@@ -64,6 +66,31 @@ def khronos_accepts_every_program() -> Iterator[None]:
     yield
     solver.gl.passes.compile_program = compile_program
     assert not programs.complaints()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_thread_holds_up_the_end() -> Iterator[None]:
+    """Every thread that the program starts may be left where it is, but for those that take files away."""
+    make, held = threading.Thread.__init__, set[str]()
+
+    def noting(self: threading.Thread, *args: Any, **named: Any) -> None:
+        make(self, *args, **named)
+        target = named.get("target")
+        place = f"{getattr(target, '__module__', '')}.{getattr(target, '__name__', '')}"
+        if not self.daemon and place.startswith(("app.", "solver.")):
+            held.add(place)
+
+    threading.Thread.__init__ = noting
+    yield
+    threading.Thread.__init__ = make
+    assert held <= {"app.ui.exporting._clean_up"}
+
+
+@pytest.fixture(scope="module")
+def collected() -> None:
+    """What the tests of other modules have left is gone."""
+    with warnings.catch_warnings(action="ignore"):
+        gc.collect()
 
 
 @pytest.fixture(scope="session")

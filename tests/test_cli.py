@@ -25,6 +25,7 @@ from app.media.project import from_recipe, save
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
+from app.ui import window
 from app.work.export import run
 from app.work.jobs import Job, Outputs
 from solver.gl.device import Device
@@ -202,10 +203,11 @@ def test_doctor_fails_where_something_vital_is_missing(folder: Path):
     nothing = {"__EGL_VENDOR_LIBRARY_DIRS": str(folder), "LIBGL_DRIVERS_PATH": str(folder), "DISPLAY": ":9999"}
     ran = process(folder, "doctor", **nothing)
     assert ran.returncode == 1
-    assert "missing" in ran.stdout
-    assert "apt-get install" in ran.stdout
-    assert "Failed to open display :9999" in ran.stdout
-    assert "check that the display is there" in ran.stdout
+    told = " ".join(ran.stdout.split())  # whose lines are as long as the terminal is wide, if there is one
+    assert "missing" in told
+    assert "apt-get install" in told
+    assert "Failed to open display :9999" in told
+    assert "check that the display is there" in told
 
 
 def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
@@ -213,6 +215,18 @@ def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
     found = next(finding for finding in doctor.examine() if finding.name == "libraries")
     assert found.vital
     assert found.mend == "pip install no-such-library"
+
+
+@pytest.mark.parametrize("words", [["cat.png"], ["frames.%04d.png"], ["./render"], ["edit", "cat.png"], ["edit"], []])
+def test_a_file_alone_is_what_the_editor_opens(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    opened: list[Path | None] = []
+    monkeypatch.setattr(window, "run", opened.append)
+    (folder / "render").write_bytes((folder / "cat.png").read_bytes())
+    assert fluidwarp(folder, *words).returncode == 0
+    name = next((word for word in words if word != "edit"), None)
+    assert opened == [name and Path(name)]
 
 
 # -- what does not ----------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,23 @@ CONVERTED = {
     "inverted": "-o b.npy --invert", "from offsets": "-o b.npy --kind offsets",
     "too large": "-o b.npy --max-pixels 100", "from corners": "-o b.npy --grid corners", "cut": "-o b.npy --overscan 1",
 }  # fmt: skip
+TOGETHER = {"render": 8, "apply": 16, "convert": 16}  # lines of the words of three others
+SIDES = 1, 2, 5, 6  # of pictures and maps that are too small for one thing or another
+
+
+def together(command: str, lines: list[str]) -> dict[str, str]:
+    """The words of three of the lines at once, by chance: what one does may depend on another."""
+    dice = Random(command)
+    # With the others nothing comes of what they stand with.
+    ways = [line for line in lines if line and not line.endswith((" 100", " other", "--forward", "--frames 1"))]
+    made = dict[str, str]()
+    for number in range(TOGETHER[command]):
+        words = " ".join(dice.sample(ways, 3)).split()
+        outputs = [at for at, word in enumerate(words) if word == "-o"]
+        for at in reversed(outputs[1:]):
+            del words[at : at + 2]
+        made[f"{number} {' '.join(words)}"] = " ".join(words if outputs else [*words, "-o", "a.png"])
+    return made
 
 
 def held(file: Path) -> Any:
@@ -67,13 +85,14 @@ def held(file: Path) -> Any:
         )
     if file.suffix == ".flo":
         return np.frombuffer(file.read_bytes()[12:], np.float32)
-    if file.suffix == ".gif" or (file.suffix == ".webp" and getattr(Image.open(file), "is_animated", False)):
+    if file.suffix in (".gif", ".webp"):
         with Image.open(file) as clip:
             frames = []
-            for number in range(clip.n_frames):  # pyright: ignore[reportAttributeAccessIssue]
+            for number in range(getattr(clip, "n_frames", 1)):
                 clip.seek(number)
                 frames.append([clip.info.get("duration"), np.asarray(clip.convert("RGBA"))])
-            return [clip.info.get("loop"), frames]
+            if file.suffix == ".gif" or len(frames) > 1:
+                return [clip.info.get("loop"), frames]
     if file.suffix in (".png", ".jpg", ".webp", ".tif", ".exr"):
         picture = read_picture(file)
         kept = {name: part is not None and len(part) for name, part in vars(picture).items() if isinstance(part, bytes)}
@@ -102,22 +121,35 @@ def folder(tmp_path: Path) -> Path:
     places = np.stack([(x + 0.5) / 32, 1 - (y + 0.5) / 24], axis=-1) + displaced
     np.save(tmp_path / "given.npy", displaced * 32)
     write_picture(tmp_path / "given.exr", Picture(np.dstack([places, 0 * x]).astype(np.float32)))
+    for side in SIDES:
+        write_picture(tmp_path / f"{side}.png", Picture(pixels[:side, :side]))
+        np.save(tmp_path / f"{side}.npy", displaced[:side, :side] * side)
     (tmp_path / "a.toml").write_text(RECIPE)
     return tmp_path
 
 
 @pytest.mark.parametrize("command", ["render", "apply", "convert"])
 def test_every_word_does_what_it_did(folder: Path, fluidwarp: Run, golden: Golden, command: str) -> None:
-    lines = {
-        "render": {name: f"render a.toml {words}" for name, words in RENDERED.items()},
-        "apply": {name: f"apply given.exr cat.png {'' if '-o ' in words else '-o a.png'} {words}"
-                  for name, words in APPLIED.items()},
-        "convert": {name: f"convert given.exr {words}" for name, words in CONVERTED.items()},
+    given, lines = {
+        "render": ("a.toml", RENDERED),
+        "apply": ("given.exr cat.png", {name: words if "-o " in words else f"-o a.png {words}"
+                                        for name, words in APPLIED.items()}),
+        "convert": ("given.exr", CONVERTED),
     }[command]  # fmt: skip
     before = set(folder.rglob("*"))
     found: dict[str, list[float]] = {}
+    lines = {name: f"{given} {words}" for name, words in (lines | together(command, [*lines.values()])).items()}
+    for side in SIDES:
+        lines[f"{side} a side"] = {
+            "render": f"a.toml -i {side}.png -o a.png --map m.npy", "apply": f"{side}.npy {side}.png -o a.png",
+            "convert": f"{side}.npy -o b.npy --invert",
+        }[command]  # fmt: skip
+        lines[f"{side} a side, the other way"] = {
+            "render": f"a.toml --size {side} -o a.png", "apply": f"given.exr {side}.png -o a.png",
+            "convert": f"{side}.npy -o b.exr --offsets",
+        }[command]  # fmt: skip
     for name, words in lines.items():
-        run = fluidwarp(folder, *words.split())
+        run = fluidwarp(folder, command, *words.split())
         summed = Sum(1.0 if "map" not in name else 100.0)
         summed.add([run.returncode, run.stdout, re.sub(r"\d+(\.\d+)? s\b", "", run.stderr)])
         for file in sorted(set(folder.rglob("*")) - before, reverse=True):

@@ -49,6 +49,14 @@ def temporary_beside(path: Path) -> Path:
     return path.with_name(temporary_name(path.stem, path.suffix))
 
 
+def name_from(folder: Path, file: Path) -> str:
+    """A file as a recipe in a folder names it: by the way there, with slashes; from another drive by its whole path."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # another drive
+        return Path(os.path.abspath(file)).as_posix()
+
+
 def writable(path: str | os.PathLike[str]) -> Path:
     """The real path behind `path`, known to be a file or free, in a folder that is there.
 

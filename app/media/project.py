@@ -12,7 +12,7 @@ from typing import Any
 
 from app.errors import UserError, printable, shown
 from app.media.clip import WHOLE, Clip
-from app.media.files import is_sequence, numbered_files, replacing
+from app.media.files import is_sequence, name_from, numbered_files, replacing
 from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, open_input, read_input
 from app.media.leftovers import temporary_folder
 from app.media.recipes import read_recipe
@@ -226,10 +226,7 @@ def _referring(project: Project, path: Path) -> Recipe:
         if not os.path.exists(target) and not (is_sequence(target) and numbered_files(target)):
             mend = "put it back" if project.is_linked else "keep the picture in the project instead"
             raise UserError(f"Cannot refer to {target}: it is gone; {mend}")
-        try:
-            names[name] = os.path.relpath(target, path.resolve().parent)
-        except ValueError:  # another drive
-            names[name] = str(target)
+        names[name] = name_from(path.resolve().parent, target)
         if printable(names[name]) != names[name]:
             raise UserError(f"Cannot refer to {target}: its name is no text; keep the picture in the project instead")
     return Recipe.model_validate(_renamed(plain(project.recipe), names))

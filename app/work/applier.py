@@ -97,16 +97,16 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     if np.isnan(values).any():
         raise UserError("the map is NaN in places, and cannot be inverted; fill it first")
     width, height = given.width, given.height
-    grid = Grid.for_picture(width, height, min(max(width, height), MOST_CELLS))
-    warp = WarpMap(device, grid, (width, height))
     try:
-        warp.set(values)
-        with ForwardMap(warp) as forward:
-            found = forward.read((width, height))
+        warp = WarpMap(device, Grid.for_picture(width, height, min(max(width, height), MOST_CELLS)), (width, height))
+        try:
+            warp.set(values)
+            with ForwardMap(warp) as forward:
+                found = forward.read((width, height))
+        finally:
+            warp.release()
     except ValueError as error:
         raise UserError(f"the map cannot be inverted: {error}") from None
-    finally:
-        warp.release()
     return Displacement(found.astype(np.float32), 0, not given.forward)
 
 

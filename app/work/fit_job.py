@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import UserError
-from app.media.files import check_kept, replacing, writable
+from app.media.files import check_kept, name_from, replacing, writable
 from app.media.landmarks import Pairs, check_ending, read_pairs, write_pairs
 from app.media.opening import Opened, check_picture
 from app.media.outlines import read_outlines
@@ -119,4 +119,4 @@ class FitJob:
         if self.image is None and found.project is not None:
             return recipe.edited(picture=None)
         file = found.source_file(self.image)
-        return recipe.edited(picture=file and Path(os.path.relpath(file, target)).as_posix())
+        return recipe.edited(picture=file and name_from(target, file))

@@ -28,6 +28,12 @@ from app.media.pictures import read_picture
 from app.media.video import read_clip
 from app.model.picture import Picture
 
+# What is left open is told when it is collected, where nothing can be raised any more.
+pytestmark = [
+    pytest.mark.usefixtures("collected"),
+    pytest.mark.filterwarnings("error::ResourceWarning", "error::pytest.PytestUnraisableExceptionWarning"),
+]
+
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import ntpath
+import os
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from app.media.files import (
     check_kept,
     check_numbers,
     is_sequence,
+    name_from,
     number_in,
     numbered,
     numbered_files,
@@ -37,6 +40,14 @@ def test_the_file_of_a_number_and_back(pattern: str, number: int, name: str, ste
     assert numbered(f"folder/{pattern}", number) == Path("folder", name)
     assert number_in(pattern, name) == number
     assert unnumbered(pattern) == stem
+
+
+def test_a_picture_is_named_by_the_way_to_it_and_on_another_drive_by_all_of_its_path(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert name_from(Path("/a/b"), Path("/a/c/d.png")) == "../c/d.png"
+    monkeypatch.setattr(os.path, "relpath", ntpath.relpath)  # as it is on Windows
+    assert name_from(Path("C:/a"), Path("D:/c/d.png")).endswith("/D:/c/d.png")
 
 
 def test_what_is_no_file_of_a_sequence() -> None:

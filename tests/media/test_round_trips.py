@@ -35,6 +35,12 @@ from app.media.pictures import read_picture, write_picture
 from app.model.picture import Layer, Picture
 from support.golden import Golden, Sum
 
+# What is left open is told when it is collected, where nothing can be raised any more.
+pytestmark = [
+    pytest.mark.usefixtures("collected"),
+    pytest.mark.filterwarnings("error::ResourceWarning", "error::pytest.PytestUnraisableExceptionWarning"),
+]
+
 CLOSE, CLOSE_LOSSY = 1e-4, 0.03
 LOSSY = re.compile(r"\.(jpe?g|webp|avif|jp2)")
 SIZE = 20, 14

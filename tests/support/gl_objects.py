@@ -5,7 +5,12 @@ from __future__ import annotations
 import ctypes
 import gc
 from collections import Counter
+from collections.abc import Callable
 from ctypes.util import find_library
+from typing import Any
+
+import moderngl
+import pytest
 
 from solver.gl.device import Device
 
@@ -25,6 +30,33 @@ def living(device: Device, *kinds: str) -> Counter[str]:
     gc.collect()
     device.collect()
     return Counter({kind: _count(kind) for kind in kinds or KINDS})
+
+
+class Made:
+    """Textures and framebuffers that are made from now on, which this keeps: no garbage collection frees them.
+
+    Args:
+        monkeypatch: of the test, at whose end nothing is noted any more.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._made: list[moderngl.Texture | moderngl.Framebuffer] = []
+        for name in ("texture", "framebuffer"):
+            monkeypatch.setattr(moderngl.Context, name, self._noting(getattr(moderngl.Context, name)))
+
+    def _noting(self, make: Callable[..., Any]) -> Callable[..., Any]:
+        def making(*args: Any, **named: Any) -> Any:
+            self._made.append(make(*args, **named))
+            return self._made[-1]
+
+        return making
+
+    @property
+    def left(self) -> list[str]:
+        """What of them has not been released: kind and size."""
+        return [
+            f"{type(one).__name__} {one.size}" for one in self._made if not isinstance(one.mglo, moderngl.InvalidObject)
+        ]
 
 
 def _count(kind: str) -> int:

@@ -118,6 +118,17 @@ def test_what_has_been_changed_meanwhile_is_kept_and_the_fit_given_up(robot: Rob
     assert names(robot) == ["Open", "Handle", "Handle", "Half"]
 
 
+def test_of_another_work_nothing_is_fitted_however_alike(robot: Robot) -> None:
+    editor = robot.editor
+    editor.fits.evaluations = 100_000
+    robot.key("shift+g")
+    editor.open(replace(editor.session.project, recipe=editor.session.recipe))
+    robot.frame(count=2)
+    assert not editor.fits.is_running
+    assert "given up" in editor.messages.shown[-1].text
+    editor.do("undo")  # the work before it
+
+
 def test_without_a_handle_that_leads_anywhere_there_is_nothing_to_fit(robot: Robot) -> None:
     robot.editor.session.edit("None", handle=())
     robot.key("shift+g")

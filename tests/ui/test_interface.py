@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -26,6 +28,7 @@ from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
 from solver.gl.device import Device
+from solver.gl.passes import Pass
 from support.editing import Robot, export_dialog, pattern, small_project
 from support.widgets import Widgets
 
@@ -87,6 +90,44 @@ def test_at_rest_nothing_is_drawn(robot: Robot) -> None:
     live(robot, 5)
     assert live(robot, 59) == 0
     assert robot.editor.wait() == 60
+
+
+def test_a_frame_in_which_nothing_changes_gives_the_gpu_nothing_new(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of all that is shown: of a clip's frame that has just come, of overlays, a selection, the history and bars."""
+    workspace, state = robot.editor.workspace, robot.editor.state
+    robot.drag((0.3, 0.5), (0.5, 0.5), steps=1)
+    robot.editor.session.settle()
+    state.lanes.shown = True
+    for name in state.overlays:
+        state.toggle_overlay(name)
+    state.choose_tool("select", False)
+    robot.drag((0.2, 0.2), (0.6, 0.6), steps=1)
+    workspace.canvas.show(np.full((*robot.editor.session.project.picture.pixels.shape[:2], 4), 99, np.uint8))
+    workspace.view = replace(workspace.view, zoom=0.3)  # its smaller versions are needed
+    robot.frame(count=3)
+    done: list[str] = []
+    for kind, names in (
+        (moderngl.Texture, ("write", "read", "read_into", "build_mipmaps")),
+        (moderngl.Framebuffer, ("read", "read_into")),
+        (moderngl.Context, ("texture", "framebuffer")),
+        (Pass, ("__call__",)),
+    ):
+        for name in names:
+            monkeypatch.setattr(kind, name, noting(getattr(kind, name), f"{kind.__name__}.{name}", done))
+    robot.frame()
+    assert not done
+
+
+def noting(function: Callable[..., Any], name: str, done: list[str]) -> Callable[..., Any]:
+    """It, which is told of each time."""
+
+    def noted(*args: Any, **named: Any) -> Any:
+        done.append(name)
+        return function(*args, **named)
+
+    return noted
 
 
 def test_frames_are_drawn_for_a_pointer_that_rests_only_where_something_may_come_to_it(robot: Robot) -> None:

@@ -354,6 +354,25 @@ def test_while_a_stroke_is_painted_the_others_stay_in_their_lanes() -> None:
     assert all(one is other for one, other in zip(blocks[1][:-1], blocks[2][:-1], strict=True))
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_kept_of_lanes_and_blocks_is_what_would_be_made_anew(seed: int) -> None:
+    """Whatever changes from one frame to the next: strokes, other bars, the length, the zoom, or several of these."""
+    dice, strokes, window = random.Random(seed), many(30), Lanes()
+    recipe, ticks, least = Recipe(), 300, 8.0
+    for _ in range(40):
+        if dice.random() < 0.5:
+            recipe = recipe.edited(stroke=strokes[: dice.randint(0, 30)])
+        if dice.random() < 0.3:
+            whirl = VortexForce(kind="vortex", point=(0.5, 0.5), during=(0.0, dice.uniform(0.1, 4)))
+            recipe = recipe.edited(force=(whirl,) * dice.randint(0, 2))
+        if dice.random() < 0.3:
+            ticks = dice.choice((100, 300, 1000))
+        if dice.random() < 0.5:
+            least = dice.uniform(0.3, 40)
+        assert window.packed(recipe, ticks, least) == Lanes().packed(recipe, ticks, least)
+        assert window.blocks(recipe, least) == Lanes().blocks(recipe, least)
+
+
 def test_the_wheel_with_ctrl_shows_less_of_time_and_all_of_it_again(painted: Robot) -> None:
     x, y = place(painted, 1).middle
     wide = place(painted, 1).width

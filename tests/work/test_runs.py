@@ -20,6 +20,7 @@ from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.resample.plan import Edges, GivenMap, Sampling
 from solver.resample.sampler import Sampler
+from support.gl_objects import Made
 from support.golden import GOLDEN, Golden, told
 from support.passes import Passes
 
@@ -51,7 +52,7 @@ def passes(shared_device: Device) -> Iterator[Golden]:
 def test_a_run_gives_the_numbers_that_are_written_down(
     device: Device, name: str, golden: Golden, passes: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    noted = Passes(monkeypatch)
+    noted, made = Passes(monkeypatch), Made(monkeypatch)
     write_picture(tmp_path / "field.png", Picture(picture(30, 20)))
     parts = {"duration": 1.0} | RUNS[name]
     parts["fluid"] = {"grid": 36, "dt": 0.025, "viscosity": 0.002} | parts.get("fluid", {})
@@ -83,6 +84,7 @@ def test_a_run_gives_the_numbers_that_are_written_down(
             found["decades of viscous residual"] = [np.log10(max(residuals.viscous_residual, 1e-7))]
     finally:
         replay.release()
+    assert not made.left, "these are still on the GPU"
     for what, numbers in found.items():
         golden.compare(f"{name} {what}", numbers, 0.1 if what.startswith("decades") else None)
     noted.compare(passes, name)
