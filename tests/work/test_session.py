@@ -53,9 +53,7 @@ def paint(
 
 
 @pytest.mark.long
-def test_eighty_strokes_saved_and_rendered_are_the_same_map(
-    device: Device, session: Session, tmp_path: Path
-) -> None:
+def test_eighty_strokes_saved_and_rendered_are_the_same_map(device: Device, session: Session, tmp_path: Path) -> None:
     dice = random.Random(2)
     for _ in range(80):
         start = dice.uniform(0.1, 0.9), dice.uniform(0.1, 0.9)
