@@ -43,6 +43,7 @@ KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
 MOST_COASTING = 60.0  # seconds
 BUDGET = 400 * 2**20  # bytes of texture memory for checkpoints
 PATIENCE = 0.05  # seconds of a frame for getting to where the playhead was sent
+RETURN = 0.08  # seconds of the frame in which another state of the history is asked for
 QUICK = 0.01  # seconds a tick may take for another one in the same frame: rather a slower fluid than fewer frames
 
 
@@ -811,7 +812,7 @@ class Session:
         self._use(recipe)
         self._beyond = max(min(moment, self.length) - self.end, 0)
         self._target = self.end
-        self._approach(time.perf_counter() + 0.08)
+        self._approach(time.perf_counter() + RETURN)
 
     def _use(self, recipe: Recipe) -> None:
         """Simulate another recipe; what differs in the past is made again over the next frames."""

@@ -41,7 +41,7 @@ def test_taylor_green_decays_at_its_rate(device: Device) -> None:
 
 
 def test_taylor_green_hardly_fades_without_viscosity(device: Device) -> None:
-    grid, dt, steps = Grid(128, 128), 1 / 128, 128
+    grid, dt, steps = Grid(96, 96), 1 / 96, 96
     energies = {}
     for name, kind in {"mac": Fluid, "paper": PaperFluid}.items():
         fluid = kind(device, grid)

@@ -149,17 +149,17 @@ def test_saved_state_goes_on_bit_for_bit(device: Device, at: int, side: int) -> 
     state = warp.save()
     assert ("pending" in state.fields) == (at >= 6), "remaps begin at steps 6, 12, 18 and 24"
     assert ("gathered" in state.fields) == (side == 2560 and at >= 12), "and 100 tiles take 13 steps"
-    go(warp, 30)
+    go(warp, 20)
     straight = warp.read()
     warp.restore(state)
-    go(warp, 30)
+    go(warp, 20)
     np.testing.assert_array_equal(warp.read(), straight)
     other = WarpMap(device, grid, (side, side))
     other.advance(velocity, 0.3)
     template = other.save()
     resumed = template.with_arrays(device, state.arrays())
     other.restore(resumed)
-    go(other, 30)
+    go(other, 20)
     np.testing.assert_array_equal(other.read(), straight)
     for made in (state, template, resumed):
         made.release()

@@ -165,12 +165,21 @@ class Desk:
             time.sleep(attempt)
         self.until(condition, what)
 
+    @property
+    def is_asking(self) -> bool:
+        """A dialog is to be seen: what lies below it, such as the tools at the left, is dim."""
+        return 60 < self.seen()[60:700, :48].max() < 215
+
+    def ask(self, chord: str) -> None:
+        """Press the key of a dialog, and wait until that is to be seen."""
+        self.insist(lambda: self.key(chord), lambda: self.is_asking, f"the dialog of {chord}")
+        time.sleep(0.5)  # its size follows what is in it some frames later
+
     def save(self, path: Path) -> None:
         """Save what is open under a new name in the folder that is proposed."""
 
         def do() -> None:
-            self.key("ctrl+s")
-            time.sleep(1.5)
+            self.ask("ctrl+s")
             # The name is marked, and what is typed takes its place.
             self.key("ctrl+a")
             self.type(path.stem)

@@ -270,6 +270,7 @@ def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """However fast the machine is."""
     monkeypatch.setattr(session, "QUICK", 0.0)
     monkeypatch.setattr(session, "PATIENCE", 0.0)
+    monkeypatch.setattr(session, "RETURN", 600.0)
 
 
 @pytest.mark.parametrize("tour", TOURS, ids=lambda tour: tour.__name__)

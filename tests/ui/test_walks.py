@@ -86,6 +86,7 @@ def test_a_walk_leads_where_it_did(
 ) -> None:
     monkeypatch.setattr(session, "QUICK", 0.0)
     monkeypatch.setattr(session, "PATIENCE", 0.0)
+    monkeypatch.setattr(session, "RETURN", 600.0)
     name, dice = f"{imgui.get_version()} {area} {number}", Random(f"{area} {number}")
     if not WRITES and not golden.has(name):
         pytest.skip("letters lie elsewhere in other versions of imgui")
