@@ -256,7 +256,7 @@ def _grown(words: np.ndarray, radius: float, canvas: Grid) -> np.ndarray:
     # The largest of 1, 2, 4 ... words from each on to the right: two of them that overlap make any width.
     runs = [np.pad(words, ((0, 0), (margin, margin)))]
     for row in range(min(int(radius / hy), height - 1) + 1):
-        reach = min(int(math.sqrt(radius**2 - (row * hy) ** 2) / hx), margin)
+        reach = min(int(math.sqrt(max(radius**2 - (row * hy) ** 2, 0.0)) / hx), margin)  # of a whole row, rounding
         level = (2 * reach + 1).bit_length() - 1
         while len(runs) <= level:
             run, ahead = runs[-1], 1 << (len(runs) - 1)
