@@ -35,7 +35,16 @@ sys.path[:0] = [path for path in (str(ROOT), str(ROOT / "tests")) if path not in
 PATIENCE = 300.0
 DRAWN = 0.004  # longer sides between the places of a curve
 SITTING = 100  # actions with one work, until it is saved, the editor left, and the work opened again and exported
-PAINTS = {"w": "push", "c": "curve", "t": "twirl", "b": "bloat", "v": "thicken", "f": "freeze", "s": "smooth", "e": "restore"}
+PAINTS = {
+    "w": "push",
+    "c": "curve",
+    "t": "twirl",
+    "b": "bloat",
+    "v": "thicken",
+    "f": "freeze",
+    "s": "smooth",
+    "e": "restore",
+}
 KEYS = ("[", "]", "{", "}", ";", "'", ".", ",", "home", "end", "space", "y", "l", "u", "x", "left", "right", "delete", "escape",
         "1", "2", "3", "4", "5", "0", "=", "-", "Tab", "ctrl+l", "ctrl+i", "ctrl+shift+i", "ctrl+shift+f", "ctrl+d", "ctrl+r",
         "ctrl+1", "shift+m", "\\", "ctrl+a", "Return", "shift+Return")  # fmt: skip
@@ -195,7 +204,9 @@ class Sitting:
             command, stdout=subprocess.PIPE, stderr=self._log, text=True, cwd=desk.folder, env=desk.env
         )
         threading.Thread(target=self._read, daemon=True).start()
-        self.until(lambda: bool(self.now) and not self.now["busy"] and desk.is_shown and self._is_open(), "the work to be open")
+        self.until(
+            lambda: bool(self.now) and not self.now["busy"] and desk.is_shown and self._is_open(), "the work to be open"
+        )
 
     def _is_open(self) -> bool:
         self.desk.window = next(iter(self.desk._titles()))
@@ -218,7 +229,9 @@ class Sitting:
         deadline = time.monotonic() + PATIENCE
         while not condition():
             if self.process.poll() is not None:
-                raise Fault(f"the editor ended with {self.process.returncode} while waiting for {what}: {self.stderr()}")
+                raise Fault(
+                    f"the editor ended with {self.process.returncode} while waiting for {what}: {self.stderr()}"
+                )
             if time.monotonic() > deadline:
                 self.process.send_signal(signal.SIGUSR1)  # where it is, on stderr
                 time.sleep(1.0)
@@ -271,7 +284,9 @@ class Sitting:
         x, y, width, height = self.now["layout"].get(part, self.now["layout"]["timebar"])
         left = 120 if part == "bar" else 0  # without the menu, and without the button that exports
         right = 330 if part == "bar" else 0
-        return round(self.dice.uniform(x + left, x + width - right - 1)), round(self.dice.uniform(y + 1, y + height - 2))
+        return round(self.dice.uniform(x + left, x + width - right - 1)), round(
+            self.dice.uniform(y + 1, y + height - 2)
+        )
 
     def rest(self) -> None:
         if self.dice.random() < 0.4:
@@ -315,7 +330,9 @@ class Sitting:
         presses = [one["rect"] for one in self.told if "press" in one]
         made = [one for told in self.told if "made" in told for one in told["made"]]
         if len(presses) != len(sent) or len(made) != len(sent):
-            raise Fault(f"{len(sent)} strokes of {PAINTS[key]} sent, {len(presses)} begun, {len(made)} made; {self.now}")
+            raise Fault(
+                f"{len(sent)} strokes of {PAINTS[key]} sent, {len(presses)} begun, {len(made)} made; {self.now}"
+            )
         for way, rect, samples in zip(sent, presses, made, strict=True):
             self.compare(way, rect, samples, PAINTS[key] == "curve")
 
@@ -504,7 +521,10 @@ def wander(folder: Path, actions: int, seed: int, size: tuple[int, int], is_busy
             took = time.monotonic() - started
             print(f"seed {seed}: {sum(counts.values())} actions, {samples} samples, {took:.0f} s", flush=True)
     except Fault as fault:
-        print(f"seed {seed}, action {sum(counts.values())}, {list(log)}, {list(sitting.hand.chords) if sitting else []}: {fault}", flush=True)
+        print(
+            f"seed {seed}, action {sum(counts.values())}, {list(log)}, {list(sitting.hand.chords) if sitting else []}: {fault}",
+            flush=True,
+        )
         return False
     finally:
         desk.close()

@@ -77,7 +77,7 @@ class FillMask(_Edit, Area):
 
     Attributes:
         amount: decades of thickness; of what is frozen, 1 freezes and 0 thaws.
-        then: what is added to the area and taken from it, in this order.
+        then: what is added to the area, taken from it, or kept of it, in this order.
     """
 
     kind: Literal["fill"]
@@ -93,8 +93,7 @@ class FillMask(_Edit, Area):
     def coverage(self, grid: Grid, pictures: NamedPictures, seen: Seen = as_it_was) -> np.ndarray:
         covered = super().coverage(grid, pictures, seen)
         for part in self.then:
-            share = part.coverage(grid, pictures, seen)
-            covered = np.maximum(covered, share) if part.combine == "add" else np.minimum(covered, 1 - share)
+            covered = part.onto(covered, part.coverage(grid, pictures, seen))
         return covered
 
 
