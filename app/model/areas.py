@@ -51,9 +51,19 @@ class Area(Model):
 
 
 class Part(Area):
-    """An area that is added to those before it, or taken from them."""
+    """An area that is added to those before it, or taken from them; or what of them lies in it is kept.
 
-    combine: Literal["add", "subtract"] = "add"
+    Attributes:
+        combine: the last is "intersect".
+    """
+
+    combine: Literal["add", "subtract", "intersect"] = "add"
+
+    def onto(self, covered: np.ndarray, share: np.ndarray) -> np.ndarray:
+        """What is covered by those before it and by it, `share`, together."""
+        if self.combine == "add":
+            return np.maximum(covered, share)
+        return np.minimum(covered, 1 - share if self.combine == "subtract" else share)
 
 
 def _inside(corners: np.ndarray, grid: Grid) -> np.ndarray:

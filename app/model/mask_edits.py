@@ -77,7 +77,7 @@ class FillMask(_Edit, Area):
 
     Attributes:
         amount: decades of thickness; of what is frozen, 1 freezes and 0 thaws.
-        then: what is added to the area and taken from it, in this order.
+        then: what is added to the area, taken from it, or kept of it, in this order.
     """
 
     kind: Literal["fill"]
@@ -93,8 +93,7 @@ class FillMask(_Edit, Area):
     def coverage(self, grid: Grid, pictures: NamedPictures, seen: Seen = as_it_was) -> np.ndarray:
         covered = super().coverage(grid, pictures, seen)
         for part in self.then:
-            share = part.coverage(grid, pictures, seen)
-            covered = np.maximum(covered, share) if part.combine == "add" else np.minimum(covered, 1 - share)
+            covered = part.onto(covered, part.coverage(grid, pictures, seen))
         return covered
 
 
@@ -256,7 +255,7 @@ def _grown(words: np.ndarray, radius: float, canvas: Grid) -> np.ndarray:
     # The largest of 1, 2, 4 ... words from each on to the right: two of them that overlap make any width.
     runs = [np.pad(words, ((0, 0), (margin, margin)))]
     for row in range(min(int(radius / hy), height - 1) + 1):
-        reach = min(int(math.sqrt(radius**2 - (row * hy) ** 2) / hx), margin)
+        reach = min(int(math.sqrt(max(radius**2 - (row * hy) ** 2, 0.0)) / hx), margin)  # of a whole row, rounding
         level = (2 * reach + 1).bit_length() - 1
         while len(runs) <= level:
             run, ahead = runs[-1], 1 << (len(runs) - 1)

@@ -199,7 +199,7 @@ class Editor:
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
         busy = self.quality.is_measuring or self.quality.is_preparing
-        return busy or self.session.is_moving or self.clock.settling
+        return busy or self.session.is_moving or self.clock.settling or self.backend.is_behind
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""
@@ -292,15 +292,15 @@ class Editor:
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         by_keys = bool(self.dialogs.shown) or self.ui.has_popup
         self.backend.begin((size[0] / self.ui.density, size[1] / self.ui.density), self.ui.density, dt, events, by_keys)
-        if self._once_typed:
+        once, self._once_typed = ([], self._once_typed) if self.backend.is_behind else (self._once_typed, [])
+        if once:
             # The field is left, as if by Enter, so that what was typed is taken before it is saved.
             internal.clear_active_id()
         try:
             with self.clock.measure("panels"):
                 self._draw_panels()
                 self._draw_over_canvas()
-            names, self._once_typed = self._once_typed, []
-            for name in names:
+            for name in once:
                 self.do(name)
         except UserError as error:
             self.messages.warn(error.in_window)

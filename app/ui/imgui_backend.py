@@ -41,6 +41,7 @@ class ImGuiBackend:
         io.config_input_text_cursor_blink = False
         self._down: set[imgui.Key] = set()
         self._mods = Mods()
+        self._later: list[Event] = []
         self.fonts = theme.load_fonts()
         imgui.backends.opengl3_init("#version 330")
 
@@ -53,6 +54,11 @@ class ImGuiBackend:
     def is_hovering(self) -> bool:
         """The pointer is on something, of which more may be shown if it rests there, as of the last frame."""
         return imgui.is_any_item_hovered() or bool(self._context.hover_item_delay_id)
+
+    @property
+    def is_behind(self) -> bool:
+        """Some of the events wait for frames to come."""
+        return bool(self._later) or self._context.input_events_queue.size() > 0
 
     def begin(
         self, size: tuple[float, float], density: float, dt: float, events: Iterable[Event], by_keys: bool = False
@@ -68,8 +74,15 @@ class ImGuiBackend:
         io.display_size = imgui.ImVec2(*size)
         io.display_framebuffer_scale = imgui.ImVec2(density, density)
         io.delta_time = max(dt, 1e-4)
-        for event in events:
-            self._feed(io, event)
+        self._later += events
+        # What is dragged does not follow in the frame in which it is let go of: the last way takes a frame of its own.
+        moved = self._context.input_events_queue.size() > 0
+        while self._later:
+            event = self._later[0]
+            if moved and isinstance(event, Button) and not event.down:
+                break
+            moved = moved or isinstance(event, Move)
+            self._feed(io, self._later.pop(0))
         imgui.backends.opengl3_new_frame()
         imgui.new_frame()
 

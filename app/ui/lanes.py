@@ -79,6 +79,7 @@ class Lanes:
         shown: the lanes are folded open.
         selected: the bars that the next edit is about.
         drag: the bar in hand.
+        box: where a box around bars was begun, in points; and what was selected before, and stays so.
         drawn: the bars that are seen, and where, as of the last frame.
         view: ticks from and to which are shown; None shows all.
     """
@@ -86,6 +87,7 @@ class Lanes:
     shown: bool = False
     selected: set[Which] = field(default_factory=set)
     drag: Drag | None = None
+    box: tuple[float, float, frozenset[Which]] | None = None
     drawn: list[tuple[Bar, Rect]] = field(default_factory=list)
     view: tuple[float, float] | None = None
     _packed: tuple[tuple[object, ...], list[list[Bar]]] = field(default=((), []), init=False)
@@ -101,7 +103,7 @@ class Lanes:
             return
         self._of = recipe, session
         if session is not of or before is None:
-            self.selected, self.drag, self.view = set(), None, None
+            self.selected, self.drag, self.box, self.view = set(), None, None, None
             return
         if all(several_of(recipe, kind) is several_of(before, kind) for kind in KINDS):
             return
@@ -191,9 +193,25 @@ class Lanes:
             bar = bar._replace(end=round(at))
         self.drag = Drag(bar, part, at, x, adds, self.span(end))
 
+    def press_beside(self, x: float, y: float, adds: bool) -> None:
+        """The pointer went down where no bar is: a box begins."""
+        self.selected = self.selected if adds else set()
+        self.box = x, y, frozenset(self.selected)
+
+    def stretch_box(self, x: float, y: float) -> None:
+        """The bars that are seen between where the box was begun and a point are selected."""
+        if self.box is not None:
+            (left, right), (top, bottom) = sorted((self.box[0], x)), sorted((self.box[1], y))
+            touched = {
+                bar.which
+                for bar, rect in self.drawn
+                if rect.x <= right and left <= rect.right and rect.y <= bottom and top <= rect.bottom
+            }
+            self.selected = self.box[2] | touched
+
     def release(self, session: Session) -> None:
-        """The pointer went up: the bar stays where it is, or was only clicked."""
-        drag, self.drag = self.drag, None
+        """The pointer went up: the bar stays where it is, or was only clicked; or the box is done."""
+        drag, self.drag, self.box = self.drag, None, None
         if drag is None:
             return
         which = drag.bar.which
@@ -264,11 +282,11 @@ class Lanes:
         self.selected = set()
 
     def cancel(self) -> bool:
-        """Give up the drag, or else what is selected; True if there was something."""
-        had = self.drag is not None or bool(self.selected)
+        """Give up the drag or the box, or else what is selected; True if there was something."""
+        had = self.drag is not None or self.box is not None or bool(self.selected)
         if self.drag is None:
-            self.selected = set()
-        self.drag = None
+            self.selected = set(self.box[2]) if self.box is not None else set()
+        self.drag = self.box = None
         return had
 
 

@@ -47,9 +47,10 @@ class Selecting:
     # -- making it --------------------------------------------------------------------------------------------------
 
     def press(self, x: float, y: float, mods: Mods) -> None:
-        """The pointer went down: Shift adds to what is selected, Alt takes from it."""
+        """The pointer went down: Shift adds to what is selected, Alt takes from it, both keep what is in both."""
         self._search, self._shown = None, self._now()
-        self._combine = "add" if mods.shift else "subtract" if mods.alt else "replace"
+        ways = {(True, False): "add", (False, True): "subtract", (True, True): "intersect"}
+        self._combine = ways.get((mods.shift, mods.alt), "replace")
         self.path = [_within(x, y)]
 
     def move(self, x: float, y: float) -> None:
@@ -113,8 +114,8 @@ class Selecting:
         """Add an area to what was selected before, or take it away; None leaves that as it was."""
         parts = self._before
         if area is not None:
-            combine = "subtract" if parts and self._combine == "subtract" else "add"
-            parts = *parts, Part(combine=combine, **dict(area))
+            combine = self._combine if parts and self._combine != "replace" else "add"
+            parts = *parts, Part.model_validate({"combine": combine, **dict(area)})
         self._show(parts)
 
     def _show(self, parts: tuple[Part, ...]) -> None:

@@ -240,12 +240,13 @@ class GlfwWindow:
         if name == self._cursor:
             return
         self._cursor = name
-        hidden = name == "none"
-        glfw.set_input_mode(self.handle, glfw.CURSOR, glfw.CURSOR_HIDDEN if hidden else glfw.CURSOR_NORMAL)
-        if not hidden:
-            if name not in self._cursors:
-                self._cursors[name] = glfw.create_standard_cursor(_CURSORS[name])
-            glfw.set_cursor(self.handle, self._cursors[name])
+        if name not in self._cursors:
+            # Not GLFW's hidden mode: whenever a mode is set, GLFW asks where the pointer is by now, and then leaves out
+            # the move to there, which comes after what has happened on the way.
+            nothing = 1, 1, [[(0, 0, 0, 0)]]
+            made = glfw.create_cursor(nothing, 0, 0) if name == "none" else glfw.create_standard_cursor(_CURSORS[name])
+            self._cursors[name] = made
+        glfw.set_cursor(self.handle, self._cursors[name])
 
 
 def run(file: Path | None = None) -> None:

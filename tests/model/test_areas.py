@@ -113,7 +113,8 @@ def test_random_parts_added_and_taken_away_are_sets(seed: int) -> None:
     """But for pixels that an edge cuts."""
     dice, pixels = random.Random(seed), textured(seed)
     parts = [
-        Part(combine=dice.choice(("add", "subtract")), **dict(anything(dice))) for _ in range(dice.randrange(1, 6))
+        Part(combine=dice.choice(("add", "subtract", "intersect")), **dict(anything(dice)))
+        for _ in range(dice.randrange(1, 6))
     ]
     first = {name: getattr(parts[0], name) for name in Area.model_fields}
     edit = FillMask(kind="fill", tick=0, of="frozen", amount=1.0, then=tuple(parts[1:]), **first)
@@ -130,7 +131,10 @@ def test_random_parts_added_and_taken_away_are_sets(seed: int) -> None:
         if part.outline is not None:
             line = np.rint(np.array(part.outline) * SIZE - 0.5).astype(np.int32)
             edges |= cv2.polylines(np.zeros(x.shape, np.uint8), [line], True, 1, 3) > 0
-        wanted = wanted & ~here if number and part.combine == "subtract" else wanted | here
+        if number and part.combine != "add":
+            wanted = wanted & (~here if part.combine == "subtract" else here)
+        else:
+            wanted = wanted | here
     assert np.array_equal((after > 127)[~edges], wanted[~edges])
     assert edges.mean() < 0.5
     assert not before.any()

@@ -62,6 +62,17 @@ def test_grow_and_shrink_are_the_largest_and_the_smallest_within_a_disc(of: Mask
     assert np.array_equal(done(SpreadMask(kind="shrink", tick=0, of=of, radius=radius), before), smaller)
 
 
+@pytest.mark.parametrize("rows", [9, 263])
+def test_a_disc_may_reach_a_whole_number_of_rows(rows: int) -> None:
+    """Of 9 of these rows the square is, as it is rounded, above the radius's."""
+    canvas = Grid.for_picture(8, 4900, 4900)
+    before = np.zeros((4900, 8), np.uint8)
+    before[2450, 4] = 255
+    edit = SpreadMask(kind="grow", tick=0, of="frozen", radius=rows / 4900)
+    column = edited(before, edit, canvas, SmallPictures(OnePicture(RED)))[:, 4]
+    assert (column > 0).sum() == 2 * rows + 1
+
+
 @pytest.mark.parametrize("of", KINDS)
 def test_feather_is_three_means(of: MaskName) -> None:
     before = words(of)

@@ -16,6 +16,7 @@ from app.media.formats import FORMATS
 from app.media.maps import MAP_ENDINGS
 from app.model.strokes import BrushPath, Change
 from app.progress import Progress
+from app.ui.events import LEFT, Button, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PRESETS, ExportDialog
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences
@@ -51,6 +52,23 @@ def test_a_slider_of_the_bar_sets_its_part_of_the_brush(
     before = asdict(robot.editor.state.brush)
     widgets.type(label, typed)
     assert changed(before, asdict(robot.editor.state.brush)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("ahead", [1, 3, 4])
+def test_a_slider_follows_to_where_it_is_let_go_of_however_few_frames_there_are(
+    robot: Robot, widgets: Widgets, ahead: int
+) -> None:
+    """On a busy machine a press, the way and the release come with one frame."""
+    widgets.look()
+    place = widgets.at["Hardness"]
+    x, y = place.middle
+    events = [Move(x, y), Button(LEFT, True), Move(x + 9, y), Move(x + place.width / 4, y), Button(LEFT, False)]
+    robot.frame(*events[:ahead])
+    robot.frame(*events[ahead:])
+    while robot.editor.backend.is_behind:
+        assert robot.editor.wait() == 0
+        robot.frame()
+    assert robot.editor.state.brush.hardness == pytest.approx(0.77, abs=0.01)
 
 
 @pytest.mark.parametrize(("label", "name"), [("Viscosity", "viscosity"), ("Drag", "drag")])

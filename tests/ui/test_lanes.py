@@ -217,6 +217,32 @@ def test_a_press_beside_the_bars_lets_go_of_them_and_delete_then_does_nothing_to
     assert lanes(painted).selected == set()
 
 
+def test_a_box_selects_the_bars_that_it_touches(painted: Robot) -> None:
+    first, second = place(painted, 0), place(painted, 1)
+    right, below = second.right + 20, max(first.bottom, second.bottom) + 4
+
+    def draw(x: float, *, shift: bool = False) -> None:
+        """From beside the bars, back to a place among them."""
+        painted.mods = Mods(shift=shift)
+        painted.move(right, below)
+        painted.press()
+        painted.move(x, min(first.y, second.y) + 1)
+        painted.mods = Mods()
+
+    draw(second.x - 2)
+    assert lanes(painted).selected == {("stroke", 1)}
+    painted.move(first.right - 2, first.y + 1)
+    assert lanes(painted).selected == {("stroke", 0), ("stroke", 1)}
+    painted.key("escape")
+    assert lanes(painted).selected == set()
+    painted.release()
+    painted.click(*first.middle)
+    draw(second.right - 2, shift=True)
+    painted.release()
+    assert lanes(painted).selected == {("stroke", 0), ("stroke", 1)}
+    assert len(names(painted)) == 3  # nothing of which was an edit
+
+
 def test_the_fields_of_a_bar_set_when_how_long_how_strong_and_how_often(painted: Robot, widgets: Widgets) -> None:
     painted.key("h")  # which has no strength of its own
     before, dt = recipe(painted).stroke[1], painted.editor.session.dt

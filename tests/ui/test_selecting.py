@@ -90,15 +90,17 @@ def test_a_rectangle_is_selected_and_frozen_by_enter_in_no_time(robot: Robot) ->
     assert is_like(frozen(robot), box(0.2, 0.3, 0.6, 0.7))
 
 
-def test_shift_adds_alt_takes_away_and_neither_begins_anew(robot: Robot) -> None:
+def test_shift_adds_alt_takes_away_both_intersect_and_neither_begins_anew(robot: Robot) -> None:
     state, one, other = robot.editor.state, ((0.1, 0.1), (0.5, 0.5)), ((0.4, 0.4), (0.8, 0.8))
     select(robot, "rectangle", *one, mods=Mods(alt=True))  # from nothing it is what is selected
     select(robot, "rectangle", *other, mods=Mods(shift=True))
     select(robot, "ellipse", (0.3, 0.3), (0.5, 0.5), mods=Mods(alt=True))
+    select(robot, "rectangle", (0.0, 0.0), (0.7, 0.6), mods=Mods(shift=True, alt=True))
     x, y = (X + 0.5) / WIDTH, (Y + 0.5) / HEIGHT
     hole = (x - 0.4) ** 2 + (y - 0.4) ** 2 < 0.1**2
     robot.key("enter")
-    assert is_like(frozen(robot), (box(0.1, 0.1, 0.5, 0.5) | box(0.4, 0.4, 0.8, 0.8)) & ~hole)
+    both = box(0.1, 0.1, 0.5, 0.5) | box(0.4, 0.4, 0.8, 0.8)
+    assert is_like(frozen(robot), both & ~hole & box(0.0, 0.0, 0.7, 0.6))
     select(robot, "rectangle", (0.6, 0.6), (0.9, 0.9))
     assert len(state.selection) == 1
     robot.key("delete")

@@ -83,6 +83,8 @@ def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path
     desk.open(work)
     words = ["mousemove", "300", "200", "sleep", "0.5"]
     for y in (200, 300, 400, 500):
+        # Each begins where the pointer stops as it comes from a panel, while its shape changes.
+        words += ["mousemove", "1100", "600", "sleep", "0.4", "mousemove", "300", str(y + 50), "sleep", "0.02"]
         words += ["mousemove", "300", str(y), "mousedown", "1", "sleep", "0.05"]
         words += ["mousemove", "500", str(y), "sleep", "0.05", "mousemove", "700", str(y), "mouseup", "1"]
     with desk.busy():  # on which a grid of 192 is as fine as one of 384 otherwise
@@ -99,6 +101,8 @@ def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path
     assert len(strokes) == 4
     for stroke in strokes:
         assert stroke.samples[-1][1] - stroke.samples[0][1] == pytest.approx(400 / 864, abs=0.01)
+    begun = [stroke.samples[0][2] for stroke in strokes]
+    assert np.diff(begun) == pytest.approx(3 * [100 / 648], abs=1e-4)
     assert all(later.first_tick > stroke.last_tick for stroke, later in pairwise(strokes))
     assert fluidwarp(tmp_path, "render", work.name, "-o", rendered.name).returncode == 0
     assert exported.read_bytes() == rendered.read_bytes()

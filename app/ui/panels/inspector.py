@@ -125,7 +125,9 @@ def _selection(ui: Ui, session: Session, state: EditorState, selecting: Selectin
         connected = ui.check("Only what is connected", state.connected)
         if slid.changed or connected != state.connected:
             selecting.set_tolerance(slid.value, connected)
-    ui.wrapped(f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, Esc gives up.", ui.palette.dim, 13)
+    ui.wrapped(
+        f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, both intersect, Esc gives up.", ui.palette.dim, 13
+    )
     _which_mask(ui, state)
     words = ("Freeze", "Thaw") if state.mask == "frozen" else ("Fill", "Clear")
     width = (imgui.get_content_region_avail().x / ui.scale - 8) / 2

@@ -190,6 +190,10 @@ def _bars(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
     if scale.x0 <= now <= scale.x1 and session.length:
         low, high = ImVec2(now, top), ImVec2(now + ui.px(1.5), top + imgui.get_window_height())
         draw.add_rect_filled(low, high, packed(ui.palette.text))
+    if lanes.box is not None:
+        begun, here = ImVec2(*lanes.box[:2]), imgui.get_mouse_pos()
+        draw.add_rect_filled(begun, here, packed(ui.palette.text, 0.12))
+        draw.add_rect(begun, here, packed(ui.palette.text, 0.6))
     imgui.end_child()
     return let_go
 
@@ -262,8 +266,11 @@ def _point(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
         if found is not None:
             state.selected = _label(session, found[0])
             lanes.press(*found, scale.tick_at(mouse.x), mouse.x, adds, session.length)
-        elif not adds:
-            lanes.selected = set()
+        else:
+            lanes.press_beside(mouse.x, mouse.y, adds)
+    elif imgui.is_item_active() and lanes.box is not None:
+        if max(abs(mouse.x - lanes.box[0]), abs(mouse.y - lanes.box[1])) > ui.px(SHAKE):
+            lanes.stretch_box(mouse.x, mouse.y)
     elif imgui.is_item_active() and lanes.drag is not None:
         drag = lanes.drag
         drag.moved |= abs(mouse.x - drag.x) > ui.px(SHAKE)
