@@ -18,16 +18,24 @@ def draw_at(
     shader: str,
     defines: dict[str, object] | None = None,
     components: int = 2,
+    more: np.ndarray | None = None,
     **inputs: Any,
 ) -> np.ndarray:
-    """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, components)."""
-    rows = max(1, -(-len(points) // _ROW))
-    listed = np.zeros((rows * _ROW, 2), np.float32)
-    listed[: len(points)] = points / domain
-    places = device.upload(listed.reshape(rows, _ROW, 2), "points")
-    found = device.field(places.size, components, "found at points")
-    device.pass_(shader, POINTS=1, **(defines or {}))(found, points=places, **inputs)
+    """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, components).
+
+    `more`: what it is told of each besides, as `u_more`, (n, 1-4).
+    """
+    lists = {"points": points / domain} | ({} if more is None else {"more": more})
+    row = min(max(len(points), 1), _ROW)
+    rows = max(1, -(-len(points) // row))
+    listed = {}
+    for name, values in lists.items():
+        texels = np.zeros((rows * row, values.shape[1]), np.float32)
+        texels[: len(values)] = values
+        listed[name] = device.upload(texels.reshape(rows, row, -1), f"{name} of a list")
+    found = device.field((row, rows), components, "found at points")
+    device.pass_(shader, POINTS=1, **(defines or {}))(found, **listed, **inputs)
     values = found.get().reshape(-1, components)[: len(points)]
-    places.release()
-    found.release()
+    for field in (*listed.values(), found):
+        field.release()
     return values
