@@ -120,6 +120,7 @@ class Handles:
         self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
+        self._shapes: list[Shape] = []
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
         self._sought: tuple[object, np.ndarray] | None = None  # where they are, and what that was found from
@@ -130,8 +131,9 @@ class Handles:
         check_type("what is led", handles, Iterable)
         for handle in handles:
             check_type("a handle", handle, Handle)
+        known = {id(shape.handle): shape for shape in self._shapes}
         self.handles = tuple(handles)
-        self._shapes = [Shape.of(handle, self._warp.extent) for handle in handles]
+        self._shapes = [known.get(id(handle)) or Shape.of(handle, self._warp.extent) for handle in handles]
         before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
         self._rows = _runs(self._counts)
         self._at = np.concatenate([np.zeros((0, 2)), *(shape.led for shape in self._shapes)])
