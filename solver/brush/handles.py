@@ -305,6 +305,8 @@ class Handles:
 
     def _fitted(self, kept: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """What was kept of handles with so many points, for those of now; one that has others has not begun yet."""
+        if np.array_equal(counts, self._counts):
+            return kept.copy()
         rows = np.full((self._counts.sum(), 2), np.nan)
         parts = np.split(kept, np.cumsum(counts))
         for here, part in zip(self._rows, parts, strict=False):
