@@ -361,6 +361,8 @@ class Recipe(Model):
                 agreed = min([agreed, *(force.starts(self.fluid.dt) for force in (mine, theirs) if force is not None)])
         renumbered = self.pin != other.pin
         for mine, theirs in zip_longest(self.handle, other.handle):
+            if mine is theirs and not renumbered:
+                continue
             if not any(led is not None and led.takes_hold for led in (mine, theirs)):
                 continue
             if mine is not None and theirs is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 MOST_ZOOM = 64.0
 STEPS = (1 / 16, 1 / 12, 1 / 8, 1 / 6, 1 / 4, 1 / 3, 1 / 2, 2 / 3, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
@@ -69,7 +70,7 @@ class Viewport:
         """The zoom as a person reads it."""
         return 100.0 * (self.zoom or self.fit_zoom)
 
-    @property
+    @cached_property
     def rect(self) -> Rect:
         """The whole picture on the screen, which may reach beyond the canvas."""
         width, height = self.picture[0] * self.scale, self.picture[1] * self.scale

@@ -33,7 +33,8 @@ class Held:
 
     def is_away(self, extent: Point) -> bool:
         """True if it is not where it is led."""
-        return hypot(*(np.subtract(self.now, self.target) * extent)) > ARRIVED
+        (x, y), (to_x, to_y), (across, down) = self.now, self.target, extent
+        return hypot((x - to_x) * across, (y - to_y) * down) > ARRIVED
 
 
 def held_in(replay: Replay) -> list[Held]:
@@ -49,8 +50,9 @@ def held_in(replay: Replay) -> list[Held]:
         if one.is_in_force(tick, dt):
             start = now if np.isnan(start[0]) else start
             target = handle.wanted(start, max(replay.time, handle.ready), dt) if handle.goal else start
-            places = ((float(x), float(y)) for x, y in (start / extent, now / extent, target / extent))
-            line = [(float(x), float(y)) for x, y in shape / extent] if one.points else []
+            places = (np.array([start, now, target]) / extent).tolist()
+            line = (shape / extent).tolist() if one.points else []
+            places, line = ([(x, y) for x, y in each] for each in (places, line))
             found.append(Held(one, label, *places, line=(*line, *line[: one.closed])))
     return found
 

@@ -12,15 +12,25 @@ from app.model.sampling import Point
 from solver.brush.handle import Handle
 
 
-def handles_of(led: Iterable[RecipeHandle | RecipePin], extent: Point) -> list[Handle]:
-    """Those of a recipe as the solver has them, in this order; none is led out of the picture, of sides `extent`."""
+class Leading:
+    """Handles and pins of a recipe as the solver has them; of those that stay the same, the same are given again.
 
-    def within(place: Point) -> Point:
-        x, y = (min(max(part, 0.0), 1.0) * side for part, side in zip(place, extent, strict=True))
-        return x, y
+    Args:
+        extent: of the picture; none is led out of it.
+    """
 
-    made = []
-    for one in led:
+    def __init__(self, extent: Point) -> None:
+        self._extent = extent
+        self._made: dict[int, tuple[RecipeHandle | RecipePin, Handle]] = {}  # by the identity of the former
+
+    def of(self, led: Iterable[RecipeHandle | RecipePin]) -> list[Handle]:
+        """Those of a recipe, in this order."""
+        made = [self._made.get(id(one)) or (one, self._handle(one)) for one in led]
+        self._made = {id(one): (one, handle) for one, handle in made}
+        return [handle for _, handle in made]
+
+    def _handle(self, one: RecipeHandle | RecipePin) -> Handle:
+        extent = self._extent
         at = one.at[0] * extent[0], one.at[1] * extent[1]
         way: dict[str, Any] = {
             "points": np.multiply(one.points, extent) if one.points else (),
@@ -29,8 +39,11 @@ def handles_of(led: Iterable[RecipeHandle | RecipePin], extent: Point) -> list[H
         if isinstance(one, RecipeHandle):
             way |= {"duration": one.duration, "local": one.local, "rotate": one.rotate, "scale": one.scale}
             way |= {"turned": one.turned}
-            way |= {"to": one.to and within(one.to)}
-            way |= {"keys": tuple((time, *within((x, y))) for time, x, y in one.keys or ())}
+            way |= {"to": one.to and self._within(one.to)}
+            way |= {"keys": tuple((time, *self._within((x, y))) for time, x, y in one.keys or ())}
             way |= {"goals": np.multiply(one.goals, extent) if one.goals else ()}
-        made.append(Handle(at, radius=one.radius, start=one.start, end=one.let_go, stiffness=one.stiffness, **way))
-    return made
+        return Handle(at, radius=one.radius, start=one.start, end=one.let_go, stiffness=one.stiffness, **way)
+
+    def _within(self, place: Point) -> Point:
+        x, y = (min(max(part, 0.0), 1.0) * side for part, side in zip(place, self._extent, strict=True))
+        return x, y

@@ -25,7 +25,7 @@ from app.model.strokes import FINEST_DETAIL, Act, Change
 from app.model.windows import FLOWING, FlowWindow, may_have_windows
 from app.work.brushwork import Brushwork, Scene
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
-from app.work.leading import handles_of
+from app.work.leading import Leading
 from app.work.loaded_forces import LoadedForce, acting
 from solver.brush.handle import Handle
 from solver.brush.handles import Handles
@@ -80,6 +80,8 @@ class Replay:
         self.checkpoints = Checkpoints(budget)
         self._brushwork = Brushwork(device)
         self._passing: Moment | None = None
+        self._led: list[tuple[str, RecipeHandle | RecipePin]] = []
+        self._led_of: Recipe | None = None
         self._build()
 
     # -- going through time -----------------------------------------------------------------------------------------
@@ -236,8 +238,11 @@ class Replay:
     @property
     def led(self) -> list[tuple[str, RecipeHandle | RecipePin]]:
         """The recipe's pins and handles that take hold of something, with what messages call them; pins come first."""
-        led = labelled(self.recipe.handle, self.recipe.pin)
-        return sorted((each for each in led if each[1].takes_hold), key=lambda each: isinstance(each[1], RecipeHandle))
+        recipe = self.recipe
+        if self._led_of is not recipe:
+            led = [each for each in labelled(recipe.handle, recipe.pin) if each[1].takes_hold]
+            self._led_of, self._led = recipe, sorted(led, key=lambda each: isinstance(each[1], RecipeHandle))
+        return self._led
 
     def as_seen(self, values: np.ndarray, grid: Grid) -> np.ndarray:
         """Values of the original's cells, (ny, nx) or (ny, nx, c), where the warp shows them at this moment."""
@@ -409,6 +414,7 @@ class Replay:
             self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
         for said in islice(objections(recipe.handle, recipe.pin, self.grid.extent), MOST_OBJECTIONS):
             self.pictures.notice(said)
+        self._leading = Leading(self.grid.extent)
         self.handles = Handles(self.fluid, self.warp, self._handles())
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
@@ -426,7 +432,7 @@ class Replay:
             force.release()
 
     def _handles(self) -> list[Handle]:
-        return handles_of((led for _, led in self.led), self.grid.extent)
+        return self._leading.of(led for _, led in self.led)
 
     def _begin_with(self, name: str) -> None:
         try:

@@ -83,6 +83,7 @@ class Session:
         self.is_grid_automatic = False
         self.last_place: tuple[float, float] | None = None
         self._gesture: OpenGesture | None = None
+        self._is_heard = True  # the simulation knows all that the gesture has made
         # The person has sent the playhead back, and what is done next takes the place of what comes after it.
         self._went_back = False
         self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
@@ -285,6 +286,7 @@ class Session:
             return
         for _ in self._gesture.catch_up(self.dt):
             self._hear(self._gesture)
+        self._take_up()
         gesture, self._gesture = self._gesture, None
         made = gesture.end()
         if gesture.idles_at is not None and isinstance(made, Stroke) and made.stays:
@@ -311,6 +313,7 @@ class Session:
         """Give up the gesture, as if it had not been."""
         if self._gesture is None:
             return
+        self._take_up()
         self._gesture.close()
         self._gesture, coasting = None, self.coasting
         self._show(self.document.recipe)
@@ -320,15 +323,21 @@ class Session:
     def _hear(self, gesture: OpenGesture) -> None:
         if gesture.made is not None:
             self._live = with_made(self._base, gesture.made, gesture.pen + 1, gesture.taken)
-            if not self._is_timeless:
-                self.replay.use(self._live)
+            self._is_heard = self._is_timeless
         self.changes += 1
+
+    def _take_up(self) -> None:
+        """Let the simulation know what the hand has done: once a step, however many samples of it there are."""
+        if not self._is_heard:
+            self._is_heard = True
+            self.replay.use(self._live)
 
     # -- handles ----------------------------------------------------------------------------------------------------
 
     @property
     def held(self) -> list[Held]:
         """The handles and pins in force at the playhead; looking reads back from the GPU where something has moved."""
+        self._take_up()
         replay = self.replay
         seen = replay, replay.recipe, replay.tick, replay.warp.version
         if self._held[0] != seen:
@@ -530,7 +539,7 @@ class Session:
         ticks = self._gesture.pen if self._gesture is not None else self.tick + 1
         if self._live.ticks < ticks:
             self._live = self._live.edited(duration=ticks * self.dt)
-            self.replay.use(self._live)
+            self._is_heard = False
             if self.made is None:
                 self.document.history.amend(self._live)
                 self._base = self._live
@@ -552,6 +561,7 @@ class Session:
             self.replay.use(with_made(self._base, painted, 0))
 
     def _step(self) -> None:
+        self._take_up()
         self.replay.advance()
         if self.tick % KEEP_EVERY == 0:
             self.replay.checkpoint()

@@ -100,3 +100,18 @@ bool is_held(vec2 place) {
 // What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves.
 vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place)); }
 #endif
+
+// D(x); by the cubic in A where CUBIC is defined.
+vec2 displacement_at(vec2 x) {
+    vec2 density = vec2(textureSize(u_accumulated, 0)) / u_picture;
+#ifdef HELD
+    if (is_held(x * density)) return within(u_limits, x, held_displacement(x * density));
+#endif
+    vec2 moved = displacement_of_submaps(x);
+#ifdef CUBIC
+    moved += cubic_displacement(u_accumulated, (x + moved) * density);
+#else
+    moved += quintic_displacement(u_accumulated, (x + moved) * density);
+#endif
+    return within(u_limits, x, moved);
+}

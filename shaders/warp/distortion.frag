@@ -12,8 +12,8 @@ layout(location = 0) out vec4 out_largest;
 layout(location = 1) out vec4 out_total;
 
 void main() {
-    vec2 moved;
-    float change = determinant_at(fragment_place() * u_picture, moved), far = length(moved);
+    Bend bend = bend_at(fragment_place() * u_picture);
+    float change = bend.determinant, far = length(bend.moved);
     out_largest = vec4(-change, change, far, 0.0);
     out_total = vec4(change <= 0.0 ? 1.0 : 0.0, far, abs(change - 1.0), 0.0);
 }

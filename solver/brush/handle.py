@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -137,13 +139,18 @@ class Handle(Course):
     def wanted(self, start: np.ndarray, time: float, dt: float) -> np.ndarray:
         """Where it shall be at a time, (2,), if it was at `start` when it began; `dt` says how exact the time is."""
 
+        x0, y0 = start.tolist()
+
         def within(place: Sequence[float]) -> np.ndarray:
-            way = np.subtract(place, start)
-            return way * min(1.0, LARGEST_LEAD * self.reach / max(float(np.hypot(*way)), 1e-30))
+            x, y = place[0] - x0, place[1] - y0
+            part = min(1.0, LARGEST_LEAD * self.reach / max(math.hypot(x, y), 1e-30))
+            return np.array((part * x, part * y))
 
         if not self.keys or time < self.ready:
             return start if self.to is None else start + self.passed(time) * within(self.to)
-        here, there, part = _between([(self.ready, *(start if self.to is None else self.to)), *self.keys], time, dt)
+        here, there, part = _between([(self.ready, *((x0, y0) if self.to is None else self.to)), *self.keys], time, dt)
+        if part == 0:
+            return start + within(here)
         return start + (1 - part) * within(here) + part * within(there)
 
     def turn(self, time: float, dt: float) -> tuple[float, float]:
@@ -305,7 +312,7 @@ def _between(
     keys: Sequence[tuple[float, ...]], time: float, dt: float
 ) -> tuple[Sequence[float], Sequence[float], float]:
     """The last of some keys that has come, the next, and the part of the way between them; the time comes first."""
-    number = max(number for number, (since, *_) in enumerate(keys) if since <= time + SAME_TIME * dt)
+    number = bisect_right(keys, time + SAME_TIME * dt, key=itemgetter(0)) - 1
     (since, *here), (until, *there) = keys[number], keys[min(number + 1, len(keys) - 1)]
     if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
         return here, here, 0.0

@@ -44,9 +44,8 @@ SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 8.0, 12.0
 CORE = 0.5  # of the radius of what turns or swells, where it does so evenly
-# Newton's method for a handle's place: longer sides that are left, where it ends, and where it has failed.
-FOUND, LOST = 1e-7, 1e-4
-MOST_ROUNDS = 8
+FOUND = 1e-7  # longer sides, as places are rounded
+LOST = 1e-4  # longer sides that are left where a handle's place is not found
 
 
 class Ring(NamedTuple):
@@ -124,9 +123,10 @@ class Handles:
         self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
+        self._shapes: list[Shape] = []
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
-        self._seen: tuple[int, np.ndarray] | None = None  # where they are in a version of the map
+        self._sought: tuple[object, np.ndarray] | None = None  # where they are, and what that was found from
         self.replace(handles)
 
     def replace(self, handles: Sequence[Handle]) -> None:
@@ -134,8 +134,9 @@ class Handles:
         check_type("what is led", handles, Iterable)
         for handle in handles:
             check_type("a handle", handle, Handle)
+        known = {id(shape.handle): shape for shape in self._shapes}
         self.handles = tuple(handles)
-        self._shapes = [Shape.of(handle, self._warp.extent) for handle in handles]
+        self._shapes = [known.get(id(handle)) or Shape.of(handle, self._warp.extent) for handle in handles]
         before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
         self._rows = _runs(self._counts)
         self._at = np.concatenate([np.zeros((0, 2)), *(shape.led for shape in self._shapes)])
@@ -146,7 +147,6 @@ class Handles:
         ridges = np.repeat([RIDGE_OF_LINES if handle.points else RIDGE for handle in handles], self._counts)
         self._soft = 1 / stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
-        self._seen = None
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -167,7 +167,7 @@ class Handles:
             raise ValueError("to lead a handle takes some time")
         begun = np.array([handle.start <= time + dt / 2 for handle in self.handles], bool)
         in_force = begun & np.array([time + dt / 2 < handle.end for handle in self.handles], bool)
-        self._places, self._seen = self._located(), None
+        self._places = self._located()
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
             self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
@@ -297,7 +297,7 @@ class Handles:
             if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), 2):
                 raise ValueError("the state of handles is missing")
         self._places, self._starts = (self._fitted(state.values[name], counts) for name in ("places", "starts"))
-        self._lead = self._seen = None
+        self._lead = None
 
     def release(self) -> None:
         """Free the textures."""
@@ -308,6 +308,8 @@ class Handles:
 
     def _fitted(self, kept: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """What was kept of handles with so many points, for those of now; one that has others has not begun yet."""
+        if np.array_equal(counts, self._counts):
+            return kept.copy()
         rows = np.full((self._counts.sum(), 2), np.nan)
         parts = np.split(kept, np.cumsum(counts))
         for here, part in zip(self._rows, parts, strict=False):
@@ -317,30 +319,17 @@ class Handles:
 
     def _located(self) -> np.ndarray:
         """Where the handles that have begun are: x with x + D(x) = at, by Newton's method from where they should be."""
-        if self._seen is None or self._seen[0] != self._warp.version:
-            self._seen = self._warp.version, self._sought()
-        return self._seen[1].copy()
+        given = self._warp.version, *(each.tobytes() for each in (self._places, self._starts, self._at, self._radii))
+        if self._sought is None or self._sought[0] != given:
+            self._sought = given, self._seek()
+        return self._sought[1].copy()
 
-    def _sought(self) -> np.ndarray:
+    def _seek(self) -> np.ndarray:
         places, begun = self._places.copy(), np.flatnonzero(~np.isnan(self._starts[:, 0]))
         if not len(begun):
             return places
-        wanted, extent, step = self._at[begun], np.array(self._warp.extent), np.array(self._fluid.grid.spacing) / 4
-        around = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]) * step
-        found = best = places[begun]
-        least = np.full(len(begun), np.inf)
-        for _ in range(MOST_ROUNDS):
-            points = found[:, None] + around
-            moved = self._warp.at(points.reshape(-1, 2)).astype(np.float64).reshape(-1, 5, 2)
-            rest = found + moved[:, 0] - wanted
-            far = np.hypot(*rest.T)
-            best, least = np.where((far < least)[:, None], found, best), np.minimum(far, least)
-            if (least < FOUND).all():
-                break
-            slopes = np.stack([moved[:, 1] - moved[:, 2], moved[:, 3] - moved[:, 4]], axis=-1) / (2 * step)
-            back = (np.linalg.pinv(np.eye(2) + slopes) @ rest[..., None])[..., 0]
-            back *= np.minimum(1.0, FARTHEST_STEP * self._radii[begun] / np.maximum(np.hypot(*back.T), 1e-30))[:, None]
-            found = np.clip(found - back, 0.0, extent)
+        wanted = self._at[begun]
+        best, least = self._warp.seek(wanted, places[begun], FARTHEST_STEP * self._radii[begun])
         if (lost := least > LOST).any():  # the map has been changed by something else than the flow
             best[lost] = wanted[lost] + self._forward.at(wanted[lost])
         places[begun] = best

@@ -42,7 +42,7 @@ class Device(Context):
             raise FieldError(f"{label}: an array of shape {array.shape} was given, (h, w) or (h, w, 1-4) is wanted")
         kind = dtype or ("f1" if array.dtype == np.uint8 else "f4")
         components = 1 if array.ndim == 2 else array.shape[2]
-        field = Field(self, (array.shape[1], array.shape[0]), components, label, kind)
+        field = Field(self, (array.shape[1], array.shape[0]), components, label, kind, cleared=False)
         field.set(array)
         return field
 

@@ -27,6 +27,8 @@ class Field:
         components: 1-4.
         label: its name in errors and in a frame debugger.
         dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1), "u4" (whole numbers) or "f2".
+        cleared: it holds zeros; else nothing that may be read before it has been written or drawn as a whole, which
+            saves a draw.
     """
 
     def __init__(
@@ -36,6 +38,7 @@ class Field:
         components: int,
         label: str,
         dtype: str = "f4",
+        cleared: bool = True,
     ) -> None:
         if not (isinstance(size, Sized) and len(size) == 2 and all(isinstance(side, Integral) for side in size)):
             raise FieldError(f"{label}: a size of {size!r} was given, (width, height) in whole texels is wanted")
@@ -59,7 +62,8 @@ class Field:
         self.texture: moderngl.Texture = texture
         self.framebuffer: moderngl.Framebuffer = framebuffer
         self._is_released = False
-        self.clear()
+        if cleared:
+            self.clear()
 
     def __getattr__(self, name: str) -> NoReturn:
         if name in ("texture", "framebuffer"):

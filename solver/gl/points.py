@@ -26,13 +26,19 @@ def draw_at(
     shader: str,
     defines: dict[str, object] | None = None,
     components: int = 2,
+    more: np.ndarray | None = None,
     **inputs: Any,
 ) -> np.ndarray:
-    """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, components)."""
-    places = device.upload(in_rows(points / domain, _ROW), "points")
-    found = device.field(places.size, components, "found at points")
-    device.pass_(shader, POINTS=1, **(defines or {}))(found, points=places, **inputs)
+    """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, components).
+
+    `more`: what it is told of each besides, as `u_more`, (n, 1-4).
+    """
+    lists = {"points": points / domain} | ({} if more is None else {"more": more})
+    row = min(max(len(points), 1), _ROW)
+    listed = {name: device.upload(in_rows(values, row), f"{name} of a list") for name, values in lists.items()}
+    found = device.field(listed["points"].size, components, "found at points")
+    device.pass_(shader, POINTS=1, **(defines or {}))(found, **listed, **inputs)
     values = found.get().reshape(-1, components)[: len(points)]
-    places.release()
-    found.release()
+    for field in (*listed.values(), found):
+        field.release()
     return values

@@ -402,6 +402,20 @@ class WarpMap:
         shader, defines = "warp/compose.frag", self._defines()
         return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())
 
+    def seek(self, points: np.ndarray, guesses: np.ndarray, farthest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where points (n, 2) of the original are, by Newton's method from guesses (n, 2), in longer sides.
+
+        Args:
+            farthest: that one of its rounds may go, (n,).
+
+        Returns:
+            The best places that were found, float64 (n, 2); and how far they are looked up from the points, (n,).
+        """
+        more = np.column_stack([guesses - points, farthest])
+        shader, defines = "warp/seek.frag", self._defines()
+        found = draw_at(self.device, guesses, self.extent, shader, defines, components=4, more=more, **self._parts())
+        return guesses + found[:, :2].astype(np.float64), found[:, 2].astype(np.float64)
+
     def determinants(self, points: np.ndarray) -> np.ndarray:
         """det J at points (n, 2) of the result, in longer sides, by the chain rule: float32 (n,)."""
         shader, defines = "warp/distortion.frag", self._held_defines()

@@ -7,7 +7,7 @@ import numpy as np
 from solver.gl.field import FieldPool
 from solver.warp.map import WarpMap
 
-PLACES = 256  # along the longer side of the picture where it is looked at, or as many as there are cells
+PLACES = 256  # along the longer side of the picture where it is looked at: two a cell up to so many, or one a cell
 RINGS = (1 / 64, 1 / 32, 1 / 16)  # radii of rings of `AROUND` places around a middle, likewise: what two handles that
 AROUND = 16  # nearly meet lead apart is less than that far across
 
@@ -37,7 +37,8 @@ class Strain:
 
     def _on_lattice(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
         warp, extent = self._warp, np.array(self._warp.extent)
-        count = np.maximum(warp.grid.size, PLACES * extent / extent.max()).astype(int)
+        cells = np.array(warp.coarse_size)
+        count = np.maximum(cells, np.minimum(2 * cells, PLACES * extent / extent.max())).astype(int)
         low = np.clip(np.floor((places - radii[:, None]) / extent * count), 0, count - 1)
         high = np.clip(np.ceil((places + radii[:, None]) / extent * count), low + 1, count)
         first, end = (np.maximum(low.min(axis=0) - 1, 0).astype(int), high.max(axis=0).astype(int))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Device, Grid, WarpMap
-from solver.warp.strain import PLACES, Strain
+from solver.warp.strain import Strain
 
 
 def turning(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -25,7 +25,7 @@ def test_what_is_around_places_is_the_worst_within_their_boxes(steps: int, devic
     found = strain.around(places, radii)
     strain.release()
 
-    texel, count = extent / warp.size, np.array([PLACES, PLACES * 0.75]).astype(int)
+    texel, count = extent / warp.size, 2 * np.array(grid.size)
     x, y = (
         np.minimum((np.arange(n) + 0.5) / n * side, side - t) for n, side, t in zip(count, extent, texel, strict=True)
     )
@@ -65,3 +65,22 @@ def test_a_fold_between_two_texels_is_told(device: Device):
     strain.release()
     assert crossed < 0
     assert plain == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.parametrize("is_held", [False, True])
+def test_points_are_sought_from_where_they_should_be(is_held: bool, device: Device):
+    """As exactly as places are rounded, through all levels of the map, and no farther in a round than is allowed."""
+    warp, extent = WarpMap(device, Grid(64, 48), (256, 192)), np.array([1.0, 0.75])
+    for _ in range(12):
+        warp.advance_prescribed(turning, 1 / 20)
+    if is_held:
+        warp.hold(device.upload(np.tri(48, 64, dtype=np.float32)))
+    places = np.array([[0.4, 0.4], [0.45, 0.5], [0.99, 0.7], [0.62, 0.31]])
+    points = places + warp.at(places)
+    found, left = warp.seek(points, np.clip(places + 0.01, 0.0, extent), np.full(4, 0.02))
+    assert left.max() < 3e-7
+    assert np.abs(found + warp.at(found) - points).max() < 3e-7
+    found, left = warp.seek(points, places + [[-0.3, 0.0]] * 4, np.full(4, 1e-3))
+    assert np.hypot(*(found - places + [0.3, 0.0]).T).max() < 8e-3
+    assert left.min() > 0.1
+    warp.release()

@@ -210,6 +210,22 @@ def test_a_handle_takes_hold_of_what_has_been_moved_to_elsewhere(device: Device)
     replay.release()
 
 
+def test_handles_are_sought_once_a_step_however_often_they_are_looked_at(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+):
+    sought, seek = [], WarpMap.seek
+    monkeypatch.setattr(WarpMap, "seek", lambda *given: (sought.append(1), seek(*given))[1])
+    replay = replay_of(device, handle=[led_to([0.3, 0.4], [0.4, 0.5])])
+    for step in range(4):  # as a hand leads it on
+        handle = replay.recipe.handle[0].edited(keys=((0.5, 0.4, 0.5 + 0.01 * step),))
+        replay.use(replay.recipe.edited(handle=(handle,)))
+        replay.advance()
+        assert np.isfinite(replay.handles.places).all()
+        assert np.isfinite(replay.handles.away).all()
+    replay.release()
+    assert len(sought) == 4
+
+
 def test_no_fold_waits_for_a_remap_of_what_has_long_halted(device: Device):
     # All ten halt at a third of a second, det J .68 at the least; taken into texels half a second later it was -.7.
     points = np.random.default_rng(4).uniform(0.1, 0.9, (2, 10, 2)).tolist()

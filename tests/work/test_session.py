@@ -19,6 +19,7 @@ from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
+from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
@@ -311,6 +312,21 @@ def strike(session: Session, number: int, tool: str = "push") -> None:
     session.advance(1)
     session.move(0.7, 0.2 + 0.2 * number)
     session.release()
+
+
+def test_however_often_the_pointer_is_heard_a_step_takes_it_up_once(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken_up, use = [], Replay.use
+    monkeypatch.setattr(Replay, "use", lambda *given: (taken_up.append(given[1]), use(*given)))
+    session.press(TOOL["push"], Press(BrushSettings(0.12, 0.2), False, session.extent, session.dt), 0.4, 0.5)
+    for sample in range(1, 30):
+        session.move(0.4 + 0.002 * sample, 0.5)
+    session.advance(1)
+    assert len(taken_up) == 1
+    assert session.replay.recipe is session.recipe
+    session.cancel()
+    assert session.replay.recipe == session.document.recipe
 
 
 def path_of(stroke: Stroke) -> list[tuple[int, float, float]]:
