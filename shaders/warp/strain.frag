@@ -21,7 +21,8 @@ void main() {
     vec2 x = min(fragment_place() * u_picture, u_picture - texel), moved;
     float determinant = determinant_at(x, moved);
     moved = within(u_limits, x, moved);
-    vec2 right = vec2(1.0, 0.0) + (displacement(x + vec2(texel.x, 0.0), density) - moved) / texel.x;
-    vec2 below = vec2(0.0, 1.0) + (displacement(x + vec2(0.0, texel.y), density) - moved) / texel.y;
-    out_strain = vec4(moved, determinant, right.x * below.y - right.y * below.x);
+    vec2 right = displacement(x + vec2(texel.x, 0.0), density), below = displacement(x + vec2(0.0, texel.y), density);
+    vec2 across = displacement(x + texel, density);
+    vec2 d1 = texel + across - moved, d2 = vec2(-texel.x, texel.y) + below - right;
+    out_strain = vec4(moved, determinant, 0.5 * (d1.x * d2.y - d1.y * d2.x) / (texel.x * texel.y));
 }

@@ -373,11 +373,10 @@ class Handles:
             return np.zeros(0)
         least, most, triangle = self._strain.around(self._places[numbers], self._radii[numbers]).T
         grown, local = self._grown(), self._locality(numbers)
-        least, triangle = least * grown, triangle * grown
+        least = np.minimum(least, triangle) * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
-        bears = _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
-        return bears * _smoothstep((triangle - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
+        return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
 
     def _locality(self, numbers: np.ndarray) -> np.ndarray:
         """The local part of each of these points, or of what has begun beside it: it changes det J there too."""
