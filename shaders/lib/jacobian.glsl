@@ -10,7 +10,7 @@ float stretch_of(int level, sampler2D submap, vec4 window, vec2 x, inout vec2 mo
     vec2 fading;
     float w = weight(level, submap, window, place, fading);
     fading *= vec2(textureSize(u_accumulated, 0)) / u_picture;
-    vec2 more = cubic_displacement(submap, at.xy * size, slope);
+    vec2 more = cubic_displacement(submap, at.xy * size, 1.0, slope);
     moved = within_picture(x, moved + w * more * at.z);
     return determinant(mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading)));
 }
@@ -23,7 +23,7 @@ float determinant_at(vec2 x, out vec2 moved) {
 #ifdef HELD
     // Not on a texel that is held by itself: its slopes would be those to others, which are not kept.
     if (texture(u_held, x / u_picture).r > 0.9) {
-        moved = cubic_displacement(u_kept, on_texel(x * density), slope);
+        moved = cubic_displacement(u_kept, on_texel(x * density), 0.0, slope);
         return determinant(mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y));
     }
 #endif
@@ -34,6 +34,6 @@ float determinant_at(vec2 x, out vec2 moved) {
 #if LEVELS > 2
     change *= stretch_of(4, u_third, u_third_window, x, moved);
 #endif
-    moved += cubic_displacement(u_accumulated, (x + moved) * density, slope);
+    moved += cubic_displacement(u_accumulated, (x + moved) * density, u_walled, slope);
     return change * determinant(mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y));
 }

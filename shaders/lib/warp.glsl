@@ -14,6 +14,7 @@ uniform sampler2D u_accumulated;
 uniform vec4 u_window;
 uniform vec2 u_picture;
 uniform vec4 u_limits;
+uniform float u_walled;
 #ifndef LEVELS
 #define LEVELS 1
 #endif
@@ -69,7 +70,7 @@ float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
 vec2 displacement_of(int level, sampler2D submap, vec4 window, vec2 x) {
     vec2 slope;
     vec3 at = in_window(window, x);
-    return cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0))) * at.z * weight(level, submap, window, x, slope);
+    return cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0)), 1.0) * at.z * weight(level, submap, window, x, slope);
 }
 
 // Where the submaps lead from x.
@@ -98,5 +99,5 @@ bool is_held(vec2 place) {
 }
 
 // What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves.
-vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place)); }
+vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), 0.0); }
 #endif

@@ -39,6 +39,6 @@ void main() {
     vec2 back = texture(u_trace, v_uv).rg;
 #endif
     back *= carried(p, size);
-    vec2 displacement = back + cubic_displacement(u_displacement, p + back) / u_spacing;
+    vec2 displacement = back + cubic_displacement(u_displacement, p + back, 1.0) / u_spacing;
     out_displacement = u_spacing * clamp(displacement, -p, size - p);
 }

@@ -13,7 +13,7 @@ vec2 displacement(vec2 x, vec2 density) {
     if (is_held(x * density)) return within(u_limits, x, held_displacement(x * density));
 #endif
     vec2 moved = displacement_of_submaps(x);
-    return within(u_limits, x, moved + cubic_displacement(u_accumulated, (x + moved) * density));
+    return within(u_limits, x, moved + cubic_displacement(u_accumulated, (x + moved) * density, u_walled));
 }
 
 void main() {

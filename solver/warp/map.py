@@ -298,6 +298,7 @@ class WarpMap:
         """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._accumulated.limits}
+        values["walled"] = self._accumulated.is_walled
         values |= {"grid": values_of(self.grid), "settled": self._is_settled}
         fields |= self.factors.save()
         for name, level in self._remapping.saved():
@@ -320,7 +321,8 @@ class WarpMap:
         if grid.picture != self.extent or tiles is None or tiles.kind != self._accumulated.now.kind:
             raise ValueError("the state is of another picture")
         left, top, right, bottom = state.values["limits"].tolist()
-        self._accumulated.restore(tiles, (left, top, right, bottom))
+        is_walled = bool(state.values.get("walled", True))
+        self._accumulated.restore(tiles, (left, top, right, bottom), is_walled)
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)
