@@ -203,13 +203,16 @@ class Handles:
         shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
-        soft = np.repeat(self._soft[listed][pushed], 2)
+        held = np.array(led)[numbers]
+        give = np.where(held, 1 / np.maximum(slower, 1e-6) - 1, 0.0)
+        softs = self._soft[listed] + give
+        soft = np.repeat(softs[pushed], 2)
         if share.any():  # what is local is shared out first: the fluid would else do all of it, going on by itself
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], share[:, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * _solved(both, wanted[pushed].ravel(), soft).reshape(-1, 2)
             wanted = wanted - np.einsum("iajb,jb->ia", local, carried)
-        soft = np.concatenate([soft, self._soft[listed][[ring.centre for ring in rings]]])
+        soft = np.concatenate([soft, softs[[ring.centre for ring in rings]]])
         shares = np.concatenate([shares, np.ones(len(rings))])
         ways = _with_rings(places, pushed, push, rings), shares, soft, wanted, carried
         self._places[listed] += wanted * dt  # where to look for them
