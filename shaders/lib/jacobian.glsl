@@ -10,7 +10,7 @@ float stretch_of(int level, sampler2D submap, vec4 window, vec2 x, inout vec2 mo
     vec2 fading;
     float w = weight(level, submap, window, place, fading);
     fading *= vec2(textureSize(u_accumulated, 0)) / u_picture;
-    vec2 more = cubic_displacement(submap, at.xy * size, 1.0, slope);
+    vec2 more = cubic_displacement(submap, at.xy * size, u_walled, slope);
     moved = within_picture(x, moved + w * more * at.z);
     return determinant(mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading)));
 }

@@ -106,7 +106,7 @@ class WarpMap:
         if fluid.grid != self.grid:
             raise ValueError(f"a map on {self.grid} cannot follow a fluid on {fluid.grid}; `move_to` takes it there")
         if tracing := fluid.begin_trace(check_step(dt)):
-            self._submap.advance_tracing(tracing.target, tracing.defines, tracing.inputs)
+            self._submap.advance_tracing(tracing.target, self._accumulated.is_walled, tracing.defines, tracing.inputs)
             self._advanced()
         else:
             self.advance_traced(fluid.trace(dt))
@@ -123,7 +123,7 @@ class WarpMap:
     def advance_traced(self, trace: Field) -> None:
         """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
         check_field("a trace", trace, self.grid)
-        self._submap.advance(trace)
+        self._submap.advance(trace, self._accumulated.is_walled)
         self._advanced()
 
     def _advanced(self) -> None:
@@ -151,6 +151,7 @@ class WarpMap:
         """
         dt = check_step(dt)
         if callable(velocity):
+            self._accumulated.is_walled = False  # it may cross the edges
             self._submap.trace.set(traced(velocity, self.grid, dt, time))
             self.advance_traced(self._submap.trace)
         else:
