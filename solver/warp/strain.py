@@ -20,7 +20,7 @@ class Strain:
         self._fields = FieldPool(warp.device, "strain")
 
     def around(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
-        """The least det J, the largest stretch and the least area between texels of the map within a radius of each place (n, 2).
+        """The least det J, largest stretch and least area between texels within a radius of each place (n, 2).
 
         The stretch is how many times farther apart in the original two neighbours of the lattice lie; the area,
         what becomes of that between four neighbouring texels, as a remap keeps what is at its texels only.

@@ -38,9 +38,7 @@ class Submap(DoubleField):
         """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
         self._advance(self.write, {}, {"trace": trace, "walled": float(is_walled)})
 
-    def advance_tracing(
-        self, trace: Field, is_walled: bool, defines: dict[str, Any], inputs: dict[str, Any]
-    ) -> None:
+    def advance_tracing(self, trace: Field, is_walled: bool, defines: dict[str, Any], inputs: dict[str, Any]) -> None:
         """Carry it one step and draw `trace`, the fluid's own, beside it: the defines and inputs of `trace.frag`."""
         self._advance((self.write, trace), {"TRACE": 1, **defines}, {"walled": float(is_walled), **inputs})
 

@@ -123,6 +123,24 @@ def test_fluid_velocity_on_faces(device: Device) -> None:
     assert errors[0] / errors[1] > 3.0
 
 
+def test_what_no_flow_crosses_the_map_does_not_leave(device: Device) -> None:
+    """Along the edges it goes on to them, in all levels; else what is cut off there folds the last texels."""
+    grid = Grid(16, 16)
+    warp, along = WarpMap(device, grid, (128, 128)), np.linspace(0.01, 0.99, 33)
+    faces = np.sin(np.pi * (np.arange(17) / 16))
+    stream = 0.3 * faces[:, None] * faces  # gliding along the edges as fast as it flows anywhere
+    flow = 16 * np.stack([np.diff(stream, axis=0)[:, :-1], -np.diff(stream, axis=1)[:-1]], axis=-1)
+    for _ in range(24):
+        warp.advance_prescribed(flow, 0.05)
+        for axis, side in ((0, 0.0), (0, 1.0), (1, 0.0), (1, 1.0)):
+            edge = np.stack([along, along], axis=-1)
+            edge[:, axis] = side
+            assert np.abs(warp.at(edge)[:, axis]).max() < 1e-6
+    given = np.full((128, 128, 2), 0.05)  # such a map of one's own stays what it is
+    warp.set(given)
+    assert warp.at(np.array([[0.0, 0.3]])) == pytest.approx(0.05, abs=1e-6)
+
+
 def test_rest_is_the_identity_exactly(device: Device) -> None:
     warp = WarpMap(device, Grid(20, 12))
     still = device.field((20, 12), 2)
