@@ -1,18 +1,35 @@
 // Reading a displacement between its texels, at position p (in texels, (0,0) the top left corner), by Lagrange
 // polynomials. At the edges the outermost texels are taken, so that the map goes on beyond them as the same polynomial.
+// `walled` is 1 where nothing crosses the texture's edges, else 0: see to_edges.
 // texture() with nearest filtering: exact at texel centres, and cheaper than texelFetch in software.
 #include "lib/cubic.glsl"
 #include "lib/quintic.glsl"
 
+// A spline times a weight that is zero on an edge is zero there too (Kantorovich and Krylov), as what crosses it is: the
+// values, that weight's inverse at their places, times the weight at p. It is the distance to the edge, where that is one of
+// four texels; a polynomial alone goes on to some value beyond, is cut off there, and from remap to remap folds the last texels.
+vec4 to_edges(float p, float cell, float count, float walled) {
+    vec4 at = cell + vec4(-0.5, 0.5, 1.5, 2.5), near = mix(vec4(1.0), p / at, walled * float(cell <= 1.0));
+    return near * mix(vec4(1.0), (count - p) / (count - at), walled * float(cell >= count - 3.0));
+}
+
+// How much that changes with p.
+vec4 to_edges_slope(float p, float cell, float count, float walled) {
+    vec4 at = cell + vec4(-0.5, 0.5, 1.5, 2.5), far = count - at;
+    float first = walled * float(cell <= 1.0), last = walled * float(cell >= count - 3.0);
+    return first / at * mix(vec4(1.0), (count - p) / far, last) - last / far * mix(vec4(1.0), p / at, first);
+}
+
 // Four-point cubic along x blended with one along y (the Boolean sum CL + LC - LL of the cubic C and the linear L), which
 // needs no corners: fourth order like the product of both, and on a map as exact. 12 reads.
-vec2 cubic_displacement(sampler2D displacement, vec2 p) {
+vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
     vec4 cx = cubic_lagrange(f.x), cy = cubic_lagrange(f.y);
+    vec4 ex = to_edges(p.x, cell.x, size.x, walled), ey = to_edges(p.y, cell.y, size.y, walled);
     vec2 lx = vec2(1.0 - f.x, f.x), ly = vec2(1.0 - f.y, f.y), bend = cx.yz - lx;
     vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
-#define AT(i, j) texture(displacement, vec2(x[i], y[j])).rg
+#define AT(i, j) texture(displacement, vec2(x[i], y[j])).rg * vec2(ex[i], ey[j])
     return (cy.y * lx.x + ly.x * bend.x) * AT(1, 1) + (cy.y * lx.y + ly.x * bend.y) * AT(2, 1)
          + (cy.z * lx.x + ly.y * bend.x) * AT(1, 2) + (cy.z * lx.y + ly.y * bend.y) * AT(2, 2)
          + ly.x * (cx.x * AT(0, 1) + cx.w * AT(3, 1)) + ly.y * (cx.x * AT(0, 2) + cx.w * AT(3, 2))
@@ -22,34 +39,49 @@ vec2 cubic_displacement(sampler2D displacement, vec2 p) {
 
 // The same with its own derivatives along x (first column) and y, to a texel: far from the middle of the four points, as in
 // a picture's corner, those of another cubic would not tell of its folds. 16 reads.
-vec2 cubic_displacement(sampler2D displacement, vec2 p, out mat2 slope) {
+vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled, out mat2 slope) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
     vec4 lx = vec4(0.0, 1.0 - f.x, f.x, 0.0), ly = vec4(0.0, 1.0 - f.y, f.y, 0.0), along = vec4(0.0, -1.0, 1.0, 0.0);
     vec4 cx = cubic_lagrange(f.x), sx = cubic_slope(f.x), by = cubic_lagrange(f.y) - ly, sy = cubic_slope(f.y) - along;
+    vec4 ex = to_edges(p.x, cell.x, size.x, walled), ey = to_edges(p.y, cell.y, size.y, walled);
+    vec4 dx = to_edges_slope(p.x, cell.x, size.x, walled), dy = to_edges_slope(p.y, cell.y, size.y, walled);
     vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
     vec2 sum = vec2(0.0);
     slope = mat2(0.0);
     for (int j = 0; j < 4; ++j)
         for (int i = 0; i < 4; ++i) {
-            vec2 value = texture(displacement, vec2(x[i], y[j])).rg;
-            sum += (cx[i] * ly[j] + lx[i] * by[j]) * value;
-            slope[0] += (sx[i] * ly[j] + along[i] * by[j]) * value;
-            slope[1] += (cx[i] * along[j] + lx[i] * sy[j]) * value;
+            vec2 read = texture(displacement, vec2(x[i], y[j])).rg, value = read * vec2(ex[i], ey[j]);
+            float weight = cx[i] * ly[j] + lx[i] * by[j];
+            sum += weight * value;
+            slope[0] += (sx[i] * ly[j] + along[i] * by[j]) * value + vec2(weight * dx[i] * read.x, 0.0);
+            slope[1] += (cx[i] * along[j] + lx[i] * sy[j]) * value + vec2(0.0, weight * dy[j] * read.y);
         }
     return sum;
 }
 
+// As the four, of six.
+void to_edges(float p, float cell, float count, float walled, out float weights[6]) {
+    float first = walled * float(cell <= 2.0), last = walled * float(cell >= count - 4.0);
+    for (int k = 0; k < 6; ++k) {
+        float at = cell - 1.5 + float(k);
+        weights[k] = mix(1.0, p / at, first) * mix(1.0, (count - p) / (count - at), last);
+    }
+}
+
 // Six-point quintic both ways: on an accumulated map of twice the grid as good as the cubic on one of four times. 36 reads.
-vec2 quintic_displacement(sampler2D displacement, vec2 p) {
+vec2 quintic_displacement(sampler2D displacement, vec2 p, float walled) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(2.0), size - 4.0), f = p - 0.5 - cell;
     float wx[6], wy[6];
     quintic_lagrange(f.x, wx);
     quintic_lagrange(f.y, wy);
+    float ex[6], ey[6];
+    to_edges(p.x, cell.x, size.x, walled, ex);
+    to_edges(p.y, cell.y, size.y, walled, ey);
     vec2 sum = vec2(0.0), corner = (cell - 1.5) * texel;
     for (int j = 0; j < 6; ++j)
         for (int i = 0; i < 6; ++i)
-            sum += wx[i] * wy[j] * texture(displacement, corner + vec2(i, j) * texel).rg;
+            sum += wx[i] * wy[j] * texture(displacement, corner + vec2(i, j) * texel).rg * vec2(ex[i], ey[j]);
     return sum;
 }

@@ -17,7 +17,7 @@ mat2 bend_of(int level, sampler2D submap, vec4 window, vec2 x, inout vec2 moved)
     vec2 fading;
     float w = weight(level, submap, window, place, fading);
     fading *= vec2(textureSize(u_accumulated, 0)) / u_picture;
-    vec2 more = cubic_displacement(submap, at.xy * size, slope);
+    vec2 more = cubic_displacement(submap, at.xy * size, u_walled, slope);
     moved = within_picture(x, moved + w * more * at.z);
     return mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading));
 }
@@ -29,7 +29,7 @@ Bend bend_at(vec2 x) {
 #ifdef HELD
     // Not on a texel that is held by itself: its slopes would be those to others, which are not kept.
     if (texture(u_held, x / u_picture).r > 0.9) {
-        bend.moved = cubic_displacement(u_kept, on_texel(x * density), slope);
+        bend.moved = cubic_displacement(u_kept, on_texel(x * density), 0.0, slope);
         bend.jacobian = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
         bend.determinant = determinant(bend.jacobian);
         return bend;
@@ -48,7 +48,7 @@ Bend bend_at(vec2 x) {
     bend.determinant *= determinant(next);
     bend.jacobian = next * bend.jacobian;
 #endif
-    bend.moved += cubic_displacement(u_accumulated, (x + bend.moved) * density, slope);
+    bend.moved += cubic_displacement(u_accumulated, (x + bend.moved) * density, u_walled, slope);
     next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
     bend.determinant *= determinant(next);
     bend.jacobian = next * bend.jacobian;

@@ -5,7 +5,7 @@
 //   would grow without end.
 // u_submap, u_second, u_third, u_accumulated: displacements, longer sides; u_window, u_second_window, u_third_window: left,
 // top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
-// bottom, longer sides.
+// bottom, longer sides; u_walled: 1 if neither what has moved nor A crosses the picture's edges, else 0.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
 // that are carried less and less before that, 1, 2 and 4 or their sum, and FADED: see weight.
 #include "lib/displacement.glsl"
@@ -14,6 +14,7 @@ uniform sampler2D u_accumulated;
 uniform vec4 u_window;
 uniform vec2 u_picture;
 uniform vec4 u_limits;
+uniform float u_walled;
 #ifndef LEVELS
 #define LEVELS 1
 #endif
@@ -69,7 +70,7 @@ float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
 vec2 displacement_of(int level, sampler2D submap, vec4 window, vec2 x) {
     vec2 slope;
     vec3 at = in_window(window, x);
-    return cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0))) * at.z * weight(level, submap, window, x, slope);
+    return cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0)), u_walled) * at.z * weight(level, submap, window, x, slope);
 }
 
 // Where the submaps lead from x.
@@ -98,7 +99,7 @@ bool is_held(vec2 place) {
 }
 
 // What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves.
-vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place)); }
+vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), 0.0); }
 #endif
 
 // D(x); by the cubic in A where CUBIC is defined.
@@ -109,9 +110,9 @@ vec2 displacement_at(vec2 x) {
 #endif
     vec2 moved = displacement_of_submaps(x);
 #ifdef CUBIC
-    moved += cubic_displacement(u_accumulated, (x + moved) * density);
+    moved += cubic_displacement(u_accumulated, (x + moved) * density, u_walled);
 #else
-    moved += quintic_displacement(u_accumulated, (x + moved) * density);
+    moved += quintic_displacement(u_accumulated, (x + moved) * density, u_walled);
 #endif
     return within(u_limits, x, moved);
 }

@@ -50,9 +50,9 @@ void main() {
 #endif
     place += moved / texel;
 #ifdef CUBIC
-    moved += cubic_displacement(u_accumulated, place);
+    moved += cubic_displacement(u_accumulated, place, u_walled);
 #else
-    moved += quintic_displacement(u_accumulated, place);
+    moved += quintic_displacement(u_accumulated, place, u_walled);
 #endif
     out_displacement = from + within(u_limits, x, moved);
 }

@@ -22,5 +22,5 @@ void main() {
     moved = within_picture(x, texture(u_moved, v_uv).rg);
 #endif
     vec2 place = (x + moved) / u_picture * vec2(textureSize(u_factor, 0));
-    out_displacement = within_picture(x, moved + u_amount * cubic_displacement(u_factor, place));
+    out_displacement = within_picture(x, moved + u_amount * cubic_displacement(u_factor, place, 0.0));
 }

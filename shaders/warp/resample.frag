@@ -7,5 +7,5 @@ uniform sampler2D u_displacement;
 layout(location = 0) out vec2 out_displacement;
 
 void main() {
-    out_displacement = quintic_displacement(u_displacement, fragment_place() * vec2(textureSize(u_displacement, 0)));
+    out_displacement = quintic_displacement(u_displacement, fragment_place() * vec2(textureSize(u_displacement, 0)), 0.0);
 }

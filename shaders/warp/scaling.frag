@@ -10,7 +10,7 @@ layout(location = 0) out float out_scaling;
 void main() {
     mat2 slope;
     vec2 density = vec2(textureSize(u_factor, 0)) / u_picture;
-    cubic_displacement(u_factor, gl_FragCoord.xy, slope);
+    cubic_displacement(u_factor, gl_FragCoord.xy, 0.0, slope);
     float trace = slope[0].x * density.x + slope[1].y * density.y;
     float square = determinant(slope) * density.x * density.y;
     float whole = 1.0 + trace + square, least = min(whole, 1.0);

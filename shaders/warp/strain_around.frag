@@ -1,6 +1,6 @@
 // Strain around: of what strain.frag has drawn on a lattice, in a row (x) of the box about each (y) of some places: the least
 // det J; the square of the largest stretch, how many times farther apart in the original a place and the one to its left, or
-// the one above it, lie; and the least triangle.
+// the one above it, lie; and the least area between texels.
 // u_strain; u_boxes: left, top, right, bottom, places of the lattice; u_step: how far apart these are, longer sides; u_last:
 // where none lies beyond, as in strain.frag.
 // reads: 2, and 2 for each place of a row

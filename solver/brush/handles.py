@@ -19,7 +19,7 @@ from solver.brush.pushes import Pushes
 from solver.brush.tip import SMALLEST, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
-from solver.limits import check_step, check_type
+from solver.limits import LEAST_STIFFNESS, check_step, check_type
 from solver.scheme import Scheme
 from solver.state import State
 from solver.warp.inverse import ForwardMap
@@ -37,9 +37,9 @@ RIDGE, RIDGE_OF_LINES = 1e-3, 1e-4
 # Where handles lie beside one another each has a push so many times as wide, too, which counts so much in the squares:
 # what they have in common is cheaper by it, and would else flow back between them.
 WIDE, WIDE_SHARE = 3.0, 0.2
-# Of the map around a handle (`Strain`): det J, which a flow keeps at 1 as long as the map resolves it, and what is
-# local does not; triangles, as the local one; and the stretch. From the first of each on it goes slower, at the second
-# it stops: before anything folds.
+# Of the map around a handle (`Strain`): det J and areas between texels, which a flow keeps at 1 as long as the map
+# resolves it, and what is local does not; and the stretch. From the first of each on it goes slower, at the second it
+# stops: before anything folds.
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 8.0, 12.0
@@ -140,12 +140,12 @@ class Handles:
         before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
         self._rows = _runs(self._counts)
         self._at = np.concatenate([np.zeros((0, 2)), *(shape.led for shape in self._shapes)])
-        self._radii, self._local, stiffness = (
+        self._radii, self._local, self._stiffness = (
             np.repeat([getattr(handle, name) for handle in handles], self._counts)
             for name in ("push_radius", "local", "stiffness")
         )
         ridges = np.repeat([RIDGE_OF_LINES if handle.points else RIDGE for handle in handles], self._counts)
-        self._soft = 1 / stiffness - 1 + ridges
+        self._soft = 1 / self._stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
 
     # -- a step -----------------------------------------------------------------------------------------------------
@@ -206,13 +206,16 @@ class Handles:
         shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
-        soft = np.repeat(self._soft[listed][pushed], 2)
+        # What halts lets go: at rest among others that flow by it would strain the map around it as if it were led.
+        firm = np.where(np.array(led)[numbers], np.maximum(slower, LEAST_STIFFNESS), 1.0)
+        softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
+        soft = np.repeat(softs[pushed], 2)
         if share.any():  # what is local is shared out first: the fluid would else do all of it, going on by itself
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], share[:, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * _solved(both, wanted[pushed].ravel(), soft).reshape(-1, 2)
             wanted = wanted - np.einsum("iajb,jb->ia", local, carried)
-        soft = np.concatenate([soft, self._soft[listed][[ring.centre for ring in rings]]])
+        soft = np.concatenate([soft, softs[[ring.centre for ring in rings]]])
         shares = np.concatenate([shares, np.ones(len(rings))])
         ways = _with_rings(places, pushed, push, rings), shares, soft, wanted, carried
         self._places[listed] += wanted * dt  # where to look for them
@@ -363,13 +366,12 @@ class Handles:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
         if not len(numbers):
             return np.zeros(0)
-        least, most, triangle = self._strain.around(self._places[numbers], self._radii[numbers]).T
+        least, most, area_left = self._strain.around(self._places[numbers], self._radii[numbers]).T
         grown, local = self._grown(), self._locality(numbers)
-        least, triangle = least * grown, triangle * grown
+        least = np.minimum(least, area_left) * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
-        bears = _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
-        return bears * _smoothstep((triangle - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
+        return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
 
     def _locality(self, numbers: np.ndarray) -> np.ndarray:
         """The local part of each of these points, or of what has begun beside it: it changes det J there too."""

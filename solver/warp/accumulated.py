@@ -66,6 +66,7 @@ class AccumulatedMap:
         self._copied: list[Region] = []  # tiles to be copied
         self._done = 0  # of both
         self.limits = self._picture = (0.0, 0.0, *extent)
+        self.is_walled = True
 
     def is_fine(self, grid: Grid) -> bool:
         """True if it has `LEAST_TEXELS` texels along a cell of a grid."""
@@ -101,7 +102,7 @@ class AccumulatedMap:
 
     def inputs(self) -> dict[str, Any]:
         """It as `lib/warp.glsl` has it."""
-        return {"accumulated": self.now, "picture": self.extent, "limits": self.limits}
+        return {"accumulated": self.now, "picture": self.extent, "limits": self.limits, "walled": float(self.is_walled)}
 
     def draw(self, part: float, draw: Callable[[Field, list[Region]], None]) -> None:
         """Come to a `part` of what is planned, 0-1: `draw` draws regions anew, out of `now`, into another field."""
@@ -132,13 +133,13 @@ class AccumulatedMap:
         self.forget()
         draw(self.now)
         self._stale = set(self._tiles)
-        self.limits = limits
+        self.limits, self.is_walled = limits, False
 
-    def restore(self, saved: SavedTiles, limits: Limits) -> None:
+    def restore(self, saved: SavedTiles, limits: Limits, is_walled: bool) -> None:
         """Go back to what `now.save()` gave and the limits of then; what was planned is forgotten."""
         self.forget()
         self._stale.update(self.now.restore(saved))
-        self.limits = limits
+        self.limits, self.is_walled = limits, is_walled
 
     def clear(self) -> None:
         """The identity; what was planned is forgotten."""
@@ -146,7 +147,7 @@ class AccumulatedMap:
         for field in (self.now, self._next):
             field.clear()
         self._stale.clear()
-        self.limits = self._picture
+        self.limits, self.is_walled = self._picture, True
 
     def release(self) -> None:
         """Free the textures."""

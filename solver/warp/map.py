@@ -109,7 +109,7 @@ class WarpMap:
         if fluid.grid != self.grid:
             raise ValueError(f"a map on {self.grid} cannot follow a fluid on {fluid.grid}; `move_to` takes it there")
         if tracing := fluid.begin_trace(check_step(dt)):
-            self._submap.advance_tracing(tracing.target, tracing.defines, tracing.inputs)
+            self._submap.advance_tracing(tracing.target, self._accumulated.is_walled, tracing.defines, tracing.inputs)
             self._advanced()
         else:
             self.advance_traced(fluid.trace(dt))
@@ -126,7 +126,7 @@ class WarpMap:
     def advance_traced(self, trace: Field) -> None:
         """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
         check_field("a trace", trace, self.grid)
-        self._submap.advance(trace)
+        self._submap.advance(trace, self._accumulated.is_walled)
         self._advanced()
 
     def _advanced(self) -> None:
@@ -154,6 +154,7 @@ class WarpMap:
         """
         dt = check_step(dt)
         if callable(velocity):
+            self._accumulated.is_walled = False  # it may cross the edges
             self._submap.trace.set(traced(velocity, self.grid, dt, time))
             self.advance_traced(self._submap.trace)
         else:
@@ -301,6 +302,7 @@ class WarpMap:
         """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._accumulated.limits}
+        values["walled"] = self._accumulated.is_walled
         values |= {"grid": values_of(self.grid), "settled": self._is_settled}
         fields |= self.factors.save()
         for name, level in self._remapping.saved():
@@ -323,7 +325,8 @@ class WarpMap:
         if grid.picture != self.extent or tiles is None or tiles.kind != self._accumulated.now.kind:
             raise ValueError("the state is of another picture")
         left, top, right, bottom = state.values["limits"].tolist()
-        self._accumulated.restore(tiles, (left, top, right, bottom))
+        is_walled = bool(state.values.get("walled", True))
+        self._accumulated.restore(tiles, (left, top, right, bottom), is_walled)
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)

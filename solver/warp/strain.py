@@ -20,10 +20,10 @@ class Strain:
         self._fields = FieldPool(warp.device, "strain")
 
     def around(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
-        """The least det J, the largest stretch and the least triangle of the map within a radius of each place (n, 2).
+        """The least det J, largest stretch and least area between texels within a radius of each place (n, 2).
 
-        The stretch is how many times farther apart in the original two neighbours of the lattice lie; the triangle,
-        what becomes of the area of one of neighbouring texels, as a remap keeps what is at its texels only.
+        The stretch is how many times farther apart in the original two neighbours of the lattice lie; the area,
+        what becomes of that between four neighbouring texels, as a remap keeps what is at its texels only.
 
         Returns:
             float64 (n, 3).

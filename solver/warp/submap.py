@@ -34,13 +34,13 @@ class Submap(DoubleField):
         self._steepness = device.field(blocks, 1, "submap, steepness")
         self._find_steepest = Reduction(device, blocks, 1, "max")
 
-    def advance(self, trace: Field) -> None:
+    def advance(self, trace: Field, is_walled: bool) -> None:
         """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
-        self._advance(self.write, {}, {"trace": trace})
+        self._advance(self.write, {}, {"trace": trace, "walled": float(is_walled)})
 
-    def advance_tracing(self, trace: Field, defines: dict[str, Any], inputs: dict[str, Any]) -> None:
+    def advance_tracing(self, trace: Field, is_walled: bool, defines: dict[str, Any], inputs: dict[str, Any]) -> None:
         """Carry it one step and draw `trace`, the fluid's own, beside it: the defines and inputs of `trace.frag`."""
-        self._advance((self.write, trace), {"TRACE": 1, **defines}, inputs)
+        self._advance((self.write, trace), {"TRACE": 1, **defines}, {"walled": float(is_walled), **inputs})
 
     def _advance(self, target: Field | tuple[Field, Field], defines: dict[str, Any], inputs: dict[str, Any]) -> None:
         inner = tuple(0.0 if at_edge else 1.0 for at_edge in self.grid.at_edge)

@@ -183,17 +183,34 @@ def _nodes(position: np.ndarray, count: int, points: int, support: int) -> tuple
     return first[..., None] + np.arange(points), value
 
 
-def lagrange(field: np.ndarray, x: np.ndarray, y: np.ndarray, points: tuple[int, int], support: int) -> np.ndarray:
-    """`field` (ny, nx, c) at positions x, y by Lagrange polynomials through `points` texels along x and y."""
-    columns, wx = _nodes(np.asarray(x, float), field.shape[1], points[0], support)
-    rows, wy = _nodes(np.asarray(y, float), field.shape[0], points[1], support)
+def _away(position: np.ndarray, around: np.ndarray, count: int, support: int) -> np.ndarray:
+    """How far from the edge, in texels, where one of the `support` texels around some places lies at it; else 1."""
+    first = np.clip(np.floor(around - 0.5).astype(int) - (support // 2 - 1), 0, count - support)
+    return np.where(first == 0, position, 1.0) * np.where(first == count - support, count - position, 1.0)
+
+
+def lagrange(
+    field: np.ndarray, x: np.ndarray, y: np.ndarray, points: tuple[int, int], support: int, walled: bool = False
+) -> np.ndarray:
+    """`field` (ny, nx, c) at positions x, y by Lagrange polynomials through `points` texels along x and y.
+
+    With `walled`, of (ny, nx, 2) what crosses an edge is 0 there: it is divided by how far its place is from the edge,
+    and in the end multiplied by that of the position.
+    """
+    x, y, (ny, nx) = np.asarray(x, float), np.asarray(y, float), field.shape[:2]
+    columns, wx = _nodes(x, nx, points[0], support)
+    rows, wy = _nodes(y, ny, points[1], support)
     values = field.astype(float)[rows[..., :, None], columns[..., None, :]]
+    if walled:
+        across = _away(columns + 0.5, x[..., None], nx, support) / _away(x, x, nx, support)[..., None]
+        down = _away(rows + 0.5, y[..., None], ny, support) / _away(y, y, ny, support)[..., None]
+        values /= np.stack(np.broadcast_arrays(across[..., None, :], down[..., :, None]), axis=-1)
     return np.einsum("...j,...i,...jic->...c", wy, wx, values)
 
 
-def cubic_displacement(field: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def cubic_displacement(field: np.ndarray, x: np.ndarray, y: np.ndarray, walled: bool = False) -> np.ndarray:
     """The Boolean sum of the cubic along x and the cubic along y."""
-    along_x, along_y, linear = (lagrange(field, x, y, points, 4) for points in ((4, 2), (2, 4), (2, 2)))
+    along_x, along_y, linear = (lagrange(field, x, y, points, 4, walled) for points in ((4, 2), (2, 4), (2, 2)))
     return along_x + along_y - linear
 
 
@@ -208,7 +225,7 @@ def advance_map(submap: np.ndarray, trace: np.ndarray, h: float) -> np.ndarray:
     """submap'(x) = (x_d - x) + submap(x_d), with x_d - x = `trace` in cells, no place outside the picture."""
     ny, nx = submap.shape[:2]
     x, y = texel_centres((nx, ny), (nx, ny))
-    moved = trace + cubic_displacement(submap, x + trace[..., 0], y + trace[..., 1]) / h
+    moved = trace + cubic_displacement(submap, x + trace[..., 0], y + trace[..., 1], walled=True) / h
     return h * np.stack([np.clip(moved[..., 0], -x, nx - x), np.clip(moved[..., 1], -y, ny - y)], axis=-1)
 
 
@@ -220,7 +237,7 @@ def compose_map(
     limits: tuple[float, float, float, float],
 ) -> np.ndarray:
     """submap(x) + accumulated(x + submap(x)) at the centres of a `size` lattice, the first place kept in the picture
-    and the second within `limits` (left, top, right, bottom)."""
+    and the second within `limits` (left, top, right, bottom), of a map that was given."""
     x, y = texel_centres(size, (1, 1))
     x, y = x * extent[0], y * extent[1]
     moved = cubic_displacement(submap, *texel_centres(size, submap.shape[1::-1]))

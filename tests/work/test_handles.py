@@ -243,6 +243,24 @@ def test_no_fold_waits_for_a_remap_of_what_has_long_halted(device: Device):
         thing.release()
 
 
+@pytest.mark.parametrize(("to", "least", "most"), [((0.6, 0.5), 0.0, 0.01), (None, 0.5, 2.0)], ids=["handle", "pin"])
+def test_what_halts_lets_go(to: tuple[float, float] | None, least: float, most: float, device: Device):
+    """At rest among others that flow by, it would strain the map around it further; a pin holds."""
+    grid = Grid(32, 32)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid, (128, 128))
+    folded, faces = np.zeros((128, 128, 2), np.float32), device.field(grid.size, 2)
+    folded[:, 66, 0] = 1.5 / 128
+    warp.set(folded)
+    handles = Handles(fluid, warp, [Handle((0.4, 0.5), to, 0.2)])
+    handles.lead(DT, 0.0)
+    faces.clear(0.1, 0.0)
+    handles.make_up(faces)
+    changed = np.abs(faces.get() - [0.1, 0.0]).max() / 0.1
+    assert least <= changed <= most
+    for thing in (handles, faces, warp, fluid):
+        thing.release()
+
+
 HANDLES = [
     led_to([0.3, 0.4], [0.4, 0.5], rotate=20.0, turned=[[0.5, 0.0, 1.1], [0.6, 10.0, 1.0]]),
     led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=0.5, stiffness=0.8),
