@@ -14,6 +14,7 @@ from app.media.landmarks import Pairs, write_pairs
 from app.media.recipes import read_recipe
 from app.model.handles import ARRIVED
 from app.model.recipe import Recipe
+from app.work.export_process import FitProcess
 from solver.gl.device import Device
 from support.commands import Run
 from support.editing import Robot, small_project
@@ -90,18 +91,32 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
         assert fitted.edited(handle=tuple(unnamed)).text() == made.edited(picture=None).text()
 
 
-@pytest.mark.parametrize("by", ["Stop", "escape"])
-def test_stopped_it_keeps_the_best_so_far(robot: Robot, widgets: Widgets, by: str) -> None:
+def test_stopped_it_keeps_the_best_so_far(robot: Robot, widgets: Widgets) -> None:
     robot.editor.fits.evaluations = 100_000
     widgets.click("Fit")
     process = robot.editor.fits.process
     assert process is not None
     robot.until(lambda: process.state.startswith("best so far"), PATIENCE)
-    widgets.click(by) if by == "Stop" else robot.key(by)
+    widgets.click("Stop")
     wait(robot)
     assert names(robot)[-1] == "Fit"
     assert 0 < process.part < 1
     assert all(np.hypot(*np.subtract(held.now, held.target)) < 4 * ARRIVED for held in robot.editor.session.held)
+
+
+def test_escape_stops_it_once_there_is_nothing_else_to_give_up(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    state, told = robot.editor.state, list[FitProcess]()
+    monkeypatch.setattr(FitProcess, "finish", lambda process: told.append(process))
+    robot.key("shift+g")
+    robot.key("m")
+    robot.drag((0.2, 0.2), (0.4, 0.4), steps=2)
+    assert state.selection
+    robot.key("escape")
+    assert (state.selection, told) == ((), [])
+    for _ in range(2):
+        robot.key("escape")
+    assert told == [robot.editor.fits.process]
+    robot.key("g")
 
 
 def test_what_has_been_changed_meanwhile_is_kept_and_the_fit_given_up(robot: Robot) -> None:
