@@ -46,6 +46,7 @@ from app.work.session import Session
 from solver.gl.device import Device
 
 AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
+TOLD = 2  # frames after a click or a key that may begin or end typing, in which imgui tells whether text is typed
 BELOW = 64.0  # points that what is told of a fit lies below what is told of an export
 
 
@@ -101,6 +102,8 @@ class Editor:
         )  # fmt: skip
         self._styled: tuple[object, ...] = ()
         self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken
+        self._later: list[Event] = []  # what the next frame hears first
+        self._known = TOLD  # frames for which it has been known whether text is being typed
         self.open(project)
 
     @property
@@ -173,6 +176,7 @@ class Editor:
             scale: of the interface, as the screen asks for; the preferences' own comes on top.
         """
         begun = time.perf_counter()
+        events = self._heard(events)
         self.workspace.release_left()
         self.clock.elapse(dt)
         self.messages.elapse(dt)
@@ -199,7 +203,8 @@ class Editor:
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
         busy = self.quality.is_measuring or self.quality.is_preparing
-        return busy or self.session.is_moving or self.clock.settling or self.backend.is_behind
+        waits = self.backend.is_behind or bool(self._later or self._once_typed)
+        return busy or waits or self.session.is_moving or self.clock.settling
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""
@@ -215,6 +220,22 @@ class Editor:
         if elsewhere or self.dialogs.is_busy or self.selecting.is_busy:
             return 0.1
         return min(self.messages.next_in or 60.0, 60.0)
+
+    def _heard(self, events: Sequence[Event]) -> list[Event]:
+        """What this frame hears: a key waits, with what comes after it, until imgui can tell whether it is text.
+
+        On a slow machine a click into a field, what is typed there, and the key of an action come all at once.
+        """
+        heard, self._later = [*self._later, *events], []
+        for number, event in enumerate(heard):
+            match event:
+                case Text() | Key(down=True) if self._known < TOLD:
+                    heard, self._later = heard[:number], heard[number:]
+                    break
+                case Button(down=True) | Key("enter" | "escape" | "tab", True):
+                    self._known = 0
+        self._known += 1
+        return heard
 
     def _lay_out(self, size: tuple[float, float], density: float, scale: float) -> None:
         self.ui.scale = scale * self.preferences.scale
@@ -292,16 +313,18 @@ class Editor:
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         by_keys = bool(self.dialogs.shown) or self.ui.has_popup
         self.backend.begin((size[0] / self.ui.density, size[1] / self.ui.density), self.ui.density, dt, events, by_keys)
-        once, self._once_typed = ([], self._once_typed) if self.backend.is_behind else (self._once_typed, [])
-        if once:
+        has_typed = bool(self._once_typed) and not self.backend.is_behind
+        if has_typed:
             # The field is left, as if by Enter, so that what was typed is taken before it is saved.
             internal.clear_active_id()
         try:
             with self.clock.measure("panels"):
                 self._draw_panels()
                 self._draw_over_canvas()
-            for name in once:
-                self.do(name)
+            if has_typed:
+                names, self._once_typed = self._once_typed, []
+                for name in names:
+                    self.do(name)
         except UserError as error:
             self.messages.warn(error.in_window)
         self.ui.end_frame()

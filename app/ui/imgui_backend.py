@@ -8,6 +8,7 @@ import moderngl
 from imgui_bundle import imgui
 
 from app.ui import theme
+from app.ui.clock import TWICE
 from app.ui.events import Button, Event, Focus, Key, Mods, Move, Text, Wheel
 from solver.gl.device import Device
 
@@ -33,6 +34,8 @@ class ImGuiBackend:
         self._context = imgui.create_context()
         io = imgui.get_io()
         io.set_ini_filename("")
+        # The second one, which nothing here goes by, has to be longer.
+        io.mouse_double_click_time, io.mouse_single_click_delay = TWICE, 2 * TWICE
         # An exception in the middle of a frame must end in a message, not in an assertion about a missing End().
         io.config_error_recovery_enable_assert = False
         io.config_error_recovery_enable_tooltip = False
@@ -57,7 +60,7 @@ class ImGuiBackend:
 
     @property
     def is_behind(self) -> bool:
-        """Some of the events wait for frames to come."""
+        """Events wait for later frames: imgui takes up one change of a key or a button in each."""
         return bool(self._later) or self._context.input_events_queue.size() > 0
 
     def begin(

@@ -19,7 +19,7 @@ from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER
 from app.model.tools import TOOL, TOOLS, Press
 from app.ui.clock import FRAMES, HOVERING, PACE
-from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Wheel
+from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog
 from app.ui.files import load_any
 from app.ui.layout import Layout
@@ -204,6 +204,32 @@ def test_what_is_offered_is_what_is_shown_and_taking_it_changes_nothing(robot: R
         robot.key(ending)
         robot.frame(count=2)
         assert robot.editor.state.brush.radius == radius
+
+
+def test_what_is_typed_while_a_frame_takes_long_is_typed_and_the_next_key_acts_on_it(robot: Robot) -> None:
+    """A click into a field, a number and the key of an action that come all at once."""
+    rect, held = robot.editor.layout.inspector, Mods(ctrl=True)
+    assert rect is not None
+    x, y = rect.x + 120, rect.y + 111
+    click = Move(x, y), Button(LEFT, True, held), Button(LEFT, False, held), Key("a", True, held), Key("a", False)
+    typed = [event for letter in "0.7" for event in (Key(letter, True), Text(letter), Key(letter, False))]
+    robot.frame(*click, *typed, Key("e", True, held), Key("e", False, held), dt=0.5)
+    robot.frame(count=20)
+    assert robot.editor.session.recipe.fluid.viscosity == pytest.approx(0.7)
+    assert isinstance(robot.editor.dialogs.shown[-1], ExportDialog)
+    assert not any(overlay.shown for overlay in robot.editor.state.overlays.values())
+
+
+def test_two_clicks_in_half_a_second_are_a_double_click(robot: Robot) -> None:
+    """As where a frame takes long."""
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    type_into(robot, rect.x + 120, rect.y + 111, "0.7")
+    robot.frame(dt=2.0)
+    for down in (True, False, True, False):
+        robot.frame(Button(LEFT, down), dt=0.2)
+    robot.frame(count=2)
+    assert robot.editor.session.recipe.fluid.viscosity == pytest.approx(0.03)
 
 
 @pytest.mark.parametrize("typed", ["nan", "banana", ""])

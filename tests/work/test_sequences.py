@@ -202,7 +202,7 @@ def test_a_picture_there_and_back_and_its_maps_go_on(folder: Path, fluidwarp: Ru
 
 
 def test_a_killed_task_keeps_its_frames(folder: Path, fluidwarp: Run):
-    (folder / "a.toml").write_text(RECIPE.replace("duration = 0.3", "duration = 20"))
+    (folder / "a.toml").write_text(RECIPE.replace("duration = 0.3", "duration = 2000"))
     command = [sys.executable, "-m", "app", "render", "a.toml", "plate.1001.exr", "-o", "w.%03d.png"]
     job = subprocess.Popen(command, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
     asked = time.monotonic()
