@@ -223,7 +223,7 @@ class Sitting:
         )
 
     def _is_open(self) -> bool:
-        self.desk.window = next(iter(self.desk._titles()))
+        self.desk.window = next(iter(self.desk.titles()))
         return self.project.stem in self.desk.title()
 
     def _read(self) -> None:
