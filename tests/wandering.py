@@ -2,11 +2,11 @@
 
     python tests/wandering.py [--actions 2000] [--seed 0] [--size 640x480] [--busy] [--folder DIR]
 
-Strokes, keys, tools, undo, sliders, zoom, masks, handles, bars, symmetry, dialogs, saving, reopening. Each event is sent
-at once, with no rest between the samples of a stroke but what chance gives. Held together are: every place that was sent
-of a stroke and the samples of the recipe; what is held in the editor and what is held of the keyboard, which is nothing;
-the recipe in the saved project and in the editor; and at the end of each sitting the bytes of an export and those of
-`fluidwarp render`. Ends with 0 if all was as it should be; what was not stands in the output, with the actions before it.
+Strokes, keys, tools, undo, sliders, zoom, masks, handles, bars, symmetry, dialogs, saving, reopening. Events are sent
+at once, with no rest between the samples of a stroke but what chance gives. Held together are: every place that was
+sent of a stroke and the samples of the recipe; what the editor takes for held of pointer and keyboard, and what is,
+which is nothing; the recipe in the saved project and in the editor; and at the end the bytes of an export and of
+`fluidwarp render`. Ends with 0 if all was as it should be; what was not stands in the output, after the actions before.
 """
 
 from __future__ import annotations
@@ -36,18 +36,21 @@ PATIENCE = 300.0
 DRAWN = 0.004  # longer sides between the places of a curve
 SITTING = 100  # actions with one work, until it is saved, the editor left, and the work opened again and exported
 PAINTS = {
-    "w": "push",
+    "p": "push",
     "c": "curve",
     "t": "twirl",
     "b": "bloat",
     "v": "thicken",
     "f": "freeze",
     "s": "smooth",
-    "e": "restore",
+    "r": "restore",
 }
-KEYS = ("[", "]", "{", "}", ";", "'", ".", ",", "home", "end", "space", "y", "l", "u", "x", "left", "right", "delete", "escape",
-        "1", "2", "3", "4", "5", "0", "=", "-", "Tab", "ctrl+l", "ctrl+i", "ctrl+shift+i", "ctrl+shift+f", "ctrl+d", "ctrl+r",
-        "ctrl+1", "shift+m", "\\", "ctrl+a", "Return", "shift+Return")  # fmt: skip
+KEYS = ("[", "]", "{", "}", ";", "'", ".", ",", "home", "end", "space", "y", "l", "u", "x", "left", "right", "delete",
+        "escape", "1", "2", "3", "4", "5", "0", "=", "-", "Tab", "ctrl+l", "ctrl+i", "ctrl+shift+i", "ctrl+shift+f",
+        "ctrl+d", "ctrl+r", "ctrl+1", "shift+m", "\\", "ctrl+a", "Return", "shift+Return")  # fmt: skip
+
+
+PARTS = ("bar", "inspector", "timebar", "lanes", "strip")
 
 
 # -- the editor, which tells what it does -----------------------------------------------------------------------------
@@ -62,7 +65,9 @@ def tell() -> None:
     """Let the editor of this process print what it is about, whenever that is another than before."""
     from imgui_bundle import imgui
 
+    from app.model.strokes import BrushPath
     from app.ui.editor import Editor
+    from app.ui.events import Mods
     from app.work.session import Session
 
     frame, press, release, last = Editor.frame, Session.press, Session.release, [""]
@@ -86,20 +91,23 @@ def tell() -> None:
             "string": self.state.stabiliser,
             "rects": [(rect.x, rect.y, rect.width, rect.height) for rect in rects],
             "held": [name for name, is_so in {
-                "drag": pointer.drag, "space": pointer.space, "before": self.state.before, "painting": self.session.is_painting,
-                f"{pointer.mods}": pointer.mods != type(pointer.mods)(), "imgui": any(io.mouse_down) or io.key_ctrl or io.key_shift or io.key_alt,
+                "drag": pointer.drag, "space": pointer.space, "before": self.state.before,
+                "painting": self.session.is_painting, f"{pointer.mods}": pointer.mods != Mods(),
+                "imgui": any(io.mouse_down) or io.key_ctrl or io.key_shift or io.key_alt,
                 "behind": self.backend.is_behind,
             }.items() if is_so],
             "dialogs": [type(dialog).__name__ for dialog in self.dialogs.shown],
             "popup": self.ui.has_popup,
             "typing": self.backend.is_typing,
-            "busy": self.files.is_loading or self.exports.is_running or self.session.is_behind or self.recovery.is_busy,
+            "busy": any((
+                self.files.is_loading, self.exports.is_running, self.session.is_behind, self.recovery.is_busy,
+            )),
             "moving": self.session.is_moving,
             "dirty": self.workspace.is_dirty,
             "recipe": told[1],
             "inspector": self.state.inspector,
             "messages": [message.text for message in self.messages.shown],
-            "layout": {name: (rect.x, rect.y, rect.width, rect.height) for name in ("bar", "inspector", "timebar", "lanes", "strip")
+            "layout": {name: (rect.x, rect.y, rect.width, rect.height) for name in PARTS
                        if (rect := getattr(self.layout, name)) is not None},
         })  # fmt: skip
         if now != last[0]:
@@ -119,11 +127,16 @@ def tell() -> None:
             return
         after = self.document.recipe
         new = [one for one in (*after.stroke, *after.mask) if one not in before.stroke and one not in before.mask]
-        ways = [[sample[1:3] for sample in one.samples] for one in new if hasattr(one, "samples")]
+        ways = [[sample[1:3] for sample in one.samples] for one in new if isinstance(one, BrushPath)]
         # Others are new because they were cut off at this moment.
         say(made=[way for way in ways if any(dist(end, begun) < 1e-4 for end in (way[0], way[-1]))])
 
-    Editor.frame, Session.press, Session.release = frame_and_tell, press_and_tell, release_and_tell
+    for of, name, telling in (
+        (Editor, "frame", frame_and_tell),
+        (Session, "press", press_and_tell),
+        (Session, "release", release_and_tell),
+    ):
+        setattr(of, name, telling)
 
 
 def edit(file: Path) -> None:
@@ -134,19 +147,20 @@ def edit(file: Path) -> None:
     run(file)
 
 
-# -- the hand -----------------------------------------------------------------------------------------------------------
+# -- the hand --------------------------------------------------------------------------------------------------------
 
 
 class Hand:
     """A pointer and a keyboard on a screen, an event at a time."""
 
     def __init__(self, display: str) -> None:
-        from Xlib import XK, X, display as displays
+        from Xlib import XK, X
+        from Xlib import display as displays
         from Xlib.ext import xtest
 
         self.screen, self._x, self._fake = displays.Display(display), X, xtest.fake_input
         self._named = {"ctrl": "Control_L", "shift": "Shift_L", "alt": "Alt_L", "[": "bracketleft", "]": "bracketright",
-                       "{": "braceleft", "}": "braceright", ";": "semicolon", "'": "apostrophe", ".": "period", ",": "comma",
+                       ";": "semicolon", "'": "apostrophe", ".": "period", ",": "comma",
                        "=": "equal", "-": "minus", "\\": "backslash", "home": "Home", "end": "End", "left": "Left",
                        "right": "Right", "delete": "Delete", "escape": "Escape"}  # fmt: skip
         self.chords = deque[str](maxlen=12)
@@ -209,7 +223,7 @@ class Sitting:
         )
 
     def _is_open(self) -> bool:
-        self.desk.window = next(iter(self.desk._titles()))
+        self.desk.window = next(iter(self.desk.titles()))
         return self.project.stem in self.desk.title()
 
     def _read(self) -> None:
@@ -240,7 +254,7 @@ class Sitting:
 
     def meet(self) -> None:
         """Wait until the editor has taken all that was sent; nothing is held then."""
-        x, y, width, height = self.now["rects"][1]
+        x, y, _, height = self.now["rects"][1]
         self._corner = (self._corner + 1) % 40
         place = int(x + 2 + self._corner), int(y + height - 3)
         self.hand.move(*place)
@@ -265,7 +279,7 @@ class Sitting:
             time.sleep(0.15)
         raise Fault(f"does not close: {self.now['dialogs']}, popup {self.now['popup']}, typing {self.now['typing']}")
 
-    # -- what is done -----------------------------------------------------------------------------------------------------
+    # -- what is done --------------------------------------------------------------------------------------------------
 
     def place(self) -> tuple[int, int] | None:
         """A point of the screen on the picture, with nothing over it."""
@@ -434,7 +448,7 @@ class Sitting:
         """Place a handle or a pin; delete it, turn it, or leave it."""
         self.hand.key("g")
         self.stroke()
-        self.hand.key(self.dice.choice(("delete", "escape", "w", "ctrl+z", "ctrl+z")))
+        self.hand.key(self.dice.choice(("delete", "escape", "p", "ctrl+z", "ctrl+z")))
 
     def dialog(self) -> None:
         """Open one, and close it."""
@@ -521,10 +535,8 @@ def wander(folder: Path, actions: int, seed: int, size: tuple[int, int], is_busy
             took = time.monotonic() - started
             print(f"seed {seed}: {sum(counts.values())} actions, {samples} samples, {took:.0f} s", flush=True)
     except Fault as fault:
-        print(
-            f"seed {seed}, action {sum(counts.values())}, {list(log)}, {list(sitting.hand.chords) if sitting else []}: {fault}",
-            flush=True,
-        )
+        chords = list(sitting.hand.chords) if sitting else []
+        print(f"seed {seed}, action {sum(counts.values())}, {list(log)}, {chords}: {fault}", flush=True)
         return False
     finally:
         desk.close()

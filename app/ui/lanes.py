@@ -207,7 +207,7 @@ class Lanes:
                 for bar, rect in self.drawn
                 if rect.x <= right and left <= rect.right and rect.y <= bottom and top <= rect.bottom
             }
-            self.selected = self.box[2] | touched
+            self.selected = set(self.box[2] | touched)
 
     def release(self, session: Session) -> None:
         """The pointer went up: the bar stays where it is, or was only clicked; or the box is done."""

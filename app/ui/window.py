@@ -243,7 +243,7 @@ class GlfwWindow:
         if name not in self._cursors:
             # Not GLFW's hidden mode: whenever a mode is set, GLFW asks where the pointer is by now, and then leaves out
             # the move to there, which comes after what has happened on the way.
-            nothing = 1, 1, [[(0, 0, 0, 0)]]
+            nothing: Any = 1, 1, [[(0, 0, 0, 0)]]  # of a pixel
             made = glfw.create_cursor(nothing, 0, 0) if name == "none" else glfw.create_standard_cursor(_CURSORS[name])
             self._cursors[name] = made
         glfw.set_cursor(self.handle, self._cursors[name])

@@ -73,7 +73,7 @@ class Desk:
             text=True,
         )
         self.until(lambda: self.is_shown, "a window")
-        self.window = next(iter(self._titles()))
+        self.window = next(iter(self.titles()))
         self.until(lambda: self.title() == f"{file.stem} - fluidwarp", "the file to be open")
 
     def open_pattern(self) -> None:
@@ -87,9 +87,9 @@ class Desk:
     @property
     def is_shown(self) -> bool:
         """A window is to be seen, and not minimised."""
-        return bool(self._titles())
+        return bool(self.titles())
 
-    def _titles(self) -> dict[str, str]:
+    def titles(self) -> dict[str, str]:
         """What stands on the windows that are to be seen, by their numbers."""
         from Xlib import X
         from Xlib.error import BadWindow
@@ -122,7 +122,7 @@ class Desk:
         return rows[:, : 4 * width].reshape(height, width, 4)[..., 2::-1]
 
     def title(self) -> str:
-        return self._titles().get(self.window, "")
+        return self.titles().get(self.window, "")
 
     def do(self, *words: str) -> str:
         return subprocess.run(["xdotool", *words], env=self.env, capture_output=True, text=True).stdout
