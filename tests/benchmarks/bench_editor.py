@@ -251,11 +251,13 @@ def window(console: Console, rounds: int, file: Path | None, keys: list[str], zo
             times = [moment for moment in times if start + 0.3 < moment < end - 0.1]
             gaps = sorted((b - a) * 1e3 for a, b in pairwise(times))
             steps = [int(count) for moment, _, count in lines if times[0] <= float(moment) <= times[-1]]
-            used = (processor_time(child.pid) - used) / (end - start)
+            shown_in_all = sum(start < float(moment) < end for moment, _, _ in lines)
+            used = processor_time(child.pid) - used
             console.print(
                 f"painting: {len(gaps) / (times[-1] - times[0]):.1f} frames a second; between two frames "
                 f"{statistics.median(gaps):.1f} ms, 95 of 100 within {gaps[int(0.95 * len(gaps))]:.1f} ms; "
-                f"{used:.0%} of a core; grid {lines[-1][1]}, {(steps[-1] - steps[0]) / len(gaps):.2f} steps a frame"
+                f"{used / (end - start):.0%} of a core, {used * 1e3 / shown_in_all:.1f} ms of it a frame; "
+                f"grid {lines[-1][1]}, {(steps[-1] - steps[0]) / len(gaps):.2f} steps a frame"
             )
             child.kill()
             child.wait()
