@@ -83,7 +83,7 @@ def no_thread_holds_up_the_end() -> Iterator[None]:
     threading.Thread.__init__ = noting
     yield
     threading.Thread.__init__ = make
-    assert held <= {"app.ui.exporting._clean_up"}
+    assert held <= {"app.work.export_process.end"}
 
 
 @pytest.fixture(scope="module")
