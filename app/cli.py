@@ -485,17 +485,18 @@ def gallery(
 def doctor() -> None:
     """Check OpenGL, the window and the encoder, and say what to install."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     from app.doctor import examine
 
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else sys.maxsize)  # a command to copy stays on its line
     table = Table(box=None, show_header=False, padding=(0, 1))
     failed = False
     for finding in examine():
         mark = "[green]ok[/]" if finding.is_well else "[red]missing[/]" if finding.vital else "[yellow]without[/]"
-        mend = f"\n[dim]{finding.mend}[/]" if finding.mend else ""
-        table.add_row(mark, finding.name, f"{finding.said}{mend}")
+        mend = f"\n[dim]{escape(finding.mend)}[/]" if finding.mend else ""
+        table.add_row(mark, finding.name, f"{escape(finding.said)}{mend}")
         failed |= finding.vital and not finding.is_well
     console.print(table)
     if failed:
