@@ -22,7 +22,7 @@ from app.ui.clock import PACE, Clock
 from app.ui.commands import Commands
 from app.ui.dialogs import Dialogs
 from app.ui.editor_state import EditorState
-from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Text, Wheel
+from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
 from app.ui.exporting import Exports
 from app.ui.files import Files
 from app.ui.fitting import Fits
@@ -229,12 +229,16 @@ class Editor:
         heard, self._later = [*self._later, *events], []
         for number, event in enumerate(heard):
             match event:
-                case Text() | Key(down=True) if self._known < TOLD:
+                case Text() | Key(down=True) if self._known < TOLD or self._once_typed:
                     heard, self._later = heard[:number], heard[number:]
                     break
-                case Button(down=True) | Key("enter" | "escape" | "tab", True):
+                # imgui hears no repeats; those of a key that is held would pile up behind one another.
+                case Button(down=True) | Key("enter" | "escape" | "tab", True, repeat=False):
                     self._known = 0
-        self._known += 1
+                case Key(down=True, mods=Mods(ctrl=True)) if self.backend.is_typing:
+                    self._known = 0  # an action may leave the field
+        if not self.backend.is_behind:  # else it has not yet taken up the click
+            self._known += 1
         return heard
 
     def _lay_out(self, size: tuple[float, float], density: float, scale: float) -> None:

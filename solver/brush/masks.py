@@ -119,6 +119,8 @@ class Masks:
         means.texture.filter = moderngl.LINEAR, moderngl.LINEAR
         for name, mask in self._painted.items():
             self.device.pass_("brush/coarsen.frag")(means, mask=mask, **blocks)
+            if name == "frozen" and not means.get().any():
+                continue  # to the map, what is no longer frozen and what never was must be the same
             self._paint(name, tip, "brush/smooth.frag", "mix", means=means, strength=min(abs(strength), 1.0), **blocks)
         means.release()
 

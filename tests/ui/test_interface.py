@@ -220,6 +220,32 @@ def test_what_is_typed_while_a_frame_takes_long_is_typed_and_the_next_key_acts_o
     assert not any(overlay.shown for overlay in robot.editor.state.overlays.values())
 
 
+def test_clicks_and_keys_that_come_all_at_once_are_heard_one_after_the_other(robot: Robot) -> None:
+    """Clicks beside a field and into it, a number, the key of an action that leaves the field, and keys after it."""
+    rect, held = robot.editor.layout.inspector, Mods(ctrl=True)
+    assert rect is not None
+    x, y = rect.x + 120, rect.y + 111
+    beside = Move(x, rect.y + 20), Button(LEFT, True), Button(LEFT, False)
+    into = Move(x, y), Button(LEFT, True, held), Button(LEFT, False, held), Key("a", True, held), Key("a", False)
+    typed = [event for letter in "0.7" for event in (Key(letter, True), Text(letter), Key(letter, False))]
+    action = Key("e", True, held), Key("e", False)
+    after = Key("escape", True), Key("escape", False), Key("t", True), Text("t"), Key("t", False)
+    robot.frame(*beside, *beside, *into, *typed, *action, *after, dt=0.5)
+    robot.frame(count=30)
+    assert robot.editor.session.recipe.fluid.viscosity == pytest.approx(0.7)
+    assert not robot.editor.dialogs.shown
+    assert robot.editor.state.tool_name == "twirl"
+
+
+@pytest.mark.parametrize("key", ["tab", "escape", "enter"])
+def test_nothing_waits_for_the_repeats_of_a_key_that_was_held(robot: Robot, key: str) -> None:
+    robot.frame(Key(key, True))
+    for _ in range(5):
+        robot.frame(*[Key(key, True, repeat=True)] * 2)
+    robot.frame(Key(key, False), Key("t", True), Text("t"), Key("t", False))
+    assert robot.editor.state.tool_name == "twirl"
+
+
 def test_two_clicks_in_half_a_second_are_a_double_click(robot: Robot) -> None:
     """As where a frame takes long."""
     rect = robot.editor.layout.inspector

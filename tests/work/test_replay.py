@@ -93,6 +93,23 @@ def test_going_anywhere_gives_the_same_bytes(replay: Replay, moments: list[bytes
         assert moment(replay) == moments[tick]
 
 
+@pytest.mark.parametrize("later", ["freeze", "thicken"])
+def test_smoothing_is_the_same_before_and_after_a_mask_has_been_painted(later: str, device: Device) -> None:
+    """Which the recipe does only after it."""
+    smooth = Stroke(tool="smooth", radius=0.2, samples=((4, 0.4, 0.4, 1.0), (5, 0.5, 0.4, 1.0)))
+    painted = smooth.model_copy(update={"tool": later, "samples": ((7, 0.4, 0.4, 1.0), (8, 0.5, 0.4, 1.0))})
+    replay = Replay(device, RECIPE.edited(stroke=(RECIPE.stroke[0], smooth, painted)), pictures())
+    replay.seek(3)
+    replay.checkpoint()
+    replay.seek(6)
+    first = moment(replay)
+    replay.seek(9)
+    replay.seek(3)
+    replay.seek(6)
+    assert moment(replay) == first
+    replay.release()
+
+
 def test_undo_and_redo_give_the_same_bytes(replay: Replay, moments: list[bytes]):
     shorter = RECIPE.edited(stroke=RECIPE.stroke[:1])
     replay.seek(LAST)
