@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import ceil
+from math import ceil, floor
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -23,6 +24,7 @@ LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exp
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
 ARROW = 30.0  # points between two arrows
 FORCE_ARROW = 32.0
+FASTEST = 0.4  # longer sides a second that fill an arrow
 FORCE_COLOUR = (1.0, 0.87, 0.2)
 RESTING = 0.5  # how strong a force is shown while it does not act
 GRID_LINES = 24.0
@@ -102,7 +104,7 @@ class Canvas:
             displacement, shown = self._seen(session, state, viewport, seen)
         self._filter(viewport, session.is_moving)
         defines: dict[str, object] = {"EDGES": EDGES[session.recipe.edges]}
-        inputs: dict[str, object] = {
+        inputs: dict[str, Any] = {
             "picture": texture,
             "displacement": displacement,
             "shown": shown,
@@ -119,18 +121,39 @@ class Canvas:
             defines["CHECKER"] = 1
             inputs |= {"light": palette.checker[1][:3], "dark": palette.checker[0][:3], "tile": 8.0 * scale * density}
         self._add_overlays(defines, inputs, session, state, scale * density)
-        if state.overlays["forces"].shown and not state.before and session.replay.forces:
+        forces, velocity = state.overlays["forces"], state.overlays["velocity"]
+        arrows: list[dict[str, Any]] = []
+        if forces.shown and not state.before and replay.forces:
             force, room = self._forces(session)
-            defines["FORCES"] = 1
-            inputs |= {"force": force, "room": room, "force_arrow": FORCE_ARROW * scale * density}
-            inputs |= {"forces_opacity": state.overlays["forces"].opacity, "force_colour": FORCE_COLOUR}
+            defines["ROOM"] = 1
+            inputs |= {"room": room, "room_opacity": forces.opacity}
+            arrows.append({"field": force, "window": WHOLE, "most": 1.0, "side": FORCE_ARROW * scale * density})
+            arrows[-1] |= {"colour": FORCE_COLOUR, "opacity": forces.opacity}
+        if velocity.shown and not state.before:
+            arrows.append({"field": replay.fluid.carrier(), "window": _window_of(replay.fluid.grid), "most": FASTEST})
+            arrows[-1] |= {"colour": (1.0, 1.0, 1.0), "opacity": velocity.opacity, "side": ARROW * scale * density}
         before = target.viewport
         target.viewport = _from_below(seen, height)
         draw = self.device.pass_("view/canvas.frag", **defines)
-        draw.draw_into(
-            target, ("displacement", "viscosity", "thickness", "frozen", "velocity", "force", "room"), **inputs
-        )
+        draw.draw_into(target, ("displacement", "viscosity", "thickness", "frozen", "room"), **inputs)
+        shared = {name: inputs[name] for name in ("origin", "step", "target_height", "split") if name in inputs}
+        for each in arrows:
+            self._draw_arrows(target, seen, **shared, **each)
         target.viewport = before
+
+    def _draw_arrows(
+        self, target: moderngl.Framebuffer, seen: Pixels, origin: tuple[float, float], side: float, **inputs: Any
+    ) -> None:
+        """Draw the arrows of a field, one in every square of `side` pixels, over the viewport, which is `seen`."""
+        (left, top), (right, bottom) = (
+            [round_((at - start) / side) for at, start in zip(ends, origin, strict=True)]
+            for ends, round_ in ((seen[:2], floor), (seen[2:], ceil))
+        )
+        arrows = self.device.pass_("view/arrows.frag", **({"SPLIT": 1} if "split" in inputs else {}))
+        inputs |= {"origin": origin, "side": side, "first": (float(left), float(top)), "across": float(right - left)}
+        count = (right - left) * (bottom - top)
+        viewport = tuple(float(edge) for edge in target.viewport)
+        arrows.draw_into(target, ("field",), "over", (0, 6 * count), viewport=viewport, **inputs)
 
     def _draw_small(self, target: moderngl.Framebuffer, session: Session) -> None:
         """Draw all of the picture as it is now into a small framebuffer, with nothing laid over it."""
@@ -268,10 +291,6 @@ class Canvas:
         if state.tool_name == "select" and state.selected_area is not None:
             defines["SELECTED"] = 1
             inputs |= {"selected": self._selection(state.selected_area), "dash": 8.0 * scale, "dash_width": scale}
-        if shown["velocity"].shown:
-            defines["ARROWS"] = 1
-            inputs |= {"velocity": replay.fluid.carrier(), "arrow": ARROW * scale, "speed": 0.4}
-            inputs |= {"arrows_opacity": shown["velocity"].opacity, "arrow_colour": (1.0, 1.0, 1.0)}
 
 
 def _window_of(grid: Grid) -> tuple[float, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
@@ -12,7 +12,7 @@ from app.model.strokes import BrushPath, Dab
 from solver.brush.brush import Brush, Motion
 from solver.brush.masks import Masks
 from solver.brush.push import Push, coasting, gain_compensation, slip_factor, strain_limit
-from solver.brush.tip import Tip
+from solver.brush.tip import Path, Tip
 from solver.brush.twirl import Twirl
 from solver.gl.device import Device
 from solver.gl.field import Field
@@ -63,37 +63,17 @@ class Brushwork:
 
     def draw(self, scene: Scene, stroke: BrushPath, tick: int, dabs: tuple[Dab, ...]) -> bool:
         """Let a stroke act, with its images, at one of its own ticks; True if it painted on the masks."""
-        painted = False
-        far = stroke.travelled(tick, scene.extent) / stroke.radius if stroke.tool == "push" else 0.0
-        for image, mirrored in stroke.images(dabs, scene.extent):
-            painted |= self._draw_image(scene, stroke, far, image, mirrored)
-        return painted
-
-    def make_up(self, scene: Scene, velocity: Field) -> None:
-        """What leads adds what it lacks, as the last touch before the projection; see `Brush.make_up`."""
-        for motion in self._leading:
-            self._brush.make_up(scene.fluid, motion, velocity, scene.warp)
-
-    def carry(self, scene: Scene) -> None:
-        """Let what is local of pushes carry the picture besides the fluid."""
-        for motion in self._leading:
-            if isinstance(motion, Push):
-                self._brush.carry(scene.fluid, motion, scene.warp)
-
-    def release(self) -> None:
-        """Free the textures."""
-        self._brush.release()
-
-    def _draw_image(self, scene: Scene, stroke: BrushPath, far: float, dabs: tuple[Dab, ...], mirrored: bool) -> bool:
         dt, fluid = scene.settings.dt, scene.fluid
-        reverse = stroke.reverse != (mirrored and stroke.tool == "twirl")
-        strength = -stroke.strength if reverse else stroke.strength
-        tips = [(_tip(stroke, dab, scene.extent), strength * dab.pressure) for dab in dabs]
+        strength = -stroke.strength if stroke.reverse else stroke.strength
+        tips = [
+            (tip, strength * dab.pressure) for tip, dab in zip(_tips(stroke, dabs, scene.extent), dabs, strict=True)
+        ]
         # Several samples in one tick: the fluid is carried by the whole way, a mask is painted piece by piece.
-        whole = replace(tips[0][0], end=tips[-1][0].end)
+        whole = tips[0][0].to(tips[-1][0])
         pressed = sum(amount for _, amount in tips) / len(tips)
         match stroke.tool:
             case "push":
+                far = stroke.travelled(tick, scene.extent) / stroke.radius
                 on = coasting(whole, dt, scene.settings.drag, scene.settings.viscosity)
                 self._lead(scene, Push(whole, dt, pressed, slip_factor(far, on), strain_limit(far, on), stroke.local))
             case "curve":
@@ -110,12 +90,28 @@ class Brushwork:
             case "restore":
                 for tip, amount in tips:
                     share = 1 - np.exp(-RESTORING * abs(amount) * dt * scene.part / len(tips))
-                    scene.warp.restore_under(tip.end, tip.radius, tip.hardness, float(share))
+                    for _, place, _ in tip.paths:
+                        scene.warp.restore_under(place, tip.radius, tip.hardness, float(share))
             case _:
                 for tip, amount in tips:
                     _paint(scene.masks, stroke.tool, tip, amount, dt / len(tips))
                 return True
         return False
+
+    def make_up(self, scene: Scene, velocity: Field) -> None:
+        """What leads adds what it lacks, as the last touch before the projection; see `Brush.make_up`."""
+        for motion in self._leading:
+            self._brush.make_up(scene.fluid, motion, velocity, scene.warp)
+
+    def carry(self, scene: Scene) -> None:
+        """Let what is local of pushes carry the picture besides the fluid."""
+        for motion in self._leading:
+            if isinstance(motion, Push):
+                self._brush.carry(scene.fluid, motion, scene.warp)
+
+    def release(self) -> None:
+        """Free the textures."""
+        self._brush.release()
 
     def _lead(self, scene: Scene, motion: Motion) -> None:
         """Let a brush lead the fluid: with what viscosity and drag will take of it, and again once they have."""
@@ -139,7 +135,15 @@ def _paint(masks: Masks, tool: str, tip: Tip, amount: float, dt: float) -> None:
             masks.smooth(tip, amount)
 
 
-def _tip(stroke: BrushPath, dab: Dab, extent: tuple[float, float]) -> Tip:
+def _tips(stroke: BrushPath, dabs: tuple[Dab, ...], extent: tuple[float, float]) -> list[Tip]:
+    """A tip for each piece of a stroke's path, with its images."""
     width, height = extent
-    start, end = (dab.x0 * width, dab.y0 * height), (dab.x1 * width, dab.y1 * height)
-    return Tip(start, end, stroke.radius, stroke.hardness, near=stroke.detail > 0)
+    images = [
+        [Path((x0 * width, y0 * height), (x1 * width, y1 * height), mirrored) for x0, y0, x1, y1, _ in pieces]
+        for pieces, mirrored in stroke.images(dabs, extent)
+    ]
+    near = stroke.detail > 0
+    return [
+        Tip(own.start, own.end, stroke.radius, stroke.hardness, near, tuple(others))
+        for own, *others in zip(*images, strict=True)
+    ]

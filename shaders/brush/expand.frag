@@ -1,11 +1,13 @@
 // Expand: bloat or pinch, a divergence source under the brush, 1 / s, drawn with additive blending.
-// u_rate: the source at the brush's centre, 1 / s; negative pinches.
+// v_vector.x: the source at the centre of an image, 1 / s; negative pinches.
+// vertices: lib/images.vert
 // reads: 0
 #include "lib/brush.glsl"
-uniform float u_rate;
 uniform vec2 u_spacing;
+flat in vec4 v_segment;
+flat in vec2 v_vector;
 layout(location = 0) out float out_source;
 
 void main() {
-    out_source = u_rate * brush_weight(gl_FragCoord.xy * u_spacing);
+    out_source = v_vector.x * brush_weight(v_segment, gl_FragCoord.xy * u_spacing);
 }

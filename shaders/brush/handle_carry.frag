@@ -2,6 +2,7 @@
 // blending; less its image beyond a wall that it pushes at or from, as carry.frag.
 // v_brush, v_vector (V): see lib/listed.vert; u_viscosity: cells, lengths^2 / s: what is thicker than at the tip is carried
 // less.
+// vertices: lib/listed.vert
 // reads: 3
 uniform sampler2D u_viscosity;
 flat in vec4 v_brush;

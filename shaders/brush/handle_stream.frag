@@ -5,6 +5,7 @@
 // (Narcowich and Ward 1994).
 // v_brush, v_vector (F): see lib/listed.vert. With ATTENUATED, less in proportion where the fluid at the node, u_thickest
 // (lengths^2 / s, from thickest), is thicker than at the tip, as lib/attenuation.glsl.
+// vertices: lib/listed.vert
 // reads: 0, and 1 when ATTENUATED
 #ifdef ATTENUATED
 uniform sampler2D u_thickest;

@@ -1,32 +1,37 @@
 // Push: make the fluid under the brush move with it, drawn with additive blending.
 //   dv = curl psi,  psi = b (dF x r),  dF = gain scaling strength (slip v_brush - v_fluid(centre)),       (B1)
 // r from the nearest point of the path: the discrete curl of a stream function at the nodes, so exactly free of
-// divergence; at the path dv = dF.
-// u_motion: the fluid's motion at the brush, from probe; u_slip: from slip; u_scaling: from restrain; u_brush_velocity:
-// lengths / s.
+// divergence; at the path dv = dF, and where images of the brush overlap, of each its share.
+// u_motion: the fluid's motion at each image, from probe; u_slip: from slip; u_scaling: from restrain; v_vector: the
+// brush's velocity, lengths / s.
+// vertices: lib/images.vert
 // reads: 3, and 20 when ATTENUATED
 #include "lib/brush.glsl"
 #include "lib/attenuation.glsl"
 uniform sampler2D u_motion;
 uniform sampler2D u_slip;
 uniform sampler2D u_scaling;
-uniform vec2 u_brush_velocity;
 uniform float u_strength;
 uniform float u_gain;
 uniform vec2 u_spacing;
+flat in vec4 v_segment;
+flat in vec2 v_vector;
+flat in int v_number;
+flat in float v_share;
 layout(location = 0) out vec2 out_velocity;
 
 float stream(vec2 node, vec2 force, float viscosity) {
-    vec2 x = node * u_spacing, r = x - brush_nearest(x);
+    vec2 x = node * u_spacing, r = x - brush_nearest(v_segment, x);
     return brush_falloff(length(r)) * (force.x * r.y - force.y * r.x) * attenuation(node, viscosity);
 }
 
 void main() {
     vec2 cell = floor(gl_FragCoord.xy);
-    vec4 motion = texelFetch(u_motion, ivec2(0), 0);
-    float slip = texelFetch(u_slip, ivec2(0), 0).r;
-    vec2 force = u_gain * texelFetch(u_scaling, ivec2(0), 0).r * u_strength * unobstructed()
-               * (slip * u_brush_velocity - motion.xy);
+    ivec2 image = ivec2(v_number, 0);
+    vec4 motion = texelFetch(u_motion, image, 0);
+    float slip = texelFetch(u_slip, image, 0).r;
+    vec2 force = u_gain * texelFetch(u_scaling, image, 0).r * u_strength * unobstructed(image) * v_share
+               * (slip * v_vector - motion.xy);
     float corner = stream(cell, force, motion.w);
     vec2 velocity = vec2(stream(cell + vec2(0.0, 1.0), force, motion.w) - corner,
                          corner - stream(cell + vec2(1.0, 0.0), force, motion.w));

@@ -1,11 +1,11 @@
 // Viscosity attenuation: how far the fluid at a node lets a brush lead it, 1 where it is no thicker than at the brush's
 // tip, less in proportion to how much thicker it is; the least of the four cells around. And the obstruction factor of
-// all of the brush, from obstruct.frag. Both 1 unless ATTENUATED.
+// all of an image of the brush, from obstruct.frag. Both 1 unless ATTENUATED.
 #ifdef ATTENUATED
 uniform sampler2D u_viscosity; // lengths^2 / s
 uniform sampler2D u_obstruction;
 
-float unobstructed() { return texelFetch(u_obstruction, ivec2(0), 0).r; }
+float unobstructed(ivec2 image) { return texelFetch(u_obstruction, image, 0).r; }
 
 float attenuation(vec2 node, float tip_viscosity) {
     vec2 texel = 1.0 / vec2(textureSize(u_viscosity, 0));
@@ -18,6 +18,6 @@ float attenuation(vec2 node, float tip_viscosity) {
     return least;
 }
 #else
-float unobstructed() { return 1.0; }
+float unobstructed(ivec2 image) { return 1.0; }
 float attenuation(vec2 node, float tip_viscosity) { return 1.0; }
 #endif

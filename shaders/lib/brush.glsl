@@ -1,11 +1,10 @@
-// The shape of a brush drawn from a to b: everything in lengths.
-uniform vec4 u_segment;   // a.xy, b.xy
+// The shape of a brush drawn along a segment from a to b (a.xy, b.xy): everything in lengths.
 uniform float u_radius;
 uniform float u_hardness; // 0 soft, 1 hard
 
 // The point of the segment nearest to x.
-vec2 brush_nearest(vec2 x) {
-    vec2 a = u_segment.xy, along = u_segment.zw - a;
+vec2 brush_nearest(vec4 segment, vec2 x) {
+    vec2 a = segment.xy, along = segment.zw - a;
     float length2 = dot(along, along);
     return a + along * (length2 > 0.0 ? clamp(dot(x - a, along) / length2, 0.0, 1.0) : 0.0);
 }
@@ -17,7 +16,7 @@ float brush_falloff(float distance_to_path) {
     return w * w * w;
 }
 
-float brush_weight(vec2 x) { return brush_falloff(distance(x, brush_nearest(x))); }
+float brush_weight(vec4 segment, vec2 x) { return brush_falloff(distance(x, brush_nearest(segment, x))); }
 
 // The flow of a soft push at r, in radii: curl of its falloff times direction x r.
 vec2 brush_flow(vec2 r, vec2 direction) {

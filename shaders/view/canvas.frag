@@ -1,16 +1,14 @@
 // Canvas: what lies under a pixel of the screen: the picture through the warp map, on a checkerboard, with its overlays.
 //   colour(x) = picture(x + D(x)),  x = (pixel - u_origin) u_step  in 0-1 of the picture
 // u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering, over u_shown: left, top, width and
-// height, 0-1 of the picture; u_extent: width and height in longer sides. EDGES: beyond the picture it is 0 transparent, 1 black, 2 as at its edge (the sampler clamps), 3 mirrored,
-// 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
+// height, 0-1 of the picture; u_extent: width and height in longer sides. EDGES: beyond the picture it is 0 transparent,
+// 1 black, 2 as at its edge (the sampler clamps), 3 mirrored, 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
 // square of the checkerboard, pixels.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY: tint of decades over
 // u_base, u_viscosity of the recipe's and u_thickness painted, and contour lines of whole ones, u_contour pixels wide.
-// FROZEN: hatch where u_frozen is 1/2 or more. ARROWS: velocity on MAC faces, lengths / s, of which u_speed fills an arrow.
-// SELECTED: dashes of half u_dash pixels along the edge of where
-// u_selected is 1/2 or more, u_dash_width pixels wide to each side.
-// FORCES: u_force on MAC faces, 1 at its strongest, as arrows of u_force_colour; where u_room swells or shrinks, a tint.
+// FROZEN: hatch where u_frozen is 1/2 or more. ROOM: a tint where u_room, over the picture, swells or shrinks.
+// SELECTED: dashes of half u_dash pixels along the edge of where u_selected is 1/2 or more, u_dash_width pixels wide to each side.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
 // reads: 2, and up to 13 with overlays
 #include "lib/decades.glsl"
@@ -55,19 +53,9 @@ uniform sampler2D u_selected;
 uniform float u_dash;
 uniform float u_dash_width;
 #endif
-#ifdef ARROWS
-uniform sampler2D u_velocity;
-uniform float u_arrow;
-uniform float u_speed;
-uniform float u_arrows_opacity;
-uniform vec3 u_arrow_colour;
-#endif
-#ifdef FORCES
-uniform sampler2D u_force;
+#ifdef ROOM
 uniform sampler2D u_room;
-uniform float u_force_arrow;
-uniform float u_forces_opacity;
-uniform vec3 u_force_colour;
+uniform float u_room_opacity;
 #endif
 layout(location = 0) out vec4 out_colour;
 
@@ -92,36 +80,6 @@ vec4 look_up(vec2 place) {
 #endif
     return colour;
 }
-
-#if defined(ARROWS) || defined(FORCES)
-// Coverage of an arrow along v (of length 0-1) in a square from -1 to 1, whose pixel is `soft` wide.
-float arrow(vec2 p, vec2 v, float soft) {
-    float size = length(v);
-    if (size < 0.1) return 0.0;
-    vec2 along = v / size;
-    vec2 q = vec2(dot(p, along), abs(p.y * along.x - p.x * along.y));
-    float reach = 0.9 * min(size, 1.0), head = min(0.5, reach);
-    float shaft = max(q.y - 0.07, max(-reach - q.x, q.x - reach + head));
-    float tip = max(0.5 * (q.x - reach) + q.y, reach - head - q.x);
-    return 1.0 - smoothstep(-soft, soft, min(shaft, tip));
-}
-
-// `seen` with arrows over it, one in every square of `side` pixels, along `field`, which lies over `window`, of which
-// `most` fills an arrow.
-vec3 with_arrows(vec3 seen, vec2 pixel, sampler2D field, vec4 window, float most, float side, vec3 colour, float opacity) {
-    vec2 tile = (floor(pixel / side) + 0.5) * side;
-    vec2 middle = (tile * u_step - window.xy) / window.zw;
-    if (inside(middle) < 0.5) return seen;
-    vec2 v = texture(field, middle).rg / most;
-    float size = length(v);
-    // Weak places are drawn longer than in proportion, or nothing but the strongest would be seen.
-    if (size > 0.0) v *= pow(min(size, 1.0), 0.4) / size;
-    vec2 p = (pixel - tile) / (0.5 * side);
-    float soft = 2.0 / side;
-    seen = mix(seen, vec3(0.0), opacity * 0.6 * arrow(p * 0.9, v * 1.12, 2.0 * soft));
-    return mix(seen, colour, opacity * arrow(p, v, soft));
-}
-#endif
 
 void main() {
     vec2 pixel = vec2(gl_FragCoord.x, u_target_height - gl_FragCoord.y) - u_origin;
@@ -174,15 +132,10 @@ void main() {
         seen = mix(seen, vec3(0.0), u_grid_opacity * 0.35 * max(shade.x, shade.y));
         seen = mix(seen, vec3(1.0), u_grid_opacity * max(line.x, line.y));
 #endif
-#ifdef FORCES
+#ifdef ROOM
         float room = texture(u_room, x).r;
         vec3 swelling = room > 0.0 ? vec3(0.90, 0.62, 0.0) : vec3(0.34, 0.71, 0.91);
-        seen = mix(seen, swelling, u_forces_opacity * 0.9 * sqrt(min(abs(room), 1.0)));
-        const vec4 all = vec4(0.0, 0.0, 1.0, 1.0);
-        seen = with_arrows(seen, pixel, u_force, all, 1.0, u_force_arrow, u_force_colour, u_forces_opacity);
-#endif
-#ifdef ARROWS
-        seen = with_arrows(seen, pixel, u_velocity, u_window, u_speed, u_arrow, u_arrow_colour, u_arrows_opacity);
+        seen = mix(seen, swelling, u_room_opacity * 0.9 * sqrt(min(abs(room), 1.0)));
 #endif
 #ifdef SELECTED
         vec2 aside = u_dash_width * u_step;

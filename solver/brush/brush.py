@@ -10,12 +10,13 @@ import numpy as np
 
 from solver.brush.distance import Distance
 from solver.brush.push import Push, Slip
-from solver.brush.tip import NEAR, Tip
+from solver.brush.tip import NEAR, Path, Tip
 from solver.brush.twirl import Twirl
 from solver.faces import check_field
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.reduction import Reduction
+from solver.images import MOST_IMAGES, for_images
 from solver.limits import check_finite, check_type
 from solver.scheme import Scheme
 from solver.warp.map import WarpMap
@@ -32,8 +33,8 @@ class Brush:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self._motion = device.field((1, 1), 4, "motion at the brush")
-        self._obstruction = device.field((1, 1), 1, "obstruction factor")
+        self._motion = device.field((MOST_IMAGES, 1), 4, "motion at the brush")
+        self._obstruction = device.field((MOST_IMAGES, 1), 1, "obstruction factor")
         self._slip = Slip(device)
         self._distance = Distance(device)
         self._sums: dict[tuple[tuple[int, int], int], Sum] = {}
@@ -58,8 +59,9 @@ class Brush:
         _check(fluid, motion, warp)
         check_field("a velocity", velocity, fluid.grid)
         self._look(fluid, motion, velocity, warp)
-        obstruct, tip = self.device.pass_("brush/obstruct.frag"), motion.tip.inputs(fluid.grid)
-        obstruct(self._obstruction, motion=self._motion, viscosity=fluid.viscosity, solid=fluid.solid, **tip)
+        obstruct, inputs = self.device.pass_("brush/obstruct.frag"), motion.tip.shape(fluid.grid)
+        inputs |= {"motion": self._motion, "viscosity": fluid.viscosity, "solid": fluid.solid}
+        obstruct(self._obstruction, region=(0, 0, len(motion.tip.paths), 1), **inputs)
         attenuation = {"viscosity": fluid.viscosity, "obstruction": self._obstruction}
         self._draw(fluid, motion, velocity, 1.0, attenuation)
 
@@ -72,10 +74,9 @@ class Brush:
         self._look(fluid, push, fluid.faces(), warp)
         solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
         carry = self.device.pass_("brush/carry.frag", **({"SOLIDS": 1} if solids else {}))
-        region = push.tip.region(fluid.grid)
-        inputs = push.tip.inputs(fluid.grid) | {"brush_velocity": push.local_velocity, "viscosity": fluid.viscosity}
-        inputs |= {"motion": self._motion, "slip": self._slip.factor, **solids}
-        fluid.local.add(lambda motion: carry(motion, add=True, region=region, **inputs))
+        inputs = {"motion": self._motion, "slip": self._slip.factor, "viscosity": fluid.viscosity, **solids}
+        vectors = push.local_velocities
+        fluid.local.add(lambda motion: push.tip.draw(carry, motion, fluid.grid, vectors, add=True, **inputs))
 
     def push(self, fluid: Scheme, tip: Tip, dt: float, strength: float = 1.0) -> None:
         """Carry the fluid under the tip along; see `Push`."""
@@ -93,9 +94,11 @@ class Brush:
         check_finite("a rate", rate)
         check_type("what expands", tip, Tip)
         check_type("what a brush moves", fluid, Scheme)
-        self._expand(fluid, tip, rate)
-        if tip.near and (around := self._area(fluid, tip.wide)):
-            self._expand(fluid, tip.wide, -rate * self._area(fluid, tip) / around)
+        images = range(len(tip.paths))
+        self._expand(fluid, tip, [rate for _ in images])
+        if tip.near:
+            areas = [(self._area(fluid, tip, image), self._area(fluid, tip.wide, image)) for image in images]
+            self._expand(fluid, tip.wide, [-rate * area / around if around else 0.0 for area, around in areas])
 
     def release(self) -> None:
         """Free the textures."""
@@ -111,7 +114,8 @@ class Brush:
             velocity=velocity,
             impulse=fluid.impulse.field,
             viscosity=fluid.viscosity,
-            at=((tip.end[0] - left) / hx, (tip.end[1] - top) / hy),
+            region=(0, 0, len(tip.paths), 1),
+            at=for_images([((x - left) / hx, (y - top) / hy) for _, (x, y), _ in tip.paths]),
             reach=tuple(max(0.25 * tip.radius / h, 0.5) for h in (hx, hy)),
             spacing=(hx, hy),
         )
@@ -123,50 +127,48 @@ class Brush:
     def _draw(
         self, fluid: Scheme, motion: Motion, faces: Field, gain: float, attenuation: dict[str, Any] | None = None
     ) -> None:
-        paint = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {}))
-        inputs: dict[str, Any] = motion.tip.inputs(fluid.grid) | motion.inputs()
-        inputs |= {"motion": self._motion, "gain": gain}
+        paint, tip = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {})), motion.tip
+        inputs: dict[str, Any] = motion.inputs() | {"motion": self._motion, "gain": gain} | (attenuation or {})
         if isinstance(motion, Push):
             inputs |= {"slip": self._slip.factor, "scaling": self._slip.scaling}
-        inputs |= attenuation or {}
 
-        def draw(target: Field) -> None:
-            paint(target, add=True, region=motion.tip.region(fluid.grid), **inputs)
+        def draw(target: Field, only: int | None = None) -> None:
+            tip.draw(paint, target, fluid.grid, motion.vectors, only, add=True, **inputs)
 
         draw(faces)
-        if any(glides := _glides(fluid, motion.tip)):
-            given = self._sum(fluid, 2, draw)
-            self._take_back(fluid, motion.tip, faces, np.where(glides, given, 0.0))
+        for image, path in enumerate(tip.paths):
+            if any(glides := _glides(fluid, tip, path)):
+                given = self._sum(fluid, 2, lambda target, image=image: draw(target, image))
+                self._take_back(fluid, tip, path, faces, np.where(glides, given, 0.0))
 
-    def _take_back(self, fluid: Scheme, tip: Tip, faces: Field, given: np.ndarray) -> None:
-        """Add what has the opposite momentum of `given`, a sum over the faces, around the end of the tip's path.
+    def _take_back(self, fluid: Scheme, tip: Tip, path: Path, faces: Field, given: np.ndarray) -> None:
+        """Add what has the opposite momentum of `given`, a sum over the faces, around the end of a path of a tip.
 
         A curl within the fluid has none. But where the picture's edge cuts through it and the fluid glides, some is
         left, and drives the fluid along the edge as far as that goes: what is driven falls off with the logarithm of
         the distance only (Stokes' paradox).
         """
-        foot = tuple(0.0 if 2 * at < side else side for at, side in zip(tip.end, fluid.grid.picture, strict=True))
+        foot = tuple(0.0 if 2 * at < side else side for at, side in zip(path.end, fluid.grid.picture, strict=True))
         hx, hy = fluid.grid.spacing
         counter = self.device.pass_("brush/counter.frag")
         for axis in np.flatnonzero(given):
             # The momentum of u is that along the edges above and below.
-            place = (tip.end[0], foot[1]) if axis == 0 else (foot[0], tip.end[1])
+            place = (path.end[0], foot[1]) if axis == 0 else (foot[0], path.end[1])
             wide = Tip(place, place, NEAR * tip.radius)
             # A soft brush of half a disc has the integral pi r^2 / 8.
             speed = np.zeros(2)
             speed[axis] = -given[axis] * hx * hy / (math.pi * wide.radius**2 / 8)
-            inputs: dict[str, Any] = wide.inputs(fluid.grid) | {"speed": tuple(speed.tolist())}
-            counter(faces, add=True, region=wide.region(fluid.grid), **inputs)
+            wide.draw(counter, faces, fluid.grid, [(float(speed[0]), float(speed[1]))], add=True)
 
-    def _expand(self, fluid: Scheme, tip: Tip, rate: float) -> None:
-        expand, region = self.device.pass_("brush/expand.frag"), tip.region(fluid.grid)
-        fluid.source.add(lambda source: expand(source, add=True, region=region, rate=rate, **tip.inputs(fluid.grid)))
+    def _expand(self, fluid: Scheme, tip: Tip, rates: list[float]) -> None:
+        expand, vectors = self.device.pass_("brush/expand.frag"), [(rate, 0.0) for rate in rates]
+        fluid.source.add(lambda source: tip.draw(expand, source, fluid.grid, vectors, add=True))
 
-    def _area(self, fluid: Scheme, tip: Tip) -> float:
-        """The fluid's cells under a tip, each by how much it is under it."""
-        weigh, region = self.device.pass_("brush/weigh.frag"), tip.region(fluid.grid)
-        inputs: dict[str, Any] = tip.inputs(fluid.grid) | {"solid": fluid.solid}
-        return float(self._sum(fluid, 1, lambda weights: weigh(weights, region=region, **inputs))[0])
+    def _area(self, fluid: Scheme, tip: Tip, image: int) -> float:
+        """The fluid's cells under an image of a tip, each by how much it is under it."""
+        weigh = self.device.pass_("brush/weigh.frag")
+        draw = lambda weights: tip.draw(weigh, weights, fluid.grid, only=image, solid=fluid.solid)  # noqa: E731
+        return float(self._sum(fluid, 1, draw)[0])
 
     def _sum(self, fluid: Scheme, components: int, draw: Callable[[Field], None]) -> np.ndarray:
         """The sum over the grid of what `draw` draws; waits for the GPU."""
@@ -201,12 +203,12 @@ class Sum:
         self._reduction.release()
 
 
-def _glides(fluid: Scheme, tip: Tip) -> tuple[bool, bool]:
-    """Whether a tip that is near reaches over edges of the picture along which the fluid glides: for u, and for v."""
+def _glides(fluid: Scheme, tip: Tip, path: Path) -> tuple[bool, bool]:
+    """Whether a tip that is near reaches over edges along which the fluid glides, on a path: for u, and for v."""
     edges = [edge and not sticks for edge, sticks in zip(fluid.grid.at_edge, fluid.params.walls.no_slip, strict=False)]
     over = [
         over
-        for a, b, side in zip(tip.start, tip.end, fluid.grid.picture, strict=True)
+        for a, b, side in zip(path.start, path.end, fluid.grid.picture, strict=True)
         for over in (min(a, b) < tip.radius, max(a, b) > side - tip.radius)
     ]
     left, right, top, bottom = (tip.near and at_edge and beyond for at_edge, beyond in zip(edges, over, strict=True))

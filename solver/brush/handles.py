@@ -431,9 +431,8 @@ class Handles:
             self._one.clear(float(found[2]))
             masks = {"viscosity": fluid.viscosity, "obstruction": self._one}
         self._motion.clear(0.0, 0.0, 0.0, float(found[3]))
-        twirl, region = fluid.device.pass_("brush/twirl.frag", **attenuated), ring.tip.region(fluid.grid)
-        inputs: dict[str, Any] = ring.tip.inputs(fluid.grid) | {"rate": speed / ring.length, "gain": 1.0}
-        twirl(faces, add=True, region=region, motion=self._motion, **inputs, **masks)
+        twirl, vectors = fluid.device.pass_("brush/twirl.frag", **attenuated), [(speed / ring.length, 0.0)]
+        ring.tip.draw(twirl, faces, fluid.grid, vectors, add=True, motion=self._motion, gain=1.0, **masks)
         self._one.clear(1.0)
 
     def _give(self, lead: Lead, faces: Field, **attenuated: Any) -> None:

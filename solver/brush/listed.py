@@ -44,5 +44,5 @@ def draw_listed(
     texels[:, 1, :2] = vectors
     brushes = device.upload(in_rows(texels, A_ROW).reshape(-1, 2 * A_ROW, 4), "brushes")
     inputs |= {"brushes": brushes, "spacing": grid.spacing, "texels": target.size}
-    shader(target, add=True, vertices=6 * len(places), **inputs)
+    shader(target, add=True, triangles=(0, 6 * len(places)), **inputs)
     brushes.release()

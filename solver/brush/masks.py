@@ -109,7 +109,11 @@ class Masks:
         The sign of the strength does not count.
         """
         check_finite("a smoothing", strength)
-        left, top, width, height = self._region(tip)
+        for image in range(len(tip.paths)):
+            self._smooth(tip, image, min(abs(strength), 1.0))
+
+    def _smooth(self, tip: Tip, image: int, strength: float) -> None:
+        left, top, width, height = self._regions(tip)[image]
         if not (width and height):
             return
         side = max(3, round(SMOOTHED * tip.radius / self.canvas.h))
@@ -121,7 +125,7 @@ class Masks:
             self.device.pass_("brush/coarsen.frag")(means, mask=mask, **blocks)
             if name == "frozen" and not means.get().any():
                 continue  # to the map, what is no longer frozen and what never was must be the same
-            self._paint(name, tip, "brush/smooth.frag", "mix", means=means, strength=min(abs(strength), 1.0), **blocks)
+            self._paint(name, tip, "brush/smooth.frag", "mix", image, means=means, strength=strength, **blocks)
         means.release()
 
     def clear(self) -> None:
@@ -296,11 +300,15 @@ class Masks:
         if name in self._painted:
             self._painted[name].clear()
 
-    def _paint(self, name: str, tip: Tip, shader: str, blend: Blend, **inputs: Any) -> None:
-        region = self._region(tip)
-        if region[2] and region[3]:
-            inputs |= tip.inputs(self.canvas)
-            self.device.pass_(shader)(self._field(name), blend=blend, region=region, **inputs)
+    def _paint(self, name: str, tip: Tip, shader: str, blend: Blend, only: int | None = None, **inputs: Any) -> None:
+        regions = [
+            region
+            for image, region in enumerate(self._regions(tip))
+            if only in (None, image) and region[2] and region[3]
+        ]
+        if regions:
+            tip.draw(self.device.pass_(shader), self._field(name), self.canvas, only=only, blend=blend, **inputs)
+        for region in regions:
             self._note_change(name, region)
 
     def _note_change(self, name: str, region: Region) -> None:
@@ -308,13 +316,15 @@ class Masks:
         if name == "frozen":
             self._frozen_in = _around(region, self._frozen_in)
 
-    def _region(self, tip: Tip) -> Region:
-        """The texels of the canvas that a tip touches."""
+    def _regions(self, tip: Tip) -> list[Region]:
+        """The texels of the canvas that each image of a tip touches."""
         check_type("what paints", tip, Tip)
-        x, y, width, height = tip.region(self.canvas)
-        left, top = max(x, 0), max(y, 0)
-        right, bottom = min(x + width, self.canvas.nx), min(y + height, self.canvas.ny)
-        return left, top, max(right - left, 0), max(bottom - top, 0)
+        found = list[Region]()
+        for x, y, width, height in tip.regions(self.canvas):
+            left, top = max(x, 0), max(y, 0)
+            right, bottom = min(x + width, self.canvas.nx), min(y + height, self.canvas.ny)
+            found.append((left, top, max(right - left, 0), max(bottom - top, 0)))
+        return found
 
     def _cells_over(self, region: Region, grid: Grid) -> Region:
         """The cells over texels of the canvas."""

@@ -10,6 +10,7 @@ from solver.brush.tip import Point, Tip
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
+from solver.images import MOST_IMAGES, for_images
 from solver.limits import check_finite, check_step, check_type
 from solver.warp.map import WarpMap
 
@@ -111,34 +112,33 @@ class Push:
             check_finite(f"a push's {name}", getattr(self, name))
         if not 0 <= self.local <= 1:
             raise ValueError("the local part of a push must be from 0 to 1")
-        for speed in self.velocity:
-            check_finite("a push's speed", speed)
+        for velocity in self.velocities:
+            for speed in velocity:
+                check_finite("a push's speed", speed)
 
     @property
     def shader(self) -> str:
         return "brush/push.frag"
 
     @property
-    def velocity(self) -> Point:
-        """What it gives: against the drag at the whole speed, and no stronger than along it."""
-        (x0, y0), (x1, y1) = self.tip.start, self.tip.end
+    def velocities(self) -> list[Point]:
+        """What its images give: against the drag at the whole speed, and no stronger than along it."""
         speed = (self.slip if self.strength > 0 else -self.slip) / self.dt
-        return (x1 - x0) * speed, (y1 - y0) * speed
+        return [((end[0] - start[0]) * speed, (end[1] - start[1]) * speed) for start, end, _ in self.tip.paths]
 
     @property
-    def local_velocity(self) -> Point:
+    def local_velocities(self) -> list[Point]:
         """What of it carries the picture and not the fluid."""
-        u, v = self.velocity
         amount = self.local * abs(self.strength)
-        return amount * u, amount * v
+        return [(amount * u, amount * v) for u, v in self.velocities]
+
+    @property
+    def vectors(self) -> list[Point]:
+        """What of it moves the fluid, lengths / s."""
+        return [((1 - self.local) * u, (1 - self.local) * v) for u, v in self.velocities]
 
     def inputs(self) -> dict[str, Any]:
-        u, v = self.velocity
-        return {
-            "brush_velocity": ((1 - self.local) * u, (1 - self.local) * v),
-            "strength": abs(self.strength),
-            "hardness": HARDEST * min(max(self.tip.hardness, 0.0), 1.0),
-        }
+        return {"strength": abs(self.strength), "hardness": HARDEST * min(max(self.tip.hardness, 0.0), 1.0)}
 
 
 class Slip:
@@ -151,33 +151,41 @@ class Slip:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self.factor = device.field((1, 1), 1, "slip factor")
-        self.scaling = device.field((1, 1), 1, "scaling of the push")
-        self._around = device.field((AROUND, AROUND), 2, "displacement around the brush")
+        self.factor = device.field((MOST_IMAGES, 1), 1, "slip factor")
+        self.scaling = device.field((MOST_IMAGES, 1), 1, "scaling of the push")
+        self._around = device.field((AROUND, MOST_IMAGES * AROUND), 2, "displacement around the brush")
+        self._found: tuple[Push, WarpMap | None, int] | None = None  # what the factor was found for
 
     def find(self, push: Push, warp: WarpMap | None) -> None:
         """Set `factor` for a push on the picture of a map; without one it holds as firmly as it can."""
+        version = 0 if warp is None else warp.version
+        # A push leads, makes up and carries in one step, in which the map is the same.
+        if self._found is not None and self._found[0] is push and self._found[1:] == (warp, version):
+            return
+        self._found = push, warp, version
         if warp is None:
             self.factor.clear(1.0)
             return
         width, height = warp.extent
-        x, y = (min(max(at, 0.0), far) for at, far in zip(push.tip.start, warp.extent, strict=True))
+        places = [(min(max(start[0], 0.0), width), min(max(start[1], 0.0), height)) for start, _, _ in push.tip.paths]
         step = push.tip.radius / FINE
-        warp.probe(self._around, (x / width, y / height), (step / width, step / height))
+        warp.probe(self._around, [(x / width, y / height) for x, y in places], (step / width, step / height))
         self.device.pass_("brush/slip.frag")(
             self.factor,
+            region=(0, 0, len(places), 1),
             around=self._around,
-            brush_velocity=push.velocity,
+            velocities=for_images(push.velocities),
             radius=push.tip.radius,
             carried=(FIRM_CARRIED, LOOSEST_CARRIED),
             strain=(push.strain_limit * SLIPPING, push.strain_limit * HELD_OFF),
-            place=(x, y),
+            places=for_images(places),
             extent=warp.extent,
         )
 
     def restrain(self, push: Push, grid: Grid, **at_brush: Field) -> None:
         """Set `scaling`, after `factor`, for a push on a fluid: its velocity, impulse and motion at the brush."""
-        inputs = push.tip.inputs(grid) | push.inputs() | {"slip": self.factor, "most": MOST_ENERGY}
+        inputs = push.tip.shape(grid) | push.inputs() | {"slip": self.factor, "most": MOST_ENERGY}
+        inputs |= {"velocities": for_images(push.vectors), "region": (0, 0, len(push.tip.paths), 1)}
         self.device.pass_("brush/restrain.frag")(self.scaling, **at_brush, **inputs)
 
     def release(self) -> None:

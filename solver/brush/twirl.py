@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from solver.brush.tip import Tip
+from solver.brush.tip import Point, Tip
 from solver.limits import check_finite, check_type
 
 
@@ -28,5 +28,10 @@ class Twirl:
     def shader(self) -> str:
         return "brush/twirl.frag"
 
+    @property
+    def vectors(self) -> list[Point]:
+        """The rates of its images, of which mirrored ones turn the other way round."""
+        return [(-self.rate if mirrored else self.rate, 0.0) for _, _, mirrored in self.tip.paths]
+
     def inputs(self) -> dict[str, Any]:
-        return {"rate": self.rate}
+        return {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Literal
 
 import moderngl
@@ -10,14 +11,18 @@ import numpy as np
 
 from solver.gl.context import Context
 from solver.gl.field import Field, FieldError
-from solver.gl.program import ShaderError, assemble, compile_program, declared_reads
+from solver.gl.program import ShaderError, compile_program, declared_reads, program_sources
 
 GL_SAMPLERS = 0x8B5E, 0x8DD2  # sampler2D, usampler2D
 
 Target = Field | Sequence[Field]
 Region = tuple[int, int, int, int]
 """Texels: left, top, width, height."""
-Blend = Literal["add", "subtract", "mix"]
+Blend = Literal["add", "subtract", "mix", "over"]
+FACTORS = {
+    "mix": (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA),
+    "over": (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA),
+}
 
 
 class Pass:
@@ -35,7 +40,7 @@ class Pass:
         self.device = device
         self.shader = shader
         self.reads = declared_reads(shader)
-        self._source, _ = assemble(shader, defines)
+        self._source = "".join(program_sources(shader, defines)[:2])
         self.program = compile_program(device.ctx, shader, defines)
         self.program.label = shader
         self._vertices = device.ctx.vertex_array(self.program, [])
@@ -59,7 +64,7 @@ class Pass:
         add: bool = False,
         blend: Blend | None = None,
         region: Region | list[Region] | None = None,
-        vertices: int = 3,
+        triangles: tuple[int, int] | None = None,
         **inputs: object,
     ) -> None:
         """Draw into `target`.
@@ -68,9 +73,11 @@ class Pass:
             target: a field, or several fields of one size.
             add: the same as `blend="add"`.
             blend: what is done with what the target holds instead of replacing it: this is added to it, taken from it,
-                or takes its place by the part that is its alpha. Fields of 8 and 16 bits stay within 0-1.
+                takes its place by the part that is its alpha ("mix"), or so, multiplied by that already ("over").
+                Fields of 8 and 16 bits stay within 0-1.
             region: (x, y, width, height) in texels, or several of them, to draw only there; clipped to the target.
-            vertices: of the triangles, where the pass has a vertex shader of its own.
+            triangles: the first of their vertices and how many, where the pass has a vertex shader of its own. A region
+                then tells where they are, and cuts nothing off.
             inputs: the shader's uniforms without their `u_`.
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
@@ -84,48 +91,62 @@ class Pass:
         regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
         if not regions:
             return
-        ctx = device.ctx
         blend = "add" if add else blend
         if blend:
-            ctx.enable_only(moderngl.BLEND)
-            factors = (
-                (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA) if blend == "mix" else (moderngl.ONE, moderngl.ONE)
-            )
-            ctx.blend_func = factors
-            equation = moderngl.FUNC_REVERSE_SUBTRACT if blend == "subtract" else moderngl.FUNC_ADD
-            ctx.blend_equation = equation  # pyright: ignore[reportAttributeAccessIssue]
-        for part in regions:
-            if region is not None:
-                framebuffer.scissor = part
+            self._begin_blending(blend)
+        # What has vertices of its own is drawn at once, wherever it lies.
+        for parts in [[part] for part in regions] if triangles is None else [regions]:
+            if triangles is None and region is not None:
+                framebuffer.scissor = parts[0]
+            first, count = triangles or (0, 3)
             framebuffer.use()
-            self._vertices.render(moderngl.TRIANGLES, vertices)
-            device.timings.count(part[2] * part[3], self.reads)
-            for field in fields:
+            self._vertices.render(moderngl.TRIANGLES, count, first=first)
+            device.timings.count(sum(width * height for _, _, width, height in parts), self.reads)
+            for field, part in product(fields, parts):
                 field.drawn(part)
         if blend:
-            ctx.enable_only(moderngl.NOTHING)
-        if region is not None:
+            device.ctx.enable_only(moderngl.NOTHING)
+        if triangles is None and region is not None:
             framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]
         device.fences.hold()
 
-    def draw_into(self, framebuffer: moderngl.Framebuffer, smooth: Sequence[str] = (), **inputs: object) -> None:
+    def draw_into(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        smooth: Sequence[str] = (),
+        blend: Blend | None = None,
+        triangles: tuple[int, int] = (0, 3),
+        **inputs: object,
+    ) -> None:
         """Draw over the viewport of a framebuffer that is not a field's, such as the window's.
 
         Args:
             framebuffer: the target; its viewport says where.
             smooth: names of inputs that are read with linear filtering, whatever their textures say.
-            inputs: the shader's uniforms without their `u_`.
+            blend, triangles, inputs: as of a call.
         """
         self.device.use()
         self._bind(inputs)
         units = [self._units[name] for name in smooth if name in self._units]
         for unit in units:
             self.device.linear.use(unit)
+        if blend:
+            self._begin_blending(blend)
         framebuffer.use()
-        self._vertices.render(moderngl.TRIANGLES, vertices=3)
+        first, count = triangles
+        self._vertices.render(moderngl.TRIANGLES, count, first=first)
+        if blend:
+            self.device.ctx.enable_only(moderngl.NOTHING)
         self.device.fences.hold()
         for unit in units:
             self.device.linear.clear(unit)
+
+    def _begin_blending(self, blend: Blend) -> None:
+        ctx = self.device.ctx
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_func = FACTORS.get(blend, (moderngl.ONE, moderngl.ONE))
+        equation = moderngl.FUNC_REVERSE_SUBTRACT if blend == "subtract" else moderngl.FUNC_ADD
+        ctx.blend_equation = equation  # pyright: ignore[reportAttributeAccessIssue]
 
     def _bind(self, inputs: dict[str, object]) -> None:
         units, numbers, device = self._units, self._numbers, self.device

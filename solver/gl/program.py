@@ -11,6 +11,7 @@ import moderngl
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
 _READS = re.compile(r"^//\s*reads:\s*(\d+)", re.MULTILINE)
+_VERTICES = re.compile(r"^//\s*vertices:\s*(\S+)", re.MULTILINE)
 # Mesa: "0:12(5): error: ..."; NVIDIA: "0(12) : error ...".
 _LOG_LINE = re.compile(r"\b0(?::(\d+)\(\d+\)|\((\d+)\))")
 
@@ -30,11 +31,6 @@ def read_shader(path: str) -> str:
         return resources.files("shaders").joinpath(*PurePosixPath(path).parts).read_text("utf-8")
     except (FileNotFoundError, IsADirectoryError) as error:
         raise ShaderError(f"shaders/{path} does not exist") from error
-
-
-def shader_exists(path: str) -> bool:
-    """True if there is a `shaders/<path>`."""
-    return resources.files("shaders").joinpath(*PurePosixPath(path).parts).is_file()
 
 
 def _flatten(path: str, seen: set[str]) -> list[tuple[str, str, int]]:
@@ -65,6 +61,12 @@ def declared_reads(path: str) -> int:
     return int(match.group(1)) if match else 0
 
 
+def _vertices(fragment: str) -> str:
+    """The vertex shader of a fragment shader: that which its header names in a line `// vertices: FILE`."""
+    match = _VERTICES.search(read_shader(fragment))
+    return match.group(1) if match else FULL_SCREEN_VERTEX
+
+
 def _carried(vertex: str, fragment: str) -> tuple[str, str]:
     """Both shaders, the uniforms of the fragment shader handed over in flat varyings, up to four numbers in each.
 
@@ -83,7 +85,8 @@ def _carried(vertex: str, fragment: str) -> tuple[str, str]:
     if not places:
         return vertex, fragment
     varyings = f"flat {{}} vec4 {', '.join(f'v_uniforms_{slot}' for slot in range(len(filled)))};"
-    uniforms = " ".join(f"uniform {kind} {name};" for name, (kind, _) in places.items())
+    declared = [f"uniform {kind} {name};" for name, (kind, _) in places.items()]
+    uniforms = " ".join(line for line in declared if line not in vertex)
     handed_over = " ".join(f"{place} = {name};" for name, (_, place) in places.items())
     vertex = vertex.replace("void main() {", f"void main() {{ {handed_over}", 1)
     fragment = _UNIFORM.sub(lambda found: f"#define {found[2]} {places[found[2]][1]}", fragment)
@@ -95,17 +98,15 @@ def _carried(vertex: str, fragment: str) -> tuple[str, str]:
 
 def program_sources(fragment: str, defines: dict[str, object]) -> tuple[str, str, list[tuple[str, int]]]:
     """The GLSL of the vertex and of the fragment shader of a program, and where each line of the latter comes from."""
-    own = fragment.replace(".frag", ".vert")
-    vertex_source, _ = assemble(own if shader_exists(own) else FULL_SCREEN_VERTEX, {})
+    vertex_source, _ = assemble(_vertices(fragment), {})
     source, table = assemble(fragment, defines)
-    if not shader_exists(own):
-        vertex_source, source = _carried(vertex_source, source)
-        table = table[: source.count("\n") - len(table)] + table
+    vertex_source, source = _carried(vertex_source, source)
+    table = table[: source.count("\n") - len(table)] + table
     return vertex_source, source, table
 
 
 def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, object]) -> moderngl.Program:
-    """The program of a fragment shader: over the whole screen, or with the vertex shader of the same name beside it.
+    """The program of a fragment shader: over the whole screen, or with the vertex shader that its header names.
 
     Raises:
         ShaderError: if it does not compile; names the file and the line, includes resolved.

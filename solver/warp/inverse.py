@@ -61,7 +61,9 @@ class ForwardMap:
             self._guess.clear()
             cells = (self._guess.width + 1) * (self._guess.height + 1)
             scatter = warp.device.pass_("warp/scatter.frag")
-            scatter(self._guess, vertices=6 * cells, displacement=warp.composed(self._guess.size), extent=warp.extent)
+            scatter(
+                self._guess, triangles=(0, 6 * cells), displacement=warp.composed(self._guess.size), extent=warp.extent
+            )
             self._guessed = warp.version
         return {"displacement": warp.composed(exact=True), "guess": self._guess, "extent": warp.extent}
 

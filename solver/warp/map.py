@@ -18,6 +18,7 @@ from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.grid import Grid
+from solver.images import for_images
 from solver.limits import check_size, check_step, check_type, numbers, places, real_array
 from solver.state import State
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
@@ -460,11 +461,19 @@ class WarpMap:
         compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **defines_of(self._levels))
         compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
 
-    def probe(self, target: Field, place: tuple[float, float], step: tuple[float, float]) -> None:
-        """Draw the displacement around a place into a small field, its texels `step` apart, both 0-1 of the picture."""
-        origin = place[0] / step[0] - target.size[0] / 2, place[1] / step[1] - target.size[1] / 2
-        compose = self.device.pass_("warp/compose.frag", **self._defines())
-        compose(target, **self._parts(), origin=origin, step=step)
+    def probe(self, target: Field, places: list[tuple[float, float]], step: tuple[float, float]) -> None:
+        """Draw the displacement on a square lattice around each of some places, one below the other.
+
+        Args:
+            target: as wide as a lattice, with room for `MOST_IMAGES` of them.
+            places: their middles, 0-1 of the picture.
+            step: how far apart the texels are, 0-1 of the picture.
+        """
+        side = target.width
+        origins = [(x / step[0] - side / 2, y / step[1] - side / 2) for x, y in places]
+        compose = self.device.pass_("warp/compose.frag", LATTICES=side, **self._defines())
+        region = 0, 0, side, len(places) * side
+        compose(target, region=region, **self._parts(), origins=for_images(origins), step=step)
 
     def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
         """How the whole map distorts, looked at on a lattice of `size`; waits for the GPU.

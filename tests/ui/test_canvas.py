@@ -72,7 +72,7 @@ def golden(shared_device: Device) -> Iterator[Golden]:
         yield golden
 
 
-@pytest.mark.parametrize("name", ["grid", "viscosity", "frozen", "arrows", "forces", "selected"])
+@pytest.mark.parametrize("name", ["grid", "viscosity", "frozen", "room", "selected"])
 def test_overlays_are_drawn_as_it_is_written_down(device: Device, name: str, golden: Golden) -> None:
     """Over part of the picture, at two zooms."""
     rng, (y, x) = np.random.default_rng(4), np.mgrid[0:24, 0:32] / 32
@@ -86,21 +86,14 @@ def test_overlays_are_drawn_as_it_is_written_down(device: Device, name: str, gol
             "base": 0.02, "viscosity_opacity": 0.7, "contour": 1.5, **window,
         },
         "frozen": {"FROZEN": 1, "frozen": half, "frozen_opacity": 0.6, "hatch": 9.0},
-        "arrows": {
-            "ARROWS": 1, "velocity": 0.3 * waves, "arrow": 21.0, "speed": 0.4, "arrows_opacity": 0.8,
-            "arrow_colour": (1.0, 0.9, 0.8), **window,
-        },
-        "forces": {
-            "FORCES": 1, "force": waves, "room": waves[..., 0] * half[..., 0], "force_arrow": 25.0,
-            "forces_opacity": 0.7, "force_colour": (1.0, 0.8, 0.2),
-        },
+        "room": {"ROOM": 1, "room": waves[..., 0] * half[..., 0], "room_opacity": 0.7},
         "selected": {"SELECTED": 1, "selected": half, "dash": 7.0, "dash_width": 1.5},
     }  # fmt: skip
     inputs: dict[str, Any] = given[name]
     inputs = {key: device.upload(value) if isinstance(value, np.ndarray) else value for key, value in inputs.items()}
     defines = {key: value for key, value in inputs.items() if key.isupper()}
     draw, target = device.pass_("view/canvas.frag", EDGES=2, **defines), device.field((160, 120), 4)
-    smooth = ("displacement", "viscosity", "thickness", "frozen", "velocity", "force", "room")
+    smooth = ("displacement", "viscosity", "thickness", "frozen", "room")
     picture = device.upload(rng.uniform(0, 1, (24, 32, 4)))
     for zoom in (1.0, 2.3):
         target.clear()
@@ -117,3 +110,22 @@ def test_overlays_are_drawn_as_it_is_written_down(device: Device, name: str, gol
             **{key: value for key, value in inputs.items() if key not in defines},
         )
         golden.compare(f"{name} {zoom}", told(target.get()[..., :3]))
+
+
+@pytest.mark.parametrize("split", [None, 0.4])
+def test_arrows_are_drawn_as_it_is_written_down(device: Device, split: float | None, golden: Golden) -> None:
+    """Over part of the picture, on what is there: those of what does not flow are not to be seen."""
+    y, x = np.mgrid[0:24, 0:32] / 32
+    waves = np.stack([np.sin(7 * x + 3 * y), np.cos(5 * x - 6 * y)], axis=-1) * (x > 0.3)[..., None]
+    target = device.field((160, 120), 4)
+    target.clear(0.2, 0.5, 0.7, 1.0)
+    arrows = device.pass_("view/arrows.frag", **({} if split is None else {"SPLIT": 1}))
+    inputs: dict[str, Any] = {"field": device.upload(0.3 * waves), "window": (0.1, 0.2, 0.7, 0.6), "most": 0.4}
+    inputs |= {"side": 21.0, "first": (-1.0, -1.0), "across": 9.0, "viewport": (0.0, 0.0, 160.0, 120.0)}
+    inputs |= {"origin": (-20.0, 13.0), "step": (1 / 150, 1 / 112), "target_height": 120.0}
+    inputs |= {"colour": (1.0, 0.9, 0.8), "opacity": 0.8} | ({} if split is None else {"split": split})
+    arrows.draw_into(target.framebuffer, ("field",), "over", (0, 6 * 9 * 7), **inputs)
+    found = target.get()
+    np.testing.assert_allclose(found[..., 3], 1.0, atol=1e-6)
+    assert (found[:, :10, 0] == np.float32(0.2)).all()
+    golden.compare(f"arrows {split}", told(found[..., :3]))

@@ -1,2 +1,0 @@
-// Handle carry: see handle_carry.frag.
-#include "lib/listed.vert"

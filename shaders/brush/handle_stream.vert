@@ -1,2 +1,0 @@
-// Handle stream: see handle_stream.frag.
-#include "lib/listed.vert"
