@@ -59,6 +59,7 @@ class Canvas:
         self._still = device.field((1, 1), 2, "no displacement")
         self._fields = FieldPool(device, "canvas")
         self._drawn: object = None  # what the displacement was found for
+        self._masks_drawn: object = None  # and what is laid over it for the masks
         # The warp as it was last seen, shown on while it is made again on another grid.
         self._last: tuple[Field, tuple[float, ...]] | None = None
         self._selected: Field | None = None
@@ -111,7 +112,6 @@ class Canvas:
             "origin": (rect.x * density, rect.y * density),
             "step": (1 / (rect.width * density), 1 / (rect.height * density)),
             "extent": session.extent,
-            "window": _window_of(session.replay.fluid.grid),
             "target_height": float(height),
         }
         if state.before or state.split is not None:
@@ -121,6 +121,9 @@ class Canvas:
             defines["CHECKER"] = 1
             inputs |= {"light": palette.checker[1][:3], "dark": palette.checker[0][:3], "tile": 8.0 * scale * density}
         self._add_overlays(defines, inputs, session, state, scale * density)
+        if not state.before and (masks := self._masks(session, state, seen, inputs, scale * density)):
+            defines["MASKS"] = 1
+            inputs |= {"masks": masks, "masks_corner": (float(seen[0]), float(height - seen[3]))}
         forces, velocity = state.overlays["forces"], state.overlays["velocity"]
         arrows: list[dict[str, Any]] = []
         if forces.shown and not state.before and replay.forces:
@@ -135,7 +138,7 @@ class Canvas:
         before = target.viewport
         target.viewport = _from_below(seen, height)
         draw = self.device.pass_("view/canvas.frag", **defines)
-        draw.draw_into(target, ("displacement", "viscosity", "thickness", "frozen", "room"), **inputs)
+        draw.draw_into(target, ("displacement", "room"), **inputs)
         shared = {name: inputs[name] for name in ("origin", "step", "target_height", "split") if name in inputs}
         for each in arrows:
             self._draw_arrows(target, seen, **shared, **each)
@@ -153,7 +156,7 @@ class Canvas:
         inputs |= {"origin": origin, "side": side, "first": (float(left), float(top)), "across": float(right - left)}
         count = (right - left) * (bottom - top)
         viewport = tuple(float(edge) for edge in target.viewport)
-        arrows.draw_into(target, ("field",), "over", (0, 6 * count), viewport=viewport, **inputs)
+        arrows.draw_into(target, ("field",), blend="over", triangles=(0, 6 * count), viewport=viewport, **inputs)
 
     def _draw_small(self, target: moderngl.Framebuffer, session: Session) -> None:
         """Draw all of the picture as it is now into a small framebuffer, with nothing laid over it."""
@@ -174,7 +177,6 @@ class Canvas:
             origin=(0.0, 0.0),
             step=(1 / width, 1 / height),
             extent=session.extent,
-            window=WHOLE,
             target_height=float(height),
         )
 
@@ -246,6 +248,34 @@ class Canvas:
         self._last = field, shown
         return self._last
 
+    def _masks(
+        self, session: Session, state: EditorState, seen: Pixels, inputs: dict[str, Any], scale: float
+    ) -> Field | None:
+        """What is laid over the pixels that are `seen` for the masks that are shown, drawn where they have changed."""
+        replay, shown = session.replay, state.overlays
+        masks, numbers, fields = replay.masks, dict[str, Any](), dict[str, Field]()
+        (left, top, right, bottom), height = seen, inputs["target_height"]
+        if state.shows_viscosity:
+            fields |= {"viscosity": masks.base_viscosity, "thickness": masks.thickness}
+            numbers |= {"viscosity_opacity": shown["viscosity"].opacity, "contour": scale}
+            numbers |= {"base": max(replay.settings.viscosity, 1e-6), "window": _window_of(replay.fluid.grid)}
+        if shown["frozen"].shown or state.edits_mask("frozen", "freeze", "smooth"):
+            fields["frozen"] = masks.frozen
+            numbers |= {"frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
+            numbers["first"] = float(left + height - bottom)  # the stripes stay where they are on the screen
+        if not fields:
+            return None
+        numbers |= {"origin": (inputs["origin"][0] - left, inputs["origin"][1] - top), "step": inputs["step"]}
+        numbers |= {"target_height": float(bottom - top)}
+        layer = self._fields.get("masks", (right - left, bottom - top), 4, "f1")
+        if (drawn := (layer, masks, masks.version, numbers)) != self._masks_drawn:
+            defines = {name.upper(): 1 for name in ("viscosity", "frozen") if name in fields}
+            self.device.pass_("view/masks.frag", **defines).draw_into(
+                layer.framebuffer, tuple(fields), **fields, **numbers
+            )
+            self._masks_drawn = drawn
+        return layer
+
     def _selection(self, area: np.ndarray) -> Field:
         """What is selected, uploaded where it is another."""
         if area is not self._selected_area:
@@ -276,18 +306,10 @@ class Canvas:
     ) -> None:
         if state.before:
             return
-        replay, shown = session.replay, state.overlays
+        shown = state.overlays
         if shown["grid"].shown:
             defines["GRID"] = 1
             inputs |= {"grid": GRID_LINES, "grid_opacity": shown["grid"].opacity, "pixel": scale}
-        if state.shows_viscosity:
-            defines["VISCOSITY"] = 1
-            base = max(session.replay.settings.viscosity, 1e-6)
-            inputs |= {"viscosity": replay.masks.base_viscosity, "thickness": replay.masks.thickness, "base": base}
-            inputs |= {"viscosity_opacity": shown["viscosity"].opacity, "contour": scale}
-        if shown["frozen"].shown or state.edits_mask("frozen", "freeze", "smooth"):
-            defines["FROZEN"] = 1
-            inputs |= {"frozen": replay.masks.frozen, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
         if state.tool_name == "select" and state.selected_area is not None:
             defines["SELECTED"] = 1
             inputs |= {"selected": self._selection(state.selected_area), "dash": 8.0 * scale, "dash_width": scale}

@@ -13,15 +13,12 @@ uniform vec3 u_colour;
 uniform float u_split;
 #endif
 flat in vec2 v_tile;
-flat in vec2 v_arrow;
+flat in vec3 v_arrow;
 layout(location = 0) out vec4 out_colour;
 
-// Coverage of an arrow along v (of length 0-1) in a square from -1 to 1, whose pixel is `soft` wide.
-float arrow(vec2 p, vec2 v, float soft) {
-    float size = length(v);
+// Coverage of an arrow of length 0-1 at q, along and beside it, in a square from -1 to 1, whose pixel is `soft` wide.
+float arrow(vec2 q, float size, float soft) {
     if (size < 0.1) return 0.0;
-    vec2 along = v / size;
-    vec2 q = vec2(dot(p, along), abs(p.y * along.x - p.x * along.y));
     float reach = 0.9 * min(size, 1.0), head = min(0.5, reach);
     float shaft = max(q.y - 0.07, max(-reach - q.x, q.x - reach + head));
     float tip = max(0.5 * (q.x - reach) + q.y, reach - head - q.x);
@@ -34,7 +31,9 @@ void main() {
     if (pixel.x * u_step.x < u_split) discard;
 #endif
     vec2 p = (pixel - v_tile) / (0.5 * u_side);
+    vec2 q = vec2(dot(p, v_arrow.xy), abs(p.y * v_arrow.x - p.x * v_arrow.y));
     float soft = 2.0 / u_side;
-    float shade = u_opacity * 0.6 * arrow(p * 0.9, v_arrow * 1.12, 2.0 * soft), light = u_opacity * arrow(p, v_arrow, soft);
+    float shade = u_opacity * 0.6 * arrow(0.9 * q, 1.12 * v_arrow.z, 2.0 * soft);
+    float light = u_opacity * arrow(q, v_arrow.z, soft);
     out_colour = vec4(light * u_colour, 1.0 - (1.0 - shade) * (1.0 - light));
 }

@@ -5,13 +5,11 @@
 // 1 black, 2 as at its edge (the sampler clamps), 3 mirrored, 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
 // square of the checkerboard, pixels.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
-// GRID: lines of the picture's own coordinates, u_grid of them along the longer side. VISCOSITY: tint of decades over
-// u_base, u_viscosity of the recipe's and u_thickness painted, and contour lines of whole ones, u_contour pixels wide.
-// FROZEN: hatch where u_frozen is 1/2 or more. ROOM: a tint where u_room, over the picture, swells or shrinks.
+// GRID: lines of the picture's own coordinates, u_grid of them along the longer side. MASKS: u_masks, what masks.frag draws,
+// its first pixel at u_masks_corner. ROOM: a tint where u_room, over the picture, swells or shrinks.
 // SELECTED: dashes of half u_dash pixels along the edge of where u_selected is 1/2 or more, u_dash_width pixels wide to each side.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
 // reads: 2, and up to 13 with overlays
-#include "lib/decades.glsl"
 #ifndef EDGES
 #define EDGES 2
 #endif
@@ -21,7 +19,6 @@ uniform vec2 u_origin;
 uniform vec2 u_step;
 uniform vec4 u_shown;
 uniform vec2 u_extent;
-uniform vec4 u_window; // where the flow is solved: left, top, width and height, 0-1 of the picture
 #ifdef SPLIT
 uniform float u_split;
 #endif
@@ -36,17 +33,9 @@ uniform float u_grid;
 uniform float u_grid_opacity;
 uniform float u_pixel;
 #endif
-#ifdef VISCOSITY
-uniform sampler2D u_viscosity;
-uniform sampler2D u_thickness;
-uniform float u_base;
-uniform float u_viscosity_opacity;
-uniform float u_contour;
-#endif
-#ifdef FROZEN
-uniform sampler2D u_frozen;
-uniform float u_frozen_opacity;
-uniform float u_hatch;
+#ifdef MASKS
+uniform sampler2D u_masks;
+uniform vec2 u_masks_corner;
 #endif
 #ifdef SELECTED
 uniform sampler2D u_selected;
@@ -100,26 +89,9 @@ void main() {
 #endif
     vec3 seen = colour.rgb;
     if (warped) {
-#ifdef VISCOSITY
-        vec2 cell = (x - u_window.xy) / u_window.zw;
-        float thicker = inside(cell) * log(max(texture(u_viscosity, cell).r, 1e-6) / u_base) * 0.4342945
-                      + decades(texture(u_thickness, x).r);
-        vec3 tint = thicker > 0.0 ? vec3(0.80, 0.30, 0.62) : vec3(0.34, 0.71, 0.91);
-        seen = mix(seen, tint, u_viscosity_opacity * clamp(abs(thicker) * 0.28, 0.0, 0.75));
-        // Where it is the same all around there is no line, whatever it is.
-        float steep = fwidth(thicker), off = abs(fract(thicker - 0.5) - 0.5);
-        if (steep > 2e-4 && abs(thicker) > 0.5) {
-            float far = off / (steep * u_contour);
-            seen = mix(seen, vec3(0.0), u_viscosity_opacity * 0.4 * (1.0 - smoothstep(0.8, 1.8, far)));
-            seen = mix(seen, vec3(1.0), u_viscosity_opacity * (1.0 - smoothstep(0.3, 0.9, far)));
-        }
-#endif
-#ifdef FROZEN
-        // One pixel wide at the edge, whether the mask's texels are smaller or larger than that.
-        float inside = texture(u_frozen, x).r - 0.5, frozen = clamp(inside / max(fwidth(inside), 1e-3) + 0.5, 0.0, 1.0);
-        float stripe = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / u_hatch) - 0.5) * 2.0;
-        vec3 ice = mix(vec3(0.0, 0.45, 0.70), vec3(0.80, 0.93, 1.0), smoothstep(0.60, 0.75, stripe));
-        seen = mix(seen, ice, u_frozen_opacity * frozen * 0.72);
+#ifdef MASKS
+        vec4 masks = texelFetch(u_masks, ivec2(gl_FragCoord.xy - u_masks_corner), 0);
+        seen = (1.0 - masks.a) * seen + masks.rgb;
 #endif
 #ifdef GRID
         vec2 lines = place * u_extent * u_grid;

@@ -15,8 +15,8 @@ from solver.brush.twirl import Twirl
 from solver.faces import check_field
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.images import MOST_IMAGES, for_images
 from solver.gl.reduction import Reduction
-from solver.images import MOST_IMAGES, for_images
 from solver.limits import check_finite, check_type
 from solver.scheme import Scheme
 from solver.warp.map import WarpMap

@@ -38,12 +38,16 @@ class Masks:
     Args:
         device: where they live.
         canvas: the texels they are painted on, over the whole picture; see `map_size`.
+
+    Attributes:
+        version: grows where `apply` finds that something has changed.
     """
 
     def __init__(self, device: Device, canvas: Grid) -> None:
         check_type("what masks are painted on", canvas, Grid)
         self.device = device
         self.canvas = canvas
+        self.version = 0
         self._kinds = {
             "thickness": Kind(canvas.size, 1, "nu2", TILE),
             "frozen": Kind(canvas.size, 1, "f1", TILE),
@@ -189,6 +193,7 @@ class Masks:
             self._changed = dict.fromkeys(self._painted, (0, 0, *self.canvas.size))
         elif not self._changed:
             return
+        self.version += 1
         cells: dict[str, Any] = {
             "origin": tuple(a / b for a, b in zip(grid.origin, grid.picture, strict=True)),
             "cell": tuple(a / b for a, b in zip(grid.spacing, grid.picture, strict=True)),

@@ -9,8 +9,8 @@ from typing import Any
 from solver.brush.tip import Point, Tip
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.images import MOST_IMAGES, for_images
 from solver.grid import Grid
-from solver.images import MOST_IMAGES, for_images
 from solver.limits import check_finite, check_step, check_type
 from solver.warp.map import WarpMap
 

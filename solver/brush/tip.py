@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.gl.field import Field
+from solver.gl.images import MOST_IMAGES, for_images
 from solver.gl.passes import Pass, Region
 from solver.grid import Grid
-from solver.images import MOST_IMAGES, for_images
 from solver.limits import check_type
 
 Point = tuple[float, float]

@@ -15,10 +15,10 @@ from solver.faces import Vector, check_field, on_faces
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.images import for_images
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.grid import Grid
-from solver.images import for_images
 from solver.limits import check_size, check_step, check_type, numbers, places, real_array
 from solver.state import State
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap

@@ -251,6 +251,11 @@ def test_a_push_slips_by_the_path_that_the_picture_has_come_with_it(device: Devi
     assert slip.factor.get()[0, 0] == pytest.approx(wanted, abs=1e-3)
     slip.find(Push(Tip((0.5, 0.3), (0.49, 0.3), 0.1), 1 / 60), warp)
     assert slip.factor.get()[0, 0] == pytest.approx(1.0, abs=1e-3)
+    push = Push(Tip((0.5, 0.3), (0.51, 0.3), 0.1), 1 / 60)
+    slip.find(push, warp)
+    warp.reset()
+    slip.find(push, warp)
+    assert slip.factor.get()[0, 0] == pytest.approx(1.0, abs=1e-3)
     slip.release()
     warp.release()
 

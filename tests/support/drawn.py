@@ -39,10 +39,11 @@ class Drawn:
             tooltip(ui, title, key, more, at_once)
 
         def drawing(self_: Pass, framebuffer: Any, smooth: Any = (), **inputs: Any) -> None:
-            if self_.shader == "view/canvas.frag":
+            if self_.shader.startswith("view/"):
+                what = self_.shader.removeprefix("view/").removesuffix(".frag")
                 numbers = {name: value for name, value in inputs.items() if isinstance(value, (float, tuple))}
-                self.lines += [f"canvas {name} {_told(value, 4)}" for name, value in numbers.items()]
-                self.lines.append(f"canvas | {sorted(inputs)}")
+                self.lines += [f"{what} {name} {_told(value, 4)}" for name, value in numbers.items()]
+                self.lines.append(f"{what} | {sorted(inputs)}")
             draw_into(self_, framebuffer, smooth, **inputs)
 
         monkeypatch.setattr(Ui, "tooltip", told)

@@ -72,20 +72,14 @@ def golden(shared_device: Device) -> Iterator[Golden]:
         yield golden
 
 
-@pytest.mark.parametrize("name", ["grid", "viscosity", "frozen", "room", "selected"])
+@pytest.mark.parametrize("name", ["grid", "room", "selected"])
 def test_overlays_are_drawn_as_it_is_written_down(device: Device, name: str, golden: Golden) -> None:
     """Over part of the picture, at two zooms."""
     rng, (y, x) = np.random.default_rng(4), np.mgrid[0:24, 0:32] / 32
-    window = {"window": (0.1, 0.2, 0.7, 0.6)}
     waves = np.stack([np.sin(7 * x + 3 * y), np.cos(5 * x - 6 * y)], axis=-1)
     half = (waves[..., :1] > 0.3).astype(np.float32)
     given: dict[str, dict[str, Any]] = {
         "grid": {"GRID": 1, "grid": 12.0, "grid_opacity": 0.8, "pixel": 1.5},
-        "viscosity": {
-            "VISCOSITY": 1, "viscosity": 10 ** (waves[..., 0] - 2), "thickness": 0.375 + 0.2 * waves[..., 1],
-            "base": 0.02, "viscosity_opacity": 0.7, "contour": 1.5, **window,
-        },
-        "frozen": {"FROZEN": 1, "frozen": half, "frozen_opacity": 0.6, "hatch": 9.0},
         "room": {"ROOM": 1, "room": waves[..., 0] * half[..., 0], "room_opacity": 0.7},
         "selected": {"SELECTED": 1, "selected": half, "dash": 7.0, "dash_width": 1.5},
     }  # fmt: skip
@@ -93,13 +87,12 @@ def test_overlays_are_drawn_as_it_is_written_down(device: Device, name: str, gol
     inputs = {key: device.upload(value) if isinstance(value, np.ndarray) else value for key, value in inputs.items()}
     defines = {key: value for key, value in inputs.items() if key.isupper()}
     draw, target = device.pass_("view/canvas.frag", EDGES=2, **defines), device.field((160, 120), 4)
-    smooth = ("displacement", "viscosity", "thickness", "frozen", "room")
     picture = device.upload(rng.uniform(0, 1, (24, 32, 4)))
     for zoom in (1.0, 2.3):
         target.clear()
         draw.draw_into(
             target.framebuffer,
-            smooth,
+            ("displacement", "room"),
             picture=picture,
             displacement=device.upload(0.05 * waves),
             shown=(0.0, 0.0, 1.0, 1.0),
@@ -129,3 +122,32 @@ def test_arrows_are_drawn_as_it_is_written_down(device: Device, split: float | N
     np.testing.assert_allclose(found[..., 3], 1.0, atol=1e-6)
     assert (found[:, :10, 0] == np.float32(0.2)).all()
     golden.compare(f"arrows {split}", told(found[..., :3]))
+
+
+@pytest.mark.parametrize("name", ["viscosity", "frozen"])
+def test_masks_are_drawn_as_it_is_written_down(device: Device, name: str, golden: Golden) -> None:
+    """Over part of the picture, at two zooms, premultiplied."""
+    y, x = np.mgrid[0:24, 0:32] / 32
+    waves = np.stack([np.sin(7 * x + 3 * y), np.cos(5 * x - 6 * y)], axis=-1)
+    given: dict[str, dict[str, Any]] = {
+        "viscosity": {
+            "viscosity": device.upload(10 ** (waves[..., 0] - 2)), "base": 0.02, "contour": 1.5,
+            "thickness": device.upload(0.375 + 0.2 * waves[..., 1]), "window": (0.1, 0.2, 0.7, 0.6),
+            "viscosity_opacity": 0.7,
+        },
+        "frozen": {"frozen": device.upload(waves[..., 0] > 0.3), "frozen_opacity": 0.6, "hatch": 9.0, "first": 4.0},
+    }  # fmt: skip
+    masks, target = device.pass_("view/masks.frag", **{name.upper(): 1}), device.field((160, 120), 4)
+    for zoom in (1.0, 2.3):
+        place = {"origin": (-20.0, 13.0), "step": (1 / (150 * zoom), 1 / (112 * zoom)), "target_height": 120.0}
+        masks.draw_into(target.framebuffer, ("viscosity", "thickness", "frozen"), **place, **given[name])
+        found = target.get()
+        assert (found[..., :3] <= found[..., 3:] + 1e-6).all()
+        golden.compare(f"{name} {zoom}", told(found))
+
+
+def test_masks_lie_over_the_picture_by_their_part(device: Device, picture: np.ndarray) -> None:
+    masks = np.random.default_rng(5).uniform(0, 0.5, (SIDE, SIDE, 4)).astype(np.float32)
+    found = drawn(device, picture, MASKS=1, masks=device.upload(masks), masks_corner=(0.0, 0.0))
+    over = masks[::-1]
+    np.testing.assert_allclose(found, (1 - over[..., 3:]) * picture[..., :3] + over[..., :3], atol=1e-6)

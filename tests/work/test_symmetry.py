@@ -10,7 +10,11 @@ from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Stroke, Symmetry, ToolName
 from app.work.replay import Replay
+from solver.brush.brush import Brush
+from solver.brush.tip import Path, Tip
+from solver.fluid import Fluid
 from solver.gl.device import Device
+from solver.grid import Grid
 
 SQUARE = Picture(np.zeros((96, 96, 3), np.uint8))
 
@@ -58,3 +62,49 @@ def test_as_many_images_as_sectors(sectors: int) -> None:
     far = [np.hypot(dab.x0 - 0.5, 0.75 * (dab.y0 - 0.5)) for dab in images]
     assert np.ptp(far) < 1e-12
     assert images[0][:2] == (0.3, 0.4)
+
+
+@pytest.mark.parametrize("sectors", [2, 8, 16])
+def test_images_that_overlap_leave_no_trace_of_their_order(device: Device, sectors: int) -> None:
+    """Around the middle all overlap: what they do there is still the same after half a turn, and no stronger."""
+    brush, grid, dt = Brush(device), Grid(64, 64), 1 / 30
+    angles = 2 * np.pi * np.arange(sectors) / sectors
+    turned = [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
+    ends = [0.5 + np.array([(0.03, 0.0), (0.03, 0.01)]) @ turn.T for turn in turned]
+    (start, end, _), *others = (Path((a[0], a[1]), (b[0], b[1])) for a, b in map(np.ndarray.tolist, ends))
+
+    def pushed(*others: Path) -> np.ndarray:
+        fluid = Fluid(device, grid)
+        brush.push(fluid, Tip(start, end, 0.2, others=others), dt)
+        found = fluid.impulse.field.get()
+        fluid.release()
+        return found
+
+    alone, together = pushed(), pushed(*others)
+    u, v = together[..., 0], together[..., 1]
+    np.testing.assert_allclose(u[:, 1:], -u[::-1, :0:-1], atol=1e-5)  # half a turn
+    np.testing.assert_allclose(v[1:], -v[:0:-1, ::-1], atol=1e-5)
+    assert 0 < np.abs(together).max() <= 1.01 * np.abs(alone).max()
+    brush.release()
+
+
+def test_images_side_by_side_push_as_one_would(device: Device) -> None:
+    """A stroke along the axis of a mirror: its image is the same stroke once more."""
+    brush, fluids = Brush(device), [Fluid(device, Grid(48, 48)) for _ in range(2)]
+    path = Path((0.5, 0.4), (0.5, 0.43), True)
+    for fluid, others in zip(fluids, ((), (path,)), strict=True):
+        brush.push(fluid, Tip(*path[:2], 0.1, others=others), 1 / 30)
+    alone, twice = (fluid.impulse.field.get() for fluid in fluids)
+    assert np.abs(alone).max() > 0.5
+    np.testing.assert_allclose(twice, alone, atol=1e-5)
+    for item in (brush, *fluids):
+        item.release()
+
+
+def test_all_images_are_drawn_at_once(device: Device) -> None:
+    def passes(symmetry: Symmetry) -> int:
+        device.timings.take()
+        displacement(device, "push", symmetry, 16)
+        return device.timings.passes["brush"]
+
+    assert passes("radial") == passes("none")
