@@ -7,6 +7,9 @@ milliseconds do not; processor time counts what all threads of this process have
 
 With `--handles`, the last of so many handles is dragged in place of the stroke; the others have arrived and stay led.
 
+With `--full`, what is to stay at 30 frames a second on two cores: a clip of 1280 x 720, a frozen place, a thick one, a
+radial symmetry of 8, and every overlay.
+
 With `--window`, the real one under Xvfb, dragged about by xdotool: from the start of the process to its first frame,
 the load of ten seconds at rest, and the time between two frames while painting.
 """
@@ -27,6 +30,7 @@ from itertools import pairwise, product
 from math import cos, sin
 from pathlib import Path
 
+import imageio_ffmpeg
 from bench_step import Jacobi
 from rich.console import Console
 from rich.table import Table
@@ -40,6 +44,8 @@ ROOT = Path(__file__).parent.parent.parent
 MOVES = 60
 REST = 10.0  # seconds
 STAGES = ("brush", "advect", "diffuse", "project", "warp map")
+OVERLAYS = ("1", "2", "3", "4", "5")  # their keys
+MASKED = {"f": (0.2, 0.7), "v": (0.7, 0.7)}  # by the key of a tool, where it is used before painting
 PARTS = ("simulate", "canvas", "panels", "interface")
 
 
@@ -58,6 +64,14 @@ class Waiting(Clock):
         yield
         self.device.ctx.finish()
         self.spent[name] += (time.perf_counter() - start) * 1e3
+
+
+def clip(folder: Path) -> Path:
+    """Ten seconds of 1280 x 720."""
+    path = folder / "clip.mp4"
+    source = ["-f", "lavfi", "-i", "testsrc2=size=1280x720:rate=30:duration=10", "-pix_fmt", "yuv420p"]
+    subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", *source, path], check=True)
+    return path
 
 
 def handles(count: int) -> list[tuple[int, int]]:
@@ -82,6 +96,11 @@ def stroke(offscreen: OffscreenEditor, each: Callable[[Callable[[], None]], None
 def frames(device: Device, cells: int, options: argparse.Namespace, table: Table) -> None:
     """The rows of one grid."""
     offscreen, rounds = OffscreenEditor(device, grid=cells, file=options.open), options.rounds
+    if options.full:
+        for tool, (x, y) in MASKED.items():
+            offscreen.key(tool)
+            offscreen.stroke(line((x, y), (x + 0.05, y)), 8)
+        offscreen.key("p")
     for key in options.keys:
         offscreen.key(key)
     for _ in range(options.zoom):
@@ -167,7 +186,7 @@ def frames(device: Device, cells: int, options: argparse.Namespace, table: Table
 
 # Runs in the editor's process: tells when each frame was shown, and the grid then.
 CHILD = """
-import sys, time, glfw
+import os, sys, time, glfw
 from app.cli import main
 from app.ui.editor import Editor
 editors = []
@@ -175,6 +194,8 @@ made, shown = Editor.__init__, glfw.swap_buffers
 def make(editor, *args, **more):
     editors.append(editor)
     made(editor, *args, **more)
+    if sectors := int(os.environ["SECTORS"]):
+        editor.state.symmetry, editor.state.sectors = "radial", sectors
 def swap(window):
     shown(window)
     print(f"{time.time():.6f} {editors[0].session.recipe.fluid.grid} {editors[0].session.replay.steps}", flush=True)
@@ -200,8 +221,9 @@ def processor_time(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def window(console: Console, rounds: int, file: Path | None, keys: list[str], zoom: int, count: int) -> None:
-    """The real window's figures; with a file, keys, turns of the wheel and a count of handles, if any."""
+def window(console: Console, options: argparse.Namespace) -> None:
+    """The real window's figures; with a file, keys, turns of the wheel, sectors and a count of handles, if any."""
+    rounds, file, keys, zoom, count = options.rounds, options.open, options.keys, options.zoom, options.handles
     screen = subprocess.Popen(
         ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp"],
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
@@ -212,6 +234,7 @@ def window(console: Console, rounds: int, file: Path | None, keys: list[str], zo
         with tempfile.TemporaryDirectory() as folder:
             env = {**os.environ, "DISPLAY": display, "XDG_CONFIG_HOME": folder, "HOME": folder}
             env.pop("WAYLAND_DISPLAY", None)
+            env["SECTORS"] = str(options.sectors)
             command = [sys.executable, "-c", CHILD, *([str(file.resolve())] if file else [])]
             starts = []
             for number in range(rounds):
@@ -239,6 +262,32 @@ def window(console: Console, rounds: int, file: Path | None, keys: list[str], zo
                 there = "mousemove", f"{x + 14}", f"{y + 8}"
                 prepare += ["mousemove", f"{x}", f"{y}", "mousedown", "1", "sleep", "0.2", *there, "sleep", "0.2"]
                 prepare += ["mouseup", "1", "sleep", "2"]
+            for tool, (x, y) in MASKED.items() if options.full else ():
+                prepare += [
+                    "key",
+                    "--delay",
+                    "200",
+                    tool,
+                    "sleep",
+                    "0.5",
+                    "mousemove",
+                    f"{300 + 400 * x:.0f}",
+                    f"{200 + 300 * y:.0f}",
+                ]
+                prepare += [
+                    "mousedown",
+                    "1",
+                    "sleep",
+                    "0.3",
+                    "mousemove_relative",
+                    "20",
+                    "0",
+                    "sleep",
+                    "0.3",
+                    "mouseup",
+                    "1",
+                ]
+                prepare += ["sleep", "1", "key", "--delay", "200", "p", "sleep", "0.5"]
             subprocess.run(["xdotool", *prepare], env=env, check=True)
             time.sleep(1)
             drag(env, 3.0)  # whatever has to be compiled
@@ -276,11 +325,20 @@ def main() -> None:
     parser.add_argument("--keys", nargs="*", default=[], help="pressed before painting, as xdotool calls them")
     parser.add_argument("--zoom", type=int, default=0, help="turns of the wheel before painting")
     parser.add_argument("--handles", type=int, default=0, help="to 16; the last is dragged instead of painting")
-    parser.add_argument("--sectors", type=int, default=0, help="of radial symmetry, 2 to 16; not with --window")
+    parser.add_argument("--sectors", type=int, default=0, help="of radial symmetry, 2 to 16")
+    parser.add_argument("--full", action="store_true", help="a clip, masks, symmetry and all overlays")
     args = parser.parse_args()
     console = Console(width=150)
+    with tempfile.TemporaryDirectory() as folder:
+        if args.full:
+            args.open, args.sectors, args.keys = clip(Path(folder)), 8, [*OVERLAYS, *args.keys]
+        measure(console, args)
+
+
+def measure(console: Console, args: argparse.Namespace) -> None:
+    """Print what was asked for."""
     if args.window:
-        window(console, args.rounds, args.open, args.keys, args.zoom, args.handles)
+        window(console, args)
         return
     with Device.headless() as device:
         table = Table(title=f"{device.limits.renderer}, {os.cpu_count()} cores")
