@@ -233,6 +233,23 @@ def test_numbers_have_an_upper_bound_which_is_allowed(text: str, most: float):
     assert float(told[1]) == most
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[time]\nstart = 1\nend = 1",
+        HANDLE + "start = 1\nend = 1",
+        HANDLE + "duration = 1\nkeys = [[1, 0, 0], [1, 0.5, 0.5]]",
+        2 * "[[change]]\ntick = 3\nviscosity = 1\n",
+        2 * "[[mask]]\nkind = 'invert'\nof = 'frozen'\ntick = 3\n",
+        STROKE + "repeat = 2\nevery = 9999999",
+        "[[stroke]]\ntool = 'curve'\nsamples = [[3, 0, 0, 1], [3, 1, 1, 1]]",
+        64 * HANDLE,
+    ],
+)
+def test_what_must_not_go_beyond_another_may_be_the_same(text: str):
+    Recipe.parse(text)
+
+
 def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
     """As Windows' Notepad sets it."""
     (tmp_path / "a.toml").write_text("duration = 2.0\n", "utf-8-sig")
