@@ -98,6 +98,7 @@ samples = [[0, 0.1, 0.30000000000000004, 1], [4, 0.2, 0.3, 0.5]]
 def test_round_trip_loses_nothing():
     recipe = Recipe.parse(FULL)
     assert Recipe.parse(recipe.text()) == recipe
+    assert Recipe.parse(recipe.text()).agrees_until(recipe) == float("inf")
     assert recipe.stroke[0].samples[0][2] == 0.30000000000000004
 
 
