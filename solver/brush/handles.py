@@ -117,7 +117,7 @@ class Handles:
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
         self._thickest = fluid.device.field(self._stream.size, 1, "viscosity at the nodes")
-        self._factor = fluid.device.field((1, 1), 1, "a factor of handles")
+        self._part = fluid.device.field((1, 1), 1, "a factor of handles")
         self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
         self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
@@ -303,7 +303,7 @@ class Handles:
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (self._stream, self._thickest, self._factor, self._motion, self._forward, self._brush, self._strain):
+        for thing in (self._stream, self._thickest, self._part, self._motion, self._forward, self._brush, self._strain):
             thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -427,8 +427,8 @@ class Handles:
         fluid = self._fluid
         masks: dict[str, Any] = {}
         if attenuated:
-            self._factor.clear(float(found[2]))
-            masks = {"viscosity": fluid.viscosity, "obstruction": self._factor}
+            self._part.clear(float(found[2]))
+            masks = {"viscosity": fluid.viscosity, "obstruction": self._part}
         self._motion.clear(0.0, 0.0, 0.0, float(found[3]))
         twirl, region = fluid.device.pass_("brush/twirl.frag", **attenuated), ring.tip.region(fluid.grid)
         inputs: dict[str, Any] = ring.tip.inputs(fluid.grid) | {"rate": speed / ring.length, "gain": 1.0}

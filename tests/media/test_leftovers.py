@@ -172,7 +172,7 @@ def test_a_name_tells_this_host_its_start_and_what_is_seen_from_here(tmp_path: P
         (tmp_path / "self/ns/pid").unlink(missing_ok=True)
         (tmp_path / "self/ns/pid").symlink_to(seen)
         (tmp_path / "sys/kernel/random/boot_id").write_text(start)
-        anew.PROC = tmp_path
+        monkeypatch.setattr(anew, "PROC", tmp_path)
         return anew.temporary_name("a").split("-")[1:3]
 
     for folder in ("self/ns", "sys/kernel/random"):

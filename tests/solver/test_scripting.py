@@ -147,7 +147,10 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda fluid: WarpMap(fluid.device, fluid.grid).set(np.full((12, 20, 2), 1e39)),
         "beyond",
     ),
-    "a place beyond all measure": (lambda fluid: WarpMap(fluid.device, fluid.grid).at([[1e39, 0.0]]), "beyond"),
+    "a place beyond all measure": (
+        lambda fluid: WarpMap(fluid.device, fluid.grid).at(np.array([[1e39, 0.0]])),
+        "beyond",
+    ),
     "NaN times a source": (lambda fluid: fluid.add_source(fluid.viscosity, np.nan), "amount"),
     "NaN times a motion": (lambda fluid: fluid.add_local(fluid.device.upload(np.ones((12, 20, 2))), np.nan), "amount"),
     "NaN times a brush": (
