@@ -60,6 +60,11 @@ def test_the_parts_of_a_sheet() -> None:
     assert (grey.min(), grey.max(), grey.shape) == (0, 255, picture.shape)
     sheet = contact_sheet("title", [("a", picture), ("b", drawn)])
     assert sheet.shape == (PANEL + 4 * MARGIN, 4 * PANEL + 3 * MARGIN, 3)
+    panels = (contact_sheet("", 5 * [("", picture)], 20) == 200).all(axis=-1)  # two rows of 40 x 20, four in the first
+    for axis, shape in ((0, (4, 40)), (1, (2, 20))):
+        edges = np.flatnonzero(np.diff(panels.any(axis=axis))) + 1
+        first, step = ((MARGIN, 2 * MARGIN)[axis], shape[1] + (1 + axis) * MARGIN)
+        assert edges.tolist() == [first + step * number + end for number in range(shape[0]) for end in (0, shape[1])]
 
 
 def test_a_sheet_is_as_high_as_its_panels(studio: Studio) -> None:

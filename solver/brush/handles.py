@@ -117,8 +117,7 @@ class Handles:
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
         self._thickest = fluid.device.field(self._stream.size, 1, "viscosity at the nodes")
-        self._one = fluid.device.field((1, 1), 1, "a factor of handles")
-        self._one.clear(1.0)
+        self._part = fluid.device.field((1, 1), 1, "a factor of handles")
         self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
         self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
@@ -304,7 +303,7 @@ class Handles:
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (self._stream, self._thickest, self._one, self._motion, self._forward, self._brush, self._strain):
+        for thing in (self._stream, self._thickest, self._part, self._motion, self._forward, self._brush, self._strain):
             thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -428,12 +427,11 @@ class Handles:
         fluid = self._fluid
         masks: dict[str, Any] = {}
         if attenuated:
-            self._one.clear(float(found[2]))
-            masks = {"viscosity": fluid.viscosity, "obstruction": self._one}
+            self._part.clear(float(found[2]))
+            masks = {"viscosity": fluid.viscosity, "obstruction": self._part}
         self._motion.clear(0.0, 0.0, 0.0, float(found[3]))
         twirl, vectors = fluid.device.pass_("brush/twirl.frag", **attenuated), [(speed / ring.length, 0.0)]
         ring.tip.draw(twirl, faces, fluid.grid, vectors, add=True, motion=self._motion, gain=1.0, **masks)
-        self._one.clear(1.0)
 
     def _give(self, lead: Lead, faces: Field, **attenuated: Any) -> None:
         """Add to a velocity on MAC faces what the active handles lack of the wanted one."""

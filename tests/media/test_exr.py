@@ -123,6 +123,7 @@ def test_layers_go_where_the_colours_go_and_ids_stay_ids(device: Device, tmp_pat
     colours = {name: noise(number, np.float32) for number, name in enumerate("RGB")}
     deep, ids, many = noise(7, np.float32) * 900, hashes(8), noise(9, np.uint32)
     layers = {"spec.R": colours["R"], "spec.G": colours["G"], "Z": deep, "ids.uCryptoAsset": ids, "id": many}
+    layers |= {"P.X": deep, "left.depth.V": deep}
     source = saved(tmp_path / "shot.exr", ({}, {**colours, **layers}))
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
     values = np.stack([3.3 + 2 * np.sin(y / 5), 1.7 * np.cos(x / 7)], axis=-1) / WIDTH
@@ -139,7 +140,7 @@ def test_layers_go_where_the_colours_go_and_ids_stay_ids(device: Device, tmp_pat
     px, py = values[..., 0] * WIDTH + x, values[..., 1] * WIDTH + y
     sure = (np.abs(px % 1 - 0.5) > 0.02) & (np.abs(py % 1 - 0.5) > 0.02)
     column, row = (np.clip(np.round(p).astype(int), 0, most - 1) for p, most in ((px, WIDTH), (py, HEIGHT)))
-    for name, plane in (("Z", deep), ("ids.uCryptoAsset", ids), ("id", many)):
+    for name, plane in list(layers.items())[2:]:
         wanted = plane[row, column].view(np.uint32)
         np.testing.assert_array_equal(seen[name].view(np.uint32)[sure], wanted[sure], err_msg=name)
 

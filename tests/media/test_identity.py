@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -260,6 +261,30 @@ def test_the_shape_of_pixels_and_other_numbers_of_an_exr_stay(device: Device, tm
     assert header["pixelAspectRatio"] == 2.0
     assert "owner" not in header
     assert "isoSpeed" not in header
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [("a.jpg", {"quality": 37, "strip": True}), ("a.exr", {"bits": 16, "codec": "none"}), ("a.png", {"bits": 16})],
+)
+def test_a_still_is_written_as_is_asked_for(device: Device, tmp_path: Path, name: str, how: dict[str, Any]):
+    """By either command: the very bytes of a file that is written so at once."""
+    picture = Picture(noise(3, np.uint8), dpi=(150.0, 150.0))
+    write_picture(tmp_path / "in.tif", picture)
+    write_picture(tmp_path / name, picture, **how)
+    wanted = (tmp_path / name).read_bytes()
+    quality = how.pop("quality", 90)
+    outputs = Outputs(tmp_path / f"out-{name}", **how)
+    recipe = Recipe(duration=0.1, fluid=FluidSettings(grid=24), output=Output(quality=quality))
+    run(device, Job(recipe, read_picture(tmp_path / "in.tif"), tmp_path, outputs), Progress())
+    assert outputs.file is not None
+    assert outputs.file.read_bytes() == wanted
+    write_map(tmp_path / "still.npy", Displacement(np.zeros((23, 37, 2))))
+    maps = MapSource(tmp_path / "still.npy")
+    Application(picture=tmp_path / "in.tif", outputs=outputs, maps=maps, quality=quality).perform(
+        lambda: device, Progress()
+    )
+    assert outputs.file.read_bytes() == wanted
 
 
 def test_what_holds_no_premultiplied_colours_gets_straight_ones(device: Device, tmp_path: Path):

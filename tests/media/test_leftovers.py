@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -156,6 +158,30 @@ def test_without_a_list_of_processes_nothing_is_swept(tmp_path: Path, monkeypatc
     path.touch()
     sweep(tmp_path)
     assert path.exists()
+
+
+def test_a_name_tells_this_host_its_start_and_what_is_seen_from_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def owner(host: str, start: str, seen: str) -> list[str]:
+        """The host and the start in a name that is made at the first look at such a place."""
+        spec = importlib.util.find_spec("app.media.leftovers")
+        assert spec is not None
+        assert spec.loader is not None
+        anew = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(anew)
+        monkeypatch.setattr(platform, "node", lambda: host)
+        (tmp_path / "self/ns/pid").unlink(missing_ok=True)
+        (tmp_path / "self/ns/pid").symlink_to(seen)
+        (tmp_path / "sys/kernel/random/boot_id").write_text(start)
+        monkeypatch.setattr(anew, "PROC", tmp_path)
+        return anew.temporary_name("a").split("-")[1:3]
+
+    for folder in ("self/ns", "sys/kernel/random"):
+        (tmp_path / folder).mkdir(parents=True)
+    (here, now), again = owner("one", "first", "all"), owner("one", "first", "all")
+    assert again == [here, now]
+    assert owner("one", "second", "all")[1] not in (here, now)
+    assert owner("one", "first", "few")[1] != now
+    assert owner("two", "first", "all")[0] != here
 
 
 def test_names_are_hidden_short_enough_and_keep_the_ending(tmp_path: Path):

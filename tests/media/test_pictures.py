@@ -323,6 +323,10 @@ def test_odd_tiffs(tmp_path: Path):
     tifffile.imwrite(path, premultiplied, photometric="rgb", extrasamples=["assocalpha"])
     assert read_picture(path).pixels[0, 0].tolist() == [64, 64, 64, 128]
     assert read_picture(path).straight().pixels[0, 0].tolist() == [128, 128, 128, 128]
+    for other, bits in ((tmp_path / "same.png", None), (tmp_path / "deep.png", 16), (tmp_path / "deep.tif", 16)):
+        write_picture(other, read_picture(path), bits=bits)
+        again = read_picture(other)
+        assert (again.premultiplied, again.pixels[0, 0].tolist()) == (False, 4 * [128 * (257 if bits else 1)])
     whole = noise(3, np.uint16).astype(np.uint32) * 65536 + 40_000
     tifffile.imwrite(path, whole, photometric="rgb")
     np.testing.assert_array_equal(read_picture(path).pixels, whole // 65536)

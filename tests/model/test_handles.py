@@ -139,6 +139,20 @@ def test_of_a_line_outside_a_corner_is_told_that_is_there() -> None:
     ]
 
 
+def test_of_a_line_it_is_told_where_it_is_turned_and_what_only_an_outline_cannot_do() -> None:
+    (said,) = objections([handle(points=[[0.5, 0.1], [0.9, 0.1]], at=[0.5, 0.1], to=None, rotate=-90)], [], (1.0, 1.0))
+    assert said == "handle[1] goes only to the picture's edge: (0.5, -0.3) is outside the picture"
+    over = {"points": [[0.3, 0.4], [0.5, 0.6], [0.7, 0.4]], "goals": [[0.3, 0.6], [0.5, 0.4], [0.7, 0.6]]}
+    assert [*objections([handle(**over)], [], (1.0, 1.0))] == []
+    (said,) = objections([handle(**over, closed=True)], [], (1.0, 1.0))
+    assert said == "handle[1] is led inside out"
+
+
+def test_what_is_only_turned_is_on_its_way_too() -> None:
+    assert handle(to=None, rotate=30, start=0.5, duration=1.0).span == (0.5, 1.5)
+    assert handle(to=None, rotate=30, start=0.5, duration=1.0).spanning(1.0, 3.0)["duration"] == 2.0
+
+
 def test_handles_that_are_never_in_force_together_do_not_contradict_each_other() -> None:
     first, second = handle(to=[0.51, 0.5], end=1.0), handle(to=[0.49, 0.5], start=1.0)
     assert [*objections([first, second], [], (1.0, 1.0))] == []

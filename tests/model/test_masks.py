@@ -241,9 +241,10 @@ def test_a_picture_of_another_size_is_fitted_and_says_so(pictures: Pictures) -> 
         ({"kind": "path", "points": [[0, 0]], "radius": 0, "scale": 1}, "radius"),
         ({"kind": "paint", "scale": 1}, "kind"),
         ({"scale": 1, "window": {"box": [0.5, 0, 0.5, 1]}}, "left < right"),
+        ({"scale": 1, "window": {"box": [0, 0.5, 1, 0.5]}}, "top < bottom"),
         ({"scale": 1, "segment": {}}, "chooses by"),
         ({"scale": 1, "segment": {"above": 0.5, "color": "#ffffff"}}, "chooses by"),
-        ({"scale": 1, "segment": {"above": 0.5, "below": 0.4}}, "nothing lies"),
+        ({"scale": 1, "segment": {"above": 0.5, "below": 0.5}}, "nothing lies"),
         ({"scale": 1, "segment": {"color": "red"}}, "#c8a040"),
     ],
 )

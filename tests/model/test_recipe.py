@@ -98,6 +98,7 @@ samples = [[0, 0.1, 0.30000000000000004, 1], [4, 0.2, 0.3, 0.5]]
 def test_round_trip_loses_nothing():
     recipe = Recipe.parse(FULL)
     assert Recipe.parse(recipe.text()) == recipe
+    assert Recipe.parse(recipe.text()).agrees_until(recipe) == float("inf")
     assert recipe.stroke[0].samples[0][2] == 0.30000000000000004
 
 
@@ -231,6 +232,23 @@ def test_numbers_have_an_upper_bound_which_is_allowed(text: str, most: float):
     told = re.search(r"must be at most (\S+), not", str(caught.value))
     assert told is not None
     assert float(told[1]) == most
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[time]\nstart = 1\nend = 1",
+        HANDLE + "start = 1\nend = 1",
+        HANDLE + "duration = 1\nkeys = [[1, 0, 0], [1, 0.5, 0.5]]",
+        2 * "[[change]]\ntick = 3\nviscosity = 1\n",
+        2 * "[[mask]]\nkind = 'invert'\nof = 'frozen'\ntick = 3\n",
+        STROKE + "repeat = 2\nevery = 9999999",
+        "[[stroke]]\ntool = 'curve'\nsamples = [[3, 0, 0, 1], [3, 1, 1, 1]]",
+        64 * HANDLE,
+    ],
+)
+def test_what_must_not_go_beyond_another_may_be_the_same(text: str):
+    Recipe.parse(text)
 
 
 def test_a_mark_before_the_text_is_read_over(tmp_path: Path):

@@ -67,6 +67,14 @@ def test_recipes_share_what_did_not_change():
     assert history.nbytes - before < before / 10
 
 
+def test_the_present_stays_though_it_is_beyond_the_budget():
+    history = History(Recipe(), budget=1)
+    for seed in range(2):
+        history.commit("Push", Recipe(stroke=(stroke(seed),)))
+        assert history.recipe.stroke == (stroke(seed),)
+        assert not history.can_undo
+
+
 def test_the_budget_drops_the_oldest():
     history = History(Recipe(), budget=200_000)
     for seed in range(100):

@@ -137,6 +137,35 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda fluid: Density(fluid.device, np.ones((12, 20))).set(np.ones((12, 20, 3))),
         "shape",
     ),
+    "a density beyond all measure": (lambda fluid: Density(fluid.device, np.full((12, 20), 1e39)), "beyond"),
+    "a density of NaN": (
+        lambda fluid: Density(fluid.device, np.ones((12, 20))).set(np.full((12, 20), np.nan)),
+        "beyond",
+    ),
+    "a velocity beyond all measure": (lambda fluid: fluid.set_velocity(np.full((12, 20, 2), -1e30)), "beyond"),
+    "a map beyond all measure": (
+        lambda fluid: WarpMap(fluid.device, fluid.grid).set(np.full((12, 20, 2), 1e39)),
+        "beyond",
+    ),
+    "a place beyond all measure": (
+        lambda fluid: WarpMap(fluid.device, fluid.grid).at(np.array([[1e39, 0.0]])),
+        "beyond",
+    ),
+    "NaN times a source": (lambda fluid: fluid.add_source(fluid.viscosity, np.nan), "amount"),
+    "NaN times a motion": (lambda fluid: fluid.add_local(fluid.device.upload(np.ones((12, 20, 2))), np.nan), "amount"),
+    "NaN times a brush": (
+        lambda fluid: Brush(fluid.device).lead(fluid, Push(Tip((0.1, 0.1), (0.2, 0.1), 0.1), 0.1), np.nan),
+        "gain",
+    ),
+    "thickened by NaN": (
+        lambda fluid: Masks(fluid.device, fluid.grid).thicken(Tip((0, 0), (0, 0), 0.1), np.nan),
+        "thick",
+    ),
+    "frozen by NaN": (lambda fluid: Masks(fluid.device, fluid.grid).freeze(Tip((0, 0), (0, 0), 0.1), np.nan), "freez"),
+    "smoothed by NaN": (
+        lambda fluid: Masks(fluid.device, fluid.grid).smooth(Tip((0, 0), (0, 0), 0.1), np.nan),
+        "smooth",
+    ),
     "a density moved by one component": (
         lambda fluid: Density(fluid.device, np.ones((12, 20))).advance(fluid.viscosity, fluid.grid, 0.1),
         "velocity",

@@ -18,6 +18,7 @@ from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER
 from app.model.tools import TOOL, TOOLS, Press
+from app.ui.chooser import FileChooser
 from app.ui.clock import FRAMES, HOVERING, PACE
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog
@@ -287,9 +288,22 @@ def test_the_size_of_an_export_is_typed_as_it_is_shown(
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
+    assert dialog.size == 240
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, f"{typed} pixels")
     assert dialog.size == 120
     robot.close()
+
+
+def test_questions_show_the_files_that_answer_them(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[tuple[str, ...]] = []
+    monkeypatch.setattr(FileChooser, "ask_which", lambda chooser, title, folder, endings, chosen: shown.append(endings))
+    files, every = robot.editor.files, ("fluidwarp", "mp4", "npy", "png", "toml")
+    for ask, wanted in (
+        (files.ask_open, every), (files.ask_frames, ("png",)), (files.ask_apply, ("mp4", "png")),
+        (files.ask_map, ("npy",)), (lambda: files.ask_mask(robot.editor.state), ("png",)),
+    ):  # fmt: skip
+        ask()
+        assert tuple(ending for ending in every if f".{ending}" in shown[-1]) == wanted
 
 
 # Keys ---------------------------------------------------------------------------------------------------------------

@@ -218,13 +218,14 @@ def at_work(folder: Path) -> subprocess.Popen[str]:
     )
 
 
-def workers(of: subprocess.Popen[str]) -> list[int]:
-    """The processes that it has started to work in."""
+def workers(of: int) -> list[int]:
+    """The processes that any thread of a process has started to work in."""
     found = []
-    for pid in Path(f"/proc/{of.pid}/task/{of.pid}/children").read_text().split():
+    for children in Path(f"/proc/{of}/task").glob("*/children"):
         with suppress(FileNotFoundError):  # it has ended since
-            if b"serve()" in Path(f"/proc/{pid}/cmdline").read_bytes():
-                found.append(int(pid))
+            for pid in children.read_text().split():
+                if b"serve()" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    found.append(int(pid))
     return found
 
 
@@ -241,13 +242,15 @@ def test_stopping_all_processes_at_once(folder: Path, number: signal.Signals, mo
     """As Ctrl+C, a scheduler and a closed terminal do, at any time: one line, and nothing half-written."""
     job = at_work(folder)
     before = {*contents(folder)}
-    wait_until(lambda: workers(job))
+    wait_until(lambda: workers(job.pid))
     if moment != "starting":
         wait_until(lambda: len({*contents(folder)} - before) == 2)
     if moment == "a worker was killed":
-        killed = workers(job)[0]
+        killed = workers(job.pid)[0]
         os.kill(killed, signal.SIGKILL)
-        wait_until(lambda: len(workers(job)) == 2 and killed not in workers(job))  # another has begun the next picture
+        wait_until(
+            lambda: len(workers(job.pid)) == 2 and killed not in workers(job.pid)
+        )  # another has begun the next picture
     os.killpg(job.pid, number)
     _, told = job.communicate(timeout=30)
     line = "fluidwarp: cancelled; 0 of 4 pictures are written, nothing is half-written\n"
@@ -287,6 +290,18 @@ def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):
                 threading.Timer(0.5, os.kill, (other.pid, signal.SIGCONT)).start()
 
         failures = run_batch(tasks(folder, pictures), hear, Progress(), cluster=cluster.scheduler_address)
+        # What is cancelled at work is not gone on with: its process ends, while one without work is kept.
+        (folder / "a.toml").write_text(RECIPE.replace("duration = 0.2", "duration = 200"))
+        endless = spread(order(folder / "a.toml", None, Outputs(folder / "{name}.%04d.png")), pictures[:1])
+        at_work: list[list[int]] = []
+
+        def has_begun() -> bool:
+            at_work.append([pid for one in cluster.workers.values() for pid in workers(one.pid)])
+            return (folder / "q0.0000.png").exists()
+
+        with pytest.raises(Cancelled):
+            run_batch(endless, hear, Progress(cancel=has_begun), cluster=cluster.scheduler_address)
+        wait_until(lambda: not all(Path(f"/proc/{pid}").exists() for pid in at_work[-1]))
     assert failures == 0, [outcome.error for outcome in heard if outcome.error]
     assert sorted(Path(outcome.label).name for outcome in heard) == sorted(expected)
     written = {name: data for name, data in contents(folder / "out").items() if not name.startswith(".")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from app.media.recipes import read_recipe
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
+from app.work.fit_job import FitJob
 from app.work.fitting import LEAST_DET, Fitted, Trial, fitted
 from app.work.replay import Replay
 from solver.gl.device import Device
@@ -198,11 +200,11 @@ def test_many_pairs_arrive_with_values_in_common(device: Device):
 
 def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device):
     heard: list[int] = []
-    found = fit(device, PAIRS, 40, report=lambda done, total: heard.append(done), cancel=lambda: max(heard) >= 3)
+    own = RECIPE.replace("grid = 32", "grid = 66")  # finer than what most of it is tried on
+    found = fit(device, PAIRS, 40, own, report=lambda done, total: heard.append(done), cancel=lambda: max(heard) >= 3)
     assert found.stopped
     assert max(heard) == 3
-    assert found.trial.recipe.fluid.grid == 32
-    assert found.trial.recipe.fluid.dt == 0.04
+    assert found.trial.recipe.fluid.grid == 66
     with pytest.raises(Cancelled):
         fit(device, PAIRS, cancel=lambda: True)
 
@@ -221,6 +223,18 @@ def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp:
     there = read_pairs([tmp_path / "out" / "a.tps"], (64, 48))
     np.testing.assert_allclose(there.places, PAIRS, atol=0.1 / 64)
     assert fluidwarp(tmp_path, "render", "out/f.toml", "-o", "out/f.png").returncode == 0
+
+
+def test_what_is_fitted_from_is_not_written_over(tmp_path: Path):
+    given = {name: tmp_path / f"{name}.csv" for name in ("pairs", "first", "second", "image", "recipe")}
+    job = FitJob(
+        recipe=str(given["recipe"]), pairs=(given["pairs"],), masks=(given["first"], given["second"]),
+        output=tmp_path / "out.toml", arrived=None, image=given["image"], evaluations=1, local=None, max_pixels=100,
+    )  # fmt: skip
+    job.check()
+    for path in (given["pairs"], given["first"], given["second"], given["image"]):
+        with pytest.raises(UserError, match=f"{path} would be replaced by its own result"):
+            replace(job, arrived=path).check()
 
 
 def test_a_fit_is_told_in_a_line():

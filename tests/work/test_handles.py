@@ -167,6 +167,22 @@ def test_what_is_local_moves_nothing_beside_it(device: Device):
         thing.release()
 
 
+def test_a_local_outline_that_grows_leaves_the_fluid_alone(device: Device):
+    grid, square = Grid(32, 32), ((0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6))
+    speeds: list[float] = []
+    for local in (0.0, 1.0):
+        fluid, warp = Fluid(device, grid), WarpMap(device, grid)
+        fluid.set_viscosity(0.03)
+        outline = Handle((0.5, 0.5), radius=0.1, points=square, closed=True, scale=1.3, duration=0.4, local=local)
+        handles = Handles(fluid, warp, [outline])
+        for _ in range(6):
+            handles.advance(1 / 60)
+        speeds.append(fluid.motion().largest_speed)
+        for thing in (handles, warp, fluid):
+            thing.release()
+    assert speeds[1] < 0.1 * speeds[0]
+
+
 def test_the_stiffer_of_two_handles_prevails(device: Device):
     grid = Grid(32, 32)
     fluid, warp = Fluid(device, grid), WarpMap(device, grid)

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from app.media import project as projects
-from app.model.mask_edits import MaskStroke
+from app.model.forces import VortexForce
+from app.model.mask_edits import InvertMask, MaskStroke
 from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.model.strokes import Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
@@ -123,7 +124,19 @@ def test_settings_before_the_first_stroke_are_the_recipe_s_own(session: Session)
     assert session.recipe.change == ()
     assert session.recipe.fluid.viscosity == 0.0006
     session.undo()
-    assert session.recipe.fluid.viscosity == pytest.approx(0.03)
+    own = session.recipe.fluid
+    assert own.viscosity == pytest.approx(0.03)
+    # What is set at the playhead, or beside what is painted, holds from there on; so does what happens but once.
+    recorded = session.recipe.edited(force=(VortexForce(kind="vortex", point=(0.5, 0.5)),), duration=9 * session.dt)
+    painted = recorded.edited(mask=(InvertMask(kind="invert", of="frozen", tick=0),))
+    for recipe, tick, settings in (
+        (recorded, 4, {"drag": 0.5}), (painted, 0, {"viscosity": 0.3}), (recorded, 0, {"clear_velocity": True}),
+    ):  # fmt: skip
+        session.edit("Force", **{key: getattr(recipe, key) for key in ("force", "duration", "mask", "change")})
+        session.seek(tick)
+        session.change("Change", **settings)
+        assert [change.tick for change in session.recipe.change] == [tick]
+        assert session.recipe.fluid == own
 
 
 def test_another_grid_replays_everything(session: Session) -> None:
