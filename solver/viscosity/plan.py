@@ -20,7 +20,8 @@ STIFF = 30.0
 STIFF_OF_SOFTEST = 4.0
 # Where all is viscous, stiff parts move together through what lies between them. If they have edges, the coarse levels,
 # which count strains in them that they do not have, cannot carry that; nor beside solids, where coarse strains are not
-# those of the fine level. There the coarse levels move parts above this kappa, in those of the softest cell, as a
+# those of the fine level: a correction could point uphill, which ended a step of contrast 100 at 9 % of error in three
+# iterations. There the coarse levels move parts above this kappa, in those of the softest cell, as a
 # whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without, or a third.
 RIGID_OF_SOFTEST = 40.0
 # The share of what bounds stiff parts that is an edge from which on they have edges: it is .5 to 1 of masks of two
@@ -113,7 +114,8 @@ def plan_for(least: float, largest: float, cells: int, is_one: bool, is_sharp: b
     if is_one:
         return Plan("cg", 2, share * TOLERANCE, cycle_leaves=UNIFORM_CYCLE_LEAVES)
     varies = largest > MODERATE * least
-    rigid = is_sharp and varies
+    # Sharp and moderate are only masks with solids.
+    rigid = is_sharp and (varies or (least > ONE_SWEEP and largest > RIGID_OF_SOFTEST * least))
     count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
     tolerance = TOLERANCE_STIFF if varies else share * TOLERANCE
