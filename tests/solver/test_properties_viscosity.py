@@ -17,8 +17,9 @@ from solver.params import FluidParams, Walls
 from solver.viscosity.parts import BROAD, find_parts
 
 
-# Of the others a spiral and snakes once took 12 to 14 iterations, and a contrast of 1e8 or a solid left 9 to 90 %.
-@pytest.mark.parametrize("seed", [*range(6), 1025, 1107, 448279178, 700096, 700135])
+# Of the others a spiral and snakes once took 12 to 14 iterations, and a contrast of 1e8 or a solid left 9 to 90 %;
+# at a contrast of 100 solids left 2 to 9 % (5136, 5505).
+@pytest.mark.parametrize("seed", [*range(6), 1025, 1107, 448279178, 700096, 700135, 5136, 5505])
 def test_viscous_step_is_near_the_direct_solution(device: Device, seed: int) -> None:
     viscosity.check_viscous_step(device, seed)
 
@@ -40,7 +41,7 @@ def test_viscous_step_is_stable(device: Device, seed: int) -> None:
 
 
 @pytest.mark.parametrize("kind", viscosity.MASKS)
-@pytest.mark.parametrize(("contrast", "softest"), [(1e2, 30.0), (1e5, 1.0), (1e5, 30.0)])
+@pytest.mark.parametrize(("contrast", "softest"), [(1e2, 1.0), (1e2, 30.0), (1e5, 1.0), (1e5, 30.0)])
 def test_every_class_of_mask(device: Device, kind: str, contrast: float, softest: float) -> None:
     case = viscosity.Case.random(kind, (96, 96), contrast, softest, np.random.default_rng(0))
     found, iterations = case.solved(device)
