@@ -262,7 +262,7 @@ class Canvas:
             base = max(session.replay.settings.viscosity, 1e-6)
             inputs |= {"viscosity": replay.masks.base_viscosity, "thickness": replay.masks.thickness, "base": base}
             inputs |= {"viscosity_opacity": shown["viscosity"].opacity, "contour": scale}
-        if shown["frozen"].shown or state.edits_mask("frozen", "freeze", "smooth"):
+        if state.shows_frozen:
             defines["FROZEN"] = 1
             inputs |= {"frozen": replay.masks.frozen, "frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
         if state.tool_name == "select" and state.selected_area is not None:

@@ -129,7 +129,9 @@ PRESETS = (
     Preset("Web", "JPEG, at most 2048 pixels, quality 85.", PICTURE, 1, size=2048, quality=85),
     Preset("Print", "TIFF of 16 bits, all pixels.", PICTURE, 4, 2),
     Preset("Film", "ProRes 4444 with alpha, all pixels, 24 frames a second.", ANIMATION, 1, fps=24.0),
-    Preset("Loop", "MP4, at most 1280 pixels, there and back without a jump.", ANIMATION, 0, size=1280, returns=True),
+    Preset(
+        "Loop", "MP4, at most 1280 pixels; ping-pong, so that it has no jump.", ANIMATION, 0, size=1280, returns=True
+    ),
 )
 RATED = (".jpg", ".webp", ".avif", ".mp4", ".webm", ".%04d.jpg")  # endings of files that have a quality
 PREVIEW = 640  # pixels along the longer side
@@ -305,10 +307,10 @@ class ExportDialog(Dialog):
         imgui.align_text_to_frame_padding()
         ui.dim("Preset")
         imgui.same_line(0, ui.px(12))
-        chosen = ui.segmented("preset", [preset.name for preset in PRESETS], now := self.preset, -1)
+        names, uses = [preset.name for preset in PRESETS], [preset.use for preset in PRESETS]
+        chosen = ui.segmented("preset", names, now := self.preset, -1, uses)
         if chosen != now:
             self.take(PRESETS[chosen])
-        ui.tooltip("Presets", more="\n".join(f"{preset.name}: {preset.use}" for preset in PRESETS))
         self._choose(ui.segmented("kind", [label for label, _ in KINDS], self.kind, -1))
         files, chosen = KINDS[self.kind][1], self.format[self.kind]
         chosen = self.format[self.kind] = ui.segmented("format", [file.name for file in files], chosen, -1)
@@ -335,7 +337,8 @@ class ExportDialog(Dialog):
                 self.start = ui.slider("from", "From", self.start, 0, seconds, SECONDS, 0.0).value
                 self.end = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds).value
             if clip is None:
-                self.returns = ui.check("There and back again", self.returns)
+                self.returns = ui.check("Ping-pong", self.returns)
+                ui.tooltip("Ping-pong", more="There and back again: a loop without a jump.")
             else:
                 kept = [word for word, has in (("sound", clip.sound), ("time code", clip.timecode)) if has]
                 pace = f"{float(self._rate):.5g} frames a second" if clip.durations is None else "own pace"
