@@ -69,6 +69,8 @@ def tell() -> None:
     from app.model.strokes import BrushPath
     from app.ui.editor import Editor
     from app.ui.events import Mods
+    from app.ui.pointer import SPLIT_REACH
+    from app.ui.viewport import Rect
     from app.work.gesture import kept_near
     from app.work.session import Session
 
@@ -91,6 +93,10 @@ def tell() -> None:
             told[:] = self.session.document.recipe, digest(self.session.document.recipe)
         pointer, view, io = self.pointer, self.workspace.view, imgui.get_io()
         rects = [view.rect, view.canvas, *self.ui.covers]
+        if (split := self.state.split) is not None:  # its line is taken hold of, and no stroke begins there
+            reach = self.ui.px(SPLIT_REACH)
+            x, _ = view.to_screen(split, 0)
+            rects.append(Rect(x - reach, view.canvas.y, 2 * reach, view.canvas.height))
         now = json.dumps({
             "at": (pointer.x, pointer.y),
             "tool": self.state.tool_name,
