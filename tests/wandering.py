@@ -4,7 +4,8 @@
 
 Strokes, keys, tools, undo, sliders, zoom, masks, handles, bars, symmetry, dialogs, saving, reopening. Events are sent
 at once, with no rest between the samples of a stroke but what chance gives. Held together are: every place that was
-sent of a stroke and the samples of the recipe; what the editor takes for held of pointer and keyboard, and what is,
+sent of a stroke and the samples of the recipe, whose ticks are those at which they were heard, or as soon as the brush
+could be there, and go no faster than the clock; what the editor takes for held of pointer and keyboard, and what is,
 which is nothing; the recipe in the saved project and in the editor; and at the end the bytes of an export and of
 `fluidwarp render`. Ends with 0 if all was as it should be; what was not stands in the output, after the actions before.
 """
@@ -68,11 +69,16 @@ def tell() -> None:
     from app.model.strokes import BrushPath
     from app.ui.editor import Editor
     from app.ui.events import Mods
+    from app.ui.pointer import SPLIT_REACH
+    from app.ui.viewport import Rect
+    from app.work.gesture import kept_near
     from app.work.session import Session
 
-    frame, press, release, last = Editor.frame, Session.press, Session.release, [""]
+    frame, press, move, release, last = Editor.frame, Session.press, Session.move, Session.release, [""]
     editors: list[Editor] = []
     begun = [0.0, 0.0]
+    heard: list[tuple[float, ...]] = []  # of the gesture: when, the clock of the frames, tick, x, y
+    clock = 0.0
     told: list[Any] = [None, ""]  # a recipe, and what it comes to
 
     def say(**what: Any) -> None:
@@ -81,10 +87,16 @@ def tell() -> None:
     def frame_and_tell(self: Editor, *given: Any, **named: Any) -> None:
         editors[:] = [self]
         frame(self, *given, **named)
+        nonlocal clock
+        clock += given[2] if len(given) > 2 else named["dt"]
         if self.session.document.recipe is not told[0]:
             told[:] = self.session.document.recipe, digest(self.session.document.recipe)
         pointer, view, io = self.pointer, self.workspace.view, imgui.get_io()
         rects = [view.rect, view.canvas, *self.ui.covers]
+        if (split := self.state.split) is not None:  # its line is taken hold of, and no stroke begins there
+            reach = self.ui.px(SPLIT_REACH)
+            x, _ = view.to_screen(split, 0)
+            rects.append(Rect(x - reach, view.canvas.y, 2 * reach, view.canvas.height))
         now = json.dumps({
             "at": (pointer.x, pointer.y),
             "tool": self.state.tool_name,
@@ -114,9 +126,19 @@ def tell() -> None:
             last[0] = now
             print(now, flush=True)
 
+    def hear(self: Session, x: float, y: float) -> None:
+        if (gesture := self._gesture) is not None:
+            heard.append((time.monotonic(), clock, gesture.pen, *kept_near(x, y)))
+
+    def move_and_tell(self: Session, x: float, y: float, *more: Any) -> None:
+        move(self, x, y, *more)
+        hear(self, x, y)
+
     def press_and_tell(self: Session, tool: Any, given: Any, x: float, y: float, *more: Any) -> None:
         press(self, tool, given, x, y, *more)
         begun[:] = x, y
+        heard.clear()
+        hear(self, x, y)
         rect = editors[0].workspace.view.rect
         say(press=tool.name, rect=(rect.x, rect.y, rect.width, rect.height))
 
@@ -127,13 +149,15 @@ def tell() -> None:
             return
         after = self.document.recipe
         new = [one for one in (*after.stroke, *after.mask) if one not in before.stroke and one not in before.mask]
-        ways = [[sample[1:3] for sample in one.samples] for one in new if isinstance(one, BrushPath)]
+        ways = [[(*sample[1:3], sample[0]) for sample in one.samples] for one in new if isinstance(one, BrushPath)]
         # Others are new because they were cut off at this moment.
-        say(made=[way for way in ways if any(dist(end, begun) < 1e-4 for end in (way[0], way[-1]))])
+        made = [way for way in ways if any(dist(end[:2], begun) < 1e-4 for end in (way[0], way[-1]))]
+        say(made=made, heard=heard, dt=self.dt, extent=self.extent)
 
     for of, name, telling in (
         (Editor, "frame", frame_and_tell),
         (Session, "press", press_and_tell),
+        (Session, "move", move_and_tell),
         (Session, "release", release_and_tell),
     ):
         setattr(of, name, telling)
@@ -210,7 +234,8 @@ class Sitting:
         self.hand = Hand(desk.env["DISPLAY"])
         self.now: dict[str, Any] = {}
         self.told: deque[dict[str, Any]] = deque()
-        self.samples = 0
+        self.sent_at = deque[list[float]](maxlen=3)  # when the places of the last strokes were sent
+        self.samples, self.late = 0, 0.0  # held together, and seconds that one was heard after it was sent at most
         self._corner = 0
         self._log = (desk.folder / "stderr.txt").open("w+")
         command = [sys.executable, str(Path(__file__)), "--edit", str(project)]
@@ -311,6 +336,7 @@ class Sitting:
         if (start := self.place()) is None:
             return None
         canvas, sent = self.now["rects"][1], [start]
+        self.sent_at.append([time.monotonic()])
         self.hand.move(*start)
         self.hand.button(1, True)
         step = self.dice.choice((2, 6, 20))
@@ -321,6 +347,7 @@ class Sitting:
             y = min(max(y, int(canvas[1]) + 1), int(canvas[1] + canvas[3]) - 1)
             if (x, y) != sent[-1]:
                 sent.append((x, y))
+                self.sent_at[-1].append(time.monotonic())
                 self.hand.move(x, y)
                 self.rest()
         self.hand.button(1, False)
@@ -337,35 +364,70 @@ class Sitting:
         self.told.clear()
         if alt:
             self.hand.one_key("alt", True)
-        sent = [way for _ in range(self.dice.randint(1, 3)) if (way := self.stroke()) and len(set(way)) > 1]
+        ways = [(way, self.sent_at[-1]) for _ in range(self.dice.randint(1, 3)) if (way := self.stroke())]
+        sent = [(way, when) for way, when in ways if len(set(way)) > 1]
         if alt:
             self.hand.one_key("alt", False)
         self.meet()
         presses = [one["rect"] for one in self.told if "press" in one]
-        made = [one for told in self.told if "made" in told for one in told["made"]]
+        made = [(one, told) for told in self.told if "made" in told for one in told["made"]]
         if len(presses) != len(sent) or len(made) != len(sent):
             raise Fault(
                 f"{len(sent)} strokes of {PAINTS[key]} sent, {len(presses)} begun, {len(made)} made; {self.now}"
             )
-        for way, rect, samples in zip(sent, presses, made, strict=True):
-            self.compare(way, rect, samples, PAINTS[key] == "curve")
+        for (way, when), rect, (samples, told) in zip(sent, presses, made, strict=True):
+            found = self.compare(way, rect, samples, PAINTS[key] == "curve")
+            if PAINTS[key] != "curve":
+                self.compare_times(when, samples[0][2], [samples[at] for at in found], told)
+
+    def compare_times(self, when: list[float], first: float, samples: list[list[float]], told: dict[str, Any]) -> None:
+        """Each has the tick in which it was heard, or the one in which the brush, at its speed, could be there.
+
+        Ticks in turn go no faster than the clock; on a machine that is too slow they may go slower.
+        """
+        from app.model.tools import FASTEST
+
+        heard, dt, at, arrives = told["heard"], told["dt"], 0, 0.0
+        (_, began, pen, *_), reach, before = heard[0], FASTEST * dt, samples[0]
+        for sent, sample in zip(when, samples, strict=True):
+            while at < len(heard) and max(abs(a - b) for a, b in zip(heard[at][3:], sample[:2], strict=True)) > 1.1e-5:
+                at += 1
+            if at == len(heard):
+                raise Fault(f"{sample} is recorded and was not heard: {told}")
+            moment, clock, tick, *_ = heard[at]
+            far = dist(
+                *([x * side for x, side in zip(one[:2], told["extent"], strict=True)] for one in (before, sample))
+            )
+            arrives, before = max(tick - pen, arrives + far / reach), sample
+            if not tick - pen <= sample[2] - first <= arrives + 1:
+                raise Fault(f"{sample} is not of tick {first + arrives:.2f}: {told}, {samples}")
+            if moment < sent or (tick - pen) * dt > clock - began + 2.7 * dt:
+                raise Fault(
+                    f"{sample} was heard at {moment}, {clock - began} s after the press, sent at {sent}: {told}"
+                )
+            self.late = max(self.late, moment - sent)
 
     def compare(
         self, way: list[tuple[int, int]], rect: list[float], samples: list[list[float]], is_curve: bool
-    ) -> None:
-        """Every place is a sample, in their order; of a curve, which may be reversed, there is one near each."""
+    ) -> list[int]:
+        """Every place is a sample, in their order; of a curve, which may be reversed, there is one near each.
+
+        The numbers of the samples that they are.
+        """
         left, top, width, height = rect
         wanted = [(min(max((x - left) / width, -0.5), 1.5), min(max((y - top) / height, -0.5), 1.5)) for x, y in way]
-        at = 0
+        at, found = 0, list[int]()
         for number, place in enumerate(wanted):
             if is_curve:
                 at = 0
             near = 1.5 * DRAWN if is_curve else 1.1e-5
-            while at < len(samples) and max(abs(a - b) for a, b in zip(samples[at], place, strict=True)) > near:
+            while at < len(samples) and max(abs(a - b) for a, b in zip(samples[at], place, strict=False)) > near:
                 at += 1
             if at == len(samples):
                 raise Fault(f"sample {number} of {len(wanted)} is lost: {place} of {wanted}, recorded {samples}")
+            found.append(at)
         self.samples += len(way)
+        return found
 
     def disturb(self) -> None:
         """Keys and the wheel during a stroke."""
@@ -516,6 +578,7 @@ def wander(folder: Path, actions: int, seed: int, size: tuple[int, int], is_busy
 
     folder.mkdir(parents=True, exist_ok=True)
     dice, counts, log, samples = random.Random(seed), Counter[str](), deque[str](maxlen=12), 0
+    late = 0.0
     project, made = folder / "work.fluidwarp", small_project(folder)
     sitting: Sitting | None = None
     desk, started = Desk(folder, threads=True), time.monotonic()
@@ -528,12 +591,13 @@ def wander(folder: Path, actions: int, seed: int, size: tuple[int, int], is_busy
                     name = sitting.act(log)
                     counts[name] += 1
             sitting.leave()
-            samples += sitting.samples
+            samples, late = samples + sitting.samples, max(late, sitting.late)
             sitting = Sitting(desk, project, dice)
             sitting.export()
             sitting.leave()
             took = time.monotonic() - started
-            print(f"seed {seed}: {sum(counts.values())} actions, {samples} samples, {took:.0f} s", flush=True)
+            done = f"{sum(counts.values())} actions, {samples} samples, heard {late:.2f} s after they were sent at most"
+            print(f"seed {seed}: {done}, {took:.0f} s", flush=True)
     except Fault as fault:
         chords = list(sitting.hand.chords) if sitting else []
         print(f"seed {seed}, action {sum(counts.values())}, {list(log)}, {chords}: {fault}", flush=True)

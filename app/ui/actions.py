@@ -99,7 +99,7 @@ def _table() -> list[Action]:
     add("Time", "play", "Play or pause", "space", lambda c: c.workspace.session.play())
     add("Time", "step", "One step on", ".", lambda c: c.workspace.session.step(), repeats=True)
     add("Time", "back", "One step back", ",", lambda c: c.step_back(), repeats=True)
-    add("Time", "repeat", "Play once, in a loop, or there and back", "", lambda c: c.repeat())
+    add("Time", "repeat", "Play once, in a loop, or as ping-pong", "", lambda c: c.repeat())
     add("Time", "start", "To the start", "home", lambda c: c.workspace.session.seek(0))
     add("Time", "end", "To the end", "end", lambda c: c.workspace.session.seek(c.workspace.session.length))
 

@@ -259,7 +259,7 @@ class Canvas:
             fields |= {"viscosity": masks.base_viscosity, "thickness": masks.thickness}
             numbers |= {"viscosity_opacity": shown["viscosity"].opacity, "contour": scale}
             numbers |= {"base": max(replay.settings.viscosity, 1e-6), "window": _window_of(replay.fluid.grid)}
-        if shown["frozen"].shown or state.edits_mask("frozen", "freeze", "smooth"):
+        if state.shows_frozen:
             fields["frozen"] = masks.frozen
             numbers |= {"frozen_opacity": shown["frozen"].opacity, "hatch": 11.0 * scale}
             numbers["first"] = float(left + height - bottom)  # the stripes stay where they are on the screen

@@ -59,7 +59,7 @@ class Commands:
         self.workspace.session.seek(self.workspace.session.moment - 1)
 
     def repeat(self) -> None:
-        """Play once, then over and over, then there and back again but for a clip, then once."""
+        """Play once, then in a loop, then there and back again but for a clip, then once."""
         session = self.workspace.session
         returns = session.recipe.time.ping_pong
         session.repeat(not session.loops and not returns, session.loops and not (returns or session.project.clip))

@@ -179,6 +179,8 @@ class Editor:
         events = self._heard(events)
         self.workspace.release_left()
         self.clock.elapse(dt)
+        if events:
+            self.messages.see()
         self.messages.elapse(dt)
         self.pointer.elapse(dt)
         with self.clock.measure("frame"):
@@ -258,7 +260,8 @@ class Editor:
         state.is_narrow = width < NARROW * self.ui.scale
         is_open = state.over_narrow if state.is_narrow else state.inspector
         names, groups = self.preferences.names, len(strip.GROUP_ENDS) + 1
-        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, names, state.lanes.shown)
+        lanes_height = state.lanes.height if state.lanes.shown else 0.0
+        return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, names, lanes_height)
 
     def _advance(self, dt: float) -> None:
         try:

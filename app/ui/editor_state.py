@@ -123,7 +123,7 @@ class EditorState:
     @classmethod
     def recalled(cls, likes: Preferences) -> EditorState:
         """As it was left."""
-        lanes = Lanes(shown=likes.lanes)
+        lanes = Lanes(shown=likes.lanes, height=likes.lanes_height)
         state = cls(
             inspector=likes.inspector, auto_quality=likes.auto_quality, stabiliser=likes.stabiliser, lanes=lanes
         )
@@ -134,6 +134,7 @@ class EditorState:
     def remember(self, likes: Preferences) -> None:
         """Take note in the preferences of what `recalled` takes from them."""
         likes.stabiliser, likes.sections = self.stabiliser, dict(self.sections)
+        likes.lanes_height = self.lanes.height
         likes.brushes = {name: asdict(brush) for name, brush in self.brushes.items()}
 
     @property
@@ -197,13 +198,21 @@ class EditorState:
         return self.tool_name in tools or (self.tool_name == "select" and self.mask == name)
 
     @property
+    def shows_frozen(self) -> bool:
+        """What is frozen is laid over the picture."""
+        return self.overlays["frozen"].shown or self.edits_mask("frozen", "freeze", "smooth")
+
+    @property
     def shows_viscosity(self) -> bool:
         """It is laid over the picture."""
         return self.overlays["viscosity"].shown or self.edits_mask("thickness", "thicken", "smooth")
 
     def show_mask(self) -> None:
-        """Let the mask that is edited be seen, with any tool."""
-        self.overlays["frozen" if self.mask == "frozen" else "viscosity"].shown = True
+        """Let the mask that is edited be seen, if the tool in hand does not show it anyway."""
+        if self.mask == "frozen" and not self.shows_frozen:
+            self.overlays["frozen"].shown = True
+        elif self.mask == "thickness" and not self.shows_viscosity:
+            self.overlays["viscosity"].shown = True
 
     def toggle_split(self) -> None:
         self.split = 0.5 if self.split is None else None

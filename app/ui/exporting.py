@@ -128,8 +128,10 @@ PICTURE, ANIMATION, MAP = range(3)
 PRESETS = (
     Preset("Web", "JPEG, at most 2048 pixels, quality 85.", PICTURE, 1, size=2048, quality=85),
     Preset("Print", "TIFF of 16 bits, all pixels.", PICTURE, 4, 2),
-    Preset("Film", "ProRes 4444 with alpha, all pixels, 24 frames a second.", ANIMATION, 1, fps=24.0),
-    Preset("Loop", "MP4, at most 1280 pixels, there and back without a jump.", ANIMATION, 0, size=1280, returns=True),
+    Preset("Film", "ProRes 4444 with alpha, all pixels, 24 frames a second or the clip's own.", ANIMATION, 1, fps=24.0),
+    Preset(
+        "Loop", "MP4, at most 1280 pixels; ping-pong, so that it has no jump.", ANIMATION, 0, size=1280, returns=True
+    ),
 )
 RATED = (".jpg", ".webp", ".avif", ".mp4", ".webm", ".%04d.jpg")  # endings of files that have a quality
 PREVIEW = 640  # pixels along the longer side
@@ -150,6 +152,7 @@ class ExportDialog(Dialog):
         format: which of its kinds of file, for each of these.
         variant: which of the variants, for each kind of file.
         returns: an animation goes there and back again.
+        presets: those that there are for it.
         forward: the map tells where the points of the original go.
         offsets: an EXR or TIFF map holds offsets in pixels.
     """
@@ -169,6 +172,8 @@ class ExportDialog(Dialog):
         if session.project.clip is not None:
             self.kind = ANIMATION
         self.returns = session.recipe.time.ping_pong
+        # No clip is played backwards.
+        self.presets = [preset for preset in PRESETS if not (preset.returns and session.project.clip)]
         self.forward = self.offsets = False
         self.picture = replace(session.project.picture, note="")  # it was told when the picture was opened
         self.size = max(self.picture.width, self.picture.height)
@@ -238,7 +243,7 @@ class ExportDialog(Dialog):
         """The one that says what is chosen; -1 if none does."""
         chosen = self.kind, self.format[self.kind], self.variant[self.kind][self.format[self.kind]]
         now = self.size, self.quality, self.fps, self.returns
-        for number, preset in enumerate(PRESETS):
+        for number, preset in enumerate(self.presets):
             if chosen == (preset.kind, preset.format, preset.variant) and now == self._of(preset):
                 return number
         return -1
@@ -305,10 +310,10 @@ class ExportDialog(Dialog):
         imgui.align_text_to_frame_padding()
         ui.dim("Preset")
         imgui.same_line(0, ui.px(12))
-        chosen = ui.segmented("preset", [preset.name for preset in PRESETS], now := self.preset, -1)
+        names, uses = [preset.name for preset in self.presets], [preset.use for preset in self.presets]
+        chosen = ui.segmented("preset", names, now := self.preset, -1, uses)
         if chosen != now:
-            self.take(PRESETS[chosen])
-        ui.tooltip("Presets", more="\n".join(f"{preset.name}: {preset.use}" for preset in PRESETS))
+            self.take(self.presets[chosen])
         self._choose(ui.segmented("kind", [label for label, _ in KINDS], self.kind, -1))
         files, chosen = KINDS[self.kind][1], self.format[self.kind]
         chosen = self.format[self.kind] = ui.segmented("format", [file.name for file in files], chosen, -1)
@@ -335,7 +340,8 @@ class ExportDialog(Dialog):
                 self.start = ui.slider("from", "From", self.start, 0, seconds, SECONDS, 0.0).value
                 self.end = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds).value
             if clip is None:
-                self.returns = ui.check("There and back again", self.returns)
+                self.returns = ui.check("Ping-pong", self.returns)
+                ui.tooltip("Ping-pong", more="There and back again: a loop without a jump.")
             else:
                 kept = [word for word, has in (("sound", clip.sound), ("time code", clip.timecode)) if has]
                 pace = f"{float(self._rate):.5g} frames a second" if clip.durations is None else "own pace"

@@ -45,6 +45,7 @@ class ImGuiBackend:
         self._down: set[imgui.Key] = set()
         self._mods = Mods()
         self._later: list[Event] = []
+        self._owed = 0.0  # seconds that have gone by while events waited
         self.fonts = theme.load_fonts()
         imgui.backends.opengl3_init("#version 330")
 
@@ -76,6 +77,8 @@ class ImGuiBackend:
             events = [event for event in events if not (isinstance(event, Key) and event.key == "tab")]
         io.display_size = imgui.ImVec2(*size)
         io.display_framebuffer_scale = imgui.ImVec2(density, density)
+        # What waits came before this frame's time went by: however slow frames are, a double click stays one.
+        self._owed, dt = (self._owed + dt, 0.0) if self.is_behind else (0.0, self._owed + dt)
         io.delta_time = max(dt, 1e-4)
         self._later += events
         # What is dragged does not follow in the frame in which it is let go of: the last way takes a frame of its own.

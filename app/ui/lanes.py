@@ -27,6 +27,7 @@ from app.model.bars import (
 from app.model.handles import RecipeHandle, RecipePin
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
+from app.ui.layout import LANES
 from app.ui.viewport import Rect
 from app.work.session import Session
 
@@ -77,6 +78,7 @@ class Lanes:
 
     Attributes:
         shown: the lanes are folded open.
+        height: of them all, in points of the design, where the window has room.
         selected: the bars that the next edit is about.
         drag: the bar in hand.
         box: where a box around bars was begun, in points; and what was selected before, and stays so.
@@ -85,6 +87,7 @@ class Lanes:
     """
 
     shown: bool = False
+    height: float = LANES
     selected: set[Which] = field(default_factory=set)
     drag: Drag | None = None
     box: tuple[float, float, frozenset[Which]] | None = None

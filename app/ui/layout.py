@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from app.ui.viewport import Rect
 
 BAR, STRIP, INSPECTOR, TIMEBAR = 48.0, 48.0, 272.0, 56.0
-LANES, MOST_LANES = 156.0, 0.5  # of the lanes, and the part that they take at most of the room above the timeline
+# Of the lanes as they come, at least and at most, and the part that they take at most of the room above the timeline.
+LANES, LEAST_LANES, TALLEST_LANES, MOST_LANES = 156.0, 76.0, 1200.0, 0.5
 # In a window narrower than this the inspector would leave the picture too little; it comes when it is asked for.
 NARROW = 720.0
 LEAST = 120.0  # of the canvas's width; where there is less, the tools make room
@@ -42,7 +43,7 @@ class Layout:
         tools: int,
         groups: int,
         names: bool = False,
-        lanes: bool = False,
+        lanes: float = 0.0,
     ) -> Layout:
         """The layout of a window.
 
@@ -52,11 +53,11 @@ class Layout:
             inspector: it is open.
             tools, groups: how many tools there are, and groups of them.
             names: the tools' names stand beside their icons, if there is room.
-            lanes: they are folded open.
+            lanes: their height, in points of the design, where there is room; 0 if they are folded away.
         """
         bar, time = BAR * scale, TIMEBAR * scale
         middle = max(height - bar - time, 1.0)
-        below = min(LANES * scale, MOST_LANES * middle) if lanes else 0.0
+        below = min(lanes * scale, MOST_LANES * middle)
         middle = max(middle - below, 1.0)
         columns = _columns(middle / scale, tools, groups)
         tool = NAMED if names else TOOL

@@ -1,4 +1,4 @@
-"""Messages in a corner of the canvas, one at a time: they go by themselves, or wait if they must not be missed."""
+"""Messages in a corner of the canvas, one at a time: they go once they were there to be read, or wait to be closed."""
 
 from __future__ import annotations
 
@@ -21,11 +21,15 @@ MOST = 3
 
 @dataclass
 class Message:
-    """Words, and how long they have still to stay; None until they are closed."""
+    """Words, and how long they have still to stay; None until they are closed.
+
+    `seen`: somebody is there, since when the time runs: what a long export says at its end waits for the person.
+    """
 
     text: str
     icon: str = "info"
     left: float | None = SECONDS
+    seen: bool = False
 
 
 class Messages:
@@ -54,12 +58,17 @@ class Messages:
 
     @property
     def next_in(self) -> float | None:
-        """Seconds until the message that is seen goes."""
-        return self.shown[-1].left if self.shown else None
+        """Seconds until the message that is shown goes; None if it stays as long as nobody does anything."""
+        return self.shown[-1].left if self.shown and self.shown[-1].seen else None
+
+    def see(self) -> None:
+        """Somebody moves the pointer, or does something else."""
+        if self.shown:
+            self.shown[-1].seen = True
 
     def elapse(self, dt: float) -> None:
-        """Let `dt` seconds go by; only for the one that is seen."""
-        if self.shown and (message := self.shown[-1]).left is not None:
+        """Let `dt` seconds go by; only for the one that is shown, and only once it is seen."""
+        if self.shown and (message := self.shown[-1]).seen and message.left is not None:
             message.left -= dt
             if message.left <= 0:
                 self.shown.remove(message)

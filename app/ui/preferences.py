@@ -13,6 +13,7 @@ from app.errors import UserError, shown
 from app.media.inputs import read_input
 from app.media.opening import shipped_recipes
 from app.ui.clipboard import pasted_folder
+from app.ui.layout import LANES, LEAST_LANES, TALLEST_LANES
 
 MOST_RECENT = 10
 MOST_BYTES = 2**20  # of the file
@@ -36,6 +37,7 @@ class Preferences:
         window: where the window was, as `GlfwWindow.place` tells it.
         keys: chords of the actions for which the person has chosen others, by the action's name.
         brushes: of each tool, by its name; `presets`: the person's own brushes, by theirs.
+        lanes_height: points of the design.
         stabiliser: points of the screen, of the string that the pen pulls the brush by.
     """
 
@@ -43,6 +45,7 @@ class Preferences:
     scale: float = 1.0
     inspector: bool = True
     lanes: bool = False
+    lanes_height: float = LANES
     auto_quality: bool = True
     embed: bool = True
     hint: bool = True
@@ -79,6 +82,8 @@ class Preferences:
         kept.scale = min(max(kept.scale, 0.75), 3.0) if math.isfinite(kept.scale) else 1.0
         kept.recent = [str(name) for name in kept.recent][:MOST_RECENT]
         kept.stabiliser = min(max(kept.stabiliser, 0.0), LONGEST_STRING) if math.isfinite(kept.stabiliser) else 0.0
+        tall = kept.lanes_height
+        kept.lanes_height = min(max(tall, LEAST_LANES), TALLEST_LANES) if math.isfinite(tall) else LANES
         is_place = len(kept.window) == 5 and all(isinstance(n, int) and abs(n) < MOST_PIXELS for n in kept.window)
         kept.window = kept.window if is_place else []
         kept.sections = {name: shown for name, shown in kept.sections.items() if isinstance(shown, bool)}

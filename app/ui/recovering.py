@@ -133,15 +133,20 @@ class Offer(Dialog):
     def _row(self, ui: Ui, found: Found, top: float) -> str:
         """One of the works, at a height in the list; what has been pressed, or ""."""
         imgui.set_cursor_pos(ImVec2(0, top))
-        right = imgui.get_content_region_avail().x
+        right, what = imgui.get_content_region_avail().x, about(found, date.today())
+        is_narrow = imgui.calc_text_size(what).x > right - ui.px(224)
+        across = ui.px(100 if is_narrow else 208)
         imgui.begin_group()
         ui.text(found.origin.name, size=15, bold=True)
-        ui.dim(about(found, date.today()))
-        ui.dim(_shortened(str(found.file), right - ui.px(224)))
+        ui.dim(what)
+        ui.dim(_shortened(str(found.file), right - across - ui.px(16)))
         imgui.end_group()
-        imgui.set_cursor_pos(ImVec2(right - ui.px(208), top + ui.px(14)))
+        imgui.set_cursor_pos(ImVec2(right - across, top + ui.px(2 if is_narrow else 14)))
         discard = ui.button("Really?" if found is self._doubted else "Discard", width=100)
-        imgui.same_line(0, ui.px(8))
+        if is_narrow:
+            imgui.set_cursor_pos(ImVec2(right - across, top + ui.px(HEIGHT / 2)))
+        else:
+            imgui.same_line(0, ui.px(8))
         restore = ui.button("Restore", primary=True, width=100)
         return "restore" if restore else "discard" if discard else ""
 

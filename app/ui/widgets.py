@@ -150,16 +150,16 @@ class Ui:
         self.text(text, colour, size)
         imgui.pop_text_wrap_pos()
 
-    def tooltip(self, title: str, key: str = "", more: str = "", at_once: bool = False) -> None:
+    def tooltip(self, title: str, key: str = "", more: str = "", at_once: bool = False, above: bool = False) -> None:
         """What the last item is, shown when the pointer rests on it; `at_once`: its name, beside it, on the way there.
 
-        `key`: the chord that does it by default.
+        `key`: the chord that does it by default. `above`: where it covers nothing below.
         """
         rests = imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
         if not (rests or (at_once and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled))):
             return
-        if at_once:
-            self._place_beside(imgui.get_item_rect_min(), imgui.get_item_rect_max())
+        if at_once or above:
+            self._place_beside(imgui.get_item_rect_min(), imgui.get_item_rect_max(), above)
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(10), self.px(7)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(6))
         if imgui.begin_tooltip():
@@ -174,13 +174,13 @@ class Ui:
             imgui.end_tooltip()
         imgui.pop_style_var(2)
 
-    def _place_beside(self, low: ImVec2, high: ImVec2) -> None:
+    def _place_beside(self, low: ImVec2, high: ImVec2, above: bool) -> None:
         """Put the next window beside an item: to the right of one at the left edge, else below or above it."""
         display, gap = imgui.get_io().display_size, self.px(6)
         if low.x < self.px(GRID) and low.y > self.px(GRID):
             imgui.set_next_window_pos(ImVec2(high.x + gap, low.y), imgui.Cond_.always)
             return
-        right, below = low.x > 0.6 * display.x, high.y < 0.7 * display.y
+        right, below = low.x > 0.6 * display.x, high.y < 0.7 * display.y and not above
         at = ImVec2(high.x if right else low.x, high.y + gap if below else low.y - gap)
         imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(float(right), 0.0 if below else 1.0))
 
@@ -257,8 +257,13 @@ class Ui:
         imgui.pop_font()
         return width
 
-    def segmented(self, name: str, choices: Sequence[str], index: int, width: float = 0.0) -> int:
-        """One of a few choices side by side; the index that is chosen now."""
+    def segmented(
+        self, name: str, choices: Sequence[str], index: int, width: float = 0.0, about: Sequence[str] = ()
+    ) -> int:
+        """One of a few choices side by side; the index that is chosen now.
+
+        `about`: of each, told above it, where it covers nothing of what the choice changes.
+        """
         palette, draw = self.palette, imgui.get_window_draw_list()
         imgui.push_font(self.fonts.regular, 13.5)
         widths = [imgui.calc_text_size(choice).x + self.px(20) for choice in choices]
@@ -275,6 +280,8 @@ class Ui:
             if imgui.invisible_button(f"{name}{number}", ImVec2(across, height)):
                 chosen = number
             hovered = imgui.is_item_hovered()
+            if about:
+                self.tooltip(choice, more=about[number], above=True)
             box = self.px(2)
             if number == index:
                 low, high = ImVec2(x + box, corner.y + box), ImVec2(x + across - box, corner.y + height - box)

@@ -472,7 +472,7 @@ class Session:
         """Play the recording over and over, or not; `returns`: there and back again, in what is exported too."""
         self.loops = loops
         if returns != self._live.time.ping_pong:
-            name = "There and back again" if returns else "One way"
+            name = "Ping-pong" if returns else "One way"
             self.edit(name, time=self._live.time.model_copy(update={"ping_pong": returns}))
 
     def pause(self) -> None:

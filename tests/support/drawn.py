@@ -34,9 +34,9 @@ class Drawn:
             self._note_words(monkeypatch, name)
         tooltip, draw_into = Ui.tooltip, Pass.draw_into
 
-        def told(ui: Ui, title: str, key: str = "", more: str = "", at_once: bool = False) -> None:
+        def told(ui: Ui, title: str, key: str = "", more: str = "", at_once: bool = False, above: bool = False) -> None:
             self.lines.append(f"tooltip | {title} | {ui.shown(key)} | {more} | {at_once}")
-            tooltip(ui, title, key, more, at_once)
+            tooltip(ui, title, key, more, at_once, above)
 
         def drawing(self_: Pass, framebuffer: Any, smooth: Any = (), **inputs: Any) -> None:
             if self_.shader.startswith("view/"):

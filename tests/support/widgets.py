@@ -30,11 +30,11 @@ class Widgets:
             self._note(monkeypatch, kind, 1 if kind == "slider" else 0)
         segmented, combo = Ui.segmented, imgui.combo
 
-        def choices(ui: Ui, name: str, words: Sequence[str], index: int, width: float = 0.0) -> int:
-            corner, chosen = imgui.get_cursor_screen_pos(), segmented(ui, name, words, index, width)
+        def choices(ui: Ui, name: str, words: Sequence[str], index: int, *more: Any) -> int:
+            corner, chosen = imgui.get_cursor_screen_pos(), segmented(ui, name, words, index, *more)
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
             imgui.push_font(ui.fonts.regular, 13.5)
-            shares = [1.0 if width else imgui.calc_text_size(word).x + ui.px(20) for word in words]
+            shares = [1.0 if any(more) else imgui.calc_text_size(word).x + ui.px(20) for word in words]
             imgui.pop_font()
             x = corner.x
             for word, share in zip(words, shares, strict=True):

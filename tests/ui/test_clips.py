@@ -119,6 +119,7 @@ def test_what_is_exported_is_what_the_command_line_makes(viewer: Robot, device: 
     viewer.rest()
     go_to(viewer, 6)
     dialog = export_dialog(viewer, tmp_path)
+    assert [preset.name for preset in dialog.presets] == ["Web", "Print", "Film"], "no ping-pong of a clip"
     dialog.kind, dialog.name = ANIMATION, "dialog"
     dialog.format[ANIMATION] = next(n for n, kind in enumerate(ANIMATIONS) if kind.name == "MP4")
     run(device, dialog.job(), Progress())

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from app.media import project as projects
 from app.media.animation import ANIMATIONS as CONTAINERS
@@ -309,6 +310,16 @@ def test_a_preset_chooses_all_that_it_says(
     assert dialog.preset == -1
 
 
+def test_what_a_preset_is_covers_nothing_of_what_it_chooses(
+    robot: Robot, widgets: Widgets, dialog: ExportDialog
+) -> None:
+    robot.move(*widgets.at["Loop"].middle)
+    robot.frame(count=60)
+    told = imgui.internal.find_window_by_name("##Tooltip_00")
+    assert told.active
+    assert told.pos.y + told.size.y <= widgets.at["Loop"].y
+
+
 def test_the_button_of_the_bar_exports(robot: Robot, widgets: Widgets) -> None:
     widgets.click("Export")
     assert isinstance(robot.editor.dialogs.shown[-1], ExportDialog)
@@ -350,7 +361,7 @@ def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: Export
         assert dialog.job().target.name.endswith(ending)
     widgets.click("H.265")
     assert dialog.job().outputs.codec == "h265"
-    widgets.click("There and back again")
+    widgets.click("Ping-pong")
     assert dialog.job().recipe.time.ping_pong
     widgets.type("Frames a second", "24")
     widgets.type("From", "0.1")

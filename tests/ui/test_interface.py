@@ -11,6 +11,7 @@ from typing import Any
 import moderngl
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from app.media.displacement import Displacement
 from app.media.maps import write_map
@@ -245,6 +246,19 @@ def test_nothing_waits_for_the_repeats_of_a_key_that_was_held(robot: Robot, key:
         robot.frame(*[Key(key, True, repeat=True)] * 2)
     robot.frame(Key(key, False), Key("t", True), Text("t"), Key("t", False))
     assert robot.editor.state.tool_name == "twirl"
+
+
+@pytest.mark.parametrize(("rest", "is_one"), [(0.1, True), (0.7, False)])
+def test_a_double_click_is_one_however_slow_frames_are(robot: Robot, rest: float, is_one: bool) -> None:
+    """imgui takes a frame for each press and release, and the time of those in which they wait is not between them."""
+    robot.frame(Move(1100, 30))
+    robot.frame(Button(LEFT, True), dt=0.3)
+    robot.frame(dt=rest)
+    found = False
+    for events in ((Button(LEFT, False), Button(LEFT, True), Button(LEFT, False)), (), (), ()):
+        robot.frame(*events, dt=0.3)
+        found |= imgui.is_mouse_double_clicked(0)
+    assert found == is_one
 
 
 def test_two_clicks_in_half_a_second_are_a_double_click(robot: Robot) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.ui.events import Key, Mods
 from app.ui.lanes import Lanes
+from app.ui.layout import LEAST_LANES
 from app.ui.viewport import Rect
 from solver.gl.device import Device
 from support.editing import Robot, small_project
@@ -91,6 +93,23 @@ def test_a_bar_is_moved_by_dragging_it_and_escape_gives_that_up(painted: Robot) 
     assert lanes(painted).drag is None
     drag(painted, 0, -1000.0)
     assert recipe(painted).stroke[0].first_tick == 0  # and not before the beginning
+
+
+def test_there_is_room_for_more_lanes_where_their_edge_is_dragged(painted: Robot) -> None:
+    before = painted.editor.layout.lanes
+    assert before is not None
+    for by, wanted in ((60.0, before.height + 60), (-1000.0, LEAST_LANES)):
+        now = painted.editor.layout.lanes
+        assert now is not None
+        painted.move(700, now.y + 2)
+        painted.press()
+        painted.move(700, now.y - by)
+        painted.release()
+        painted.frame()
+        assert painted.editor.layout.lanes == replace(now, y=now.bottom - wanted, height=wanted)
+    painted.editor.remember()
+    assert painted.editor.preferences.lanes_height == LEAST_LANES
+    assert names(painted)[-1] == "Push", "no bar was taken hold of"
 
 
 def test_a_bar_is_stretched_at_its_ends(painted: Robot) -> None:

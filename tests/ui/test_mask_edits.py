@@ -20,6 +20,15 @@ def frozen(robot: Robot) -> np.ndarray:
     return robot.editor.session.replay.masks.frozen.get()
 
 
+@pytest.mark.parametrize(("tool", "is_shown"), [("freeze", False), ("smooth", False), ("push", True)])
+def test_a_mask_that_the_tool_shows_anyway_turns_on_no_overlay(robot: Robot, tool: str, is_shown: bool) -> None:
+    """Its opacity would push the buttons away from under the pointer, and it would stay over what is painted then."""
+    robot.editor.state.choose_tool(tool, False)
+    robot.editor.commands.edit_mask("fill")
+    assert robot.editor.state.overlays["frozen"].shown == is_shown
+    assert robot.editor.state.shows_frozen
+
+
 def test_a_mask_follows_the_pointer_in_every_frame_and_takes_no_time(robot: Robot) -> None:
     session = robot.editor.session
     robot.key("f")
@@ -77,7 +86,7 @@ def test_a_button_edits_the_mask_of_the_tool(robot: Robot, widgets: Widgets, kin
     assert (edit.kind, edit.tick) == (kind, 0)
     assert not isinstance(edit, (FeatherMask, SpreadMask)) or edit.radius == 0.07
     assert not isinstance(edit, FillMask) or (edit.amount, edit.of) == (-1.5, "thickness")
-    assert state.overlays["viscosity"].shown
+    assert state.shows_viscosity
     assert robot.editor.session.document.history.entries[-1].name == f"{kind.capitalize()} the thickness"
 
 

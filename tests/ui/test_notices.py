@@ -27,8 +27,12 @@ def test_each_message_is_seen_for_its_five_seconds_the_newest_first() -> None:
     messages.warn("stays")
     assert messages.next_in is None
     messages.say("first")
+    messages.see()
     messages.elapse(2.0)
     messages.say("second")
+    messages.elapse(60.0)
+    assert messages.next_in is None, "a long export ends while nobody is there: it waits for the person"
+    messages.see()
     assert messages.next_in == 5.0
     messages.elapse(5.0)
     assert [message.text for message in messages.shown] == ["stays", "first"]

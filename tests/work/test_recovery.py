@@ -18,6 +18,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from app.errors import UserError
 from app.media import project as projects
@@ -29,6 +30,7 @@ from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.model.undo import History
 from app.ui.recovering import Offer
+from app.ui.widgets import Ui
 from app.work import locks, recovery
 from app.work.locks import Lock
 from app.work.recovery import Found, Journal, find
@@ -36,6 +38,7 @@ from app.work.session import Session
 from killing import Painter, digest_of, digest_of_warp
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
+from support.widgets import Widgets
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -555,6 +558,25 @@ def answer(robot: Robot, choice: str) -> None:
     y = rect.bottom - 36 if choice == "Later" else rect.y + 118
     robot.click(x, y)
     robot.until(lambda: not robot.editor.files.is_loading)
+
+
+def test_what_is_offered_is_told_beside_its_buttons_also_in_a_small_window(
+    starter: Starter, before: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert before.recipe.stroke
+    robot = starter.start(tmp_path)
+    widgets, told = Widgets(robot, monkeypatch), dict[str, float]()
+
+    def dim(ui: Ui, words: str, *more: float) -> None:
+        plain(ui, words, *more)
+        told[words] = imgui.get_item_rect_max().x
+
+    plain = Ui.dim
+    monkeypatch.setattr(Ui, "dim", dim)
+    robot.scale, robot.size = 2.0, (800, 520)
+    robot.frame(count=4)
+    assert told
+    assert max(told.values()) <= min(widgets.at["Discard"].x, widgets.at["Restore"].x)
 
 
 def test_restored_work_is_as_it_was_and_unsaved(

@@ -40,6 +40,8 @@ def draw(
         _zoom(ui, workspace, do)
     if state.tool_name == "handle" and not session.recipe.leads and canvas.width > ui.px(HINT):
         _how(ui, canvas, "Drag a point to where it should go. Click to pin one where it is.")
+    elif state.tool_name == "freeze" and not session.recipe.mask and canvas.width > ui.px(HINT):
+        _how(ui, canvas, "Leave a margin to what you push: fluid sticks to what is frozen.")
     elif selecting.hint and canvas.width > ui.px(HINT):
         _how(ui, canvas, selecting.hint)
     elif preferences.hint and canvas.width > ui.px(HINT):
@@ -110,7 +112,7 @@ def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:
         imgui.same_line(0, 0)
         imgui.set_cursor_pos_y(top + ui.px(4))
         ui.text("Drag on the picture to push it.", size=14, bold=True)
-        if canvas.width > ui.px(860):
+        if canvas.width > ui.px(860) and not preferences.recent:
             imgui.same_line(0, ui.px(8))
             imgui.set_cursor_pos_y(top + ui.px(4))
             ui.dim(f"Drop your own picture here, or press {ui.shown('ctrl+o')}.", 14)

@@ -333,12 +333,13 @@ def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         _which_mask(ui, state)
         if state.mask == "thickness":
             _brightness(ui, workspace.session, state)
-    slid = ui.slider(
-        "mask reach", "By", state.mask_reach, 0.001, 0.25, Unit(" px", max(workspace.canvas.size)), 0.02,
-        logarithmic=True, title="How far", more="By so much Feather, Grow and Shrink move its edges.",
-    )  # fmt: skip
-    state.mask_reach = slid.value
     for row in (("invert", "fill", "clear"), ("feather", "grow", "shrink"), ("load", "save")):
+        if "grow" in row:
+            slid = ui.slider(
+                "mask reach", "By", state.mask_reach, 0.001, 0.25, Unit(" px", max(workspace.canvas.size)), 0.02,
+                logarithmic=True, title="How far", more="By so much Feather, Grow and Shrink move its edges.",
+            )  # fmt: skip
+            state.mask_reach = slid.value
         width = (imgui.get_content_region_avail().x / ui.scale - 8 * (len(row) - 1)) / len(row)
         for number, name in enumerate(row):
             if number:
@@ -389,7 +390,7 @@ def _history(ui: Ui, workspace: Workspace, state: EditorState) -> None:
     entries, present = history.entries, history.index
     # As much as is in sight without scrolling the inspector, the header of the section below included.
     room = imgui.get_content_region_avail().y - ui.px(60)
-    most = max(4, min(8, int(room / ui.px(ROW))))
+    most = max(4, int(room / ui.px(ROW)))
     height = min(len(entries), most) * ui.px(ROW) + ui.px(4)
     imgui.begin_child("entries", ImVec2(0, height))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))

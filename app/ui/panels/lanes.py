@@ -17,7 +17,8 @@ from app.model.strokes import Stroke
 from app.ui import icons
 from app.ui.actions import ACTIONS, Do
 from app.ui.editor_state import EditorState
-from app.ui.lanes import Part
+from app.ui.lanes import Lanes, Part
+from app.ui.layout import LEAST_LANES, TALLEST_LANES
 from app.ui.panels import timebar
 from app.ui.panels.timebar import FORCES, HANDLES, MASKS
 from app.ui.theme import packed, rgb
@@ -28,6 +29,7 @@ from app.work.session import Session
 ROW, GAP = 20.0, 3.0
 HEAD, RULER = 30.0, 18.0
 LOW = 100.0  # points of height up to which there is no ruler
+EDGE = 6.0  # points of the upper edge that can be taken hold of
 GRIP = 6.0  # points at a bar's ends by which it is stretched
 NARROWEST = 9.0  # points of a bar
 SHAKE = 3.0  # points that the pointer may move and is not dragging yet
@@ -65,7 +67,7 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
     if session.is_painting:
         lanes.selected = set()
     with ui.panel("lanes", rect, (12, 4), imgui.WindowFlags_.no_scroll_with_mouse):
-        ui.rule(ImVec2(rect.x, rect.y), ImVec2(rect.right, rect.y + ui.px(1)))
+        _edge(ui, rect, lanes)
         _head(ui, session, state, do)
         bar = imgui.get_style().scrollbar_size
         x0 = rect.x + ui.px(12)
@@ -77,6 +79,23 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         imgui.pop_style_var()
     if let_go:
         lanes.release(session)
+
+
+def _edge(ui: Ui, rect: Rect, lanes: Lanes) -> None:
+    """The upper edge, which is dragged to make room for more lanes."""
+    corner = imgui.get_cursor_screen_pos()
+    imgui.set_cursor_screen_pos(ImVec2(rect.x, rect.y))
+    imgui.invisible_button("edge", ImVec2(rect.width, ui.px(EDGE)))
+    held, hovered = imgui.is_item_active(), imgui.is_item_hovered()
+    if held and imgui.get_io().mouse_delta.y:
+        lanes.height = min(max((rect.bottom - imgui.get_mouse_pos().y) / ui.scale, LEAST_LANES), TALLEST_LANES)
+    ui.tooltip("The lanes", more="Drag for more of them, or fewer.")
+    low, high = ImVec2(rect.x, rect.y), ImVec2(rect.right, rect.y + ui.px(2 if held or hovered else 1))
+    if held or hovered:
+        imgui.get_window_draw_list().add_rect_filled(low, high, packed(ui.palette.accent))
+    else:
+        ui.rule(low, high)
+    imgui.set_cursor_screen_pos(corner)
 
 
 def _head(ui: Ui, session: Session, state: EditorState, do: Do) -> None:

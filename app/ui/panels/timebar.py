@@ -25,11 +25,15 @@ MASKS = rgb("0f86c9")
 HANDLES = rgb("4fc1a6")
 FORCES = rgb("a99be0")
 REPEATS = {  # how the recording is played: icon, name, and what a click makes of it
-    "once": ("once", "Plays once", "Click to play it over and over."),
-    "loop": ("loop", "Plays over and over", "Click to play it there and back again, in what is exported too."),
+    "once": ("once", "Plays once", "Click to play it in a loop."),
+    "loop": (
+        "loop",
+        "Loop: plays over and over",
+        "Click for ping-pong: there and back again, in what is exported too.",
+    ),
     "returns": (
         "returns",
-        "Plays there and back again",
+        "Ping-pong: plays there and back again",
         "Without a jump, in what is exported too. Click to play it once.",
     ),
 }
