@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise, takewhile
 from math import ceil, cos, floor, inf, radians, sin
@@ -253,6 +254,17 @@ def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list
         for several in (handles, pins)
         for number, led in enumerate(several, 1)
     ]
+
+
+def in_words(said: str) -> str:
+    """What messages say, with handles and pins called as the window does: handle 1 "smile" is handle[1] "smile"."""
+    return re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", said)
+
+
+def heading(said: str) -> str:
+    """The same with a capital."""
+    words = in_words(said)
+    return f"{words[:1].upper()}{words[1:]}"
 
 
 def _short(seconds: float) -> float:

@@ -17,6 +17,7 @@ from app.model.tools import TOOLS
 from app.ui import theme
 from app.ui.actions import ACTIONS
 from app.ui.canvas import Canvas
+from app.ui.cautions import Cautions
 from app.ui.chooser import FileChooser
 from app.ui.clock import PACE, Clock
 from app.ui.commands import Commands
@@ -84,6 +85,7 @@ class Editor:
         self.files = Files(self.workspace, self.chooser, self.dialogs, self.messages, likes, self.open)
         self.exports = Exports(self.messages)
         self.fits = Fits(self.workspace, self.messages)
+        self.cautions = Cautions(self.workspace, self.messages)
         self.quality = Quality(self.workspace, self.state, self.files, self.exports, self.fits, self.messages)
         self.recovery = Recovery(self.journals, self.dialogs, self.messages, self.files.restore)
         self.selecting = Selecting(self.workspace, self.state, self.messages)
@@ -272,7 +274,9 @@ class Editor:
             try:
                 self._handle_one(event)
             except UserError as error:
-                self.messages.warn(error.in_window)
+                # What the hand tries in vain is no state of the work, that somebody would have to take note of.
+                tell = self.messages.caution if isinstance(event, (Button, Move)) else self.messages.warn
+                tell(error.in_window)
 
     def _handle_one(self, event: Event) -> None:
         match event:
@@ -352,6 +356,7 @@ class Editor:
         if self.session.notice:
             self.messages.say(self.session.notice)
             self.session.notice = None
+        self.cautions.look()
         self.exports.draw(self.ui, self.layout.canvas)
         self.fits.draw(self.ui, self.layout.canvas, BELOW if self.exports.is_running else 0.0)
         self.files.draw(self.ui, self.layout.canvas)

@@ -221,8 +221,10 @@ class Files:
             self.messages.warn(error.in_window)
             return
         self.preferences.opened(loading.path)
-        for notice in self.workspace.session.pictures.notices:
-            self.messages.say(notice)
+        session = self.workspace.session
+        for notice in session.pictures.notices:
+            if notice not in session.objections:  # which are told of any work
+                self.messages.say(notice)
         if loading.found is None:
             return
         if loading.found.is_as_it_was(loading.project):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
+from app.model.handles import heading
 from app.model.recipe import Recipe
 from app.ui.exporting import under_way
 from app.ui.messages import Messages
@@ -15,7 +16,8 @@ from app.work.fit_job import Fit
 from app.work.fitting import EVALUATIONS
 from app.work.session import Session
 
-TOLD = 2  # notices, beside how it went: no more messages are shown at a time
+FIT = "Fit"  # what the history calls it
+TOLD = 6  # notices in a message
 
 
 class Fits:
@@ -70,7 +72,7 @@ class Fits:
         process.poll()
         if not self._is_still_of_use(process.fit.recipe):
             self.give_up()
-            self._messages.say("The fit has been given up: what it was of has been changed.")
+            self._messages.say("The fit was stopped, because the work was changed meanwhile. Press Fit to start again.")
         elif process.is_done:
             self.process = None
             self._take(process)
@@ -98,8 +100,15 @@ class Fits:
             self._messages.say("The fit has been stopped before it had found anything.")
         else:
             fluid = session.recipe.fluid.model_copy(update={"viscosity": made.fluid.viscosity})
-            session.edit("Fit", handle=made.handle, pin=made.pin, duration=made.duration, fluid=fluid)
+            session.edit(FIT, handle=made.handle, pin=made.pin, duration=made.duration, fluid=fluid)
             session.seek(session.end)
-            for notice in process.notices[:TOLD]:
-                self._messages.say(f"{notice[:1].upper()}{notice[1:]}.")
-            self._messages.done(f"Fitted: {process.outcome.verdict}.")
+            verdict = process.outcome.verdict
+            if process.outcome.is_met:
+                self._messages.done(f"Fitted: {verdict}.")
+                return
+            words = [f"{heading(notice)}." for notice in process.notices[:TOLD]]
+            rest = [f"{len(process.notices) - TOLD} more are in the inspector."] * (len(process.notices) > TOLD)
+            self._messages.warn(
+                " ".join(["Fitted as well as it could be.", *words, *rest]),
+                lambda: self._workspace.session is session and session.document.recipe.handle == made.handle,
+            )

@@ -21,11 +21,12 @@ MOST = 3
 
 @dataclass
 class Message:
-    """Words, and how long they have still to stay; None until they are closed."""
+    """Words, and how long they have still to stay, None until they are closed; but no longer than they hold."""
 
     text: str
     icon: str = "info"
     left: float | None = SECONDS
+    holds: Callable[[], bool] = lambda: True
 
 
 class Messages:
@@ -44,9 +45,13 @@ class Messages:
         """Something to know."""
         self._add(Message(text))
 
-    def warn(self, text: str) -> None:
-        """Something that went wrong; it stays until it is closed."""
-        self._add(Message(text, "warn", None))
+    def warn(self, text: str, holds: Callable[[], bool] = lambda: True) -> None:
+        """Something that went wrong; it stays until it is closed, or does not hold any more."""
+        self._add(Message(text, "warn", None, holds))
+
+    def caution(self, text: str, holds: Callable[[], bool] = lambda: True) -> None:
+        """Something that cannot be, or will not turn out as it is wished; it goes by itself."""
+        self._add(Message(text, "warn", SECONDS, holds))
 
     def done(self, text: str) -> None:
         """Something that went well."""
@@ -58,7 +63,10 @@ class Messages:
         return self.shown[-1].left if self.shown else None
 
     def elapse(self, dt: float) -> None:
-        """Let `dt` seconds go by; only for the one that is seen."""
+        """Let `dt` seconds go by, only for the one that is seen; what does not hold any more goes."""
+        if gone := [message for message in self.shown if not message.holds()]:
+            self.shown = [message for message in self.shown if message not in gone]
+            self._changed()
         if self.shown and (message := self.shown[-1]).left is not None:
             message.left -= dt
             if message.left <= 0:

@@ -69,7 +69,7 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
     assert [handle.at for handle in session.recipe.handle] == [handle.at for handle in before.handle]
     assert [handle.to for handle in session.recipe.handle] == [handle.goal for handle in before.handle]
     assert session.tick == session.end
-    assert not any(held.is_away(session.extent) for held in session.held)
+    assert not any(held.is_away for held in session.held)
     assert robot.editor.messages.shown[-1].text.startswith("Fitted: 2 pairs, mean error 0.")
     robot.key("ctrl+z")
     robot.rest()
@@ -129,7 +129,7 @@ def test_what_has_been_changed_meanwhile_is_kept_and_the_fit_given_up(robot: Rob
     robot.key("ctrl+z")
     robot.frame(count=2)
     assert not robot.editor.fits.is_running
-    assert "given up" in robot.editor.messages.shown[-1].text
+    assert "work was changed meanwhile" in robot.editor.messages.shown[-1].text
     assert names(robot) == ["Open", "Handle", "Handle", "Half"]
 
 
@@ -140,7 +140,7 @@ def test_of_another_work_nothing_is_fitted_however_alike(robot: Robot) -> None:
     editor.open(replace(editor.session.project, recipe=editor.session.recipe))
     robot.frame(count=2)
     assert not editor.fits.is_running
-    assert "given up" in editor.messages.shown[-1].text
+    assert "work was changed meanwhile" in editor.messages.shown[-1].text
     editor.do("undo")  # the work before it
 
 

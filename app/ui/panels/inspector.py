@@ -15,7 +15,7 @@ import numpy as np
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.model.handles import ARRIVED, RecipeHandle, labelled
+from app.model.handles import RecipeHandle, heading, labelled
 from app.model.mask_edits import MASKS, THICKEST, THINNEST, MaskStroke, PictureMask, is_brightness
 from app.model.presets import DEFAULT
 from app.model.strokes import Symmetry
@@ -166,7 +166,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             13,
         )
     else:
-        ui.text(label.capitalize().replace("[", " ").replace("]", ""), size=14)
+        ui.text(heading(label), size=14)
         imgui.same_line()
         ui.dim(_whereabouts(workspace, label))
         slid = ui.slider(
@@ -190,8 +190,11 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         if ui.button("Remove", width=-1, height=30):
             do("remove")
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
-    away = sum(held.is_away(session.extent) for held in session.held)
-    ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all" + (f", {away} not there yet" if away else ""))
+    away, unmet = sum(held.is_away for held in session.held), session.unmet
+    rest = f", {len(unmet)} not where led" if unmet else f", {away} not there yet" if away else ""
+    ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all{rest}")
+    for said in (*session.objections, *unmet.values()):
+        ui.wrapped(f"{heading(said)}.", ui.palette.text, 13)
     with ui.enabled(any(handle.goal for handle in recipe.handle)):
         if ui.button("Fit##handles", width=-1, height=30):
             do("fit_handles")
@@ -225,8 +228,8 @@ def _whereabouts(workspace: Workspace, label: str) -> str:
     session, pixels = workspace.session, max(workspace.canvas.size)
     for held in session.held:
         if held.label == label:
-            led, left = (hypot(*np.subtract(a, held.target) * session.extent) for a in (held.start, held.now))
-            rest = f", {pixels * left:.0f} px left" if left > ARRIVED else ""
+            led = hypot(*np.subtract(held.start, held.target) * session.extent)
+            rest = f", {pixels * held.left:.0f} px left" if held.is_away else ""
             return f"led {pixels * led:.0f} px{rest}" if led > 1e-9 else f"stays{rest}"
     return ""
 
