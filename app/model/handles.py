@@ -292,7 +292,8 @@ def objections(
         if (ends := way.after[beyond & ~outside]).size:
             yield f"{way.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
         elif (far := _lengths(way.after - way.before).max() / way.reach) > LARGEST_LEAD:
-            yield f"{way.label} goes only {LARGEST_LEAD:g} of the {far:.3g} radii to its goal; give it a larger radius"
+            more = "give it a larger reach (radius)"
+            yield f"{way.label} goes only {LARGEST_LEAD:g} times as far as it reaches, of {far:.3g} to its goal; {more}"
         if way.led.closed and _area(way.before) * _area(way.after) < 0:
             yield f"{way.label} is led inside out"
     for one, other in combinations([way for way in led if way.led.takes_hold], 2):

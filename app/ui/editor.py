@@ -82,9 +82,11 @@ class Editor:
         self.chooser = FileChooser(self.dialogs, self.messages)
         self.journals = Journals(journals, self.messages)
         self.workspace = Workspace(device, self.journals, Viewport(self.layout.canvas, (1, 1)))
-        self.files = Files(self.workspace, self.chooser, self.dialogs, self.messages, likes, self.open)
-        self.exports = Exports(self.messages)
         self.fits = Fits(self.workspace, self.messages)
+        self.files = Files(
+            self.workspace, self.chooser, self.dialogs, self.messages, likes, self.open, self.fits.start_with
+        )
+        self.exports = Exports(self.messages)
         self.cautions = Cautions(self.workspace, self.messages)
         self.quality = Quality(self.workspace, self.state, self.files, self.exports, self.fits, self.messages)
         self.recovery = Recovery(self.journals, self.dialogs, self.messages, self.files.restore)
@@ -298,7 +300,7 @@ class Editor:
                 self.remember()
             # A dialog is about the work that is open, and is answered before there is another one.
             case Drop(paths) if paths and not self.dialogs.shown:
-                self.files.open(Path(paths[0]))
+                self.files.open(*map(Path, paths))
             case CloseWish():
                 self.do("quit")
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
+from pathlib import Path
 
+from app.errors import UserError
+from app.media.landmarks import Pairs, read_pairs
 from app.model.handles import heading
 from app.model.recipe import Recipe
 from app.ui.exporting import under_way
@@ -13,7 +17,7 @@ from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.export_process import FitProcess
 from app.work.fit_job import Fit
-from app.work.fitting import EVALUATIONS
+from app.work.fitting import DURATION, EVALUATIONS
 from app.work.session import Session
 
 FIT = "Fit"  # what the history calls it
@@ -21,7 +25,7 @@ TOLD = 6  # notices in a message
 
 
 class Fits:
-    """The fit that is under way, if any: `fluidwarp fit` of the work's own handles.
+    """The fit that is under way, if any: `fluidwarp fit` of the work's own handles, or of pairs in files.
 
     Attributes:
         evaluations: see `fitted`.
@@ -33,6 +37,7 @@ class Fits:
         self.evaluations = EVALUATIONS
         self.process: FitProcess | None = None
         self._session: Session | None = None  # whose handles are fitted
+        self._of: Recipe | None = None  # what it was then
         self._stopping = False
 
     @property
@@ -47,11 +52,27 @@ class Fits:
         if not any(handle.goal for handle in session.recipe.handle):
             self._messages.say("There is nothing to fit yet: drag a point to where it should go, with Handle.")
             return
+        self._begin(session.recipe)
+
+    def start_with(self, files: Sequence[Path]) -> None:
+        """Begin to fit the pairs in files, as `fluidwarp fit --pairs`, with a handle for each beside what there is.
+
+        Raises:
+            UserError: if they cannot be read, are not two sets of points, or something is being fitted.
+        """
+        if self.is_running:
+            raise UserError("A fit is under way: stop it, or wait for it, and then drop the pairs again.")
+        session = self._workspace.session
+        picture, recipe = session.project.picture, session.recipe
+        pairs = read_pairs(files, (picture.width, picture.height))
+        self._begin(recipe if session.has_begun else recipe.edited(duration=DURATION[0]), pairs)
+
+    def _begin(self, recipe: Recipe, pairs: Pairs | None = None) -> None:
+        session = self._workspace.session
         session.seek(session.end)
-        self._session, self._stopping = session, False
+        self._session, self._of, self._stopping = session, session.recipe, False
         project = session.project
-        fit = Fit(session.recipe, project.picture, project.folder, evaluations=self.evaluations)
-        self.process = FitProcess(fit)
+        self.process = FitProcess(Fit(recipe, project.picture, project.folder, pairs, self.evaluations))
 
     def finish(self) -> None:
         """Let it end with the best so far."""
@@ -70,7 +91,7 @@ class Fits:
         if (process := self.process) is None:
             return
         process.poll()
-        if not self._is_still_of_use(process.fit.recipe):
+        if not self._is_still_of_use():
             self.give_up()
             self._messages.say("The fit was stopped, because the work was changed meanwhile. Press Fit to start again.")
         elif process.is_done:
@@ -81,10 +102,10 @@ class Fits:
             if under_way(ui, "fitting", canvas, down, f"Fitting: {state}", process.part, "Stop"):
                 self.finish()
 
-    def _is_still_of_use(self, recipe: Recipe) -> bool:
+    def _is_still_of_use(self) -> bool:
         """The work goes on being simulated as it was when the fit began, if perhaps on another grid."""
-        session = self._workspace.session
-        if session is not self._session:
+        session, recipe = self._workspace.session, self._of
+        if session is not self._session or recipe is None:
             return False
         now = session.recipe
         return now is recipe or (

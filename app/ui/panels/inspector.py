@@ -161,7 +161,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
         ui.wrapped(
             "Drag a point of the picture to where it should go, or click to pin it. With Shift draw a line, which is "
-            "dragged as one. Click one to select it.",
+            "dragged as one. Click one to select it. Or drop a file of pairs on the window (.csv, .pts, .tps).",
             ui.palette.dim,
             13,
         )
@@ -191,8 +191,9 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             do("remove")
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
     away, unmet = sum(held.is_away for held in session.held), session.unmet
-    rest = f", {len(unmet)} not where led" if unmet else f", {away} not there yet" if away else ""
-    ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all{rest}")
+    rest = f", {len(unmet)} did not arrive" if unmet else f", {away} not there yet" if away else ""
+    if recipe.leads:
+        ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all{rest}")
     for said in (*session.objections, *unmet.values()):
         ui.wrapped(f"{heading(said)}.", ui.palette.text, 13)
     with ui.enabled(any(handle.goal for handle in recipe.handle)):
