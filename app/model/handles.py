@@ -187,13 +187,18 @@ class RecipeHandle(_Led, Course):
         return self.keys[-1][1:] if self.keys else self.to
 
     @property
+    def is_led(self) -> bool:
+        """True if it goes or turns somewhere."""
+        return self.goal is not None or self.turns
+
+    @property
     def span(self) -> tuple[float, float]:
         """The seconds from its start to the end of its way; of what has none, until it lets go."""
-        return (self.start, self.last) if self.goal or self.turns else super().span
+        return (self.start, self.last) if self.is_led else super().span
 
     def spanning(self, start: float, end: float) -> dict[str, Any]:
         """Its times, with its way between others; what it holds after that it holds as long."""
-        if not (self.goal or self.turns):
+        if not self.is_led:
             return super().spanning(start, end)
         first, last = self.span
         factor, end = ((end - start) / (last - first), end) if last > first else (1.0, start)

@@ -147,7 +147,13 @@ def test_of_another_work_nothing_is_fitted_however_alike(robot: Robot) -> None:
 
 
 def test_without_a_handle_that_leads_anywhere_there_is_nothing_to_fit(robot: Robot) -> None:
-    robot.editor.session.edit("None", handle=())
+    turned = [{"at": (0.5, 0.5), "keys": (), "rotate": 20.0}, {"at": (0.5, 0.5), "to": (0.6, 0.5), "muted": True}]
+    turned, muted = Recipe.model_validate({"handle": tuple(turned)}).handle
+    robot.editor.session.edit("Turned", handle=(turned,))
+    robot.key("shift+g")
+    assert robot.editor.fits.is_running
+    robot.editor.fits.give_up()
+    robot.editor.session.edit("None", handle=(muted,))
     robot.key("shift+g")
     assert not robot.editor.fits.is_running
     assert "nothing to fit" in robot.editor.messages.shown[-1].text
