@@ -96,6 +96,9 @@ class Files:
         What may be a picture as well as a map is asked about. Pairs are fitted, of which there may be two files.
         """
         if path.suffix.lower() in ENDINGS:
+            session = self.workspace.session
+            if session is self.workspace.placeholder and not session.has_begun:
+                raise UserError(f"{path.name} has pairs of points: first open the picture that they are of.")
             self.fit((path, *others))
             return
         match holds(path):

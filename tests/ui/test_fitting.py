@@ -170,6 +170,10 @@ def test_pairs_that_fall_on_the_window_are_fitted_as_by_the_command_line(robot: 
     robot.editor.do("undo")
     robot.editor.do("undo")
     robot.rest()
+    robot.editor.workspace.placeholder = session
+    robot.frame(Drop((str(tmp_path / "p.csv"),)))
+    assert "first open the picture" in messages.shown[-1].text
+    robot.editor.workspace.placeholder = None
     robot.frame(Drop((str(tmp_path / "p.csv"),)))
     process = robot.editor.fits.process
     assert process is not None

@@ -161,7 +161,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
         ui.wrapped(
             "Drag a point of the picture to where it should go, or click to pin it. With Shift draw a line, which is "
-            "dragged as one. Click one to select it. Or drop a file of pairs on the window (.csv, .pts, .tps).",
+            "dragged as one. Click one to select it. Or drop a file of pairs on the window: CSV, PTS or TPS.",
             ui.palette.dim,
             13,
         )
