@@ -137,7 +137,7 @@ def _handles(
         if line:
             lines.add_polyline(line, packed(BLACK, 0.45 * alpha), ui.px(4.6), 0)
             lines.add_polyline(line, packed(ink, 0.8 * alpha), ui.px(2.2), 0)
-        if held.is_away:
+        if held.is_away and held.due:
             due: list[Any] = [ImVec2(*view.to_screen(*place)) for place in held.due]
             lines.add_polyline(due, packed(BLACK, 0.45 * alpha), ui.px(3.4), 0)
             lines.add_polyline(due, packed(WARN, 0.8 * alpha), ui.px(1.2), 0)
