@@ -254,15 +254,16 @@ def test_what_cannot_be_met_is_told_as_the_command_line_tells_it_until_it_is_men
 
 
 def test_a_handle_is_led_on_from_where_it_is_whatever_amount_is_seen(robot: Robot) -> None:
-    drag(robot, (0.4, 0.5), (0.5, 0.5))
     session = robot.editor.session
-    session.edit("Amount", amount=0.5)
-    robot.frame()
+    led = Recipe.model_validate({"handle": ({"at": (0.4, 0.5), "to": (0.5, 0.5), "duration": 0.2},)}).handle
+    session.edit("Led", handle=led, duration=session.dt * 12, amount=0.5)
+    session.seek(session.end)
+    robot.rest()
     (mark,) = session.marks
     assert 0.42 < mark.now[0] < 0.48
     assert mark.target == pytest.approx(mark.now, abs=2 * ARRIVED)
     drag(robot, mark.target, (mark.target[0], 0.55))
-    assert names(robot) == ["Open", "Handle", "Amount", "Lead on"]
+    assert names(robot) == ["Open", "Led", "Lead on"]
     assert session.recipe.handle[0].goal == pytest.approx((0.5, 0.55), abs=4e-3)
 
 

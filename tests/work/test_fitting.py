@@ -222,7 +222,7 @@ def test_stopped_it_is_as_good_as_was_told_last(device: Device):
         device,
         crossing,
         9,
-        RECIPE.replace("grid = 32", "grid = 96"),
+        RECIPE.replace("grid = 32", "grid = 72"),
         report=lambda done, total: made.append(done),
         tell=said.append,
         cancel=lambda: made[-1] >= 10,
