@@ -67,7 +67,8 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
         sets += _read(path, size)
     if len(sets) != 2:
         found = f"{len(sets)} sets of landmarks" if len(sets) != 1 else "one set of landmarks"
-        raise UserError(f"{files} has {found}; pairs need two, where the points are and where they should be")
+        said = f"{files} has {found}; pairs need two, where the points are and where they should be"
+        raise UserError(said, in_window=f"{said}: drop two files at once")
     if len(sets[0]) != len(sets[1]):
         raise UserError(f"{files}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}")
     if not len(sets[0]):

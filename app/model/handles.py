@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise, takewhile
 from math import ceil, cos, floor, inf, radians, sin
@@ -186,13 +187,18 @@ class RecipeHandle(_Led, Course):
         return self.keys[-1][1:] if self.keys else self.to
 
     @property
+    def is_led(self) -> bool:
+        """True if it goes or turns somewhere."""
+        return self.goal is not None or self.turns
+
+    @property
     def span(self) -> tuple[float, float]:
         """The seconds from its start to the end of its way; of what has none, until it lets go."""
-        return (self.start, self.last) if self.goal or self.turns else super().span
+        return (self.start, self.last) if self.is_led else super().span
 
     def spanning(self, start: float, end: float) -> dict[str, Any]:
         """Its times, with its way between others; what it holds after that it holds as long."""
-        if not (self.goal or self.turns):
+        if not self.is_led:
             return super().spanning(start, end)
         first, last = self.span
         factor, end = ((end - start) / (last - first), end) if last > first else (1.0, start)
@@ -255,6 +261,17 @@ def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list
     ]
 
 
+def in_words(said: str) -> str:
+    """What messages say, with handles and pins called as the window does: handle 1 "smile" is handle[1] "smile"."""
+    return re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", said)
+
+
+def heading(said: str) -> str:
+    """The same with a capital."""
+    words = in_words(said)
+    return f"{words[:1].upper()}{words[1:]}"
+
+
 def _short(seconds: float) -> float:
     """To a billionth of a second, so that moving it there and back leaves no digits behind."""
     return round(seconds, 9)
@@ -280,7 +297,8 @@ def objections(
         if (ends := way.after[beyond & ~outside]).size:
             yield f"{way.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
         elif (far := _lengths(way.after - way.before).max() / way.reach) > LARGEST_LEAD:
-            yield f"{way.label} goes only {LARGEST_LEAD:g} of the {far:.3g} radii to its goal; give it a larger radius"
+            more = "give it a larger reach (radius)"
+            yield f"{way.label} goes only {LARGEST_LEAD:g} times as far as it reaches, of {far:.3g} to its goal; {more}"
         if way.led.closed and _area(way.before) * _area(way.after) < 0:
             yield f"{way.label} is led inside out"
     for one, other in combinations([way for way in led if way.led.takes_hold], 2):

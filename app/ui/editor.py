@@ -17,6 +17,7 @@ from app.model.tools import TOOLS
 from app.ui import theme
 from app.ui.actions import ACTIONS
 from app.ui.canvas import Canvas
+from app.ui.cautions import Cautions
 from app.ui.chooser import FileChooser
 from app.ui.clock import PACE, Clock
 from app.ui.commands import Commands
@@ -81,9 +82,12 @@ class Editor:
         self.chooser = FileChooser(self.dialogs, self.messages)
         self.journals = Journals(journals, self.messages)
         self.workspace = Workspace(device, self.journals, Viewport(self.layout.canvas, (1, 1)))
-        self.files = Files(self.workspace, self.chooser, self.dialogs, self.messages, likes, self.open)
-        self.exports = Exports(self.messages)
         self.fits = Fits(self.workspace, self.messages)
+        self.files = Files(
+            self.workspace, self.chooser, self.dialogs, self.messages, likes, self.open, self.fits.start_with
+        )
+        self.exports = Exports(self.messages)
+        self.cautions = Cautions(self.workspace, self.messages)
         self.quality = Quality(self.workspace, self.state, self.files, self.exports, self.fits, self.messages)
         self.recovery = Recovery(self.journals, self.dialogs, self.messages, self.files.restore)
         self.selecting = Selecting(self.workspace, self.state, self.messages)
@@ -275,7 +279,9 @@ class Editor:
             try:
                 self._handle_one(event)
             except UserError as error:
-                self.messages.warn(error.in_window)
+                # What the hand tries in vain is no state of the work, that somebody would have to take note of.
+                tell = self.messages.caution if isinstance(event, (Button, Move)) else self.messages.warn
+                tell(error.in_window)
 
     def _handle_one(self, event: Event) -> None:
         match event:
@@ -297,7 +303,7 @@ class Editor:
                 self.remember()
             # A dialog is about the work that is open, and is answered before there is another one.
             case Drop(paths) if paths and not self.dialogs.shown:
-                self.files.open(Path(paths[0]))
+                self.files.open(*map(Path, paths))
             case CloseWish():
                 self.do("quit")
 
@@ -355,6 +361,7 @@ class Editor:
         if self.session.notice:
             self.messages.say(self.session.notice)
             self.session.notice = None
+        self.cautions.look()
         self.exports.draw(self.ui, self.layout.canvas)
         self.fits.draw(self.ui, self.layout.canvas, BELOW if self.exports.is_running else 0.0)
         self.files.draw(self.ui, self.layout.canvas)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
@@ -15,6 +15,7 @@ from app.errors import UserError
 from app.media import project as projects
 from app.media.clip import rate_of
 from app.media.files import sequence_of
+from app.media.landmarks import ENDINGS
 from app.media.maps import MAP_ENDINGS, holds
 from app.media.opening import check_picture
 from app.media.pictures import write_picture
@@ -37,7 +38,7 @@ from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.recovery import Found
 
-OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, *CLIP_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS)))
+OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, *CLIP_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS, *ENDINGS)))
 TICK = 1 / 30  # seconds
 AT_ONCE = 0.15  # seconds that opening may take without a word about it
 
@@ -48,6 +49,7 @@ class Files:
 
     Attributes:
         show: opens a project that has been read, with its picture as the canvas shows it and what it was restored from.
+        fit: fits pairs in files to the picture that is open.
     """
 
     workspace: Workspace
@@ -56,6 +58,7 @@ class Files:
     messages: Messages
     preferences: Preferences
     show: Callable[[Project, np.ndarray | None, Found | None], None]
+    fit: Callable[[Sequence[Path]], None]
     _loading: Loading | None = field(default=None, init=False)
 
     # -- opening ----------------------------------------------------------------------------------------------------
@@ -87,11 +90,17 @@ class Files:
         path = self.preferences.open_from / f"{self.workspace.session.project.name}-{of}.png"
         self.chooser.ask_where("Save the mask", path, (".png",), lambda path: self.save_mask(path, of))
 
-    def open(self, path: Path) -> None:
+    def open(self, path: Path, *others: Path) -> None:
         """Open a picture, a recipe or a project, after asking about unsaved work; of a warp map, start from it.
 
-        What may be a picture as well as a map is asked about.
+        What may be a picture as well as a map is asked about. Pairs are fitted, of which there may be two files.
         """
+        if path.suffix.lower() in ENDINGS:
+            session = self.workspace.session
+            if session is self.workspace.placeholder and not session.has_begun:
+                raise UserError(f"{path.name} has pairs of points: first open the picture that they are of.")
+            self.fit((path, *others))
+            return
         match holds(path):
             case "map":
                 self.start_from_map(path)
@@ -221,8 +230,10 @@ class Files:
             self.messages.warn(error.in_window)
             return
         self.preferences.opened(loading.path)
-        for notice in self.workspace.session.pictures.notices:
-            self.messages.say(notice)
+        session = self.workspace.session
+        for notice in session.pictures.notices:
+            if notice not in session.objections:  # which are told of any work
+                self.messages.say(notice)
         if loading.found is None:
             return
         if loading.found.is_as_it_was(loading.project):

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
+from pathlib import Path
 
+from app.errors import UserError
+from app.media.landmarks import Pairs, read_pairs
+from app.model.handles import heading
 from app.model.recipe import Recipe
 from app.ui.exporting import under_way
 from app.ui.messages import Messages
@@ -12,14 +17,15 @@ from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.export_process import FitProcess
 from app.work.fit_job import Fit
-from app.work.fitting import EVALUATIONS
+from app.work.fitting import DURATION, EVALUATIONS
 from app.work.session import Session
 
-TOLD = 2  # notices, beside how it went: no more messages are shown at a time
+FIT = "Fit"  # what the history calls it
+TOLD = 6  # notices in a message
 
 
 class Fits:
-    """The fit that is under way, if any: `fluidwarp fit` of the work's own handles.
+    """The fit that is under way, if any: `fluidwarp fit` of the work's own handles, or of pairs in files.
 
     Attributes:
         evaluations: see `fitted`.
@@ -31,6 +37,7 @@ class Fits:
         self.evaluations = EVALUATIONS
         self.process: FitProcess | None = None
         self._session: Session | None = None  # whose handles are fitted
+        self._of: Recipe | None = None  # what it was then
         self._stopping = False
 
     @property
@@ -42,14 +49,30 @@ class Fits:
         if self.is_running:
             return
         session = self._workspace.session
-        if not any(handle.goal for handle in session.recipe.handle):
+        if not any(handle.is_led and not handle.muted for handle in session.recipe.handle):
             self._messages.say("There is nothing to fit yet: drag a point to where it should go, with Handle.")
             return
+        self._begin(session.recipe)
+
+    def start_with(self, files: Sequence[Path]) -> None:
+        """Begin to fit the pairs in files, as `fluidwarp fit --pairs`, with a handle for each beside what there is.
+
+        Raises:
+            UserError: if they cannot be read, are not two sets of points, or something is being fitted.
+        """
+        if self.is_running:
+            raise UserError("A fit is under way: stop it, or wait for it, and then drop the pairs again.")
+        session = self._workspace.session
+        picture, recipe = session.project.picture, session.recipe
+        pairs = read_pairs(files, (picture.width, picture.height))
+        self._begin(recipe if session.has_begun else recipe.edited(duration=DURATION[0]), pairs)
+
+    def _begin(self, recipe: Recipe, pairs: Pairs | None = None) -> None:
+        session = self._workspace.session
         session.seek(session.end)
-        self._session, self._stopping = session, False
+        self._session, self._of, self._stopping = session, session.recipe, False
         project = session.project
-        fit = Fit(session.recipe, project.picture, project.folder, evaluations=self.evaluations)
-        self.process = FitProcess(fit)
+        self.process = FitProcess(Fit(recipe, project.picture, project.folder, pairs, self.evaluations))
 
     def finish(self) -> None:
         """Let it end with the best so far."""
@@ -68,9 +91,9 @@ class Fits:
         if (process := self.process) is None:
             return
         process.poll()
-        if not self._is_still_of_use(process.fit.recipe):
+        if not self._is_still_of_use():
             self.give_up()
-            self._messages.say("The fit has been given up: what it was of has been changed.")
+            self._messages.say("The fit was stopped, because the work was changed meanwhile. Press Fit to start again.")
         elif process.is_done:
             self.process = None
             self._take(process)
@@ -79,10 +102,10 @@ class Fits:
             if under_way(ui, "fitting", canvas, down, f"Fitting: {state}", process.part, "Stop"):
                 self.finish()
 
-    def _is_still_of_use(self, recipe: Recipe) -> bool:
+    def _is_still_of_use(self) -> bool:
         """The work goes on being simulated as it was when the fit began, if perhaps on another grid."""
-        session = self._workspace.session
-        if session is not self._session:
+        session, recipe = self._workspace.session, self._of
+        if session is not self._session or recipe is None:
             return False
         now = session.recipe
         return now is recipe or (
@@ -98,8 +121,15 @@ class Fits:
             self._messages.say("The fit has been stopped before it had found anything.")
         else:
             fluid = session.recipe.fluid.model_copy(update={"viscosity": made.fluid.viscosity})
-            session.edit("Fit", handle=made.handle, pin=made.pin, duration=made.duration, fluid=fluid)
+            session.edit(FIT, handle=made.handle, pin=made.pin, duration=made.duration, fluid=fluid)
             session.seek(session.end)
-            for notice in process.notices[:TOLD]:
-                self._messages.say(f"{notice[:1].upper()}{notice[1:]}.")
-            self._messages.done(f"Fitted: {process.outcome.verdict}.")
+            verdict = process.outcome.verdict
+            if process.outcome.is_met:
+                self._messages.done(f"Fitted: {verdict}.")
+                return
+            words = [f"{heading(notice)}." for notice in process.notices[:TOLD]]
+            rest = [f"{len(process.notices) - TOLD} more are in the inspector."] * (len(process.notices) > TOLD)
+            self._messages.warn(
+                " ".join(["Fitted as well as it could be.", *words, *rest]),
+                lambda: self._workspace.session is session and session.document.recipe.handle == made.handle,
+            )

@@ -21,7 +21,7 @@ MOST = 3
 
 @dataclass
 class Message:
-    """Words, and how long they have still to stay; None until they are closed.
+    """Words, and how long they have still to stay, None until they are closed; but no longer than they hold.
 
     `seen`: somebody is there, since when the time runs: what a long export says at its end waits for the person.
     """
@@ -29,6 +29,7 @@ class Message:
     text: str
     icon: str = "info"
     left: float | None = SECONDS
+    holds: Callable[[], bool] = lambda: True
     seen: bool = False
 
 
@@ -48,9 +49,13 @@ class Messages:
         """Something to know."""
         self._add(Message(text))
 
-    def warn(self, text: str) -> None:
-        """Something that went wrong; it stays until it is closed."""
-        self._add(Message(text, "warn", None))
+    def warn(self, text: str, holds: Callable[[], bool] = lambda: True) -> None:
+        """Something that went wrong; it stays until it is closed, or does not hold any more."""
+        self._add(Message(text, "warn", None, holds))
+
+    def caution(self, text: str, holds: Callable[[], bool] = lambda: True) -> None:
+        """Something that cannot be, or will not turn out as it is wished; it goes by itself."""
+        self._add(Message(text, "warn", SECONDS, holds))
 
     def done(self, text: str) -> None:
         """Something that went well."""
@@ -67,7 +72,10 @@ class Messages:
             self.shown[-1].seen = True
 
     def elapse(self, dt: float) -> None:
-        """Let `dt` seconds go by; only for the one that is shown, and only once it is seen."""
+        """Let `dt` seconds go by, only for the one that is shown and seen; what does not hold any more goes."""
+        if gone := [message for message in self.shown if not message.holds()]:
+            self.shown = [message for message in self.shown if message not in gone]
+            self._changed()
         if self.shown and (message := self.shown[-1]).seen and message.left is not None:
             message.left -= dt
             if message.left <= 0:

@@ -90,7 +90,7 @@ class PointerController:
         return self._nearest()
 
     def _nearest(self) -> Held | None:
-        """The handle or pin nearest to the pointer, by where it is and where it shall be, within its grip."""
+        """The handle or pin whose mark is nearest to the pointer, by where it is and shall be, within its grip."""
         view = self.workspace.view
 
         def far(held: Held) -> float:
@@ -99,7 +99,7 @@ class PointerController:
             pieces = [*((place, place) for place in places), *pairwise(line)]
             return min(_distance((self.x, self.y), *piece) for piece in pieces)
 
-        held = min(self.workspace.session.held, key=far, default=None)
+        held = min(self.workspace.session.marks, key=far, default=None)
         return held if held is not None and far(held) <= self.ui.px(GRIP) else None
 
     @property
@@ -211,9 +211,9 @@ class PointerController:
         workspace, view, brush = self.workspace, self.workspace.view, self.state.brush
         if abs(x - self._start[0]) + abs(y - self._start[1]) > SHAKE:
             self._moved = True
-        if self.drag == "hold" and self._moved:
-            self.drag = "paint"
-            self._paint(self._pressed)
+        if self.drag == "hold" and self._moved and self._pressed is not None:
+            self.drag, label = "paint", self._pressed.label
+            self._paint(next((held for held in workspace.session.held if held.label == label), self._pressed))
         match self.drag:
             case "paint":
                 workspace.session.move(*view.to_picture(x, y), pressure, mods.shift)

@@ -101,7 +101,7 @@ class Offer(Dialog):
 
     def body(self, ui: Ui) -> bool:
         offered = self._recovery.offered
-        ui.wrapped("fluidwarp ended before this was saved. It is here up to the last stroke.", ui.palette.dim, 14)
+        ui.wrapped("fluidwarp ended before this was saved. It is here up to the last change.", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(4)))
         imgui.begin_child("offered", ImVec2(0, ui.px(HEIGHT) * min(len(offered), ROWS)))
         restored = discarded = None
@@ -153,9 +153,10 @@ class Offer(Dialog):
 
 def about(found: Found, today: date) -> str:
     """How much there is, and from when."""
-    strokes = found.work.strokes
-    count = "1 stroke" if strokes == 1 else f"{strokes} strokes" if strokes else "changes without a stroke"
-    return f"{count}, {_moment(found.when, today)}"
+    work = found.work
+    counts = [(work.strokes, "stroke"), (work.handles, "handle")]
+    told = [f"{count} {noun}{'s' if count > 1 else ''}" for count, noun in counts if count]
+    return f"{' and '.join(told) or 'other changes'}, {_moment(found.when, today)}"
 
 
 def _moment(when: datetime, today: date) -> str:

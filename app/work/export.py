@@ -170,7 +170,7 @@ class _Export:
         """What the user should know of the last warp, and of what the output cannot hold."""
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
-        for said in unmet(self.replay, ARRIVED):
+        for _, said in unmet(self.replay, ARRIVED):
             self.pictures.notice(said)
         output, clip = self.outputs.file, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture, **self._along)):

@@ -20,12 +20,12 @@ from app.model.handles import (
     MOST_HANDLES,
     MOST_OBJECTIONS,
     RecipeHandle,
-    RecipePin,
     labelled,
     objections,
 )
 from app.model.picture import Picture
 from app.model.recipe import Recipe
+from app.model.schema import label_of
 from app.progress import Progress
 from app.work.replay import Replay
 from solver.components import connected_components
@@ -51,7 +51,9 @@ class Trial:
     Attributes:
         recipe: that was played.
         arrived: where the pairs' points are in the end, (n, 2) in fractions; NaN of those without a handle.
-        residuals: how far each pair that can be met is from its place, longer sides.
+        errors: how far what is led by each is from where it should be, by the point of it that is farthest, (n,) in
+            longer sides; NaN likewise.
+        residuals: the same of those that can be met, of places outside the picture from its edge.
         work: the length of the way, the integral over time of the root mean square of grad u; how fast it is gone makes
             no difference. Landmarks are matched by flows along the shortest one (Joshi and Miller, 2000).
         det: the least det J of the map.
@@ -60,6 +62,7 @@ class Trial:
 
     recipe: Recipe
     arrived: np.ndarray
+    errors: np.ndarray
     residuals: np.ndarray
     work: float
     det: float
@@ -84,8 +87,9 @@ class Fitted:
     Attributes:
         trial: the best, on the recipe's own grid.
         pairs: where each point is and where it arrives; those without a handle are left out.
-        errors: how far all are from where they should be, in pixels; NaN of those without a handle.
+        errors: the trial's, in pixels.
         stopped: the search was ended before its budget.
+        is_met: all arrive, within `ARRIVED`, and nothing folds.
         notices: what the user should hear of.
     """
 
@@ -93,6 +97,7 @@ class Fitted:
     pairs: Pairs
     errors: np.ndarray
     stopped: bool
+    is_met: bool
     notices: tuple[str, ...]
 
     @property
@@ -120,12 +125,14 @@ def fitted(
     By COBYQA (Ragonneau and Zhang), a trust-region method without derivatives for bounds and constraints: on a coarse
     grid first with all handles alike, then the radius of each, then the duration of each; and with all alike again on
     the recipe's own. Many handles stay alike: for so many replays that is found better.
+    What is told of the best so far, and returned, has been played on the recipe's own grid: where handles are in each
+    other's way they halt elsewhere on a coarse one. The start is, and what each part of the search has found.
     Handles of an earlier fit are replaced. A budget ends it and no clock, so that the same is found again. If
-    `progress` says to stop, the best so far is checked on the recipe's own grid and returned.
+    `progress` says to stop, what was found since is played there too, and the best is returned.
 
     Args:
         folder: where the names of the recipe's other pictures start from.
-        pairs: None are those of the recipe's own handles, which are replaced; those that stay as they are become pins.
+        pairs: None are those of the recipe's own handles, which are replaced, and keep their numbers.
         evaluations: replays on the coarse grid.
         local: of all handles; None is 1 where there are curves, 0 of points, and the recipe's own keep theirs.
 
@@ -137,28 +144,32 @@ def fitted(
     if local is not None:
         aim = replace(aim, handles=tuple(each.model_copy(update={"local": local}) for each in aim.handles))
     search = _Search(device, aim, picture, folder, progress)
-    fine = max(evaluations // A_FINE_ONE, 1)
-    progress.total = evaluations + fine
-    point, stopped = search.start, False
-    count = len(search.numbers)
+    fine, count = max(evaluations // A_FINE_ONE, 1), len(search.numbers)
     alike, each = _directions(count), np.eye(3 * count + 1)
-    parts = (alike, 0.25, 3), (each[:, :count], 0.15, 2), (each[:, 2 * count : -1], 0.15, 1)
+    parts = [(alike, 0.25), (each[:, :count], 0.15), (each[:, 2 * count : -1], 0.15)][: 3 if count <= ALONE else 1]
+    progress.total = evaluations + search.fine.cost * (fine + len(parts))
+    stopped = False
     try:
-        for directions, reach, share in parts if count <= ALONE else [(alike, 0.25, 1)]:
-            point = search.run(search.coarse, point, directions, reach, (evaluations - progress.done) // share)
-        point = search.run(search.fine, point, alike, 0.05, fine)
+        search.trial(search.coarse, search.start)  # soon there is something to stop with
+        search.trial(search.fine, search.start)
+        for number, (directions, reach) in enumerate(parts):
+            left = evaluations - search.coarse.replays
+            search.run(search.coarse, search.coarse.best, directions, reach, left // (len(parts) - number))
+            search.trial(search.fine, search.coarse.best)
+        search.run(search.fine, search.fine.best, alike, 0.05, fine)
     except Cancelled:
-        if search.best is None:
+        if search.coarse.found is None:
             raise
-        point, stopped = search.best[0], True
-    return search.ended(point, stopped)
+        stopped = True
+    return search.ended(stopped)
 
 
 @dataclass(frozen=True)
 class _Aim:
-    """What is fitted: a recipe without its handles, and what becomes of each pair, but for what is searched.
+    """What is fitted: a recipe, and what becomes of each pair, but for what is searched.
 
     `names`: what messages call each pair. `begins`: where each handle's point is when it begins, (n, 2) in fractions.
+    `own`: of the recipe's handles the numbers of those that are fitted, from 0; others come after all.
     """
 
     recipe: Recipe
@@ -166,6 +177,7 @@ class _Aim:
     names: tuple[str, ...]
     handles: tuple[RecipeHandle, ...]
     begins: np.ndarray
+    own: tuple[int, ...] = ()
 
 
 def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None) -> _Aim:
@@ -179,36 +191,30 @@ def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs
         made = tuple(one.model_copy(update={"name": name}) for name in names)
         places = np.round(pairs.places, DECIMALS)
         return _Aim(base, Pairs(places, pairs.curves), names, made, places[:, 0])
-    led, names, places, begins, pins, muted = (
-        [],
-        [],
-        [],
-        [],
-        list(recipe.pin),
-        tuple(handle for handle in recipe.handle if handle.muted),
-    )
+    led, names, places, begins, own, kept = [], [], [], [], [], list(recipe.handle)
     extent = np.array([picture.width, picture.height]) / max(picture.width, picture.height)
     starts = _starts(device, recipe, picture, folder)
-    for number, (handle, start) in enumerate(zip(recipe.handle, starts, strict=True), 1):
+    for number, (handle, start) in enumerate(zip(recipe.handle, starts, strict=True)):
         end = np.round(handle.goal or start, DECIMALS)
         if handle.muted:
             continue
         if handle.turns or np.hypot(*((end - handle.at) * extent)) > ARRIVED:
             led.append(handle)
-            names.append(handle.name or f"{handle.kind} {number}")
+            own.append(number)
+            names.append(label_of(handle.kind, number + 1, handle.name))
             begins.append(start)
             places.append((np.round(handle.at, DECIMALS), end))
         else:
-            pin = RecipePin.model_validate({name: getattr(handle, name) for name in RecipePin.model_fields})
-            pins.append(pin if _has_times(recipe) else pin.model_copy(update={"start": 0.0, "end": None}))
+            times = {} if _has_times(recipe) else {"start": 0.0, "end": None}
+            kept[number] = handle.model_copy(update={"to": None, "keys": (), "goals": (), **times})
     if not led:
         raise UserError("no handle of the recipe leads anywhere; give --pairs, or [[handle]]s with a place to go to")
-    base = recipe.edited(handle=muted, pin=tuple(pins))
+    base = recipe.edited(handle=tuple(kept))
     pairs = Pairs.points(np.array(places))
     if not _has_times(base):
         base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
         led, begins = [each.model_copy(update={"start": 0.0}) for each in led], pairs.places[:, 0]
-    return _Aim(base, pairs, tuple(names), tuple(led), np.array(begins))
+    return _Aim(base, pairs, tuple(names), tuple(led), np.array(begins), tuple(own))
 
 
 def _has_times(recipe: Recipe) -> bool:
@@ -238,12 +244,24 @@ def _directions(count: int) -> np.ndarray:
     return (kinds[:, None] == np.arange(4)).astype(float)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Stage:
-    """A recipe without the handles of the fit, and the pictures that it is played with."""
+    """A grid that a recipe is played on, with these pictures; the recipe is without what is fitted.
+
+    `cost`: of a replay, in those on a coarse grid. `found`: the best trial so far, and its point; `replays`: made.
+    """
 
     recipe: Recipe
     pictures: Pictures
+    cost: int = 1
+    found: tuple[np.ndarray, Trial] | None = None
+    replays: int = 0
+
+    @property
+    def best(self) -> np.ndarray:
+        """The point of the best trial."""
+        assert self.found is not None
+        return self.found[0]
 
 
 class _Search:
@@ -257,12 +275,15 @@ class _Search:
         self.extent = np.array([picture.width, picture.height]) / self.longer
         self.notices: list[str] = []
         self.numbers = self._usable(base)
-        self.fine = _Stage(base, Pictures(picture, folder))
+        self.fine = _Stage(base, Pictures(picture, folder), A_FINE_ONE)
         self.hopeful = self._reachable()
         apart = -(-self.longer // COARSE_PICTURE)
         small = replace(picture, pixels=np.ascontiguousarray(picture.pixels[::apart, ::apart]))
-        self.coarse = _Stage(_coarse(base), Pictures(small, folder))
-        self.best: tuple[np.ndarray, Trial, _Stage] | None = None
+        coarse = _Stage(_coarse(base), Pictures(small, folder))
+        if apart == 1 and coarse.recipe == base:
+            self.fine = coarse
+        self.coarse = coarse
+        self._tried: dict[tuple[bool, bytes], Trial] = {}
         ways = np.hypot(*((pairs[:, 1] - aim.begins) * self.extent).T)[self.numbers]
         least = np.clip(1.01 * ways / LARGEST_LEAD, RANGES[0][0], 1.0)
         own = max(base.fluid.viscosity, 1e-6)
@@ -277,44 +298,37 @@ class _Search:
         first = listed(np.maximum(1.5 * ways, 0.25), 1.0, 0.8, own)
         self.start = np.clip((first - self.low) / np.maximum(self.high - self.low, 1e-9), 0, 1)
 
-    def run(self, stage: _Stage, origin: np.ndarray, groups: np.ndarray, reach: float, budget: int) -> np.ndarray:
-        """The best point found from `origin` along `groups`: `budget` replays, at first `reach` of the cube apart."""
+    def run(self, stage: _Stage, origin: np.ndarray, groups: np.ndarray, reach: float, budget: int) -> None:
+        """Search from `origin` along `groups`: with `budget` replays, at first `reach` of the cube apart."""
         from scipy.optimize import NonlinearConstraint, minimize
 
-        tried: dict[bytes, Trial] = {}
+        if budget <= 1:
+            return
 
         def trial(step: np.ndarray) -> Trial:
-            if (key := step.tobytes()) not in tried:
-                tried[key] = self._tried(stage, np.clip(origin + groups @ step, 0, 1))
-            return tried[key]
+            return self.trial(stage, np.clip(origin + groups @ step, 0, 1))
 
         def constraints(step: np.ndarray) -> np.ndarray:
             found = trial(step)
             return np.array([-found.excess / ARRIVED, (found.det - LEAST_DET) / LEAST_DET])
 
-        if self.best is not None and self.best[2] is not stage:
-            self.best = None
-        still = np.zeros(groups.shape[1])
-        trial(still)
-        if budget > 1:
-            inside = [origin[group > 0] for group in groups.T]
-            minimize(
-                lambda step: trial(step).work,
-                still,
-                method="COBYQA",
-                bounds=[(-part.min(), 1 - part.max()) for part in inside],
-                constraints=NonlinearConstraint(constraints, 0, np.inf),
-                options={"maxfev": budget, "initial_tr_radius": reach, "final_tr_radius": 1e-3},
-            )
-        assert self.best is not None
-        return self.best[0]
+        inside = [origin[group > 0] for group in groups.T]
+        minimize(
+            lambda step: trial(step).work,
+            np.zeros(groups.shape[1]),
+            method="COBYQA",
+            bounds=[(-part.min(), 1 - part.max()) for part in inside],
+            constraints=NonlinearConstraint(constraints, 0, np.inf),
+            options={"maxfev": budget, "initial_tr_radius": reach, "final_tr_radius": 1e-3},
+        )
 
-    def ended(self, point: np.ndarray, stopped: bool) -> Fitted:
+    def ended(self, stopped: bool) -> Fitted:
         """The result: the best on the recipe's own grid, and less of the way where that folds."""
-        if self.best is None or self.best[2] is not self.fine:
-            trial = self._played(self.fine, self._recipe(self.fine.recipe, point), Progress())
-        else:
-            trial = self.best[1]
+        if stopped:
+            self.progress = Progress()
+            self.trial(self.fine, self.coarse.best)
+        assert self.fine.found is not None
+        point, trial = self.fine.found
         part = 1.0
         while trial.folds and part > 0:
             part = part / 2 if part > 0.5**HALVINGS else 0.0
@@ -323,30 +337,36 @@ class _Search:
             self.notices.append(f"the pairs go only {part:g} of their ways: farther, the picture folds")
         if trial.folds:
             self.notices.append("the picture folds even so: the recipe itself folds it")
-        errors = np.hypot(*((trial.arrived - self.pairs[:, 1]) * self.extent).T) * self.longer
-        for number in self.numbers:
-            if not errors[number] <= ARRIVED * self.longer:
-                self.notices.append(f"{self._label(number)} ends {errors[number]:.3g} pixels from where it should be")
+        errors = trial.errors * self.longer
+        missed = [number for number in self.numbers if not trial.errors[number] <= ARRIVED]
+        for number in missed:
+            self.notices.append(f"{self._label(number)} ends {errors[number]:.3g} pixels from where it should be")
         said = objections(trial.recipe.handle, trial.recipe.pin, (self.extent[0], self.extent[1]))
         self.notices += list(islice(said, MOST_OBJECTIONS))
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
-        return Fitted(trial, pairs, errors, stopped, tuple(self.notices))
+        is_met = not (missed or trial.folds) and len(self.numbers) == len(self.pairs)
+        return Fitted(trial, pairs, errors, stopped, is_met, tuple(self.notices))
 
-    def _tried(self, stage: _Stage, point: np.ndarray) -> Trial:
-        trial = self._played(stage, self._recipe(stage.recipe, point), self.progress)
-        if self.best is None or trial.rank < self.best[1].rank:
-            self.best = point, trial, stage
-        best = self.best[1]
-        mean = float(best.residuals.mean()) * self.longer if len(best.residuals) else 0.0
-        self.progress.enter(f"best so far {mean:.2f} px, work {best.work:.3f}")
-        self.progress.advance()
+    def trial(self, stage: _Stage, point: np.ndarray) -> Trial:
+        """What comes of a point of the cube on a grid."""
+        if (key := (stage is self.fine, point.tobytes())) in self._tried:
+            return self._tried[key]
+        trial = self._tried[key] = self._played(stage, self._recipe(stage.recipe, point), self.progress)
+        stage.replays += 1
+        if stage.found is None or trial.rank < stage.found[1].rank:
+            stage.found = point, trial
+        if self.fine.found is not None:
+            best = self.fine.found[1]
+            off = f"{np.nanmean(best.errors) * self.longer:.2f} px off on average" + ", and folds" * (best.folds > 0)
+            self.progress.enter(f"best so far {off}, work {best.work:.3f}")
+        self.progress.advance(stage.cost)
         return trial
 
     def _recipe(self, base: Recipe, point: np.ndarray, part: float = 1.0) -> Recipe:
         """The recipe that a point of the cube stands for, its handles led a part of their ways."""
         values = [_rounded(value) for value in np.exp(self.low + point * (self.high - self.low))]
-        count, handles = len(self.numbers), []
+        count, handles = len(self.numbers), dict(enumerate(base.handle))
         for row, number in enumerate(self.numbers):
             (at, end), handle = self.pairs[number], self.aim.handles[number]
             to = self.aim.begins[number] + part * (np.clip(end, 0, 1) - self.aim.begins[number])
@@ -362,9 +382,15 @@ class _Search:
             if handle.turned:
                 _, values_of["rotate"], values_of["scale"] = handle.turned[-1]
                 values_of["turned"] = ()
-            handles.append(handle.model_copy(update=values_of))
+            handles[self._slots[row]] = handle.model_copy(update=values_of)
         fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
-        return base.edited(handle=(*base.handle, *handles), fluid=fluid)
+        return base.edited(handle=tuple(handles.values()), fluid=fluid)
+
+    @property
+    def _slots(self) -> list[int]:
+        """The number that the handle of each pair that has one has in the recipe, from 0."""
+        own, first = self.aim.own, len(self.aim.recipe.handle)
+        return [own[number] if own else first + row for row, number in enumerate(self.numbers)]
 
     def _played(self, stage: _Stage, recipe: Recipe, progress: Progress) -> Trial:
         replay = Replay(self.device, recipe, stage.pictures, budget=0)
@@ -375,14 +401,15 @@ class _Search:
                 replay.advance()
                 work += _strain(replay) * recipe.fluid.dt
             found = replay.warp.statistics()
-            arrived = np.full((len(self.pairs), 2), np.nan)
-            # Handles come after pins, and those of the fit last.
-            arrived[self.numbers] = replay.handles.places[-len(self.numbers) :] / self.extent
+            arrived, away = np.full((len(self.pairs), 2), np.nan), np.full(len(self.pairs), np.nan)
+            labels = [label for label, _ in replay.led]
+            rows = [labels.index(label) for label, _ in (labelled(recipe.handle, ())[slot] for slot in self._slots)]
+            arrived[self.numbers] = replay.handles.places[rows] / self.extent
+            away[self.numbers] = replay.handles.away[rows]
         finally:
             replay.release()
-        ends = np.clip(self.pairs[self.hopeful, 1], 0, 1)
-        residuals = np.hypot(*((arrived[self.hopeful] - ends) * self.extent).T)
-        return Trial(recipe, arrived, residuals, work, found.det_min, found.folds)
+        errors = np.fmax(np.hypot(*((arrived - self.pairs[:, 1]) * self.extent).T), away)
+        return Trial(recipe, arrived, errors, away[self.hopeful], work, found.det_min, found.folds)
 
     def _label(self, number: int) -> str:
         """What messages call a pair."""
@@ -397,7 +424,7 @@ class _Search:
                 self.notices.append(f"{self._label(number)} is left out: its point is outside the picture")
             elif not there:
                 self.notices.append(f"{self._label(number)} goes only to the picture's edge: its place is outside it")
-        numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin)
+        numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin) - len(self.aim.own)
         if not len(numbers):
             raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:

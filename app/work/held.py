@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from math import hypot
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.model.handles import ARRIVED, RecipeHandle, RecipePin
 from app.model.sampling import Point
 from app.work.replay import Replay
+from solver.warp.inverse import ForwardMap
+
+Line = tuple[Point, ...]
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,9 @@ class Held:
         led: as the recipe has it.
         label: what messages call it.
         start, now, target: where it was when it began, is, and shall be.
-        line: where the points of its line are, the first again at the end of a closed one; none of a point.
+        left: how far what is farthest of it is from where it shall be, longer sides, as `unmet` tells it.
+        line, due: where the points of its line are, and shall be, the first again at the end of a closed one; none of a
+            point.
     """
 
     led: RecipeHandle | RecipePin
@@ -29,12 +33,14 @@ class Held:
     start: Point
     now: Point
     target: Point
-    line: tuple[Point, ...] = ()
+    left: float
+    line: Line = ()
+    due: Line = ()
 
-    def is_away(self, extent: Point) -> bool:
+    @property
+    def is_away(self) -> bool:
         """True if it is not where it is led."""
-        (x, y), (to_x, to_y), (across, down) = self.now, self.target, extent
-        return hypot((x - to_x) * across, (y - to_y) * down) > ARRIVED
+        return self.left > ARRIVED
 
 
 def held_in(replay: Replay) -> list[Held]:
@@ -44,21 +50,47 @@ def held_in(replay: Replay) -> list[Held]:
     if not any(one.is_in_force(tick, dt) for _, one in led):
         return found
     shapes = handles.shapes
-    for (label, one), handle, shape, now, start in zip(
-        led, handles.handles, shapes, handles.middles(shapes), handles.starts, strict=True
+    for (label, one), handle, shape, now, start, (due, left) in zip(
+        led,
+        handles.handles,
+        shapes,
+        handles.middles(shapes),
+        handles.starts,
+        handles.left(replay.time, dt),
+        strict=True,
     ):
         if one.is_in_force(tick, dt):
             start = now if np.isnan(start[0]) else start
-            target = handle.wanted(start, max(replay.time, handle.ready), dt) if handle.goal else start
-            places = (np.array([start, now, target]) / extent).tolist()
-            line = (shape / extent).tolist() if one.points else []
-            places, line = ([(x, y) for x, y in each] for each in (places, line))
-            found.append(Held(one, label, *places, line=(*line, *line[: one.closed])))
+            target = handle.wanted(start, max(replay.time, handle.ready), dt, np.inf) if handle.goal else start
+            lines = [_fractions(each, extent, one.closed) if one.points else () for each in (shape, due)]
+            begun, here, goal = _fractions(np.array([start, now, target]), extent)
+            found.append(Held(one, label, begun, here, goal, left, *lines))
     return found
 
 
-def unmet(replay: Replay, within: float) -> Iterator[str]:
-    """Which handles are farther than `within` longer sides from where they are led at this moment, and how far."""
+def as_seen(held: list[Held], replay: Replay) -> list[Held]:
+    """The same where the picture is seen at the recipe's amount: what has arrived lies on what it holds there too."""
+    amount, extent = replay.recipe.amount, replay.grid.extent
+    if amount == 1 or not held:
+        return held
+    places = [np.multiply([one.now, *one.line], extent) for one in held]
+    listed = np.concatenate(places)
+    listed = listed + replay.warp.at(listed)  # in the original
+    with ForwardMap(replay.seen) as forward:
+        listed = listed + forward.at(listed)
+    seen, several = [], np.split(listed, np.cumsum([len(each) for each in places])[:-1])
+    for one, shown in zip(held, several, strict=True):
+        now, *line = _fractions(shown, extent)
+        start = _between(one.led.at, one.start, amount)
+        target = _between(now, (now[0] + one.target[0] - one.now[0], now[1] + one.target[1] - one.now[1]), amount)
+        seen.append(replace(one, start=start, now=now, target=target, line=tuple(line), due=()))
+    return seen
+
+
+def unmet(replay: Replay, within: float) -> Iterator[tuple[str, str]]:
+    """Which handles are farther than `within` longer sides from where they are led, by what messages call them, and a
+    sentence of how far each is.
+    """
     if not replay.handles.handles:
         return
     solid = replay.fluid.solid.get()
@@ -68,4 +100,13 @@ def unmet(replay: Replay, within: float) -> Iterator[str]:
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
             why = ": what it holds is frozen" if (solid[rows, columns] == 255).any() else ""
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
-            yield f"{label} is {far:.3g} longer sides ({pixels:.3g} pixels) away from where it is led{why}"
+            yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led{why}"
+
+
+def _fractions(places: np.ndarray, extent: Point, closed: bool = False) -> Line:
+    line = [(x, y) for x, y in (places / extent).tolist()]
+    return (*line, *line[: 1 if closed else 0])
+
+
+def _between(one: Point, other: Point, part: float) -> Point:
+    return one[0] + part * (other[0] - one[0]), one[1] + part * (other[1] - one[1])

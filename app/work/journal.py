@@ -99,6 +99,11 @@ class Work:
         return max(len(recipe.stroke) + sum(edit.kind == "stroke" for edit in recipe.mask) for recipe in recipes)
 
     @property
+    def handles(self) -> int:
+        """How many handles and pins there are, likewise."""
+        return max(len(entry.recipe.handle) + len(entry.recipe.pin) for entry in self.entries[self.index :])
+
+    @property
     def is_unsaved(self) -> bool:
         """True if something would be lost: the present, or what can be redone."""
         return self.recipe != self.saved or self.index < len(self.entries) - 1

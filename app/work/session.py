@@ -10,6 +10,7 @@ import time
 from collections.abc import Collection
 from dataclasses import replace
 from fractions import Fraction
+from itertools import islice
 from math import ceil
 from typing import Any
 
@@ -22,7 +23,7 @@ from app.media.project import Project
 from app.model.bars import Changed, Which, with_changed
 from app.model.document import Document
 from app.model.edits import TIMED, check_room, cut_off, with_change, with_led, with_made, with_taken
-from app.model.handles import RecipeHandle, RecipePin, is_inside
+from app.model.handles import ARRIVED, MOST_OBJECTIONS, RecipeHandle, RecipePin, is_inside, objections
 from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.recipe import Recipe
 from app.model.sampling import Point
@@ -31,7 +32,7 @@ from app.model.timeline import NEARLY, Timeline, moment_at
 from app.model.tools import Made, Press, Tool, Touch
 from app.model.windows import detail_for
 from app.work.gesture import OpenGesture, kept_near
-from app.work.held import Held, held_in
+from app.work.held import Held, as_seen, held_in, unmet
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.map import WarpMap
@@ -88,6 +89,9 @@ class Session:
         self._went_back = False
         self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
         self._held: tuple[object, list[Held]] = (None, [])
+        self._marks: tuple[object, list[Held]] = (None, [])
+        self._objections: tuple[object, tuple[str, ...]] = (None, ())
+        self._unmet: tuple[object, dict[str, str]] = (None, {})
         # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
         self._base = project.recipe
         self._live = project.recipe
@@ -343,6 +347,37 @@ class Session:
         if self._held[0] != seen:
             self._held = seen, held_in(replay)
         return self._held[1]
+
+    @property
+    def marks(self) -> list[Held]:
+        """`held`, where the picture is seen at its amount."""
+        held, amount = self.held, 1.0 if self.is_painting else self.replay.recipe.amount
+        if self._marks[0] != (seen := (self._held[0], amount)):
+            self._marks = seen, held if amount == 1 else as_seen(held, self.replay)
+        return self._marks[1]
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """What of the handles and pins cannot be met, by number, as the command line says it; but for what is being
+        changed.
+        """
+        led = self.document.recipe.handle, self.document.recipe.pin
+        if self._objections[0] != led:
+            self._objections = led, tuple(islice(objections(*led, self.extent), MOST_OBJECTIONS))
+        return self._objections[1]
+
+    @property
+    def unmet(self) -> dict[str, str]:
+        """Which handles have come to rest, at the end, elsewhere than where they are led, and how the command line says
+        it, by what messages call them; reads back from the GPU.
+        """
+        replay = self.replay
+        if self.is_moving or self.tick != self.end or not replay.recipe.leads:
+            return {}
+        seen = replay, replay.recipe, replay.tick, replay.warp.version
+        if self._unmet[0] != seen:
+            self._unmet = seen, dict(unmet(replay, ARRIVED))
+        return self._unmet[1]
 
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:
         """Set something about the handle or pin that messages call so, from its start on, and let it arrive.

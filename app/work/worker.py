@@ -46,6 +46,7 @@ class Outcome:
         notices: what the user should hear of.
         verdict: which stop condition ended the simulation and when, or how well a fit went; "" if neither.
         recipe: that has been fitted.
+        is_met: what was fitted has come where it should; see `Fitted`.
     """
 
     label: str
@@ -54,6 +55,7 @@ class Outcome:
     notices: tuple[str, ...] = ()
     verdict: str = ""
     recipe: Recipe | None = None
+    is_met: bool = True
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,9 @@ def perform(work: Work, progress: Progress) -> Outcome:
     try:
         if isinstance(work, Fit):
             found = work.perform(own_device(), progress)
-            return Outcome(label, notices=found.notices, verdict=found.told, recipe=found.trial.recipe)
+            return Outcome(
+                label, notices=found.notices, verdict=found.told, recipe=found.trial.recipe, is_met=found.is_met
+            )
         if isinstance(work, Piece):
             report = work.perform(own_device, progress)
         else:

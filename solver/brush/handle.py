@@ -136,14 +136,17 @@ class Handle(Course):
         """Where it is led in the end; None if it stays where it is at its start."""
         return self.keys[-1][1:] if self.keys else self.to
 
-    def wanted(self, start: np.ndarray, time: float, dt: float) -> np.ndarray:
-        """Where it shall be at a time, (2,), if it was at `start` when it began; `dt` says how exact the time is."""
+    def wanted(self, start: np.ndarray, time: float, dt: float, farthest: float = LARGEST_LEAD) -> np.ndarray:
+        """Where it shall be at a time, (2,), if it was at `start` when it began; `dt` says how exact the time is.
+
+        `farthest`: radii from there that it goes.
+        """
 
         x0, y0 = start.tolist()
 
         def within(place: Sequence[float]) -> np.ndarray:
             x, y = place[0] - x0, place[1] - y0
-            part = min(1.0, LARGEST_LEAD * self.reach / max(math.hypot(x, y), 1e-30))
+            part = min(1.0, farthest * self.reach / max(math.hypot(x, y), 1e-30))
             return np.array((part * x, part * y))
 
         if not self.keys or time < self.ready:
@@ -263,14 +266,14 @@ class Shape:
         far = np.hypot(*way.T)[:, None]
         return starts + way * np.minimum(1.0, LARGEST_LEAD * handle.reach / np.maximum(far, 1e-30))
 
-    def ends(self, starts: np.ndarray) -> np.ndarray:
-        """Where its points shall be in the end, (n, 2)."""
-        goal = self.handle.goal
-        return self._about(self.middle(starts) if goal is None else np.array(goal), starts, math.inf)
+    def due(self, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
+        """Where its points shall be once it has gone its first way, and at a time after that, (n, 2), however far."""
+        handle = self.handle
+        time = max(time, handle.ready, handle.upright)
+        return self._about(handle.wanted(self.middle(starts), time, dt, math.inf), starts, time, dt)
 
-    def away(self, places: np.ndarray, starts: np.ndarray) -> float:
-        """How far what is farthest of it is from where it shall be; of a ring, by how far it is turned and scaled."""
-        ends = self.ends(starts)
+    def away(self, places: np.ndarray, ends: np.ndarray) -> float:
+        """How far what is farthest of it is from these places; of a ring, by how far it is turned and scaled."""
         left = places - ends
         if self.is_ring:
             arms = places[1:] - places[0]

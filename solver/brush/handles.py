@@ -271,10 +271,17 @@ class Handles:
         """How far what is led by each is from where it shall be in the end, (n,) in longer sides, by the point that is
         farthest; 0 of pins that have not begun.
         """
-        found = np.zeros(len(self.handles))
-        for number, (shape, now, rows) in enumerate(zip(self._shapes, self.shapes, self._rows, strict=True)):
+        return np.array([left for _, left in self.left(math.inf, 1.0)])
+
+    def left(self, time: float, dt: float) -> list[tuple[np.ndarray, float]]:
+        """Where the points of each shall be, (k, 2) in longer sides, and how far it is from there, as `away`; once it
+        has gone its first way, and at a time after that.
+        """
+        found = []
+        for shape, now, rows in zip(self._shapes, self.shapes, self._rows, strict=True):
             starts = now if np.isnan(self._starts[rows]).any() else self._starts[rows]
-            found[number] = shape.away(now, starts)
+            due = shape.due(starts, time, dt)
+            found.append((due, shape.away(now, due)))
         return found
 
     # -- its state --------------------------------------------------------------------------------------------------

@@ -128,7 +128,9 @@ def test_how_near_two_handles_may_lie_and_be_led() -> None:
 def test_a_handle_goes_two_radii_at_most() -> None:
     assert [*objections([handle(to=[0.699, 0.5])], [], (1.0, 1.0))] == []
     (said,) = objections([handle(to=[0.75, 0.5])], [], (1.0, 1.0))
-    assert said == "handle[1] goes only 2 of the 2.5 radii to its goal; give it a larger radius"
+    assert said == (
+        "handle[1] goes only 2 times as far as it reaches, of 2.5 to its goal; give it a larger reach (radius)"
+    )
     assert [*objections([handle(to=[0.5, 0.75])], [], (1.0, 0.75))] == []
 
 

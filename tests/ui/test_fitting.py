@@ -14,7 +14,9 @@ from app.media.landmarks import Pairs, write_pairs
 from app.media.recipes import read_recipe
 from app.model.handles import ARRIVED
 from app.model.recipe import Recipe
+from app.ui.events import Drop
 from app.work.export_process import FitProcess
+from app.work.worker import Outcome
 from solver.gl.device import Device
 from support.commands import Run
 from support.editing import Robot, small_project
@@ -69,7 +71,7 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
     assert [handle.at for handle in session.recipe.handle] == [handle.at for handle in before.handle]
     assert [handle.to for handle in session.recipe.handle] == [handle.goal for handle in before.handle]
     assert session.tick == session.end
-    assert not any(held.is_away(session.extent) for held in session.held)
+    assert not any(held.is_away for held in session.held)
     assert robot.editor.messages.shown[-1].text.startswith("Fitted: 2 pairs, mean error 0.")
     robot.key("ctrl+z")
     robot.rest()
@@ -129,7 +131,7 @@ def test_what_has_been_changed_meanwhile_is_kept_and_the_fit_given_up(robot: Rob
     robot.key("ctrl+z")
     robot.frame(count=2)
     assert not robot.editor.fits.is_running
-    assert "given up" in robot.editor.messages.shown[-1].text
+    assert "work was changed meanwhile" in robot.editor.messages.shown[-1].text
     assert names(robot) == ["Open", "Handle", "Handle", "Half"]
 
 
@@ -140,15 +142,64 @@ def test_of_another_work_nothing_is_fitted_however_alike(robot: Robot) -> None:
     editor.open(replace(editor.session.project, recipe=editor.session.recipe))
     robot.frame(count=2)
     assert not editor.fits.is_running
-    assert "given up" in editor.messages.shown[-1].text
+    assert "work was changed meanwhile" in editor.messages.shown[-1].text
     editor.do("undo")  # the work before it
 
 
 def test_without_a_handle_that_leads_anywhere_there_is_nothing_to_fit(robot: Robot) -> None:
-    robot.editor.session.edit("None", handle=())
+    turned = [{"at": (0.5, 0.5), "keys": (), "rotate": 20.0}, {"at": (0.5, 0.5), "to": (0.6, 0.5), "muted": True}]
+    turned, muted = Recipe.model_validate({"handle": tuple(turned)}).handle
+    robot.editor.session.edit("Turned", handle=(turned,))
+    robot.key("shift+g")
+    assert robot.editor.fits.is_running
+    robot.editor.fits.give_up()
+    robot.editor.session.edit("None", handle=(muted,))
     robot.key("shift+g")
     assert not robot.editor.fits.is_running
     assert "nothing to fit" in robot.editor.messages.shown[-1].text
+
+
+def test_pairs_that_fall_on_the_window_are_fitted_as_by_the_command_line(robot: Robot, tmp_path: Path) -> None:
+    session, messages = robot.editor.session, robot.editor.messages
+    size = session.project.picture.width, session.project.picture.height
+    pairs = Pairs.points(np.array([((0.2, 0.3), (0.25, 0.3)), ((0.6, 0.6), (0.6, 0.55))]))
+    for name in ("p.csv", "p.pts", "q.pts"):
+        write_pairs(tmp_path / name, pairs, size)
+    robot.frame(Drop((str(tmp_path / "p.pts"),)))
+    assert "drop two files at once" in messages.shown[-1].text
+    robot.editor.do("undo")
+    robot.editor.do("undo")
+    robot.rest()
+    robot.editor.workspace.placeholder = session
+    robot.frame(Drop((str(tmp_path / "p.csv"),)))
+    assert "first open the picture" in messages.shown[-1].text
+    robot.editor.workspace.placeholder = None
+    robot.frame(Drop((str(tmp_path / "p.csv"),)))
+    process = robot.editor.fits.process
+    assert process is not None
+    assert process.fit.pairs is not None
+    np.testing.assert_allclose(process.fit.pairs.places, pairs.places, atol=1e-9)
+    assert process.fit.recipe.duration == 1.0  # nothing has been done yet that has a time
+    robot.frame(Drop((str(tmp_path / "p.pts"), str(tmp_path / "q.pts"))))
+    assert "A fit is under way" in messages.shown[-1].text
+    assert robot.editor.fits.process is process
+
+
+def test_a_fit_that_falls_short_is_no_success_and_told_of_until_it_is_undone(robot: Robot) -> None:
+    robot.key("shift+g")
+    process, session = robot.editor.fits.process, robot.editor.session
+    assert process is not None
+    made = session.recipe.edited(handle=tuple(each.model_copy(update={"end": 9.0}) for each in session.recipe.handle))
+    notices = ("handle[1] ends 12 pixels from where it should be", "handle[1] and handle[2] cross each other's way")
+    process.stop()
+    process.is_done, process.outcome = True, Outcome("", notices=notices, verdict="2 pairs", recipe=made, is_met=False)
+    robot.rest()
+    (message,) = robot.editor.messages.shown
+    assert message.icon == "warn"
+    assert "Handle 1 ends 12 pixels from where it should be. Handle 1 and handle 2 cross" in message.text
+    robot.key("ctrl+z")
+    robot.frame(count=2)
+    assert not robot.editor.messages.shown
 
 
 def test_what_cannot_be_fitted_is_told(robot: Robot) -> None:

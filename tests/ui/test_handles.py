@@ -74,7 +74,7 @@ def test_a_click_pins_a_point(robot: Robot) -> None:
     assert pin.keys == ()
     assert handle.keys
     for held in robot.editor.session.held:
-        assert not held.is_away(robot.editor.session.extent)
+        assert not held.is_away
     assert robot.editor.session.held[0].now == pytest.approx((0.5, 0.5), abs=3e-3)
 
 
@@ -92,7 +92,7 @@ def test_a_line_is_drawn_with_shift_and_dragged_as_one(robot: Robot) -> None:
     drag(robot, (0.33, 0.5), (0.36, 0.55))  # by any place of it
     assert names(robot) == ["Open", "Line", "Lead on"]
     (held,) = session.held
-    assert not held.is_away(session.extent)
+    assert not held.is_away
     ends = np.array([held.line[0], held.line[-1]]) - [line.points[0], line.points[-1]]
     assert ends == pytest.approx(np.tile([0.03, 0.05], (2, 1)), abs=6e-3)
 
@@ -214,12 +214,57 @@ def test_escape_gives_a_handle_up(robot: Robot) -> None:
 def test_nothing_is_held_outside_the_picture_nor_too_much_in_it(robot: Robot) -> None:
     robot.click(*robot.at(-0.05, 0.5))
     assert "nothing of the picture" in robot.editor.messages.shown[-1].text
+    assert robot.editor.messages.shown[-1].left is not None  # it goes by itself
     pin = {"at": (0.5, 0.5), "keys": ()}
     full = Recipe.model_validate({"handle": tuple(pin for _ in range(MOST_HANDLES))})
     robot.editor.session.edit("Many", handle=full.handle)
     robot.click(*robot.at(0.2, 0.2))
     assert f"{MOST_HANDLES} handles" in robot.editor.messages.shown[-1].text
     assert len(robot.editor.session.recipe.handle) == MOST_HANDLES
+
+
+def test_what_cannot_be_met_is_told_as_the_command_line_tells_it_until_it_is_mended(
+    robot: Robot, tmp_path: Path, fluidwarp: Run
+) -> None:
+    session, frozen = robot.editor.session, {"kind": "path", "points": ((0.2, 0.2),), "radius": 0.1, "hardness": 1.0}
+    handles = (
+        {"at": (0.4, 0.5), "to": (0.6, 0.5), "duration": 0.05},
+        {"at": (0.6, 0.5), "to": (0.4, 0.5), "duration": 0.05, "name": "Nose"},
+        {"at": (0.2, 0.2), "to": (0.3, 0.2), "duration": 0.05},
+    )
+    recipe = Recipe.model_validate({"handle": handles, "freeze": (frozen,), "duration": 0.1})
+    session.edit("Contradict", handle=recipe.handle, freeze=recipe.freeze, duration=session.dt * 3)
+    session.seek(session.end)
+    robot.rest()
+    said = [*session.objections, *session.unmet.values()]
+    assert said[0] == 'handle[1] and handle[2] "Nose" cross each other\'s way'
+    assert said[-1].endswith("away from where it is led: what it holds is frozen")
+    told = " ".join(message.text for message in robot.editor.messages.shown)
+    assert 'Handle 1 and handle 2 "Nose" cross each other\'s way.' in told
+    assert list(session.unmet) == [held.label for held in session.held if held.is_away]
+    projects.save(replace(session.project, recipe=session.recipe), tmp_path / "w.fluidwarp")
+    rendered = fluidwarp(tmp_path, "render", "w.fluidwarp", "-o", "w.png").stderr
+    assert all(sentence in rendered for sentence in said)
+    robot.frame(count=3)
+    assert len(robot.editor.messages.shown) <= 2  # told once
+    robot.key("ctrl+z")
+    robot.rest()
+    assert not robot.editor.messages.shown
+    assert session.objections == ()
+
+
+def test_a_handle_is_led_on_from_where_it_is_whatever_amount_is_seen(robot: Robot) -> None:
+    session = robot.editor.session
+    led = Recipe.model_validate({"handle": ({"at": (0.4, 0.5), "to": (0.5, 0.5), "duration": 0.2},)}).handle
+    session.edit("Led", handle=led, duration=session.dt * 12, amount=0.5)
+    session.seek(session.end)
+    robot.rest()
+    (mark,) = session.marks
+    assert 0.42 < mark.now[0] < 0.48
+    assert mark.target == pytest.approx(mark.now, abs=2 * ARRIVED)
+    drag(robot, mark.target, (mark.target[0], 0.55))
+    assert names(robot) == ["Open", "Led", "Lead on"]
+    assert session.recipe.handle[0].goal == pytest.approx((0.5, 0.55), abs=4e-3)
 
 
 def test_going_on_from_an_earlier_moment_takes_back_what_was_led_after_it(robot: Robot) -> None:
@@ -234,7 +279,7 @@ def test_going_on_from_an_earlier_moment_takes_back_what_was_led_after_it(robot:
     first, second = session.recipe.handle
     assert first.goal == pytest.approx((0.45, 0.5), abs=2e-3)
     assert second.at == pytest.approx((0.2, 0.3), abs=2e-3)
-    assert not any(held.is_away(session.extent) for held in session.held)
+    assert not any(held.is_away for held in session.held)
 
 
 def test_the_inspector_s_settings_hold_from_the_start(robot: Robot, device: Device) -> None:

@@ -17,6 +17,7 @@ from app.model.strokes import Stroke
 from app.ui.events import Key, Mods
 from app.ui.lanes import Lanes
 from app.ui.layout import LEAST_LANES
+from app.ui.panels.lanes import name_of
 from app.ui.viewport import Rect
 from solver.gl.device import Device
 from support.editing import Robot, small_project
@@ -339,6 +340,7 @@ def test_handles_and_pins_are_bars_too(robot: Robot) -> None:
     assert later == moved(handle, round((later.start - 0.1) / robot.editor.session.dt), robot.editor.session.dt)
     assert later.start > 0.15
     assert robot.editor.state.selected == "handle[1]"
+    assert name_of(later.edited(name="Nose"), ("handle", 0)) == 'Handle 1 "Nose"'
     drag(robot, 0, 60.0, part=0.99, kind="handle")
     assert recipe(robot).handle[0].start == later.start
     assert recipe(robot).handle[0].duration > 0.35

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from datetime import date, datetime
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 from app.media.opening import shipped_recipes
+from app.model.recipe import Recipe
+from app.model.schema import frozen
+from app.model.undo import Entry
 from app.ui.browser import Browser
 from app.ui.messages import MOST, Messages
 from app.ui.preferences import MOST_RECENT, Preferences
+from app.ui.recovering import about
+from app.work.journal import Work
 
 
 def test_the_newest_messages_stay_and_none_stands_twice() -> None:
@@ -20,6 +28,33 @@ def test_the_newest_messages_stay_and_none_stands_twice() -> None:
     assert [message.text for message in messages.shown][-1] == "number 2"
     assert len({message.text for message in messages.shown}) == MOST
     assert len(heard) == MOST + 3
+
+
+def test_what_does_not_hold_any_more_goes_at_once_and_a_caution_by_itself() -> None:
+    messages, holds = Messages(lambda: None), [True]
+    messages.warn("waits for somebody", lambda: holds[0])
+    messages.caution("goes")
+    messages.elapse(4.0)
+    assert len(messages.shown) == 2
+    messages.elapse(1.0)
+    assert [message.text for message in messages.shown] == ["waits for somebody"]
+    holds[0] = False
+    messages.elapse(0.0)
+    assert not messages.shown
+
+
+def test_what_can_be_restored_is_counted_handles_too() -> None:
+    def told(**parts: Any) -> str:
+        recipe = Recipe.model_validate(frozen(parts))
+        entries = (Entry(name, made, 0, 0) for name, made in (("Open", Recipe()), ("Edit", recipe)))
+        found = SimpleNamespace(work=Work(tuple(entries), 1, Recipe()), when=datetime(2001, 2, 3, 4, 5))
+        return about(found, date(2001, 2, 3))  # pyright: ignore[reportArgumentType]
+
+    stroke = {"tool": "push", "samples": [[0, 0.2, 0.2, 1.0], [3, 0.3, 0.2, 1.0]]}
+    handle, pin = {"at": [0.2, 0.2], "to": [0.3, 0.2]}, {"at": [0.7, 0.7]}
+    assert told(stroke=[stroke], handle=[handle], pin=[pin]) == "1 stroke and 2 handles, today at 04:05"
+    assert told(handle=[handle]) == "1 handle, today at 04:05"
+    assert told(amount=0.5) == "other changes, today at 04:05"
 
 
 def test_each_message_is_seen_for_its_five_seconds_the_newest_first() -> None:

@@ -109,50 +109,58 @@ at = [0.3, 0.4]
 keys = [[0.1, 0.3, 0.4], [0.3, 0.36, 0.43]]
 start = 0.1
 [[handle]]
+name = "off"
+at = [0.5, 0.5]
+to = [0.9, 0.5]
+muted = true
+[[handle]]
+at = [0.2, 0.8]
+keys = []
+[[handle]]
 name = "nose"
 at = [0.6, 0.5]
 to = [0.6, 0.44]
 duration = 0.2
 local = 0.5
-[[handle]]
-at = [0.2, 0.8]
-keys = []
 """
 
 
-def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_those_that_stay_are_pins(device: Device):
+def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_all_keep_their_numbers(device: Device):
     found = fit(device, None, 3, RECIPE + HANDLES)
     np.testing.assert_allclose(found.pairs.places[:, 0], PAIRS[:, 0])
     recipe = found.trial.recipe
-    assert [handle.name for handle in recipe.handle] == ["", "nose"]  # as they were called
-    assert [(handle.at, handle.to, handle.local) for handle in recipe.handle] == [
-        ((0.3, 0.4), (0.36, 0.43), 0.0),
-        ((0.6, 0.5), (0.6, 0.44), 0.5),
+    assert [(handle.name, handle.at, handle.to, handle.local) for handle in recipe.handle] == [
+        ("", (0.3, 0.4), (0.36, 0.43), 0.0),
+        ("off", (0.5, 0.5), (0.9, 0.5), 0.0),
+        ("", (0.2, 0.8), None, 0.0),
+        ("nose", (0.6, 0.5), (0.6, 0.44), 0.5),
     ]
-    assert [pin.at for pin in recipe.pin] == [(0.8, 0.8), (0.2, 0.8)]
+    assert recipe.handle[1].muted
+    assert recipe.pin == Recipe.parse(RECIPE).pin
     assert recipe.duration == 1.0
     assert found.errors.max() < 0.2
     with pytest.raises(UserError, match="no handle of the recipe leads anywhere"):
         fit(device, None)
 
 
-def test_what_is_turned_is_turned_at_the_end_as_it_was_and_a_line_that_stays_is_pinned_whole(device: Device):
+def test_what_is_turned_is_turned_at_the_end_as_it_was_and_a_line_that_stays_is_held_whole(device: Device):
     still = "[[handle]]\nat = [0.2, 0.3]\nrotate = 40.0\nturned = [[1.1, 20.0, 1.5]]\n"
     led = "[[handle]]\nat = [0.4, 0.6]\nto = [0.46, 0.6]\nduration = 0.1\nrotate = 90.0\nturned = [[0.2, 30.0, 1.2]]\n"
     line = "[[handle]]\npoints = [[0.7, 0.2], [0.8, 0.2], [0.8, 0.4]]\nclosed = true\nkeys = []\n"
     recipe = fit(device, None, 2, RECIPE + still + led + line).trial.recipe
-    assert [(each.at, each.to, each.rotate, each.scale, each.turned) for each in recipe.handle] == [
+    assert [(each.at, each.to, each.rotate, each.scale, each.turned) for each in recipe.handle[:2]] == [
         ((0.2, 0.3), (0.2, 0.3), 20.0, 1.5, ()),
         ((0.4, 0.6), (0.46, 0.6), 30.0, 1.2, ()),
     ]
-    assert (recipe.pin[1].points, recipe.pin[1].closed) == (((0.7, 0.2), (0.8, 0.2), (0.8, 0.4)), True)
+    stays = recipe.handle[2]
+    assert (stays.points, stays.closed, stays.goal) == (((0.7, 0.2), (0.8, 0.2), (0.8, 0.4)), True, None)
 
 
 def test_what_is_pinned_between_strokes_is_pinned_then(device: Device):
     stroke = '[[stroke]]\ntool = "push"\nsamples = [[0, 0.2, 0.2, 1.0], [3, 0.3, 0.2, 1.0]]\n'
     led = "[[handle]]\nat = [0.4, 0.6]\nto = [0.46, 0.6]\nduration = 0.1\nstart = 0.2\n"
     pinned = "[[handle]]\nat = [0.7, 0.2]\nkeys = []\nstart = 0.2\nend = 0.36\n"
-    pin = fit(device, None, 1, RECIPE + stroke + led + pinned).trial.recipe.pin[1]
+    pin = fit(device, None, 1, RECIPE + stroke + led + pinned).trial.recipe.handle[1]
     assert (pin.at, pin.start, pin.end) == ((0.7, 0.2), 0.2, 0.36)
 
 
@@ -209,6 +217,24 @@ def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device
         fit(device, PAIRS, cancel=lambda: True)
 
 
+def test_stopped_it_is_as_good_as_was_told_last(device: Device):
+    """What is in each other's way halts elsewhere on the coarse grid than on the fine one."""
+    crossing, made, said = np.array([[[0.4, 0.5], [0.6, 0.5]], [[0.6, 0.5], [0.4, 0.5]]]), list[int](), list[str]()
+    found = fit(
+        device,
+        crossing,
+        9,
+        RECIPE.replace("grid = 32", "grid = 72"),
+        report=lambda done, total: made.append(done),
+        tell=said.append,
+        cancel=lambda: made[-1] >= 10,
+    )
+    *_, last = (float(state.split()[3]) for state in said if state.startswith("best so far"))
+    assert found.errors.mean() <= last + 0.005
+    assert found.stopped
+    assert not found.is_met
+
+
 def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp: Run, tmp_path: Path):
     write_picture(tmp_path / "a.png", PICTURE)
     (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE)
@@ -239,8 +265,8 @@ def test_what_is_fitted_from_is_not_written_over(tmp_path: Path):
 
 def test_a_fit_is_told_in_a_line():
     nothing, pairs = np.zeros(0), Pairs.points(PAIRS)
-    trial = Trial(Recipe(), pairs.places, nothing, work=1.25, det=0.5, folds=3)
-    told = Fitted(trial, pairs, np.array([0.25, 0.75, np.nan]), False, ()).told
+    trial = Trial(Recipe(), pairs.places, nothing, nothing, work=1.25, det=0.5, folds=3)
+    told = Fitted(trial, pairs, np.array([0.25, 0.75, np.nan]), False, False, ()).told
     assert told == "2 pairs, mean error 0.5 pixels, most 0.75; work 1.25, least det J 0.5, 3 folds"
 
 

@@ -13,7 +13,7 @@ from app.model.handles import ARRIVED, MOST_OBJECTIONS, objections
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
-from app.work.held import unmet
+from app.work.held import as_seen, held_in, unmet
 from app.work.replay import Replay
 from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
 from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
@@ -390,8 +390,9 @@ def test_what_is_not_reached_is_told_by_number(device: Device):
     handles = [led_to([0.6, 0.6], [0.7, 0.6]), led_to([0.15, 0.17], [0.4, 0.5], name="held")]
     replay = replay_of(device, handle=handles, freeze=[frozen_disc])
     replay.seek(48)
-    (said,) = unmet(replay, ARRIVED)
-    assert said.startswith('handle[2] "held" is 0.')
+    ((label, said),) = unmet(replay, ARRIVED)
+    assert label == 'handle[2] "held"'
+    assert said.startswith('handle[2] "held" is ')
     assert said.endswith("away from where it is led: what it holds is frozen")
     assert replay.warp.statistics().folds == 0
     replay.release()
@@ -403,8 +404,45 @@ def test_a_line_that_is_led_about_a_place_far_outside_is_told_of(device: Device)
     line = {"at": [0.5, -4.0], "points": [[0.2, 0.5], [0.6, 0.5]], "to": [0.5, -3.8], "duration": 0.1}
     replay = replay_of(device, handle=[line], freeze=[frozen_disc], duration=0.1)
     replay.seek(4)
-    (said,) = unmet(replay, ARRIVED)
+    ((_, said),) = unmet(replay, ARRIVED)
     assert said.endswith("away from where it is led: what it holds is frozen")
+    replay.release()
+
+
+def test_what_is_left_of_a_turned_line_is_its_farthest_point_s_way_wherever_it_is_told(device: Device):
+    """Its middle stays where it is; a handle in a frozen part, led too far, tells all of its way too."""
+    frozen_disc = {"kind": "path", "points": [[0.8, 0.2]], "radius": 0.1, "hardness": 1.0}
+    line = {"points": [[0.3, 0.5], [0.6, 0.5]], "to": [0.45, 0.5], "rotate": 90.0, "duration": 0.1}
+    far = led_to([0.8, 0.2], [0.2, 0.2], radius=0.1, duration=0.1)
+    replay = replay_of(device, handle=[line, far], freeze=[frozen_disc], duration=0.1)
+    replay.seek(4)
+    turned, held = held_in(replay)
+    assert turned.now == pytest.approx(turned.target, abs=0.01)
+    assert turned.left > 0.05
+    farthest = max(
+        np.hypot(*((np.array(one) - other) * EXTENT)) for one, other in zip(turned.line, turned.due, strict=True)
+    )
+    assert turned.left == pytest.approx(farthest)
+    assert held.left == pytest.approx(0.6, abs=0.02)
+    assert held.target == pytest.approx((0.2, 0.2))
+    for one, (label, said) in zip((turned, held), unmet(replay, ARRIVED), strict=True):
+        assert one.label == label
+        assert f"is {one.left * 128:.3g} pixels" in said
+    replay.release()
+
+
+def test_marks_lie_on_what_they_hold_as_the_picture_is_seen_at_an_amount(device: Device):
+    line = {"points": [[0.3, 0.3], [0.3, 0.5]], "to": [0.35, 0.4], "duration": 0.1}
+    replay = replay_of(device, handle=[led_to([0.7, 0.5], [0.8, 0.45], duration=0.1), line], amount=0.5, duration=0.2)
+    replay.seek(12)
+    held = held_in(replay)
+    assert as_seen(held, Replay(device, replay.recipe.edited(amount=1.0), replay.pictures, budget=0)) is held
+    for one, seen in zip(held, as_seen(held, replay), strict=True):
+        places = np.multiply([[one.now, *one.line], [seen.now, *seen.line]], EXTENT)
+        whole, half = places[0] + replay.warp.at(places[0]), places[1] + replay.seen.at(places[1])
+        np.testing.assert_allclose(half, whole, atol=2e-4)
+        assert np.hypot(*(places[0] - places[1]).T).min() > 0.01
+        assert seen.start == pytest.approx(one.led.at, abs=1e-6)
     replay.release()
 
 
@@ -423,8 +461,8 @@ def test_what_walls_part_from_its_goal_is_told_and_folds_nothing(device: Device)
     wall = {"kind": "path", "points": ring.tolist(), "radius": 0.04, "hardness": 1.0}
     replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5], radius=0.1)], freeze=[wall], duration=1.0)
     replay.seek(60)
-    (said,) = unmet(replay, ARRIVED)
-    assert said.startswith("handle[1] is 0.")
+    ((label, _),) = unmet(replay, ARRIVED)
+    assert label == "handle[1]"
     found = replay.warp.statistics()
     assert found.folds == 0
     assert found.det_min > 0

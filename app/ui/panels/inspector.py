@@ -15,7 +15,7 @@ import numpy as np
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.model.handles import ARRIVED, RecipeHandle, labelled
+from app.model.handles import RecipeHandle, RecipePin, heading, labelled
 from app.model.mask_edits import MASKS, THICKEST, THINNEST, MaskStroke, PictureMask, is_brightness
 from app.model.presets import DEFAULT
 from app.model.strokes import Symmetry
@@ -161,14 +161,14 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
         ui.wrapped(
             "Drag a point of the picture to where it should go, or click to pin it. With Shift draw a line, which is "
-            "dragged as one. Click one to select it.",
+            "dragged as one. Click one to select it. Or drop a file of pairs on the window: CSV, PTS or TPS.",
             ui.palette.dim,
             13,
         )
     else:
-        ui.text(label.capitalize().replace("[", " ").replace("]", ""), size=14)
+        ui.text(heading(label), size=14)
         imgui.same_line()
-        ui.dim(_whereabouts(workspace, label))
+        ui.dim(_whereabouts(workspace, label, led))
         slid = ui.slider(
             "held radius", "Reach", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
             title="How far it reaches", more="It goes at most twice as far.",
@@ -190,9 +190,13 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         if ui.button("Remove", width=-1, height=30):
             do("remove")
         ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
-    away = sum(held.is_away(session.extent) for held in session.held)
-    ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all" + (f", {away} not there yet" if away else ""))
-    with ui.enabled(any(handle.goal for handle in recipe.handle)):
+    away, unmet = sum(held.is_away for held in session.held), session.unmet
+    rest = f", {len(unmet)} did not arrive" if unmet else f", {away} not there yet" if away else ""
+    if recipe.leads:
+        ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all{rest}")
+    for said in (*session.objections, *unmet.values()):
+        ui.wrapped(f"{heading(said)}.", ui.palette.text, 13)
+    with ui.enabled(any(handle.is_led and not handle.muted for handle in recipe.handle)):
         if ui.button("Fit##handles", width=-1, height=30):
             do("fit_handles")
         more = "Searches how far and how fast each reaches; may take a minute."
@@ -220,15 +224,17 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     ui.tooltip("A key at the playhead", more="It keeps this turn and size until here; what is set later becomes a key.")
 
 
-def _whereabouts(workspace: Workspace, label: str) -> str:
-    """How far the handle that is called so is led, and what is left of that, in pixels; of one that is in force."""
+def _whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin) -> str:
+    """How far the handle that is called so is led, and what is left of that, in pixels; or why it does nothing."""
     session, pixels = workspace.session, max(workspace.canvas.size)
     for held in session.held:
         if held.label == label:
-            led, left = (hypot(*np.subtract(a, held.target) * session.extent) for a in (held.start, held.now))
-            rest = f", {pixels * left:.0f} px left" if left > ARRIVED else ""
-            return f"led {pixels * led:.0f} px{rest}" if led > 1e-9 else f"stays{rest}"
-    return ""
+            way = hypot(*np.subtract(held.start, held.target) * session.extent)
+            rest = f", {pixels * held.left:.0f} px left" if held.is_away else ""
+            if way > 1e-9:
+                return f"led {pixels * way:.0f} px{rest}"
+            return f"{'turned' if isinstance(led, RecipeHandle) and led.turns else 'stays'}{rest}"
+    return "muted" if led.muted else "not at work at this moment"
 
 
 def _set_held(session: Session, label: str, name: str, slid: Slid, **setting: Any) -> None:

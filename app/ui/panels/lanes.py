@@ -9,8 +9,8 @@ from typing import NamedTuple
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.model.bars import KINDS, Actor, Bar, bar_of, one_of, several_of
-from app.model.handles import RecipeHandle, RecipePin
+from app.model.bars import KINDS, Actor, Bar, Which, bar_of, one_of, several_of
+from app.model.handles import RecipeHandle, RecipePin, heading
 from app.model.recipe import MOST_TICKS
 from app.model.schema import label_of
 from app.model.strokes import Stroke
@@ -133,7 +133,7 @@ def _told(session: Session, state: EditorState) -> str:
     recipe, lanes = session.recipe, state.lanes
     if only := lanes.only(recipe):
         which, one = only
-        return f"{name_of(one)}: {when(session, bar_of(one, which, session.end, session.dt))}"
+        return f"{name_of(one, which)}: {when(session, bar_of(one, which, session.end, session.dt))}"
     if lanes.selected:
         return f"{len(lanes.selected)} selected"
     counts = [(len(several_of(recipe, kind)), kind) for kind in reversed(KINDS)]
@@ -141,12 +141,12 @@ def _told(session: Session, state: EditorState) -> str:
     return ", ".join(told) or "Strokes become bars here: move them, stretch them, repeat them."
 
 
-def name_of(one: Actor) -> str:
-    """What a person calls it."""
+def name_of(one: Actor, which: Which) -> str:
+    """What a person calls it; handles and pins have their number, which messages tell."""
     if isinstance(one, Stroke):
         return one.tool.capitalize()
     if isinstance(one, RecipeHandle | RecipePin):
-        return one.name or one.kind.capitalize()
+        return heading(label_of(one.kind, which[1] + 1, one.name))
     return one.name or f"{one.kind.capitalize()} force"
 
 
@@ -252,7 +252,7 @@ def _bar(ui: Ui, session: Session, state: EditorState, bar: Bar, y: float, scale
     icons.draw(draw, icon, x, y + ui.px(3.5), ui.px(13), ink, 2.0)
     if right - left > ui.px(60):
         imgui.push_font(ui.fonts.regular, 12.5)
-        draw.add_text(ImVec2(x + ui.px(18), y + ui.px(3)), ink, name_of(one))
+        draw.add_text(ImVec2(x + ui.px(18), y + ui.px(3)), ink, name_of(one, bar.which))
         imgui.pop_font()
     draw.pop_clip_rect()
 
@@ -346,4 +346,4 @@ def _tell(ui: Ui, session: Session, bar: Bar) -> None:
     if bar.muted:
         more.append("Muted: it does nothing.")
     more.append("Drag to move it, its ends to stretch it." if bar.is_free else "It acts all the time.")
-    ui.tooltip(name_of(one), more=" ".join(more))
+    ui.tooltip(name_of(one, bar.which), more=" ".join(more))

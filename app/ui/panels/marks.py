@@ -10,6 +10,7 @@ from typing import Any
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.model.handles import in_words
 from app.model.sampling import Point
 from app.ui.editor_state import EditorState, Overlay
 from app.ui.pointer import PointerController
@@ -117,13 +118,17 @@ def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController
 def _handles(
     ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList
 ) -> None:
-    """Where handles were, are and shall be; faint while another tool is in hand. A pin is a dot in a ring."""
+    """Where handles were, are and shall be; faint, and without their numbers, while another tool is in hand.
+
+    A pin is a dot in a ring.
+    """
     in_hand = state.tool_name == "handle"
     alpha, hovered = 1.0 if in_hand else 0.45, pointer.hovered
-    for held in session.held:
+    for held in session.marks:
         start, now, target = (ImVec2(*view.to_screen(*place)) for place in (held.start, held.now, held.target))
         selected = in_hand and held.label == state.selected
-        ink = ui.palette.accent if selected or held is hovered else WHITE
+        is_hovered = hovered is not None and held.label == hovered.label
+        ink = ui.palette.accent if selected or is_hovered else WHITE
         if selected:
             reach = held.led.radius * view.longer
             lines.add_circle(target, reach, packed(BLACK, 0.3), max(32, min(int(reach), 96)), ui.px(2.0))
@@ -132,21 +137,42 @@ def _handles(
         if line:
             lines.add_polyline(line, packed(BLACK, 0.45 * alpha), ui.px(4.6), 0)
             lines.add_polyline(line, packed(ink, 0.8 * alpha), ui.px(2.2), 0)
+        if held.is_away and held.due:
+            due: list[Any] = [ImVec2(*view.to_screen(*place)) for place in held.due]
+            lines.add_polyline(due, packed(BLACK, 0.45 * alpha), ui.px(3.4), 0)
+            lines.add_polyline(due, packed(WARN, 0.8 * alpha), ui.px(1.2), 0)
         if hypot(target.x - start.x, target.y - start.y) > ui.px(8):
             for colour, width in ((packed(BLACK, 0.45 * alpha), 3.6), (packed(ink, 0.8 * alpha), 1.6)):
                 lines.add_line(start, target, colour, ui.px(width))
             lines.add_circle_filled(start, ui.px(3.2), packed(BLACK, 0.45 * alpha), 16)
             lines.add_circle_filled(start, ui.px(2.2), packed(ink, alpha), 16)
-        radius = ui.px(7 if selected or held is hovered else 6)
+        radius = ui.px(7 if selected or is_hovered else 6)
         lines.add_circle_filled(target, radius + ui.px(1.4), packed(BLACK, 0.45 * alpha), 24)
         lines.add_circle_filled(target, radius, packed(ui.palette.panel, 0.85 * alpha), 24)
         lines.add_circle(target, radius, packed(ink, alpha), 24, ui.px(1.8))
-        if held.is_away(session.extent):
+        if held.is_away:
             lines.add_line(now, target, packed(WARN, alpha), ui.px(1.6))
             lines.add_circle_filled(now, ui.px(4), packed(BLACK, 0.45 * alpha), 16)
             lines.add_circle_filled(now, ui.px(3), packed(WARN, alpha), 16)
         else:
             lines.add_circle_filled(target, ui.px(2.6), packed(ink, alpha), 16)
+        if in_hand:
+            is_left = start.x > target.x
+            across = (radius + ui.px(7)) * (-1 if is_left else 1)
+            _number(ui, held.label, ImVec2(target.x + across, target.y), is_left, ink, lines)
+
+
+def _number(ui: Ui, label: str, at: ImVec2, is_left: bool, ink: Colour, lines: imgui.ImDrawList) -> None:
+    """What messages call a handle or a pin, beside its mark, away from where it came from; of handles the number and
+    the name.
+    """
+    words = in_words(label).removeprefix("handle ")
+    imgui.push_font(ui.fonts.bold, 12.0)
+    size, box = imgui.calc_text_size(words), ImVec2(ui.px(3), 0.0)
+    at = ImVec2(at.x - (size.x if is_left else 0.0), at.y - size.y / 2)
+    lines.add_rect_filled(at - box, at + size + box, packed(BLACK, 0.5), ui.px(4))
+    lines.add_text(at, packed(ink), words)
+    imgui.pop_font()
 
 
 def _path(ui: Ui, view: Viewport, session: Session, lines: imgui.ImDrawList) -> None:

@@ -26,7 +26,7 @@ def draw(ui: Ui, session: Session, state: EditorState) -> None:
         ui.dim(f"{len(state.lanes.selected)} selected")
         return
     which, one = only
-    ui.text(name_of(one), size=14)
+    ui.text(name_of(one, which), size=14)
     _times(ui, session, which, one)
     if isinstance(one, Stroke):
         most = max(STRONGEST, one.strength)

@@ -1,0 +1,48 @@
+"""What of the handles cannot be met, told as soon as it comes up: the sentences of the command line."""
+
+from __future__ import annotations
+
+from app.model.handles import RecipeHandle, RecipePin, heading
+from app.ui.fitting import FIT
+from app.ui.messages import Messages
+from app.ui.workspace import Workspace
+from app.work.session import Session
+
+TOLD = 3  # sentences in a message; the inspector has all of them
+
+Led = tuple[tuple[RecipeHandle, ...], tuple[RecipePin, ...]]
+
+
+class Cautions:
+    """Tells, each time once, which handles contradict each other, and which have come to rest where they should not."""
+
+    def __init__(self, workspace: Workspace, messages: Messages) -> None:
+        self._workspace, self._messages = workspace, messages
+        self._session: Session | None = None
+        self._led: Led | None = None  # what the known ones are of
+        self._known: set[str] = set()  # sentences, and what is unmet by its label: how far it is changes
+
+    def look(self) -> None:
+        """Tell what is new."""
+        session = self._workspace.session
+        if session.is_painting:
+            return
+        said = {each: each for each in session.objections} | session.unmet
+        if session is not self._session:
+            self._session, self._known = session, set()
+        new = [sentence for key, sentence in said.items() if key not in self._known]
+        led = _led(session)
+        # While it moves, or is looked at before its end, nobody can tell what will be unmet.
+        self._known = self._known | said.keys() if led == self._led or session.is_moving else set(said)
+        self._led = led
+        history = session.document.history
+        if new and history.entries[history.index].name != FIT:  # which has told what it could not meet
+            words = [f"{heading(sentence)}." for sentence in new[:TOLD]]
+            rest = [f"{len(new) - TOLD} more of this kind are in the inspector."] * (len(new) > TOLD)
+            self._messages.caution(
+                " ".join([*words, *rest]), lambda: session is self._workspace.session and _led(session) == led
+            )
+
+
+def _led(session: Session) -> Led:
+    return session.document.recipe.handle, session.document.recipe.pin
