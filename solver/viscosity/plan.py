@@ -22,7 +22,7 @@ STIFF_OF_SOFTEST = 4.0
 # which count strains in them that they do not have, cannot carry that; nor beside solids, where coarse strains are not
 # those of the fine level. There the coarse levels move parts above this kappa, in those of the softest cell, as a
 # whole; what is less stiff strains a little, and is theirs. Smooth masks take half the iterations without, or a third.
-# F-cycles make coarse strains that are overshot beside solids twice: their corrections could point uphill, which ended a
+# F-cycles repeat the coarse correction, which is overshot beside solids: it could point uphill, which ended a
 # step of contrast 100 at 9 % of error in three iterations.
 RIGID_OF_SOFTEST = 40.0
 # The share of what bounds stiff parts that is an edge from which on they have edges: it is .5 to 1 of masks of two
