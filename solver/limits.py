@@ -17,6 +17,8 @@ LARGEST_VISCOSITY = 1e6
 LARGEST_LEAD = 2.0
 # Radii that a line is long which is led as a whole: the radius of a longer one is larger.
 LONGEST_LINE = 5.0
+# Times farther apart, or nearer, that neighbours may be led.
+MOST_STRETCH = 4.0
 # Degrees that a handle is turned, times that it is made as large, and how firmly it leads.
 MOST_TURNED, LEAST_SCALE, MOST_SCALE, LEAST_STIFFNESS = 720, 0.1, 10, 0.001
 

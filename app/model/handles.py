@@ -14,15 +14,21 @@ from pydantic import Field, model_validator
 from app.model.sampling import Point
 from app.model.schema import Fraction01, Model, Place, Several, label_of
 from solver.course import SAME_TIME, Course
-from solver.limits import LARGEST_LEAD, LEAST_SCALE, LEAST_STIFFNESS, LONGEST_LINE, MOST_SCALE, MOST_TURNED
+from solver.limits import (
+    LARGEST_LEAD,
+    LEAST_SCALE,
+    LEAST_STIFFNESS,
+    LONGEST_LINE,
+    MOST_SCALE,
+    MOST_STRETCH,
+    MOST_TURNED,
+)
 
 MOST_HANDLES = 64  # with the pins
 MOST_LINES = 16  # of them; of each up to 41 points are led
 MOST_OBJECTIONS = 12  # to them that are told
 ARRIVED = 0.001  # longer sides: half a pixel of 512
-# Radii that two places are apart at which they are the same; how many times farther apart, or nearer, neighbours may be
-# led.
-SAME, MOST_STRETCH = 0.05, 4.0
+SAME = 0.05  # radii that two places are apart at which they are the same
 
 Time = Annotated[float, Field(ge=0, le=1_000_000)]
 Line = Annotated[Several[Point], Field(max_length=500)]

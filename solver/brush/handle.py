@@ -20,6 +20,7 @@ from solver.limits import (
     LEAST_STIFFNESS,
     LONGEST_LINE,
     MOST_SCALE,
+    MOST_STRETCH,
     MOST_TURNED,
     check_type,
     numbers,
@@ -216,7 +217,8 @@ class Shape:
         handle: whose it is.
         led: their places in the original, (n, 2).
         goals: where they shall be, likewise; None if the handle has no goals.
-        around: the first of those that lie around an area; None if they are no closed line and no ring.
+        around: the first of those that lie around an area; None if they are no closed line and no ring, or if a part of
+            the line is outside and it is neither scaled nor has goals: the edge closes it, and what flows along that.
         extent: the sides of the picture, which lines do not leave.
     """
 
@@ -242,6 +244,8 @@ class Shape:
                 led = np.concatenate([led, led + RING * handle.radius * ring])
         inside = ((led >= 0) & (led <= extent)).all(axis=1)
         if len(led) > 1 and inside.any():
+            if handle.points and not (inside.all() or handle.goals or handle.turns):
+                around = None
             led, goals = led[inside], goals if goals is None else goals[inside]
         return cls(handle, led, goals, around if len(led) >= 3 + (around or 0) else None, extent)
 
@@ -286,7 +290,8 @@ class Shape:
         """Its points with the handle at a place, turned as at a time."""
         if len(starts) == 1:
             return there[None]
-        return np.clip(self._laid(there, starts, time, dt), 0.0, self.extent)
+        laid = self._laid(there, starts, time, dt)
+        return np.clip(laid, *((0.0, self.extent) if self.is_ring else beside_edges(starts, self.extent)))
 
     def _laid(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
         handle, from_middle = self.handle, starts - self.middle(starts)
@@ -297,6 +302,16 @@ class Shape:
         angle, scale = handle.turn(time, dt)
         turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
         return there + scale * from_middle @ turn
+
+
+def beside_edges(places: np.ndarray, extent: Point) -> tuple[np.ndarray, np.ndarray]:
+    """The nearest and farthest from the left and upper edges that places (n, 2) of a line may be led, (n, 2) each.
+
+    What is at an edge stays there, so no place comes more than `MOST_STRETCH` times as far from one, or as near.
+    """
+    near, far = np.clip(places, 0.0, extent), extent - np.clip(places, 0.0, extent)
+    least = np.maximum(near / MOST_STRETCH, extent - far * MOST_STRETCH)
+    return least, np.minimum(near * MOST_STRETCH, extent - far / MOST_STRETCH)
 
 
 def spun(motion: np.ndarray, arms: np.ndarray) -> float:

@@ -43,6 +43,8 @@ WIDE, WIDE_SHARE = 3.0, 0.2
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 8.0, 12.0
+# Seconds in which what a handle lacks is halved, or it lets go: with nothing in its way it falls to a fiftieth.
+PATIENCE = 4 / RATE
 CORE = 0.5  # of the radius of what turns or swells, where it does so evenly
 FOUND = 1e-7  # longer sides, as places are rounded
 LOST = 1e-4  # longer sides that are left where a handle's place is not found
@@ -69,6 +71,15 @@ class Ring(NamedTuple):
         return float(np.hypot(*self.arms.T).mean())
 
 
+class Way(NamedTuple):
+    """Where points of a handle shall be now and a step later, (k, 2); if that moves; what the farthest has to go."""
+
+    now: np.ndarray
+    then: np.ndarray
+    goes: bool
+    left: float
+
+
 class Lead(NamedTuple):
     """What the points of active handles do in a step, found before it.
 
@@ -79,11 +90,12 @@ class Lead(NamedTuple):
         drawn: of each push the number of its point, (m,).
         rings: r of them.
         loops: which of them are closed lines.
-        influence: what the pushes and the turns of rings do to the pushed and to rings, (2 p + r, 2 m + r).
-        shares: how much each of those counts in the squares, (2 m + r,).
-        soft: what of their will they give up, (2 p + r,): see (H3).
+        back, system: what gives the strengths of pushes and of turns of rings for what the pushed and rings lack,
+            (2 m + r, 2 p + r) and (2 p + r, 2 p + r); see `_system`.
         wanted: how the fluid shall move at them all, (n, 2), longer sides / s.
         local: what of their motion carries the picture and not the fluid, (p, 2).
+        owners: of each push the number of its handle, (m,).
+        bounds: how strong each may be, longer sides / s, (m,).
     """
 
     places: np.ndarray
@@ -93,11 +105,12 @@ class Lead(NamedTuple):
     drawn: np.ndarray
     rings: list[Ring]
     loops: list[slice]
-    influence: np.ndarray
-    shares: np.ndarray
-    soft: np.ndarray
+    back: np.ndarray
+    system: np.ndarray
     wanted: np.ndarray
     local: np.ndarray
+    owners: np.ndarray
+    bounds: np.ndarray
 
 
 class Handles:
@@ -122,6 +135,7 @@ class Handles:
         self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
+        self._lacks = np.zeros((0, 2))  # of each the least that it lacked, and for how long it has not been halved
         self._shapes: list[Shape] = []
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
@@ -146,6 +160,7 @@ class Handles:
         ridges = np.repeat([RIDGE_OF_LINES if handle.points else RIDGE for handle in handles], self._counts)
         self._soft = 1 / self._stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
+        self._lacks = self._fitted_lacks(self._lacks)
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -176,10 +191,11 @@ class Handles:
             return
         rows = _runs(self._counts[in_force])  # of each in what is listed
         places, radii = self._places[listed], self._radii[listed]
-        slower = self.slower(listed)
+        ways = [self._way(number, time, dt) for number in active]
+        slower = self.slower(listed) * np.repeat(self._progressing(active, ways, dt), self._counts[in_force])
         for each in rows:
             slower[each] = slower[each].min()  # what is led as a whole goes as slowly as the slowest of it
-        wanted, growths, led = self._wanted(active, rows, slower, time, dt)
+        wanted, growths, led = self._wanted(active, rows, slower, ways, dt)
         rings, loops, is_pushed = list[Ring](), list[slice](), np.ones(len(listed), bool)
         for number, each, growth in zip(active, rows, growths, strict=True):
             shape, local = self._shapes[number], self._shapes[number].handle.local
@@ -212,13 +228,15 @@ class Handles:
         if share.any():  # what is local is shared out first: the fluid would else do all of it, going on by itself
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], share[:, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
-            carried = part * _solved(both, wanted[pushed].ravel(), soft).reshape(-1, 2)
+            back, system = _system(both, soft)
+            carried = part * (back @ np.linalg.solve(system, wanted[pushed].ravel())).reshape(-1, 2)
             wanted = wanted - np.einsum("iajb,jb->ia", local, carried)
         soft = np.concatenate([soft, softs[[ring.centre for ring in rings]]])
         shares = np.concatenate([shares, np.ones(len(rings))])
-        ways = _with_rings(places, pushed, push, rings), shares, soft, wanted, carried
+        solving = *_system(_with_rings(places, pushed, push, rings), soft, shares), wanted, carried
         self._places[listed] += wanted * dt  # where to look for them
-        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, *ways)
+        bounds = numbers[drawn], FARTHEST_STEP * reaches / dt
+        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, *solving, *bounds)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -288,7 +306,7 @@ class Handles:
 
     def save(self) -> State:
         """A copy of this moment."""
-        kept = {"places": self._places, "starts": self._starts, "counts": self._counts}
+        kept = {"places": self._places, "starts": self._starts, "counts": self._counts, "lacks": self._lacks}
         return State({}, {name: values.copy() for name, values in kept.items()})
 
     def restore(self, state: State) -> None:
@@ -306,6 +324,10 @@ class Handles:
             if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), 2):
                 raise ValueError("the state of handles is missing")
         self._places, self._starts = (self._fitted(state.values[name], counts) for name in ("places", "starts"))
+        lacks = state.values.get("lacks")
+        if lacks is None or lacks.dtype != np.float64 or lacks.shape != (len(counts), 2):
+            raise ValueError("the state of handles is missing")
+        self._lacks = self._fitted_lacks(lacks)
         self._lead = None
 
     def release(self) -> None:
@@ -326,6 +348,12 @@ class Handles:
                 rows[here] = part
         return rows
 
+    def _fitted_lacks(self, kept: np.ndarray) -> np.ndarray:
+        """What was kept of some handles, for those of now: what is new has lacked nothing yet."""
+        found = np.tile([np.inf, 0.0], (len(self.handles), 1))
+        found[: len(kept)] = kept[: len(found)]
+        return found
+
     def _located(self) -> np.ndarray:
         """Where the handles that have begun are: x with x + D(x) = at, by Newton's method from where they should be."""
         given = self._warp.version, *(each.tobytes() for each in (self._places, self._starts, self._at, self._radii))
@@ -344,17 +372,33 @@ class Handles:
         places[begun] = best
         return places
 
+    def _way(self, number: int, time: float, dt: float) -> Way:
+        shape, rows = self._shapes[number], self._rows[number]
+        now, then = (shape.wanted(self._starts[rows], at, dt) for at in (time, time + dt))
+        left = float(np.hypot(*(then - self._places[rows]).T).max())
+        return Way(now, then, bool(np.abs(then - now).max() > FOUND * dt), left)
+
+    def _progressing(self, active: list[int], ways: list[Way], dt: float) -> np.ndarray:
+        """1 for each of these handles; 0 for what comes no nearer to its goal, as long as nobody's goal moves."""
+        lacks = np.array([way.left for way in ways])
+        if any(way.goes for way in ways):
+            self._lacks[active] = np.inf, 0.0
+        least, waited = self._lacks[active].T
+        nearer = lacks < least / 2
+        least, waited = np.where(nearer, lacks, least), np.where(nearer, 0.0, waited + dt)
+        self._lacks[active] = np.stack([least, waited], axis=-1)
+        return np.where((waited > PATIENCE) & (lacks > 1 / max(self._warp.size)), 0.0, 1.0)
+
     def _wanted(
-        self, active: list[int], rows: list[slice], slower: np.ndarray, time: float, dt: float
+        self, active: list[int], rows: list[slice], slower: np.ndarray, ways: list[Way], dt: float
     ) -> tuple[np.ndarray, list[float], list[bool]]:
         """How the points of these handles shall move in this step, longer sides / s, and areas within grow, 1 / s.
 
         Then which of them shall not be where they began.
         """
         wanted, growths, led, back = np.zeros((len(slower), 2)), list[float](), list[bool](), -math.expm1(-RATE * dt)
-        for number, each in zip(active, rows, strict=True):
+        for number, each, (now, then, *_) in zip(active, rows, ways, strict=True):
             shape, here = self._shapes[number], self._places[self._rows[number]]
-            now, then = (shape.wanted(self._starts[self._rows[number]], at, dt) for at in (time, time + dt))
             led.append(bool(np.abs(then - self._starts[self._rows[number]]).max() > FOUND))
             step = slower[each, None] * (then - now + back * (now - here))
             most, far = FARTHEST_STEP * shape.handle.reach, float(np.hypot(*step.T).max())
@@ -451,8 +495,13 @@ class Handles:
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             lacks[loop] -= (lacks[loop] * arms).sum() / max((arms**2).sum(), 1e-30) * arms
         told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
-        strengths, count = _solved(lead.influence, told, lead.soft, lead.shares), 2 * len(lead.drawn)
+        strengths, count = lead.back @ np.linalg.solve(lead.system, told), 2 * len(lead.drawn)
         lacking, spins = strengths[:count].reshape(-1, 2), strengths[count:]
+        # What strains is the force, much of which its own image takes back near an edge: it keeps the bound of a step.
+        over = np.hypot(*lacking.T) / lead.bounds
+        parts = np.ones(lead.owners.max() + 1)
+        np.minimum.at(parts, lead.owners, 1 / np.maximum(over, 1.0))
+        lacking *= parts[lead.owners, None]
         masks: dict[str, Any] = {}
         if attenuated:
             lacking *= found[lead.drawn, 2:3]
@@ -466,12 +515,10 @@ class Handles:
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 
-def _solved(
-    influence: np.ndarray, wanted: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0
-) -> np.ndarray:
-    """The forces that together make what is wanted, as far as the ridge and stiffness let them: (H3)."""
+def _system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """W K' and K W K' + diag(soft) of (H3): forces are the first times the second's inverse times what is wanted."""
     back = (shares * influence).T
-    return back @ np.linalg.solve(influence @ back + np.diag(soft), wanted)
+    return back, influence @ back + np.diag(soft)
 
 
 def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.ndarray) -> np.ndarray:

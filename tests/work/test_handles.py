@@ -16,6 +16,8 @@ from app.model.schema import frozen
 from app.work.held import as_seen, held_in, unmet
 from app.work.replay import Replay
 from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
+from solver.brush.handle import Shape, beside_edges
+from solver.limits import MOST_STRETCH
 from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
 
 BLACK = np.zeros((96, 128, 3), np.uint8)
@@ -138,12 +140,48 @@ def test_an_outline_goes_into_another_form_and_size(device: Device):
     assert warp.statistics().folds == 0
 
 
-def test_what_of_a_line_is_outside_is_not_led(device: Device):
+@pytest.mark.parametrize("cells", [64, 96])
+def test_what_of_a_line_is_outside_is_not_led(cells: int, device: Device):
     line = Handle((0.1, 0.5), (0.15, 0.55), duration=0.5, points=((-0.2, 0.5), (0.3, 0.5)))
-    led, _ = led_alone(device, line, ticks=30, cells=96)
+    led, _ = led_alone(device, line, ticks=30, cells=cells)
     (shape,) = led.shapes
     assert shape.min() > 0.02
     assert led.away[0] * PIXELS < 0.5
+
+
+def test_a_line_is_led_as_far_from_an_edge_as_the_map_bears(device: Device):
+    """What is at the edge stays there, and what is near it goes a part of the way."""
+    line = Shape.of(Handle((0.05, 0.5), (0.25, 0.5), points=((-0.1, 0.5), (0.2, 0.5))), (1.0, 1.0))
+    starts = np.array([[0.0, 0.5], [0.01, 0.5], [0.1, 0.5], [0.2, 0.5]])
+    moved = beside_edges(starts, (1.0, 1.0))
+    assert moved[0].T[0] == pytest.approx([0, 0.0025, 0.025, 0.05])
+    assert moved[1].T[0] == pytest.approx([0, 0.04, 0.4, 0.8])
+    assert line.ends(line.led).T[0].min() == pytest.approx(MOST_STRETCH * line.led.T[0].min())
+
+
+def test_half_a_loop_is_drawn_off_the_edge_without_tearing_it(device: Device):
+    """Nor does a source swell what the edge has closed."""
+    angles = np.arange(24) * np.pi / 12
+    loop = tuple((1 + 0.15 * np.cos(a), 0.5 + 0.15 * np.sin(a)) for a in angles)
+    led, warp = led_alone(
+        device, Handle((1.0, 0.5), (0.85, 0.6), 0.15, duration=0.4, closed=True, points=loop), ticks=12, cells=32
+    )
+    found = warp.statistics()
+    assert found.folds == 0
+    assert found.det_min > 0.88
+    assert led.away[0] * PIXELS < 85
+
+
+def test_what_comes_no_nearer_lets_go(device: Device):
+    """Of two that lie beside one another and are led across; and the fluid comes to rest."""
+    ways = [Handle((0.5, y), (x, 0.5), RADIUS, duration=0.1) for x, y in ((0.4, 0.5), (0.6, 0.53))]
+    grid = Grid(32, 32)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid, (64, 64))
+    fluid.set_viscosity(0.3)
+    handles = Handles(fluid, warp, ways)
+    for _ in range(40):
+        handles.advance(DT)
+    assert fluid.motion().largest_speed < 1e-4
 
 
 def test_a_fluid_handle_beside_local_ones_arrives(device: Device):
