@@ -266,7 +266,8 @@ class Shape:
         there = handle.wanted(middle, time, dt)
         if len(starts) == 1:
             return there[None]
-        way = self._about(there, starts, time, dt) - starts
+        there = self._about(there, starts, time, dt)
+        way = (there if self.is_ring else np.clip(there, *beside_edges(starts, self.extent))) - starts
         far = np.hypot(*way.T)[:, None]
         return starts + way * np.minimum(1.0, LARGEST_LEAD * handle.reach / np.maximum(far, 1e-30))
 
@@ -290,8 +291,7 @@ class Shape:
         """Its points with the handle at a place, turned as at a time."""
         if len(starts) == 1:
             return there[None]
-        laid = self._laid(there, starts, time, dt)
-        return np.clip(laid, *((0.0, self.extent) if self.is_ring else beside_edges(starts, self.extent)))
+        return np.clip(self._laid(there, starts, time, dt), 0.0, self.extent)
 
     def _laid(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
         handle, from_middle = self.handle, starts - self.middle(starts)
