@@ -42,7 +42,8 @@ void read_live(bool turned) {
         vec4 here = turn(turned ? open_v(vec2(at)) : open_u(vec2(at)), turned);
         vec4 there = turn(turned ? open_v(vec2(next)) : open_u(vec2(next)), turned);
         ivec2 first = 2 * turn(at, turned), end = turn(size, turned);
-        vec4 glide = glides(vec4(first.yy, first.yy + 1), turned ? u_box.x : u_box.y, turned ? u_no_slip.xy : u_no_slip.zw);
+        vec4 glide = glides(vec4(first.yy, first.yy + 1), turned ? u_box.x : u_box.y,
+                            turned ? sides_across(u_no_slip.xy, u_alone.x) : sides_across(u_no_slip.zw, u_alone.y));
         vec4 moves = max(max(here, vec4(here.y, there.x, here.w, there.z)), 1.0 - glide);
         moves *= float(first.y >= 0) * vec4(lessThan(ivec4(first.yy, first.yy + 1), end.yyyy));
         live[2 * q] = moves.xy;

@@ -2,12 +2,14 @@
 // u_coarse_u, u_coarse_v: coarse faces e; u_u, u_v: the iterate f.
 // Linear along the face's normal; 3/4 and 1/4 of the two nearest across it. A coarse face that is exactly zero is
 // fixed (or at rest, which makes no difference): at free-slip walls the other one then counts whole.
+// u_alone: see restrict.frag.
 // reads: 12
 #include "viscosity/operator.glsl"
 uniform sampler2D u_coarse_u;
 uniform sampler2D u_coarse_v;
 uniform sampler2D u_u;
 uniform sampler2D u_v;
+uniform vec2 u_alone;
 in vec2 v_uv;
 layout(location = 0) out vec4 out_u;
 layout(location = 1) out vec4 out_v;
@@ -44,8 +46,8 @@ void main() {
     vec2 texel = 1.0 / vec2(textureSize(u_coarse_u, 0)), p = (vec2(place >> 1) + 1.5) * texel;
     vec2 first = vec2(place >> 1) * 2.0, box = floor(0.5 * u_box);
     vec2 x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
-    out_u = open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y, first.y, box.y, u_no_slip.zw);
-    out_v = open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x, first.x, box.x, u_no_slip.xy).xzyw;
+    out_u = open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y, first.y, box.y, sides_across(u_no_slip.zw, u_alone.y));
+    out_v = open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x, first.x, box.x, sides_across(u_no_slip.xy, u_alone.x)).xzyw;
 #ifndef ALONE
     out_u += texture(u_u, v_uv);
     out_v += texture(u_v, v_uv);

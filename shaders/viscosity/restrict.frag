@@ -4,7 +4,7 @@
 // Along its normal a face gathers 1/2, 1, 1/2; across it 1/4, 3/4, 3/4, 1/4, or, at free-slip walls, the whole of the two
 // that it would share with a fixed neighbour.
 // u_alone: 2 where the finer grid is a single column (x) or row (y), which has no other to be joined to: it is coarsened
-// along itself only, and counts as two; else 1.
+// along itself only, whatever its walls do, and counts as two; else 1.
 // With START a second pair of outputs, the first damped Jacobi sweep on it from rest: u_weight D^-1 times it.
 // reads: 29
 uniform sampler2D u_u;
@@ -50,8 +50,8 @@ void main() {
     vec2 p = (2.0 * here + 1.5) * fine_texel, fx = x * fine_texel, fy = y * fine_texel;
     vec4 left = open_v(here - x).xzyw, above = open_u(here - y), open_here_u = open_u(here);
     vec4 open_here_v = open_v(here).xzyw, right = open_v(here + x).xzyw, below = open_u(here + y);
-    out_u = gather(u_u, p, fx, fy, false, above, open_here_u, below, 2.0 * here.y, u_box.y, u_no_slip.zw);
-    out_v = gather(u_v, p, fy, fx, true, left, open_here_v, right, 2.0 * here.x, u_box.x, u_no_slip.xy).xzyw;
+    out_u = gather(u_u, p, fx, fy, false, above, open_here_u, below, 2.0 * here.y, u_box.y, sides_across(u_no_slip.zw, u_alone.y));
+    out_v = gather(u_v, p, fy, fx, true, left, open_here_v, right, 2.0 * here.x, u_box.x, sides_across(u_no_slip.xy, u_alone.x)).xzyw;
 #ifdef START
     Faces inverse = inverse_diagonal(v_uv);
     out_start_u = u_weight * inverse.u * out_u;

@@ -29,3 +29,13 @@ vec4 glides(vec4 place, float far, vec2 no_slip) {
     return vec4(1.0);
 #endif
 }
+
+// Where the fluid sticks to the two sides across which a level is coarsened, or not: `alone` is 2 for a single column or
+// row, which is carried over as it is, whatever its walls do. (Of one viscosity the walls' drag is that of the coarse cells.)
+vec2 sides_across(vec2 no_slip, float alone) {
+#ifdef UNIFORM
+    return no_slip;
+#else
+    return no_slip * (2.0 - alone);
+#endif
+}

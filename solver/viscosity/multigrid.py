@@ -210,7 +210,8 @@ class Multigrid:
         else:
             self.sawtooth(coarser, coarser.rhs)
         prolong = self.device.pass_("viscosity/prolong.frag", ALONE=1, **level.defines)
-        prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **level.bounds)
+        inputs = coarser.faces.read.inputs("coarse_")
+        prolong(level.faces.write.fields, region=level.region, alone=coarser.alone, **inputs, **level.bounds)
         level.faces.swap()
         self.smooth(level, rhs, self._weights(level))
 
@@ -230,7 +231,7 @@ class Multigrid:
             self.cycle(coarser, coarser.rhs, 0)
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"ALONE": 1} if rigid else {}))
         prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
-                **level.bounds)  # fmt: skip
+                alone=coarser.alone, **level.bounds)  # fmt: skip
         if rigid:
             means = rigid.add_others(free, faces)
             self.residual(level, faces, rhs, free)

@@ -181,7 +181,8 @@ class Level:
         if not finer.depth:
             inputs |= {"xx0": finer.packed["cells"], "node0": finer.packed["nodes"], "aspect": self.aspect}
             defines = {"FINE_IS_FINEST": 1, **slip}
-        for kind, names in (("cells", CELLS), ("nodes", NODES)):
+        nodes = "nodes" if self.alone == (1.0, 1.0) else "line"
+        for kind, names in (("cells", CELLS), (nodes, NODES)):
             draw = self.device.pass_(f"viscosity/coarsen_{kind}.frag", **defines)
             wanted = *names, "open", *(("aspect",) if kind == "cells" else ())
             read = {name: inputs[name] for name in wanted if name in inputs}

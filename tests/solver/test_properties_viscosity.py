@@ -99,7 +99,8 @@ def test_a_long_channel(device: Device, kind: str, size: tuple[int, int]) -> Non
     assert viscosity.error(case.solved(device)[0], case.exact()) < viscosity.ERROR[1e5]
 
 
-@pytest.mark.parametrize("seed", range(3))
+# Of the others a mask between walls of which some stick once left all of it, 16 and 30 %.
+@pytest.mark.parametrize("seed", [*range(3), 5083, 5397, 5885])
 def test_viscous_step_in_a_channel_is_near_the_direct_solution(device: Device, seed: int) -> None:
     viscosity.check_viscous_step_in_a_channel(device, seed)
 
