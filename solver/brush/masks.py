@@ -40,7 +40,7 @@ class Masks:
         canvas: the texels they are painted on, over the whole picture; see `map_size`.
 
     Attributes:
-        version: grows where `apply` or `restore` finds that something has changed: as long as it is the same, so are they.
+        version: grows where `apply` or `restore` finds that something has changed.
     """
 
     def __init__(self, device: Device, canvas: Grid) -> None:
