@@ -130,12 +130,11 @@ class Browser(Dialog):
         return ui.button(label, primary=True, width=88)
 
     def _take(self, path: Path) -> bool:
-        """Hand the file over; False where the person has to say first that it may be replaced."""
+        """Hand the file over; False where that fails, or the person has to say first that it may be replaced."""
         if self.writes and os.path.exists(path) and not self._confirm:
             self._confirm = True
             return False
-        self._chosen(path)
-        return True
+        return self.attempt(lambda: self._chosen(path))
 
 
 def _by_name(path: Path) -> str:

@@ -38,7 +38,7 @@ class Cautions:
         history = session.document.history
         if new and history.entries[history.index].name != FIT:  # which has told what it could not meet
             words = [f"{heading(sentence)}." for sentence in new[:TOLD]]
-            rest = [f"{len(new) - TOLD} more of this kind are in the inspector."] * (len(new) > TOLD)
+            rest = [f"{len(new) - TOLD} more like these: see the inspector."] * (len(new) > TOLD)
             self._messages.caution(
                 " ".join([*words, *rest]), lambda: session is self._workspace.session and _led(session) == led
             )

@@ -36,7 +36,7 @@ class Fits:
         self._workspace, self._messages = workspace, messages
         self.evaluations = EVALUATIONS
         self.process: FitProcess | None = None
-        self._session: Session | None = None  # whose handles are fitted
+        self._session: Session | None = None  # whose handles are fitted, while they are
         self._of: Recipe | None = None  # what it was then
         self._stopping = False
 
@@ -84,7 +84,10 @@ class Fits:
         """Stop it; nothing comes of it."""
         if self.process is not None:
             self.process.stop()
-            self.process = None
+        self._end()
+
+    def _end(self) -> None:
+        self.process = self._session = self._of = None
 
     def draw(self, ui: Ui, canvas: Rect, down: float) -> None:
         """How far it is and how near it comes, so many points below the canvas's edge; with a button to stop it."""
@@ -93,10 +96,12 @@ class Fits:
         process.poll()
         if not self._is_still_of_use():
             self.give_up()
-            self._messages.say("The fit was stopped, because the work was changed meanwhile. Press Fit to start again.")
+            again = "Press Fit" if process.fit.pairs is None else "Drop the pairs again"
+            self._messages.say(f"The fit was stopped, because the work was changed meanwhile. {again} to start again.")
         elif process.is_done:
-            self.process = None
-            self._take(process)
+            session = self._session
+            self._end()
+            self._take(process, session)
         else:
             state = "checking the best" if self._stopping else process.state or "getting ready"
             if under_way(ui, "fitting", canvas, down, f"Fitting: {state}", process.part, "Stop"):
@@ -112,9 +117,9 @@ class Fits:
             now.duration == recipe.duration and now.on_grid(recipe.fluid.grid).agrees_until(recipe) == inf
         )
 
-    def _take(self, process: FitProcess) -> None:
+    def _take(self, process: FitProcess, session: Session | None) -> None:
         """Make what has been found an edit, and play it."""
-        made, session = process.outcome.recipe, self._session
+        made = process.outcome.recipe
         if process.error:
             self._messages.warn(process.error)
         elif made is None or session is None:
@@ -128,7 +133,7 @@ class Fits:
                 self._messages.done(f"Fitted: {verdict}.")
                 return
             words = [f"{heading(notice)}." for notice in process.notices[:TOLD]]
-            rest = [f"{len(process.notices) - TOLD} more are in the inspector."] * (len(process.notices) > TOLD)
+            rest = [f"{len(process.notices) - TOLD} more like these."] * (len(process.notices) > TOLD)
             self._messages.warn(
                 " ".join(["Fitted as well as it could be.", *words, *rest]),
                 lambda: self._workspace.session is session and session.document.recipe.handle == made.handle,

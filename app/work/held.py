@@ -81,6 +81,10 @@ def as_seen(held: list[Held], replay: Replay) -> list[Held]:
     seen, several = [], np.split(listed, np.cumsum([len(each) for each in places])[:-1])
     for one, shown in zip(held, several, strict=True):
         now, *line = _fractions(shown, extent)
+        if line:  # its middle is no point of the picture, and goes as its points do
+            count = len(line) - one.led.closed
+            across, down = (np.mean(line[:count], axis=0) - np.mean(one.line[:count], axis=0)).tolist()
+            now = one.now[0] + across, one.now[1] + down
         start = _between(one.led.at, one.start, amount)
         target = _between(now, (now[0] + one.target[0] - one.now[0], now[1] + one.target[1] - one.now[1]), amount)
         seen.append(replace(one, start=start, now=now, target=target, line=tuple(line), due=()))

@@ -40,7 +40,7 @@ class Masks:
         canvas: the texels they are painted on, over the whole picture; see `map_size`.
 
     Attributes:
-        version: grows where `apply` finds that something has changed.
+        version: grows where `apply` or `restore` finds that something has changed.
     """
 
     def __init__(self, device: Device, canvas: Grid) -> None:
@@ -274,6 +274,7 @@ class Masks:
             if name in self._painted or not saved.is_blank:
                 for region in self._field(name).restore(saved):
                     self._changed[name] = _around(region, self._changed.get(name))
+                    self.version += 1  # it is shown before anybody calls `apply`
         self._frozen_in = None
 
     @property

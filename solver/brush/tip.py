@@ -46,6 +46,7 @@ class Tip:
     Raises:
         ValueError: if a number is not finite, or beyond all measure, or the radius is not positive, or with more than
             16 paths.
+        TypeError: if one of the others is no `Path`, or what must be a number is none.
     """
 
     start: Point
@@ -56,6 +57,8 @@ class Tip:
     others: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
+        for path in self.others:
+            check_type("an image of a brush", path, Path)
         for start, end, _ in self.paths:
             for what, place in (("start", start), ("end", end)):
                 if not (isinstance(place, (tuple, Sequence, np.ndarray)) and len(place) == 2):

@@ -245,6 +245,7 @@ def test_a_picture_of_another_size_is_fitted_and_says_so(pictures: Pictures) -> 
         ({"scale": 1, "segment": {}}, "chooses by"),
         ({"scale": 1, "segment": {"above": 0.5, "color": "#ffffff"}}, "chooses by"),
         ({"scale": 1, "segment": {"above": 0.5, "below": 0.5}}, "nothing lies"),
+        ({"scale": 1, "segment": {"above": 0.5, "below": 0.4}}, "nothing lies"),
         ({"scale": 1, "segment": {"color": "red"}}, "#c8a040"),
     ],
 )

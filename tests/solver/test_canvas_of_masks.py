@@ -52,6 +52,20 @@ def covered(values: np.ndarray, canvas: Grid, grid: Grid) -> np.ndarray:
     return values
 
 
+def test_as_long_as_the_version_is_the_same_so_are_the_masks(device: Device, masks: Masks) -> None:
+    """Also where they go back: the window shows them before anything is simulated."""
+    fluid, empty = Fluid(device, GRID), masks.save()
+    masks.freeze(Tip((0.5, 0.3), (0.5, 0.3), 0.1), 1)
+    masks.apply(fluid)
+    painted, version = masks.save(), masks.version
+    masks.restore(painted)
+    assert masks.version == version
+    masks.restore(empty)
+    assert masks.version > version
+    for thing in (fluid, empty, painted):
+        thing.release()
+
+
 def test_nothing_is_kept_of_masks_that_are_not_painted(device: Device, masks: Masks) -> None:
     viscosity, solid = told(masks, device, GRID)
     assert (viscosity == np.float32(0.03)).all()

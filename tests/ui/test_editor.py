@@ -14,6 +14,7 @@ from threading import Event
 import numpy as np
 import pytest
 
+from app.errors import UserError
 from app.media import project as projects
 from app.media.codecs.cmyk import INK
 from app.media.displacement import Displacement
@@ -669,6 +670,8 @@ def test_a_message_that_comes_or_goes_by_itself_is_drawn_until_it_fits(robot: Ro
     rested = robot.pixels()
     robot.frame(count=10)
     assert np.array_equal(robot.pixels(), rested)
+    robot.move(*robot.at(0.5, 0.5))  # somebody is there
+    robot.frame(count=10)
     robot.frame(dt=6.0)
     assert robot.editor.wants_frame()
 
@@ -752,6 +755,24 @@ def test_a_folder_that_is_not_there_is_told_in_the_browser(robot: Robot) -> None
     robot.frame(count=2)
     assert browser.problem == "There is no /nonesuch."
     assert robot.editor.dialogs.shown == [browser]
+
+
+def test_what_cannot_be_done_with_the_file_that_is_chosen_is_told_in_the_browser(robot: Robot, tmp_path: Path) -> None:
+    def refuse(path: Path) -> None:
+        raise UserError(f"{path.name} does not fit")
+
+    robot.editor.chooser.ask_which("Open", tmp_path, (".pts",), refuse)
+    robot.frame(count=2)
+    browser = robot.editor.dialogs.shown[-1]
+    assert isinstance(browser, Browser)
+    (tmp_path / "a.pts").touch()
+    browser.typed = str(tmp_path / "a.pts")
+    robot.click(browser.rect.x + 200, browser.rect.y + 72)
+    robot.key("enter")
+    robot.frame(count=2)
+    assert browser.problem == "a.pts does not fit"
+    assert robot.editor.dialogs.shown == [browser]
+    assert not robot.editor.messages.shown
 
 
 @pytest.mark.parametrize("helper", ["absent", "failing", "working"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -183,6 +184,10 @@ def test_pairs_that_fall_on_the_window_are_fitted_as_by_the_command_line(robot: 
     robot.frame(Drop((str(tmp_path / "p.pts"), str(tmp_path / "q.pts"))))
     assert "A fit is under way" in messages.shown[-1].text
     assert robot.editor.fits.process is process
+    robot.editor.do("redo")
+    robot.frame()
+    assert "Drop the pairs again" in messages.shown[-1].text
+    assert robot.editor.fits not in gc.get_referrers(session), "what was fitted is not kept for ever"
 
 
 def test_a_fit_that_falls_short_is_no_success_and_told_of_until_it_is_undone(robot: Robot) -> None:

@@ -11,7 +11,9 @@ import pytest
 from app.errors import UserError
 from app.media.pictures import read_picture
 from app.model.mask_edits import FeatherMask, FillMask, SpreadMask
+from app.model.recipe import Recipe
 from app.ui.actions import ACTIONS
+from app.ui.widgets import Ui
 from support.editing import Robot
 from support.widgets import Widgets
 
@@ -27,6 +29,25 @@ def test_a_mask_that_the_tool_shows_anyway_turns_on_no_overlay(robot: Robot, too
     robot.editor.commands.edit_mask("fill")
     assert robot.editor.state.overlays["frozen"].shown == is_shown
     assert robot.editor.state.shows_frozen
+
+
+@pytest.mark.parametrize("tool", ["", "freeze", "push"])
+def test_the_hint_of_a_margin_goes_once_something_is_frozen(
+    robot: Robot, tool: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also if the fluid moved meanwhile, or the recipe froze it."""
+    said, text = list[str](), Ui.text
+    monkeypatch.setattr(
+        Ui, "text", lambda ui, words, *more, **named: (said.append(words), text(ui, words, *more, **named))
+    )
+    path = {"kind": "path", "points": ((0.2, 0.2),), "radius": 0.1}
+    stroke = {"tool": tool, "samples": ((0, 0.2, 0.2, 1.0), (3, 0.3, 0.2, 1.0))}
+    made = Recipe.model_validate({"stroke": (stroke,)} if tool else {"freeze": (path,)})
+    robot.editor.session.edit("Made", stroke=made.stroke, freeze=made.freeze)
+    robot.key("f")
+    said.clear()
+    robot.frame()
+    assert any("Leave a margin" in words for words in said) == (tool == "push")
 
 
 def test_a_mask_follows_the_pointer_in_every_frame_and_takes_no_time(robot: Robot) -> None:

@@ -34,6 +34,7 @@ def test_what_does_not_hold_any_more_goes_at_once_and_a_caution_by_itself() -> N
     messages, holds = Messages(lambda: None), [True]
     messages.warn("waits for somebody", lambda: holds[0])
     messages.caution("goes")
+    messages.see()
     messages.elapse(4.0)
     assert len(messages.shown) == 2
     messages.elapse(1.0)

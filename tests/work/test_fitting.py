@@ -209,10 +209,11 @@ def test_many_pairs_arrive_with_values_in_common(device: Device):
 def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device):
     heard: list[int] = []
     own = RECIPE.replace("grid = 32", "grid = 66")  # finer than what most of it is tried on
-    found = fit(device, PAIRS, 40, own, report=lambda done, total: heard.append(done), cancel=lambda: max(heard) >= 3)
+    found = fit(device, PAIRS, 40, own, report=lambda done, total: heard.append(done), cancel=lambda: max(heard) >= 10)
     assert found.stopped
-    assert max(heard) == 3
+    assert max(heard) == 10  # two replays on a coarse grid, and one on its own, which counts as eight
     assert found.trial.recipe.fluid.grid == 66
+    assert found.trial.recipe.fluid.dt == 0.04
     with pytest.raises(Cancelled):
         fit(device, PAIRS, cancel=lambda: True)
 

@@ -485,6 +485,15 @@ def test_marks_lie_on_what_they_hold_as_the_picture_is_seen_at_an_amount(device:
     replay.release()
 
 
+def test_the_mark_of_a_bent_line_is_where_it_was_drawn_as_the_picture_is_seen_as_it_was(device: Device):
+    line = {"points": [[0.2, 0.7], [0.4, 0.8], [0.6, 0.7]], "to": [0.4, 0.65], "duration": 0.1}
+    replay = replay_of(device, handle=[line], amount=0.0, duration=0.2)
+    replay.seek(12)
+    (seen,) = as_seen(held_in(replay), replay)
+    assert seen.now == pytest.approx(seen.led.at, abs=2e-3)
+    replay.release()
+
+
 def test_an_outline_of_no_size_is_led(device: Device):
     corners = [[0.5, 0.5], [0.5 + 1e-9, 0.5], [0.5, 0.5 + 1e-9]]
     replay = replay_of(device, handle=[{"points": corners, "closed": True, "to": [0.52, 0.5], "scale": 2.0}])

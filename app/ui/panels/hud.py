@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
+from app.model.recipe import Recipe
 from app.ui.actions import Do
 from app.ui.clock import Clock
 from app.ui.editor_state import EditorState
@@ -40,7 +41,7 @@ def draw(
         _zoom(ui, workspace, do)
     if state.tool_name == "handle" and not session.recipe.leads and canvas.width > ui.px(HINT):
         _how(ui, canvas, "Drag a point to where it should go. Click to pin one where it is.")
-    elif state.tool_name == "freeze" and not session.recipe.mask and canvas.width > ui.px(HINT):
+    elif state.tool_name == "freeze" and not _has_frozen(session.recipe) and canvas.width > ui.px(HINT):
         _how(ui, canvas, "Leave a margin to what you push: fluid sticks to what is frozen.")
     elif selecting.hint and canvas.width > ui.px(HINT):
         _how(ui, canvas, selecting.hint)
@@ -52,6 +53,11 @@ def draw(
         _statistics(ui, canvas, session, numbers, clock)
     if session.is_behind and session.target - session.tick >= BEHIND:
         _catching_up(ui, canvas, session)
+
+
+def _has_frozen(recipe: Recipe) -> bool:
+    """True if something has been frozen: by the recipe, in no time, or while the fluid moved."""
+    return bool(recipe.freeze or recipe.mask) or any(stroke.tool == "freeze" for stroke in recipe.stroke)
 
 
 def _zoom(ui: Ui, workspace: Workspace, do: Do) -> None:
