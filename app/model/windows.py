@@ -85,8 +85,8 @@ class FlowWindow(NamedTuple):
 
         Returns:
             `now` if they have room there; strokes that go on also stay in one that is coarser than they asked for, as a
-            wide movement has needed it. None if one of them wants the whole picture, as it does where its symmetry makes
-            images all over it, or if no window with cells finer than those of `whole` has room for them.
+            wide movement has needed it. None if one of them wants the whole picture, as one with images all over it
+            does, or if no window with cells finer than those of `whole` has room for them.
         """
         detail = min(act.stroke.detail if act.stroke.symmetry == "none" else 0 for act in acts)
         finest = max(whole.size)
