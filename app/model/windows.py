@@ -85,10 +85,11 @@ class FlowWindow(NamedTuple):
 
         Returns:
             `now` if they have room there; strokes that go on also stay in one that is coarser than they asked for, as a
-            wide movement has needed it. None if one of them wants the whole picture, or if no window with cells finer
-            than those of `whole` has room for them.
+            wide movement has needed it. None if one of them wants the whole picture, as one with images all over it
+            does, or if no window with cells finer than those of `whole` has room for them.
         """
-        detail, finest = min(act.stroke.detail for act in acts), max(whole.size)
+        detail = min(act.stroke.detail if act.stroke.symmetry == "none" else 0 for act in acts)
+        finest = max(whole.size)
         ends, room = [], [1.0, 1.0, 0.0, 0.0]
         for stroke, _, dabs in acts:
             for dab in dabs:

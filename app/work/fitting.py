@@ -419,6 +419,8 @@ class _Search:
     def _usable(self, base: Recipe) -> np.ndarray:
         """The numbers of the pairs that get a handle; of the others it is noted why not."""
         inside = np.abs(self.pairs - 0.5).max(axis=2) <= 0.5
+        # The middle of a line may be in the picture and none of its corners.
+        inside[:, 0] &= [handle.takes_hold for handle in self.aim.handles]
         for number, (here, there) in enumerate(inside):
             if not here:
                 self.notices.append(f"{self._label(number)} is left out: its point is outside the picture")

@@ -91,6 +91,8 @@ def test_what_no_window_holds_has_a_coarser_one_or_the_whole_picture():
     assert FlowWindow.of([Act(stroke(), 0, at(0.0, 0.5, 1.0, 0.5))], None, WHOLE) is None
     here = at(0.5, 0.5, 0.5, 0.5)
     assert FlowWindow.of([Act(stroke(), 0, here), Act(stroke(detail=0), 0, here)], None, WHOLE) is None
+    # Its images would lie outside.
+    assert FlowWindow.of([Act(stroke().model_copy(update={"symmetry": "radial"}), 0, here)], None, WHOLE) is None
     far = [Act(stroke(), 0, at(0.1, 0.5, 0.1, 0.5)), Act(stroke(), 0, at(0.9, 0.5, 0.9, 0.5))]
     assert FlowWindow.of(far, None, WHOLE) is None
 

@@ -102,6 +102,9 @@ def test_pairs_that_nobody_can_lead_are_refused(device: Device):
         fit(device, PAIRS + 2)
     with pytest.raises(UserError, match=r"70 pairs beside the recipe's 1 handles and pins; at most 64"):
         fit(device, np.repeat(PAIRS[:1], 70, axis=0))
+    around = "[[handle]]\npoints = [[-0.5, 0.5], [1.5, 0.5]]\nto = [0.6, 0.5]\n"
+    with pytest.raises(UserError, match="no pair has its point in the picture"):
+        fit(device, None, recipe=RECIPE + around)
 
 
 HANDLES = """[[handle]]
