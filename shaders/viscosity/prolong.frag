@@ -1,4 +1,4 @@
-// Prolong: the coarse correction on the finer grid, added to the iterate, f + P e; ALONE: P e.
+// Prolong: the coarse correction on the finer grid, added to the iterate, f + P e; CORRECTION: P e alone.
 // u_coarse_u, u_coarse_v: coarse faces e; u_u, u_v: the iterate f.
 // Linear along the face's normal; 3/4 and 1/4 of the two nearest across it. A coarse face that is exactly zero is
 // fixed (or at rest, which makes no difference): at free-slip walls the other one then counts whole.
@@ -48,7 +48,7 @@ void main() {
     vec2 x = vec2(texel.x, 0.0), y = vec2(0.0, texel.y);
     out_u = open_u(own_texel()) * spread(u_coarse_u, p, x, y, false, odd.x, odd.y, first.y, box.y, sides_across(u_no_slip.zw, u_alone.y));
     out_v = open_v(own_texel()) * spread(u_coarse_v, p, y, x, true, odd.y, odd.x, first.x, box.x, sides_across(u_no_slip.xy, u_alone.x)).xzyw;
-#ifndef ALONE
+#ifndef CORRECTION
     out_u += texture(u_u, v_uv);
     out_v += texture(u_v, v_uv);
 #endif

@@ -209,7 +209,7 @@ class Multigrid:
             self.smooth(coarser, coarser.rhs, self._weights(coarser)[begun:])
         else:
             self.sawtooth(coarser, coarser.rhs)
-        prolong = self.device.pass_("viscosity/prolong.frag", ALONE=1, **level.defines)
+        prolong = self.device.pass_("viscosity/prolong.frag", CORRECTION=1, **level.defines)
         inputs = coarser.faces.read.inputs("coarse_")
         prolong(level.faces.write.fields, region=level.region, alone=coarser.alone, **inputs, **level.bounds)
         level.faces.swap()
@@ -229,7 +229,7 @@ class Multigrid:
         self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser, start=True), is_full=is_full)
         if is_full and coarser is not self.direct_level:
             self.cycle(coarser, coarser.rhs, 0)
-        prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"ALONE": 1} if rigid else {}))
+        prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"CORRECTION": 1} if rigid else {}))
         prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
                 alone=coarser.alone, **level.bounds)  # fmt: skip
         if rigid:
