@@ -200,13 +200,9 @@ def split(region: Region, inner: Region) -> tuple[list[Region], list[Region]]:
     )
     if x0 == x1 or y0 == y1:
         return [], [region]
-    around = (
-        (x, y, right - x, y0 - y),
-        (x, y1, right - x, bottom - y1),
-        (x, y0, x0 - x, y1 - y0),
-        (x1, y0, right - x1, y1 - y0),
-    )
-    return [(x0, y0, x1 - x0, y1 - y0)], [part for part in around if part[2] and part[3]]
+    ends = (x, y, right, y0), (x, y1, right, bottom), (x, y0, x0, y1), (x1, y0, right, y1)
+    around = [(left, top, far - left, low - top) for left, top, far, low in ends if left < far and top < low]
+    return [(x0, y0, x1 - x0, y1 - y0)], around
 
 
 def _clipped(region: Region | list[Region], size: tuple[int, int]) -> list[Region]:

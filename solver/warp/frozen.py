@@ -68,8 +68,7 @@ class Frozen:
         x, y, width, height = region = _grown(region, FADED, self.size)
         faded = _faded(near)[y - top :, x - left :][:height, :width]
         held.set(faded, region)
-        if box := differing(np.zeros_like(faded), faded):
-            self.box = hull((x + box[0], y + box[1], *box[2:]), self.box)
+        self._reach(faded, x, y)
         rows.release()
         now.release()
 
@@ -136,7 +135,7 @@ class Frozen:
             held = tiles["held"]
             for region, tile in zip(held.kind.regions, held.tiles.flat, strict=True):
                 if tile.field is not None:
-                    self.box = hull(region, self.box)
+                    self._reach(tile.field.get(), *region[:2])
 
     def release(self) -> None:
         """Let go of everything."""
@@ -144,6 +143,11 @@ class Frozen:
             if field is not None:
                 field.release()
         self.held = self.kept = self.box = None
+
+    def _reach(self, held: np.ndarray, x: int, y: int) -> None:
+        """Let the box be about what of `held` is not 0 too, the first texel of which is (x, y)."""
+        if box := differing(np.zeros_like(held), held):
+            self.box = hull((x + box[0], y + box[1], *box[2:]), self.box)
 
     def _fields(self) -> tuple[TiledField, TiledField]:
         """Both, made when they are wanted first."""

@@ -181,7 +181,7 @@ class Remapping:
         inputs = self._accumulated.inputs() | inputs_of(levels, self._frozen.inputs())
 
         def draw(target: Field, regions: list[Region]) -> None:
-            # Also where the map is held: places beside that may look into it, and once it is thawed it goes on from there.
+            # Also where it is held: places beside that may look into it, and once thawed it goes on from there.
             for is_near, parts in self._frozen.parts(regions, (0.0, 0.0), target.texel):
                 defines = defines_of(levels if is_near else away_from_held(levels))
                 compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **defines)
