@@ -243,7 +243,7 @@ class Canvas:
         # Two are kept: each stroke begins and ends a movement.
         field = self._fields.get("displacement, moving" if moves else "displacement", size, 2)
         if (drawn := (field, warp, warp.version, shown)) != self._drawn:
-            warp.draw(field, origin, step)
+            warp.draw(field, origin, step, coarsely=moves)
             self._drawn = drawn
         self._last = field, shown
         return self._last

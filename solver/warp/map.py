@@ -443,14 +443,18 @@ class WarpMap:
         step: tuple[float, float],
         exact: bool = False,
         moved: Field | None = None,
+        coarsely: bool = False,
     ) -> None:
         """Draw the displacement at (fragment + origin) step, 0-1 of the picture.
 
         Args:
             exact: not to be looked at between its texels.
             moved: another displacement of `target`'s size, after which this one is drawn.
+            coarsely: the accumulated map need not be looked up more exactly than `target` will be, linearly.
         """
-        cubic = {} if exact else {"CUBIC": 1}
+        # Its own texels must not be farther apart than those of the target.
+        linear = coarsely and all(side * n >= 1.0 for side, n in zip(step, self.size, strict=True))
+        cubic = {} if exact else {"LINEAR": 1} if linear else {"CUBIC": 1}
         if moved is None:
             self._compose(target, origin, step, **cubic)
         else:
