@@ -459,7 +459,8 @@ class WarpMap:
             self._compose(target, origin, step, **cubic)
         else:
             compose = self.device.pass_("warp/compose.frag", FROM=1, **self._defines() | cubic)
-            compose(target, **self._parts(), **{"from": moved}, origin=origin, step=step)
+            inputs: dict[str, Any] = self._parts() | {"from": moved}
+            compose(target, **inputs, origin=origin, step=step)
 
     def draw_held(
         self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field
