@@ -243,7 +243,7 @@ class Canvas:
         # Two are kept: each stroke begins and ends a movement.
         field = self._fields.get("displacement, moving" if moves else "displacement", size, 2)
         if (drawn := (field, warp, warp.version, shown)) != self._drawn:
-            warp.draw(field, origin, step)
+            warp.draw(field, origin, step, coarsely=moves)
             self._drawn = drawn
         self._last = field, shown
         return self._last
@@ -339,8 +339,10 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
     if pixels.shape[2] <= 2:
         pixels = np.concatenate([pixels[..., :1].repeat(3, axis=2), pixels[..., 1:]], axis=2)
     if pixels.shape[2] == 3:
-        opaque = np.full((*pixels.shape[:2], 1), 255, np.uint8)
-        return np.ascontiguousarray(np.concatenate([pixels, opaque], axis=2))
+        opaque = np.full((*pixels.shape[:2], 4), 255, np.uint8)
+        for channel in range(3):  # of a frame of a clip a third of what it takes to copy three at once
+            opaque[..., channel] = pixels[..., channel]
+        return opaque
     alpha = pixels[..., 3:].astype(np.uint16)
     colours = ((pixels[..., :3] * alpha + 127) // 255).astype(np.uint8)
     if shown.premultiplied and shown.linear:

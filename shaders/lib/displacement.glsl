@@ -20,6 +20,14 @@ vec4 to_edges_slope(float p, float cell, float count, float walled) {
     return first / at * mix(vec4(1.0), (count - p) / far, last) - last / far * mix(vec4(1.0), p / at, first);
 }
 
+// Between the four next texels. 4 reads.
+vec2 linear_displacement(sampler2D displacement, vec2 p) {
+    vec2 texel = 1.0 / vec2(textureSize(displacement, 0)), cell = floor(p - 0.5), f = p - 0.5 - cell;
+    vec2 low = (cell + 0.5) * texel, high = low + texel;
+    return mix(mix(texture(displacement, low).rg, texture(displacement, vec2(high.x, low.y)).rg, f.x),
+               mix(texture(displacement, vec2(low.x, high.y)).rg, texture(displacement, high).rg, f.x), f.y);
+}
+
 // Four-point cubic along x blended with one along y (the Boolean sum CL + LC - LL of the cubic C and the linear L), which
 // needs no corners: fourth order like the product of both, and on a map as exact. 12 reads.
 vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled) {

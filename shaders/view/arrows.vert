@@ -27,7 +27,12 @@ void main() {
     v_arrow = seen ? vec3(v / size, pow(min(size, 1.0), 0.4)) : vec3(0.0);
     // Two triangles: (0 0) (1 0) (0 1) and (0 1) (1 0) (1 1); from 0.08 on its shade would be seen.
     vec2 corner = vec2(turn == 1 || turn > 3 ? 0.5 : -0.5, turn == 2 || turn == 3 || turn == 5 ? 0.5 : -0.5);
-    vec2 pixel = v_tile + u_origin + (v_arrow.z > 0.08 ? corner : vec2(0.0)) * u_side;
+    // No more of the square than the shade covers, see arrows.frag, and a pixel around it.
+    float reach = 0.9 * min(1.12 * v_arrow.z, 1.0), soft = 2.0 / u_side;
+    float along = (reach + 2.0 * soft) / 0.9 + soft;
+    float beside = max(0.5 * min(0.5, reach) + 3.0 * soft, 0.07 + 2.0 * soft) / 0.9 + soft;
+    vec2 covered = min(abs(v_arrow.xy) * along + abs(v_arrow.yx) * beside, vec2(1.0));
+    vec2 pixel = v_tile + u_origin + (v_arrow.z > 0.08 ? corner * covered : vec2(0.0)) * u_side;
     vec2 place = vec2(pixel.x, u_target_height - pixel.y);
     gl_Position = vec4((place - u_viewport.xy) / u_viewport.zw * 2.0 - 1.0, 0.0, 1.0);
 }

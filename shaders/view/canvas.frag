@@ -90,7 +90,7 @@ void main() {
     vec3 seen = colour.rgb;
     if (warped) {
 #ifdef MASKS
-        vec4 masks = texelFetch(u_masks, ivec2(gl_FragCoord.xy - u_masks_corner), 0);
+        vec4 masks = texture(u_masks, (gl_FragCoord.xy - u_masks_corner) / vec2(textureSize(u_masks, 0)));
         seen = (1.0 - masks.a) * seen + masks.rgb;
 #endif
 #ifdef GRID
@@ -100,8 +100,8 @@ void main() {
         vec2 line = 1.0 - smoothstep(0.3 * u_pixel, 1.1 * u_pixel, near / wide);
         // Where lines are closer than their own width, none can be told apart.
         line *= 1.0 - smoothstep(0.25, 0.6, wide);
-        vec2 shade = 1.0 - smoothstep(0.8 * u_pixel, 2.2 * u_pixel, near / wide);
-        seen = mix(seen, vec3(0.0), u_grid_opacity * 0.35 * max(shade.x, shade.y));
+        float shade = 1.0 - smoothstep(0.8 * u_pixel, 2.2 * u_pixel, min(near.x / wide.x, near.y / wide.y));
+        seen = mix(seen, vec3(0.0), u_grid_opacity * 0.35 * shade);
         seen = mix(seen, vec3(1.0), u_grid_opacity * max(line.x, line.y));
 #endif
 #ifdef ROOM

@@ -12,7 +12,7 @@ import numpy as np
 from solver.brush.tip import Tip
 from solver.gl.device import Device
 from solver.gl.field import Field, FieldPool
-from solver.gl.passes import Blend, Region, differing
+from solver.gl.passes import Blend, Region, differing, hull
 from solver.gl.tiled import TILE, Kind, SavedTiles, TiledField
 from solver.grid import Grid
 from solver.limits import LARGEST_VISCOSITY, as_mask, check_finite, check_type, viscosities
@@ -273,7 +273,7 @@ class Masks:
         for name, saved in state.tiles.items():
             if name in self._painted or not saved.is_blank:
                 for region in self._field(name).restore(saved):
-                    self._changed[name] = _around(region, self._changed.get(name))
+                    self._changed[name] = hull(region, self._changed.get(name))
                     self.version += 1  # it is shown before anybody calls `apply`
         self._frozen_in = None
 
@@ -318,9 +318,9 @@ class Masks:
             self._note_change(name, region)
 
     def _note_change(self, name: str, region: Region) -> None:
-        self._changed[name] = _around(region, self._changed.get(name))
+        self._changed[name] = hull(region, self._changed.get(name))
         if name == "frozen":
-            self._frozen_in = _around(region, self._frozen_in)
+            self._frozen_in = hull(region, self._frozen_in)
 
     def _regions(self, tip: Tip) -> list[Region]:
         """The texels of the canvas that each image of a tip touches."""
@@ -338,13 +338,3 @@ class Masks:
         ends = [((first * texel - start) / h, ((first + n) * texel - start) / h) for first, n, texel, start, h in sides]
         (left, right), (top, bottom) = ((floor(a), ceil(b)) for a, b in ends)
         return left, top, right - left, bottom - top
-
-
-def _around(region: Region, other: Region | None) -> Region:
-    """The smallest region about two, or about the first."""
-    if other is None:
-        return region
-    (x, right), (y, bottom) = (
-        (min(region[k], other[k]), max(region[k] + region[k + 2], other[k] + other[k + 2])) for k in (0, 1)
-    )
-    return x, y, right - x, bottom - y

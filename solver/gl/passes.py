@@ -182,6 +182,29 @@ def differing(before: np.ndarray, after: np.ndarray) -> Region | None:
     return x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y
 
 
+def hull(region: Region, other: Region | None) -> Region:
+    """The smallest region about two, or about the first."""
+    if other is None:
+        return region
+    (x, right), (y, bottom) = (
+        (min(region[k], other[k]), max(region[k] + region[k + 2], other[k] + other[k + 2])) for k in (0, 1)
+    )
+    return x, y, right - x, bottom - y
+
+
+def split(region: Region, inner: Region) -> tuple[list[Region], list[Region]]:
+    """A region's part in another, if there is one, and up to four around it."""
+    (x, x0, x1, right), (y, y0, y1, bottom) = (
+        (low, *(min(max(at, low), low + side) for at in (first, first + count)), low + side)
+        for low, side, first, count in zip(region[:2], region[2:], inner[:2], inner[2:], strict=True)
+    )
+    if x0 == x1 or y0 == y1:
+        return [], [region]
+    ends = (x, y, right, y0), (x, y1, right, bottom), (x, y0, x0, y1), (x1, y0, right, y1)
+    around = [(left, top, far - left, low - top) for left, top, far, low in ends if left < far and top < low]
+    return [(x0, y0, x1 - x0, y1 - y0)], around
+
+
 def _clipped(region: Region | list[Region], size: tuple[int, int]) -> list[Region]:
     """The parts of one region or several that lie within a target."""
     several = region if isinstance(region, list) else [region]

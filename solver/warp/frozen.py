@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.passes import Region
+from solver.gl.passes import Region, differing, hull, split
 from solver.gl.tiled import SavedTiles, TiledField
 
 # Texels: a place in a frozen pixel may lie nearest to the next texel, and what is looked up there is interpolated from
@@ -34,6 +34,7 @@ class Frozen:
         held: 1 where a place is held, 2/3 where only a texel's middle is; else (127 - so many texels away) / 255 along
             the axes, or 0; None as long as nothing was frozen.
         kept: the displacement where it is held, longer sides.
+        box: about all texels of `held` that are not 0; None if all are.
     """
 
     def __init__(self, device: Device, size: tuple[int, int]) -> None:
@@ -41,6 +42,7 @@ class Frozen:
         self.size = size
         self.held: TiledField | None = None
         self.kept: TiledField | None = None
+        self.box: Region | None = None
 
     def hold(self, mask: Field, changed: Region, draw: Draw) -> None:
         """Hold what a mask over the whole picture, of any size, has frozen in a region; let go of the rest of it."""
@@ -64,7 +66,9 @@ class Frozen:
         near[near < 128] = 0
         near[y - top :, x - left :][:height, :width] = values
         x, y, width, height = region = _grown(region, FADED, self.size)
-        held.set(_faded(near)[y - top :, x - left :][:height, :width], region)
+        faded = _faded(near)[y - top :, x - left :][:height, :width]
+        held.set(faded, region)
+        self._reach(faded, x, y)
         rows.release()
         now.release()
 
@@ -91,6 +95,27 @@ class Frozen:
         self.device.pass_("step/widen_solid.frag")(target, frozen=cells)
         cells.release()
 
+    def parts(
+        self, regions: list[Region], origin: tuple[float, float], step: tuple[float, float]
+    ) -> list[tuple[bool, list[Region]]]:
+        """Regions of a target by whether what is held, or fades before it, lies there.
+
+        Args:
+            regions: of the target's texels.
+            origin, step: a texel stands for the place (texel + origin) step, 0-1 of the picture.
+        """
+        if self.held is None or self.box is None:
+            return [(False, regions)]
+        # Of a place the texels around it are read: up to one away from it.
+        (x, right), (y, bottom) = (
+            (floor((self.box[k] - 1) / (step[k] * n) - origin[k]) - 1,
+             ceil((self.box[k] + self.box[k + 2] + 1) / (step[k] * n) - origin[k]) + 1)
+            for k, n in enumerate(self.size)
+        )  # fmt: skip
+        pairs = [split(region, (x, y, right - x, bottom - y)) for region in regions]
+        found = [(is_near, [part for pair in pairs for part in pair[0 if is_near else 1]]) for is_near in (True, False)]
+        return [(is_near, parts) for is_near, parts in found if parts]
+
     def inputs(self) -> dict[str, Any]:
         """It as `lib/warp.glsl` has it; nothing if nothing was frozen."""
         return {"held": self.held, "kept": self.kept} if self.held and self.kept else {}
@@ -106,13 +131,23 @@ class Frozen:
         else:
             for name, field in zip(("held", "kept"), self._fields(), strict=True):
                 field.restore(tiles[name])
+            self.box = None
+            held = tiles["held"]
+            for region, tile in zip(held.kind.regions, held.tiles.flat, strict=True):
+                if tile.field is not None:
+                    self._reach(tile.field.get(), *region[:2])
 
     def release(self) -> None:
         """Let go of everything."""
         for field in (self.held, self.kept):
             if field is not None:
                 field.release()
-        self.held = self.kept = None
+        self.held = self.kept = self.box = None
+
+    def _reach(self, held: np.ndarray, x: int, y: int) -> None:
+        """Let the box be about what of `held` is not 0 too, the first texel of which is (x, y)."""
+        if box := differing(np.zeros_like(held), held):
+            self.box = hull((x + box[0], y + box[1], *box[2:]), self.box)
 
     def _fields(self) -> tuple[TiledField, TiledField]:
         """Both, made when they are wanted first."""

@@ -28,7 +28,7 @@ from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
 from solver.warp.state import FACTOR, SUBMAPS, MapState, grid_in, values_of
-from solver.warp.submap import Level, Submap, defines_of, inputs_of, window_of
+from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
 MOST_PLACES = 2**19  # at which its distortion is looked at
@@ -366,7 +366,8 @@ class WarpMap:
         if key not in self._composed:
             self._composed[key] = self.device.field(size, 2, f"warp map at {size[0]} x {size[1]}")
         if key not in self._fresh:
-            self._compose(self._composed[key], **({} if exact else {"CUBIC": 1}))
+            field = self._composed[key]
+            self._compose(field, (0.0, 0.0), field.texel, **({} if exact else {"CUBIC": 1}))
             self._fresh.add(key)
         return self._composed[key]
 
@@ -396,7 +397,7 @@ class WarpMap:
             float32 (height, width, 2), longer sides.
         """
         field = self.device.field(self.coarse_size if size is None else size, 2, "warp map, to read")
-        self._compose(field)
+        self._compose(field, (0.0, 0.0), field.texel)
         displacement = field.get()
         field.release()
         return displacement
@@ -442,16 +443,24 @@ class WarpMap:
         step: tuple[float, float],
         exact: bool = False,
         moved: Field | None = None,
+        coarsely: bool = False,
     ) -> None:
         """Draw the displacement at (fragment + origin) step, 0-1 of the picture.
 
         Args:
             exact: not to be looked at between its texels.
             moved: another displacement of `target`'s size, after which this one is drawn.
+            coarsely: the accumulated map need not be looked up more exactly than `target` will be, linearly.
         """
-        defines = self._defines() | ({} if exact else {"CUBIC": 1}) | ({} if moved is None else {"FROM": 1})
-        inputs: dict[str, Any] = self._parts() | ({} if moved is None else {"from": moved})
-        self.device.pass_("warp/compose.frag", **defines)(target, **inputs, origin=origin, step=step)
+        # Its own texels must not be farther apart than those of the target.
+        linear = coarsely and all(side * n >= 1.0 for side, n in zip(step, self.size, strict=True))
+        cubic = {} if exact else {"LINEAR": 1} if linear else {"CUBIC": 1}
+        if moved is None:
+            self._compose(target, origin, step, **cubic)
+        else:
+            compose = self.device.pass_("warp/compose.frag", FROM=1, **self._defines() | cubic)
+            inputs: dict[str, Any] = self._parts() | {"from": moved}
+            compose(target, **inputs, origin=origin, step=step)
 
     def draw_held(
         self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field
@@ -512,9 +521,12 @@ class WarpMap:
         self._frozen.widen(still, window, self.extent)
         return still, window
 
-    def _compose(self, target: Field, **defines: object) -> None:
-        compose = self.device.pass_("warp/compose.frag", **self._defines() | defines)
-        compose(target, **self._parts(), origin=(0.0, 0.0), step=target.texel)
+    def _compose(
+        self, target: Field, origin: tuple[float, float], step: tuple[float, float], **defines: object
+    ) -> None:
+        for is_near, regions in self._frozen.parts([(0, 0, *target.size)], origin, step):
+            compose = self.device.pass_("warp/compose.frag", **self._defines(is_near) | defines)
+            compose(target, region=regions, **self._parts(), origin=origin, step=step)
 
     @property
     def _levels(self) -> list[Level]:
@@ -526,10 +538,10 @@ class WarpMap:
         """Whether the submap is."""
         return self._is_settled and self._frozen.held is not None
 
-    def _defines(self) -> dict[str, object]:
-        """How the whole map is put together."""
+    def _defines(self, is_near: bool = True) -> dict[str, object]:
+        """How the whole map is put together, where something is held near or not: see `Frozen.parts`."""
         fine: dict[str, object] = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        return fine | self._held_defines()
+        return fine | (self._held_defines() if is_near else defines_of(away_from_held(self._levels)))
 
     def _held_defines(self) -> dict[str, object]:
         return defines_of(self._levels) | ({} if self._frozen.held is None else {"HELD": 1})

@@ -8,10 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Region
 from solver.grid import Grid
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.frozen import Frozen
-from solver.warp.submap import Level, Submap, defines_of, inputs_of, window_of
+from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
 
 REMAP_STEPS = 8  # steps over which a remap is spread, at least
 MOST_TILES = 8  # that are made anew in a step, unless something has to be out of the way: the work of one of the fluid
@@ -176,10 +178,16 @@ class Remapping:
     def _draw_anew(self, levels: list[Level], part: float) -> None:
         """Come to a `part` of the accumulated map's tiles that are planned for levels."""
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
-        # Also where the map is held: places beside that may look into it, and once it is thawed it goes on from there.
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **defines_of(levels))
         inputs = self._accumulated.inputs() | inputs_of(levels, self._frozen.inputs())
-        self._accumulated.draw(part, lambda target, regions: compose(target, region=regions, **inputs))
+
+        def draw(target: Field, regions: list[Region]) -> None:
+            # Also where it is held: places beside that may look into it, and once thawed it goes on from there.
+            for is_near, parts in self._frozen.parts(regions, (0.0, 0.0), target.texel):
+                defines = defines_of(levels if is_near else away_from_held(levels))
+                compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **defines)
+                compose(target, region=parts, **inputs)
+
+        self._accumulated.draw(part, draw)
 
     @property
     def _whole(self) -> int:

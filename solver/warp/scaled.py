@@ -63,9 +63,11 @@ class ScaledMap:
             self._drawn = made
         return field
 
-    def draw(self, target: Field, origin: tuple[float, float], step: tuple[float, float]) -> None:
+    def draw(
+        self, target: Field, origin: tuple[float, float], step: tuple[float, float], coarsely: bool = False
+    ) -> None:
         """As `WarpMap.draw`."""
-        self._draw(target, origin, step, exact=False)
+        self._draw(target, origin, step, exact=False, coarsely=coarsely)
 
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
         """As `WarpMap.read`."""
@@ -86,21 +88,28 @@ class ScaledMap:
         """Free the textures; the map stays."""
         self._fields.release()
 
-    def _draw(self, target: Field, origin: tuple[float, float], step: tuple[float, float], exact: bool) -> None:
+    def _draw(
+        self,
+        target: Field,
+        origin: tuple[float, float],
+        step: tuple[float, float],
+        exact: bool,
+        coarsely: bool = False,
+    ) -> None:
         warp, amount, fields = self.warp, self.amount, self._fields
         if amount == 0:
             target.clear()
             return
         if amount == 1:
-            warp.draw(target, origin, step, exact)
+            warp.draw(target, origin, step, exact, coarsely=coarsely)
             return
         before, whole = None, fields.get("whole", target.size, 2)
         bent: dict[str, Any] = {}
         if amount > 1:  # first all of it, and a part of it after that
             amount, before = amount - 1, fields.get("before", target.size, 2)
-            warp.draw(before, origin, step, exact)
+            warp.draw(before, origin, step, exact, coarsely=coarsely)
             bent = {"scaled": before, "unscaled": before}
-        warp.draw(whole, origin, step, exact, before)
+        warp.draw(whole, origin, step, exact, before, coarsely)
         # Beside what is held the factors, of two texels a cell, are far from the map's own slopes.
         if not warp.factors.is_one and warp.held is None:
             for name, part in (("scaled", amount), ("unscaled", 1.0)):

@@ -92,6 +92,11 @@ def defines_of(levels: list[Level]) -> dict[str, object]:
     return {name: count for name, count in counts.items() if count}
 
 
+def away_from_held(levels: list[Level]) -> list[Level]:
+    """Levels as they are where nothing is held: there the uppermost moves in full; those below it look elsewhere."""
+    return [levels[0]._replace(is_weighed=False), *levels[1:]]
+
+
 def inputs_of(levels: list[Level], held: dict[str, Any]) -> dict[str, Any]:
     """Levels, the uppermost first, and what is held as `lib/warp.glsl` has them."""
     parts = dict(held)

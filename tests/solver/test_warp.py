@@ -443,6 +443,59 @@ def test_what_is_held_is_found_where_the_mask_has_changed(device: Device, texels
         thing.release()
 
 
+def test_a_lattice_of_the_map_is_what_it_is_at_its_points(device: Device) -> None:
+    """About what is held, far from it, and where it was thawed: also after going back, and on a lattice of a part."""
+    grid, size, rng = Grid(64, 40), (320, 200), np.random.default_rng(8)
+    warp, mask = WarpMap(device, grid, size), np.zeros((200, 320), np.uint8)
+    flow = device.upload(smooth(rng, grid.size, 0.3), "flow")
+    target = device.field((90, 70), 2, "part")
+    row, column = np.mgrid[0:70, 0:90]
+    origin, step = (13.7, -2.3), (1 / 120, 1 / 75)
+    places = np.stack([(column + 0.5 + origin[0]) * step[0], (row + 0.5 + origin[1]) * step[1]], axis=-1)
+    inside = (np.abs(places - 0.5) < 0.5).all(axis=-1)
+    points = places[inside] * grid.picture
+    saved, most = None, 0.0
+    for tick in range(48):
+        warp.advance(flow, 0.02)
+        if tick in (5, 20, 40):
+            mask[:] = 0
+            mask[60 + tick : 80 + tick, 150 - tick : 190] = 255
+            warp.hold(device.upload(mask))
+        if tick == 30:
+            saved = warp.save()
+        if tick == 44 and saved:
+            warp.restore(saved)
+        if tick % 6 == 0 or tick > 40:
+            warp.draw(target, origin, step, exact=True)
+            drawn, found = target.get()[inside], warp.at(points)
+            np.testing.assert_allclose(drawn, found, atol=2e-6)
+            most = max(most, np.abs(found).max())
+    assert most > 0.03
+    assert warp.held is not None
+    if saved:
+        saved.release()
+    warp.release()
+
+
+def test_a_coarse_look_at_the_map_is_as_exact_as_itself(device: Device) -> None:
+    """Between texels that are twice as far apart as the map's it is off by more; on a finer lattice it is the cubic."""
+    grid, rng = Grid(48, 32), np.random.default_rng(3)
+    warp = WarpMap(device, grid, (192, 128))
+    for _ in range(20):
+        warp.advance(device.upload(smooth(rng, grid.size, 0.2), "flow"), 0.02)
+    warp.remap()
+    found = {}
+    for size in ((90, 60), (400, 260)):
+        for coarsely in (False, True):
+            target = device.field(size, 2, "look")
+            warp.draw(target, (0.0, 0.0), target.texel, coarsely=coarsely)
+            found[size, coarsely] = target.get()
+    np.testing.assert_array_equal(found[(400, 260), True], found[(400, 260), False])
+    cubic, linear = found[(90, 60), False], found[(90, 60), True]
+    between = np.abs(0.5 * (cubic[:-2] + cubic[2:]) - cubic[1:-1]).max()
+    assert 0 < np.abs(linear - cubic).max() < 0.5 * between
+
+
 def test_holding_what_is_frozen_leaves_the_rest_as_it_flows(device: Device) -> None:
     """A frozen disc in the vortex: the same areas, and the same map two cells away, as if only the fluid knew of it."""
     grid = Grid(64, 64)
