@@ -75,6 +75,7 @@ class Brush:
         solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
         carry = self.device.pass_("brush/carry.frag", **({"SOLIDS": 1} if solids else {}))
         inputs = {"motion": self._motion, "slip": self._slip.factor, "viscosity": fluid.viscosity, **solids}
+        inputs["hardness"] = push.local_hardness
         vectors = push.local_velocities
         fluid.local.add(lambda motion: push.tip.draw(carry, motion, fluid.grid, vectors, add=True, **inputs))
 

@@ -47,6 +47,9 @@ MOST_GAIN = 20.0
 # do so many times faster than the brush moves. With .3 a stroke of Putty folds there.
 HARDEST = 0.15
 
+# The part of the radius that is the core of a fully hard tip, as `lib/brush.glsl` has it.
+CORE = 0.9
+
 # The lattice on which strain is looked at: texels along the brush's radius, and one beyond the brush on either side.
 FINE = 8
 AROUND = 2 * (FINE + 1) + 1
@@ -131,6 +134,15 @@ class Push:
         """What of it carries the picture and not the fluid."""
         amount = self.local * abs(self.strength)
         return [(amount * u, amount * v) for u, v in self.velocities]
+
+    @property
+    def local_hardness(self) -> float:
+        """Of that: the tip's, but for a rim that is no narrower than what it moves in a step is wide.
+
+        What goes on through a rim presses what is in it together by e to the power of the way over the rim's width.
+        """
+        far = max(math.hypot(*velocity) for velocity in self.local_velocities) * self.dt / self.tip.radius
+        return max(min(self.tip.hardness, (1 - far) / CORE), 0.0)
 
     @property
     def vectors(self) -> list[Point]:

@@ -45,16 +45,15 @@ class Factors:
 
     def take(self, submap: Level, held: Field | None) -> None:
         """Take in what a submap has moved, which begins anew with nothing; `held`: as the map has it."""
-        before = self._open.read
         self._merge(self._open.write, submap, held)
+        left = self._left(self._open.write) if len(self._closed) < MOST else 1.0
+        # One step has turned it too far, and is a factor by itself; what has turned nothing before is none.
+        if left < SPLIT and self._left(self._open.read) < 1:
+            self._close(self._open.read)
+            self._open.read.clear()
+            self._merge(self._open.write, submap, held)
+            left = self._left(self._open.write)
         self._open.swap()
-        if len(self._closed) >= MOST:
-            return
-        if (left := self._left(self._open.read)) < SPLIT:  # one step has turned it too far: it is a factor by itself
-            self._close(before)
-            before.clear()
-            self._merge(self._open.read, submap, held)
-            left = self._left(self._open.read)
         if left < CLOSED and len(self._closed) < MOST:
             self._close(self._open.read)
             self._open.read.clear()

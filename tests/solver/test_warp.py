@@ -13,10 +13,12 @@ from solver.gl.tiled import TILE, TiledField
 from solver.grid import Grid
 from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
+from solver.warp.factors import Factors
 from solver.warp.frozen import FADED, Frozen
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 from solver.warp.remapping import MOST_TILES, REMAP_STEPS
+from solver.warp.submap import Level
 from support import reference
 from support.flows import VORTEX_TIME, saved, vortex, vortex_faces
 
@@ -713,3 +715,27 @@ def test_freezing_a_place_of_a_large_picture_looks_only_about_it(device: Device)
     np.testing.assert_allclose(warp.read((512, 512)), before, atol=1e-6)
     mask.release()
     warp.release()
+
+
+def test_what_one_step_has_turned_far_is_a_factor_that_holds_it_once(device: Device) -> None:
+    grid = Grid(32, 32)
+    x, y = (places - 0.5 for places in grid.centres())
+    factors, maps = Factors(device, grid), list[Level]()
+    for angle in (0.5, 2.5):
+        turn = angle * np.exp(-(x**2 + y**2) / 0.02)
+        across, down = (np.cos(turn) - 1) * x - np.sin(turn) * y, np.sin(turn) * x + (np.cos(turn) - 1) * y
+        displacement = np.stack([across, down], axis=-1)
+        maps.append(Level(device.upload(displacement.astype(np.float32)), grid))
+    little, far = maps
+    factors.take(far, None)
+    alone = [field.get() for field in factors.save().values()]
+    assert len(alone) == 2, "nothing is no factor"
+    factors.clear()
+    factors.take(little, None)
+    factors.take(far, None)
+    first, second, rest = (field.get() for field in factors.save().values())
+    assert first.any()
+    assert np.array_equal(second, alone[0])
+    assert not rest.any()
+    for thing in (factors, little.field, far.field):
+        thing.release()

@@ -94,6 +94,21 @@ def test_a_local_push_of_half_a_radius_a_tick_folds_nothing(grid: int, device: D
     replay.release()
 
 
+@pytest.mark.parametrize(("radius", "step"), [(0.3, 0.25), (0.3, 1.0), (0.15, 2.0)])
+def test_a_quick_hard_local_push_folds_nothing_and_carries_as_far(radius: float, step: float, device: Device) -> None:
+    """Of a rim of a tenth of the radius, pushed on by one and more in a tick, nothing would be left."""
+    samples = tuple((n, 0.5 + step * radius * (n - 1.5), 0.5, 1.0) for n in range(4))
+    push = {"tool": "push", "local": 1.0, "radius": radius, "hardness": 1.0, "samples": samples}
+    recipe = Recipe.model_validate({"fluid": {"grid": 64, "viscosity": 0.3, "drag": 0.0}, "stroke": (push,)})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((256, 256, 3), np.uint8))))
+    replay.seek(2)
+    assert replay.warp.statistics().displacement_max > 0.9 * min(step, 1) * radius
+    for tick in (2, 4):
+        replay.seek(tick)
+        assert replay.warp.statistics().det_min > 0
+    replay.release()
+
+
 @pytest.mark.parametrize("slant", [0.0, 0.1])
 def test_a_local_push_into_something_frozen_presses_what_it_brings_together_smoothly(
     device: Device, slant: float
