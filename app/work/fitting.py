@@ -20,8 +20,11 @@ from app.media.landmarks import Pairs
 from app.model.handles import (
     ARRIVED,
     LARGEST_LEAD,
+    LEAST_SCALE,
     MOST_HANDLES,
     MOST_OBJECTIONS,
+    MOST_SCALE,
+    MOST_TURNED,
     RecipeHandle,
     RecipePin,
     labelled,
@@ -37,7 +40,6 @@ from app.work.replay import Replay
 from solver.brush.handle import Shape, area
 from solver.components import connected_components
 from solver.gl.device import Device
-from solver.limits import LEAST_SCALE, MOST_SCALE, MOST_TURNED
 from solver.warp.inverse import ForwardMap
 
 EVALUATIONS = 32  # replays on the coarse grid
@@ -101,6 +103,7 @@ class Fitted:
         stopped: the search was ended before its budget.
         is_met: all arrive, within `ARRIVED`, and nothing folds.
         notices: what the user should hear of.
+        noun: what has been fitted: "pair" or "handle".
     """
 
     trial: Trial
@@ -109,14 +112,16 @@ class Fitted:
     stopped: bool
     is_met: bool
     notices: tuple[str, ...]
+    noun: str = NAME
 
     @property
     def told(self) -> str:
         """The result in a line."""
         errors, trial = self.errors[np.isfinite(self.errors)], self.trial
+        several, folds = "s" * (len(errors) != 1), "s" * (trial.folds != 1)
         return (
-            f"{len(errors)} pairs, mean error {errors.mean():.3g} pixels, most {errors.max():.3g}; "
-            f"work {trial.work:.3g}, least det J {trial.det:.3g}, {trial.folds} folds"
+            f"{len(errors)} {self.noun}{several}, mean error {errors.mean():.3g} pixels, most {errors.max():.3g}; "
+            f"work {trial.work:.3g}, least det J {trial.det:.3g}, {trial.folds} fold{folds}"
         )
 
 
@@ -453,7 +458,7 @@ class _Search:
     def __init__(self, device: Device, aim: _Aim, picture: Picture, folder: Path, progress: Progress) -> None:
         self.device, self.aim, self.progress = device, aim, progress
         pairs, base = aim.pairs.places, aim.recipe
-        self.pairs = pairs
+        self.pairs, self.noun = pairs, RecipeHandle.kind if aim.own else NAME
         self.longer = max(picture.width, picture.height)
         self.extent = np.array([picture.width, picture.height]) / self.longer
         self.notices: list[str] = []
@@ -529,7 +534,7 @@ class _Search:
             part = part / 2 if part > 0.5**HALVINGS else 0.0
             trial = self._played(self.fine, self._recipe(self.fine.recipe, point, part), Progress())
         if part < 1:
-            self.notices.append(f"the pairs go only {part:g} of their ways: farther, the picture folds")
+            self.notices.append(f"the {self.noun}s go only {part:g} of their ways: farther, the picture folds")
         if trial.folds:
             self.notices.append("the picture folds even so: the recipe itself folds it")
         errors = trial.errors * self.longer
@@ -541,7 +546,7 @@ class _Search:
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
         is_met = not (missed or trial.folds) and len(self.numbers) == len(self.pairs)
-        return Fitted(trial, pairs, errors, stopped, is_met, tuple(self.notices))
+        return Fitted(trial, pairs, errors, stopped, is_met, tuple(self.notices), self.noun)
 
     def trial(self, stage: _Stage, point: np.ndarray) -> Trial:
         """What comes of a point of the cube on a grid."""
@@ -623,10 +628,12 @@ class _Search:
                 self.notices.append(f"{self._label(number)} goes only to the picture's edge: its place is outside it")
         numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin) - len(self.aim.own)
         if not len(numbers):
+            if self.aim.own:
+                raise UserError("no handle that is led holds anything of the picture: all lie outside it")
             raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:
             others = f" beside the recipe's {taken} handles and pins" if taken else ""
-            raise UserError(f"there are {len(numbers)} pairs{others}; at most {MOST_HANDLES} work together")
+            raise UserError(f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together")
         return numbers
 
     def _reachable(self) -> np.ndarray:
