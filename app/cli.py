@@ -365,7 +365,14 @@ def fit(
     with on_terminal(output.name, None, at_once=None) as progress, Device.headless() as device:
         asked = progress.cancel
         progress.cancel = lambda: asked() or (until is not None and monotonic() >= until)
-        found = job.perform(device, progress)
+        try:
+            found = job.perform(device, progress)
+        except Cancelled:
+            if asked():
+                raise
+            raise UserError(
+                f"--time-limit {time_limit:g} has passed before anything was found; nothing is written, allow more"
+            ) from None
     _tell(*found.notices, f"{output.name}: {found.told}")
     if asked():
         _fail("stopped; the best so far is written", INTERRUPTED)

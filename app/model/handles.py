@@ -139,9 +139,10 @@ class RecipeHandle(_Led, Course):
         keys: when it shall be where after that, at an even speed from one to the next; the way of the editor's hand.
             Without `to` they must be given, and may be none: a handle that nobody has led yet.
         local: from 0, which pushes as a fluid does, to 1, which moves what is under it alone.
-        goals: where the corners of its line shall be, as many; without, they keep their places about `at`.
+        goals: where the corners of its line shall be then, as many; without, they keep their places about `at`.
         rotate, scale: degrees that it is turned about `at` in that time, clockwise, and times that it is made as large.
-            A point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1.
+            A point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1. With goals
+            it is how the line turns on its way to them.
         turned: how it shall be turned and scaled after that, or from its start, at an even speed from one to the next.
     """
 
@@ -161,8 +162,6 @@ class RecipeHandle(_Led, Course):
             raise ValueError("'to' is missing")
         if self.goals and len(self.goals) != len(self.points):
             raise ValueError(f"'points' has {len(self.points)} places and 'goals' {len(self.goals)}; give as many")
-        if self.goals and self.turns:
-            raise ValueError("give either 'goals', or 'rotate' and 'scale'")
         for name, ready in (("keys", self.ready), ("turned", self.upright)):
             times = [ready, *(key[0] for key in getattr(self, name) or ())]
             if any(later < earlier for earlier, later in pairwise(times)):
@@ -335,15 +334,18 @@ class _Way:
         self.before = self.after = np.multiply(led.corners, extent)
         lines = [self.before]
         if isinstance(led, RecipeHandle):
-            at, goal = np.multiply(led.at, extent), np.multiply(led.goal or led.at, extent)
-            if led.goals and led.to:
+            laid, goal = (
+                np.multiply(led.corners, extent) - np.multiply(led.at, extent),
+                np.multiply(led.goal or led.at, extent),
+            )
+            first = led.rotate or 0.0, led.scale or 1.0
+            angle, scale = led.turned[-1][1:] if led.turned else first
+            if led.goals and led.to:  # turned as far as it is then
                 lines.append(np.multiply(led.goals, extent))
-                self.after = lines[1] + goal - np.multiply(led.to, extent)
-            else:
-                angle, scale = led.turned[-1][1:] if led.turned else (led.rotate or 0.0, led.scale or 1.0)
-                angle = radians(angle)
-                turn = np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
-                self.after = goal + scale * (self.before - at) @ turn
+                laid, angle, scale = lines[1] - np.multiply(led.to, extent), angle - first[0], scale / first[1]
+            angle = radians(angle)
+            turn = np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
+            self.after = goal + scale * laid @ turn
         rounds = ([*line, line[0]] if led.closed else line for line in lines)
         self.reach = max(led.radius, max(_lengths(np.diff(line, axis=0)).sum() for line in rounds) / LONGEST_LINE)
 

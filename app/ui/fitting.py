@@ -123,18 +123,21 @@ class Fits:
         if process.error:
             self._messages.warn(process.error)
         elif made is None or session is None:
-            self._messages.say("The fit has been stopped before it had found anything.")
+            self._messages.say("The fit was stopped before it had found anything. Nothing has changed.")
         else:
             fluid = session.recipe.fluid.model_copy(update={"viscosity": made.fluid.viscosity})
             session.edit(FIT, handle=made.handle, pin=made.pin, duration=made.duration, fluid=fluid)
             session.seek(session.end)
-            verdict = process.outcome.verdict
+            verdict, stopped = process.outcome.verdict, process.outcome.stopped
             if process.outcome.is_met:
-                self._messages.done(f"Fitted: {verdict}.")
+                self._messages.done(f"{'Stopped; the best so far is kept' if stopped else 'Fitted'}: {verdict}.")
                 return
+            as_well = (
+                "Stopped; the best so far is kept, and not all arrive" if stopped else "Fitted as well as it could be"
+            )
             words = [f"{heading(notice)}." for notice in process.notices[:TOLD]]
             rest = [f"{len(process.notices) - TOLD} more like these."] * (len(process.notices) > TOLD)
             self._messages.warn(
-                " ".join(["Fitted as well as it could be.", *words, *rest]),
+                " ".join([f"{as_well}: {verdict}.", *words, *rest]),
                 lambda: self._workspace.session is session and session.document.recipe.handle == made.handle,
             )

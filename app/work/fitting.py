@@ -5,9 +5,12 @@ Long, as what is searched, what is tried and what is told of it share the number
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
+from math import inf, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,19 +20,27 @@ from app.media.landmarks import Pairs
 from app.model.handles import (
     ARRIVED,
     LARGEST_LEAD,
+    LEAST_SCALE,
     MOST_HANDLES,
     MOST_OBJECTIONS,
+    MOST_SCALE,
+    MOST_TURNED,
     RecipeHandle,
+    RecipePin,
     labelled,
     objections,
 )
 from app.model.picture import Picture
 from app.model.recipe import Recipe
+from app.model.sampling import Point
 from app.model.schema import label_of
 from app.progress import Progress
+from app.work.leading import Leading
 from app.work.replay import Replay
+from solver.brush.handle import Shape, area
 from solver.components import connected_components
 from solver.gl.device import Device
+from solver.warp.inverse import ForwardMap
 
 EVALUATIONS = 32  # replays on the coarse grid
 A_FINE_ONE = 8  # of them for each on the recipe's own
@@ -41,6 +52,7 @@ RANGES = (0.06, 0.5), (0.05, 1.0), (0.3, 0.9), (3e-4, 0.3)
 DURATION = 1.0, 2.0  # seconds, from and to, for a recipe's own handles: a hand leads one after the other
 DECIMALS = 8  # of places: those in a file of pairs are no more exact, and the same are to give the same
 NAME = "pair"  # and a number: what the handle that is made for a pair is called
+SAME = 1e-6  # longer sides that two places are apart at which they are the same: the editor's have as many digits
 HALVINGS = 4  # of the way, where nothing else keeps it from folding
 
 
@@ -91,6 +103,7 @@ class Fitted:
         stopped: the search was ended before its budget.
         is_met: all arrive, within `ARRIVED`, and nothing folds.
         notices: what the user should hear of.
+        noun: what has been fitted: "pair" or "handle".
     """
 
     trial: Trial
@@ -99,14 +112,16 @@ class Fitted:
     stopped: bool
     is_met: bool
     notices: tuple[str, ...]
+    noun: str = NAME
 
     @property
     def told(self) -> str:
         """The result in a line."""
         errors, trial = self.errors[np.isfinite(self.errors)], self.trial
+        several, folds = "s" * (len(errors) != 1), "s" * (trial.folds != 1)
         return (
-            f"{len(errors)} pairs, mean error {errors.mean():.3g} pixels, most {errors.max():.3g}; "
-            f"work {trial.work:.3g}, least det J {trial.det:.3g}, {trial.folds} folds"
+            f"{len(errors)} {self.noun}{several}, mean error {errors.mean():.3g} pixels, most {errors.max():.3g}; "
+            f"work {trial.work:.3g}, least det J {trial.det:.3g}, {trial.folds} fold{folds}"
         )
 
 
@@ -140,9 +155,10 @@ def fitted(
         UserError: if no pair lies in the picture, or there are too many.
         Cancelled: if it is stopped before anything has been found.
     """
-    aim = _aimed(device, recipe, picture, folder, pairs)
+    aim = _aimed(device, recipe, picture, folder, pairs, progress)
     if local is not None:
-        aim = replace(aim, handles=tuple(each.model_copy(update={"local": local}) for each in aim.handles))
+        leads = (replace(lead, handle=lead.handle.model_copy(update={"local": local})) for lead in aim.leads)
+        aim = replace(aim, leads=tuple(leads))
     search = _Search(device, aim, picture, folder, progress)
     fine, count = max(evaluations // A_FINE_ONE, 1), len(search.numbers)
     alike, each = _directions(count), np.eye(3 * count + 1)
@@ -165,6 +181,125 @@ def fitted(
 
 
 @dataclass(frozen=True)
+class _Lead:
+    """What a handle is to bring about, whatever its values; places are in longer sides.
+
+    What is seen when a handle is set is what it shall move and keep: a line its outline as it lies on the picture then,
+    not as it lies in the original; a point how it is turned and how large it is then. Where a fit lets it begin at
+    another time, or after other things, it leads what it holds from where that lies then to the same ends.
+
+    `shape`: of the handle as it is asked; `begins`, `ends`: where the points of that are when it begins, and shall be
+    in the end, also outside the picture, (k, 2); `there`: where it is itself then, (2,); `until`: seconds when its way
+    has to be over, since something is done there that comes after it.
+    """
+
+    handle: RecipeHandle
+    shape: Shape
+    begins: np.ndarray
+    ends: np.ndarray
+    there: np.ndarray
+    until: float = inf
+
+    @classmethod
+    def of(cls, handle: RecipeHandle, shape: Shape, begins: np.ndarray, starts: np.ndarray, until: float) -> _Lead:
+        """One that was set where its points were at `starts`."""
+        there = np.multiply(handle.goal, shape.extent) if handle.goal else shape.middle(starts)
+        return cls(handle, shape, begins, shape.laid(there, starts, inf), there, until)
+
+    def off(self, places: np.ndarray) -> tuple[float, float]:
+        """How far its points are, by the farthest, from where they should be; and from where they can be."""
+        inside = np.clip(self.ends, 0.0, self.shape.extent)
+        return self.shape.away(places, self.ends), self.shape.away(places, inside)
+
+    @property
+    def goes(self) -> bool:
+        """False if all of it stays where it is in the original."""
+        return self.handle.turns or float(np.hypot(*(self.ends - self.shape.led).T).max()) > ARRIVED
+
+    @property
+    def bends(self) -> bool:
+        """True if it is a line that does not keep its shape."""
+        return bool(self.course(1.0)["goals"])
+
+    @property
+    def way(self) -> float:
+        """How far the farthest of its points goes."""
+        return float(np.hypot(*(self.ends - self.begins).T).max())
+
+    def course(self, part: float) -> dict[str, Any]:
+        """The keys of a handle that goes a part of this way."""
+        handle, (angle, scale), extent = self.handle, self._turn, self.shape.extent
+        turn = {"rotate": angle * part, "scale": scale**part}
+        given = {"keys": None, "turned": (), "goals": (), "end": None} | (turn if handle.turns else {})
+        if not handle.points:
+            return given
+        if handle.goals and handle.to and not handle.turned and self._is_unmoved and part == 1:
+            shift = self.there / extent - handle.to
+            goals = np.round(handle.goals + shift, DECIMALS).tolist()
+            return given | {"goals": tuple((x, y) for x, y in goals)}
+        swung, led = scale * np.exp(1j * np.radians(angle)), self.shape.led
+        rigid = self.there + _vectors(swung * _complex(led - self.shape.middle(led)))
+        if np.abs(rigid - self.ends).max() <= SAME:
+            return given
+        begin = self.shape.middle(self.begins)
+        arms = (1 - part) * _complex(self.begins - begin) + part / swung * _complex(self.ends - self.there)
+        swung_so_far = scale**part * np.exp(1j * part * np.radians(angle))
+        points, goals = self._line(begin + part * (self.there - begin) + _vectors(swung_so_far * arms))
+        return given | {"points": points, "goals": goals} | turn
+
+    @property
+    def _is_unmoved(self) -> bool:
+        """True if its points lie where they do in the original when it begins."""
+        return bool(np.abs(self.begins - self.shape.led).max() <= SAME)
+
+    @property
+    def _turn(self) -> tuple[float, float]:
+        """Degrees that it is turned on its way, and times that it is made as large."""
+        handle = self.handle
+        angle, scale = handle.turned[-1][1:] if handle.turned else (handle.rotate or 0.0, handle.scale or 1.0)
+        if len(self.begins) == 1 or self._is_unmoved:
+            return angle, scale
+        arms, ends = (
+            _complex(each - (each[0] if self.shape.is_ring else each.mean(axis=0))) for each in (self.begins, self.ends)
+        )
+        swung = np.vdot(arms, ends) / np.vdot(arms, arms).real
+        found = float(np.degrees(np.angle(swung)))
+        found += 360 * round((angle - found) / 360)
+        grown = sqrt(abs(area(self.ends[1:]) / area(self.begins[1:]))) if self.shape.is_ring else abs(swung)
+        return (
+            _rounded(float(np.clip(found, -MOST_TURNED, MOST_TURNED))),
+            _rounded(float(np.clip(grown, LEAST_SCALE, MOST_SCALE))),
+        )
+
+    def _line(self, ends: np.ndarray) -> tuple[tuple[Point, ...], tuple[Point, ...]]:
+        """Corners of its line and the points of it that are led, and where all shall be if these end so; fractions."""
+        handle, extent, corners = self.handle, self.shape.extent, self.handle.points
+        line, stations = np.multiply([*corners, corners[0]], extent), self.shape.handle.stations
+        numbers = np.union1d(np.arange(len(corners)), stations)
+
+        def along(numbers: np.ndarray) -> np.ndarray:
+            return np.stack([np.interp(numbers, np.arange(len(line)), side) for side in line.T], axis=-1)
+
+        led = along(stations)
+        inside = stations[((led >= 0) & (led <= extent)).all(axis=1)]
+        period = len(corners) if handle.closed else None
+        moved = [np.interp(numbers, inside, side, period=period) for side in (ends - self.shape.led).T]
+        points = along(numbers)
+        places = (np.round(each / extent, DECIMALS).tolist() for each in (points, points + np.stack(moved, axis=-1)))
+        points, goals = (tuple((x, y) for x, y in each) for each in places)
+        return points, goals
+
+
+def _complex(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (n, 2) as complex numbers, whose angles are clockwise."""
+    return vectors @ np.array([1, 1j])
+
+
+def _vectors(numbers: np.ndarray) -> np.ndarray:
+    return np.stack([np.real(numbers), np.imag(numbers)], axis=-1)
+
+
+@dataclass(frozen=True)
 class _Aim:
     """What is fitted: a recipe, and what becomes of each pair, but for what is searched.
 
@@ -175,67 +310,120 @@ class _Aim:
     recipe: Recipe
     pairs: Pairs
     names: tuple[str, ...]
-    handles: tuple[RecipeHandle, ...]
+    leads: tuple[_Lead, ...]
     begins: np.ndarray
     own: tuple[int, ...] = ()
 
 
-def _aimed(device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None) -> _Aim:
+def _aimed(
+    device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None, progress: Progress
+) -> _Aim:
     """What is fitted to given pairs, or, None, to those of the recipe's own handles."""
+    extent = picture.width / max(picture.width, picture.height), picture.height / max(picture.width, picture.height)
     if pairs is not None:
         base = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each)))
         # What is local carries a curve's points between its handles along: a fluid flows back there. And all do, since
         # those that push as a fluid does halt where what is local has pressed the picture together.
         one = RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if any(pairs.curves) else 0.0)
         names = tuple(f"{NAME} {number}" for number in range(1, len(pairs.places) + 1))
-        made = tuple(one.model_copy(update={"name": name}) for name in names)
-        places = np.round(pairs.places, DECIMALS)
-        return _Aim(base, Pairs(places, pairs.curves), names, made, places[:, 0])
-    led, names, places, begins, own, kept = [], [], [], [], [], list(recipe.handle)
-    extent = np.array([picture.width, picture.height]) / max(picture.width, picture.height)
-    starts = _starts(device, recipe, picture, folder)
-    for number, (handle, start) in enumerate(zip(recipe.handle, starts, strict=True)):
-        end = np.round(handle.goal or start, DECIMALS)
-        if handle.muted:
+        pairs, leads = Pairs(np.round(pairs.places, DECIMALS), pairs.curves), list[_Lead]()
+        for name, (at, to) in zip(names, pairs.places.tolist(), strict=True):
+            handle = one.model_copy(update={"name": name, "at": tuple(at), "to": tuple(to)})
+            (shape,) = _shapes([handle], extent)
+            leads.append(_Lead.of(handle, shape, shape.led, shape.led, inf))
+        return _Aim(base, pairs, names, tuple(leads), pairs.places[:, 0])
+    timed = _has_times(recipe)
+    if not timed:  # all go at once: what is pinned later than that goes to where it was pinned
+        late = [RecipeHandle.model_validate(pin.model_dump() | {"keys": ()}) for pin in recipe.pin if pin.start > 0]
+        pins = tuple(pin for pin in recipe.pin if pin.start <= 0)
+        recipe = recipe.edited(handle=(*recipe.handle, *late), pin=pins)
+    leads, names, places, begins, own, kept = [], [], [], [], [], list(recipe.handle)
+    shapes = _shapes(recipe.handle, extent)
+    at_once, starts = _starts(device, recipe, picture, folder, shapes, progress)
+    for number, (handle, shape) in enumerate(zip(recipe.handle, shapes, strict=True)):
+        if handle.muted or _lets_go(handle, recipe):
             continue
-        if handle.turns or np.hypot(*((end - handle.at) * extent)) > ARRIVED:
-            led.append(handle)
+        start = starts[number]
+        begin, until = (start, _until(handle, recipe)) if timed else (at_once[number], inf)
+        lead = _Lead.of(handle if timed else handle.model_copy(update={"start": 0.0}), shape, begin, start, until)
+        if lead.goes:
+            leads.append(lead)
             own.append(number)
             names.append(label_of(handle.kind, number + 1, handle.name))
-            begins.append(start)
-            places.append((np.round(handle.at, DECIMALS), end))
+            begins.append(shape.middle(begin) / extent)
+            places.append((np.round(handle.at, DECIMALS), np.round(lead.there / extent, DECIMALS)))
         else:
-            times = {} if _has_times(recipe) else {"start": 0.0, "end": None}
+            times = {} if timed else {"start": 0.0, "end": None}
             kept[number] = handle.model_copy(update={"to": None, "keys": (), "goals": (), **times})
-    if not led:
-        raise UserError("no handle of the recipe leads anywhere; give --pairs, or [[handle]]s with a place to go to")
+    if not leads:
+        raise UserError(
+            "no handle of the recipe leads anywhere; give --pairs, or [[handle]]s with a place to go to, which they "
+            "hold to its end",
+            in_window="There is nothing to fit: no handle leads anywhere, and holds it to the end.",
+        )
     base = recipe.edited(handle=tuple(kept))
-    pairs = Pairs.points(np.array(places))
-    if not _has_times(base):
+    if not timed:
         base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
-        led, begins = [each.model_copy(update={"start": 0.0}) for each in led], pairs.places[:, 0]
-    return _Aim(base, pairs, tuple(names), tuple(led), np.array(begins), tuple(own))
+    return _Aim(base, Pairs.points(np.array(places)), tuple(names), tuple(leads), np.array(begins), tuple(own))
+
+
+def _shapes(handles: Sequence[RecipeHandle], extent: Point) -> list[Shape]:
+    """What handles lead, as the solver has it."""
+    return [Shape.of(handle, extent) for handle in Leading(extent).of(handles)]
 
 
 def _has_times(recipe: Recipe) -> bool:
     """True if something in it has its time: what is led after it, or beside it, is fitted there."""
-    return bool(recipe.stroke or recipe.change or recipe.mask or recipe.force)
+    lets_go = any(_lets_go(led, recipe) for led in (*recipe.handle, *recipe.pin))
+    return bool(recipe.stroke or recipe.change or recipe.mask or recipe.force or lets_go)
 
 
-def _starts(device: Device, recipe: Recipe, picture: Picture, folder: Path) -> list[np.ndarray]:
-    """Where the points of a recipe's handles are when they begin, if something moves them: (2,) each, in fractions."""
-    starts, timed = [np.array(handle.at) for handle in recipe.handle], _has_times(recipe)
-    ticks = [handle.first_tick(recipe.fluid.dt) for handle in recipe.handle if timed or handle.goal is None]
-    if not ticks:
-        return starts
+def _flows(recipe: Recipe) -> bool:
+    """True if something but handles moves the fluid, or sets it: another viscosity would make that another one."""
+    return bool(recipe.stroke or recipe.change or recipe.force)
+
+
+def _lets_go(led: RecipeHandle | RecipePin, recipe: Recipe) -> bool:
+    """True if a handle or a pin has let go before the end: what it has done is not asked of that any more."""
+    return not led.muted and led.end is not None and led.let_go <= (recipe.ticks - 0.5) * recipe.fluid.dt
+
+
+def _until(handle: RecipeHandle, recipe: Recipe) -> float:
+    """The seconds when what comes after a handle's way begins; that was done where the handle had left the picture."""
+    dt = recipe.fluid.dt
+    ticks = [one.first_tick for one in recipe.stroke if not one.muted]
+    ticks += [one.tick for one in (*recipe.change, *recipe.mask)]
+    ticks += [led.first_tick(dt) for led in (*recipe.handle, *recipe.pin) if not led.muted]
+    return min((tick * dt for tick in ticks if tick * dt >= max(handle.last, handle.start + dt) - dt / 2), default=inf)
+
+
+def _starts(
+    device: Device, recipe: Recipe, picture: Picture, folder: Path, shapes: list[Shape], progress: Progress
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Where the points of a recipe's handles are at first, and when they begin: (k, 2) each, in longer sides."""
+    places = [shape.led for shape in shapes]
+    first, starts = list(places), list(places)
+    ticks = [handle.first_tick(recipe.fluid.dt) for handle in recipe.handle if handle.takes_hold]
+    if not ticks or (max(ticks) <= recipe.begins and recipe.map is None):
+        return first, starts
     replay = Replay(device, recipe, Pictures(picture, folder), budget=0)
-    replay.seek(min(max(ticks) + 1, recipe.ticks))
+    progress.enter("looking where the handles were set")
+    try:
+        now = replay.handles.shapes
+        while replay.tick < min(max(ticks) + 1, recipe.ticks):
+            progress.check()
+            replay.advance()
+        saved = replay.handles.save().values
+    finally:
+        replay.release()
     labels = [label for label, _ in labelled(recipe.handle, ())]
-    for (label, _), start in zip(replay.led, replay.handles.starts, strict=True):
-        if label in labels and not np.isnan(start[0]):
-            starts[labels.index(label)] = start / replay.grid.extent
-    replay.release()
-    return starts
+    then = np.split(saved["starts"], np.cumsum(saved["counts"])[:-1])
+    for (label, _), here, begun in zip(replay.led, now, then, strict=True):
+        if label in labels:
+            number = labels.index(label)
+            first[number] = here
+            starts[number] = here if np.isnan(begun).any() else begun
+    return first, starts
 
 
 def _directions(count: int) -> np.ndarray:
@@ -270,7 +458,7 @@ class _Search:
     def __init__(self, device: Device, aim: _Aim, picture: Picture, folder: Path, progress: Progress) -> None:
         self.device, self.aim, self.progress = device, aim, progress
         pairs, base = aim.pairs.places, aim.recipe
-        self.pairs = pairs
+        self.pairs, self.noun = pairs, RecipeHandle.kind if aim.own else NAME
         self.longer = max(picture.width, picture.height)
         self.extent = np.array([picture.width, picture.height]) / self.longer
         self.notices: list[str] = []
@@ -284,9 +472,11 @@ class _Search:
             self.fine = coarse
         self.coarse = coarse
         self._tried: dict[tuple[bool, bytes], Trial] = {}
-        ways = np.hypot(*((pairs[:, 1] - aim.begins) * self.extent).T)[self.numbers]
-        least = np.clip(1.01 * ways / LARGEST_LEAD, RANGES[0][0], 1.0)
-        own = max(base.fluid.viscosity, 1e-6)
+        leads, own = [aim.leads[number] for number in self.numbers], max(base.fluid.viscosity, 1e-6)
+        ways = np.array([lead.way for lead in leads])
+        # Of what is turned about a point, the reach says how much is: that is asked too.
+        rings = np.array([lead.handle.radius if lead.shape.is_ring else 0.0 for lead in leads])
+        least = np.maximum(np.clip(1.01 * ways / LARGEST_LEAD, RANGES[0][0], 1.0), rings)
 
         def listed(radii: np.ndarray, stiffness: float, duration: float, mu: float) -> np.ndarray:
             return np.log([*radii, *[stiffness] * len(ways), *[duration] * len(ways), mu])
@@ -294,9 +484,15 @@ class _Search:
         (_, widest), *ranges = RANGES
         low, high = zip(*ranges, strict=True)
         self.low = listed(least, low[0], low[1], min(low[2], own))
-        self.high = listed(np.maximum(least, widest), high[0], high[1], max(high[2], own))
+        # And a line that is bent has as many points that are told where they shall be.
+        bent = np.array([lead.shape.handle.reach if lead.bends else widest for lead in leads])
+        self.high = listed(np.where(rings, least, np.maximum(least, bent)), high[0], high[1], max(high[2], own))
+        if _flows(base):
+            self.low[-1] = self.high[-1] = np.log(own)
         first = listed(np.maximum(1.5 * ways, 0.25), 1.0, 0.8, own)
-        self.start = np.clip((first - self.low) / np.maximum(self.high - self.low, 1e-9), 0, 1)
+        self.is_free = self.high > self.low
+        self.start = np.where(self.is_free, (first - self.low) / np.where(self.is_free, self.high - self.low, 1.0), 0)
+        self.start = np.clip(self.start, 0, 1)
 
     def run(self, stage: _Stage, origin: np.ndarray, groups: np.ndarray, reach: float, budget: int) -> None:
         """Search from `origin` along `groups`: with `budget` replays, at first `reach` of the cube apart."""
@@ -312,6 +508,10 @@ class _Search:
             found = trial(step)
             return np.array([-found.excess / ARRIVED, (found.det - LEAST_DET) / LEAST_DET])
 
+        groups = groups * self.is_free[:, None]
+        groups = groups[:, groups.any(axis=0)]
+        if not groups.size:
+            return
         inside = [origin[group > 0] for group in groups.T]
         minimize(
             lambda step: trial(step).work,
@@ -334,7 +534,7 @@ class _Search:
             part = part / 2 if part > 0.5**HALVINGS else 0.0
             trial = self._played(self.fine, self._recipe(self.fine.recipe, point, part), Progress())
         if part < 1:
-            self.notices.append(f"the pairs go only {part:g} of their ways: farther, the picture folds")
+            self.notices.append(f"the {self.noun}s go only {part:g} of their ways: farther, the picture folds")
         if trial.folds:
             self.notices.append("the picture folds even so: the recipe itself folds it")
         errors = trial.errors * self.longer
@@ -346,7 +546,7 @@ class _Search:
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
         is_met = not (missed or trial.folds) and len(self.numbers) == len(self.pairs)
-        return Fitted(trial, pairs, errors, stopped, is_met, tuple(self.notices))
+        return Fitted(trial, pairs, errors, stopped, is_met, tuple(self.notices), self.noun)
 
     def trial(self, stage: _Stage, point: np.ndarray) -> Trial:
         """What comes of a point of the cube on a grid."""
@@ -368,22 +568,20 @@ class _Search:
         values = [_rounded(value) for value in np.exp(self.low + point * (self.high - self.low))]
         count, handles = len(self.numbers), dict(enumerate(base.handle))
         for row, number in enumerate(self.numbers):
-            (at, end), handle = self.pairs[number], self.aim.handles[number]
+            (at, end), lead = self.pairs[number], self.aim.leads[number]
             to = self.aim.begins[number] + part * (np.clip(end, 0, 1) - self.aim.begins[number])
             values_of = {
                 "at": (float(at[0]), float(at[1])),
                 "to": (float(to[0]), float(to[1])),
-                "keys": None,
-                "end": None,
-                "radius": values[row],
+                "radius": values[row] if self.is_free[row] else lead.handle.radius,
                 "stiffness": min(values[count + row], 1.0),
-                "duration": _rounded(values[2 * count + row] * max(base.duration - handle.start, 0.0)),
+                "duration": _rounded(
+                    values[2 * count + row] * max(min(base.duration, lead.until) - lead.handle.start, 0.0)
+                ),
             }
-            if handle.turned:
-                _, values_of["rotate"], values_of["scale"] = handle.turned[-1]
-                values_of["turned"] = ()
-            handles[self._slots[row]] = handle.model_copy(update=values_of)
-        fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
+            handles[self._slots[row]] = lead.handle.model_copy(update=lead.course(part) | values_of)
+        viscosity = values[-1] if self.is_free[-1] else base.fluid.viscosity
+        fluid = base.fluid.model_copy(update={"viscosity": viscosity})
         return base.edited(handle=tuple(handles.values()), fluid=fluid)
 
     @property
@@ -401,15 +599,17 @@ class _Search:
                 replay.advance()
                 work += _strain(replay) * recipe.fluid.dt
             found = replay.warp.statistics()
-            arrived, away = np.full((len(self.pairs), 2), np.nan), np.full(len(self.pairs), np.nan)
-            labels = [label for label, _ in replay.led]
-            rows = [labels.index(label) for label, _ in (labelled(recipe.handle, ())[slot] for slot in self._slots)]
-            arrived[self.numbers] = replay.handles.places[rows] / self.extent
-            away[self.numbers] = replay.handles.away[rows]
+            leads = [self.aim.leads[number] for number in self.numbers]
+            points = np.concatenate([lead.shape.led for lead in leads])
+            with ForwardMap(replay.warp) as forward:
+                points = points + forward.at(points)
         finally:
             replay.release()
-        errors = np.fmax(np.hypot(*((arrived - self.pairs[:, 1]) * self.extent).T), away)
-        return Trial(recipe, arrived, errors, away[self.hopeful], work, found.det_min, found.folds)
+        arrived, off = np.full((len(self.pairs), 2), np.nan), np.full((len(self.pairs), 2), np.nan)
+        several = np.split(points, np.cumsum([len(lead.shape.led) for lead in leads])[:-1])
+        for number, lead, places in zip(self.numbers, leads, several, strict=True):
+            arrived[number], off[number] = lead.shape.middle(places) / self.extent, lead.off(places)
+        return Trial(recipe, arrived, off[:, 0], off[self.hopeful, 1], work, found.det_min, found.folds)
 
     def _label(self, number: int) -> str:
         """What messages call a pair."""
@@ -420,7 +620,7 @@ class _Search:
         """The numbers of the pairs that get a handle; of the others it is noted why not."""
         inside = np.abs(self.pairs - 0.5).max(axis=2) <= 0.5
         # The middle of a line may be in the picture and none of its corners.
-        inside[:, 0] &= [handle.takes_hold for handle in self.aim.handles]
+        inside[:, 0] &= [lead.handle.takes_hold for lead in self.aim.leads]
         for number, (here, there) in enumerate(inside):
             if not here:
                 self.notices.append(f"{self._label(number)} is left out: its point is outside the picture")
@@ -428,10 +628,12 @@ class _Search:
                 self.notices.append(f"{self._label(number)} goes only to the picture's edge: its place is outside it")
         numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin) - len(self.aim.own)
         if not len(numbers):
+            if self.aim.own:
+                raise UserError("no handle that is led holds anything of the picture: all lie outside it")
             raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:
             others = f" beside the recipe's {taken} handles and pins" if taken else ""
-            raise UserError(f"there are {len(numbers)} pairs{others}; at most {MOST_HANDLES} work together")
+            raise UserError(f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together")
         return numbers
 
     def _reachable(self) -> np.ndarray:

@@ -47,6 +47,7 @@ class Outcome:
         verdict: which stop condition ended the simulation and when, or how well a fit went; "" if neither.
         recipe: that has been fitted.
         is_met: what was fitted has come where it should; see `Fitted`.
+        stopped: it was ended before its budget; likewise.
     """
 
     label: str
@@ -56,6 +57,7 @@ class Outcome:
     verdict: str = ""
     recipe: Recipe | None = None
     is_met: bool = True
+    stopped: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,9 +84,8 @@ def perform(work: Work, progress: Progress) -> Outcome:
     try:
         if isinstance(work, Fit):
             found = work.perform(own_device(), progress)
-            return Outcome(
-                label, notices=found.notices, verdict=found.told, recipe=found.trial.recipe, is_met=found.is_met
-            )
+            how = {"recipe": found.trial.recipe, "is_met": found.is_met, "stopped": found.stopped}
+            return Outcome(label, notices=found.notices, verdict=found.told, **how)
         if isinstance(work, Piece):
             report = work.perform(own_device, progress)
         else:

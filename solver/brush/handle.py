@@ -52,9 +52,10 @@ class Handle(Course):
             at an even speed from one to the next.
         points: the corners of a line that is led as a whole, in the original; what of it is outside is not led.
         closed: the line ends where it begins.
-        goals: where the corners shall be, as many; without, they keep their places about `at`.
+        goals: where the corners shall be after that way, as many; without, they keep their places about `at`.
         rotate, scale: degrees that it is turned about `at` on its way, clockwise, and times that it is made as large. A
-            point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1.
+            point with neither turns as the fluid does; with one of them, and a line, the other is 0 or 1. A line that
+            has goals has come to these then, and takes their shape while it turns.
         turned: times, degrees and scales (t, angle, scale), in order and none before its first way has ended: how it
             is turned and how large it is after that, likewise at an even speed.
 
@@ -117,8 +118,6 @@ class Handle(Course):
             raise ValueError(f"a line of a handle has {2 + self.closed} different points or more")
         if self.goals and len(self.goals) != len(self.points):
             raise ValueError(f"a line of {len(self.points)} points has {len(self.goals)} goals; as many are wanted")
-        if self.goals and self.turns:
-            raise ValueError("a line that has goals is not turned or scaled besides")
         if self.goals and self.to is None:
             object.__setattr__(self, "to", tuple(np.mean(self.goals, axis=0).tolist()))
         scale = 1.0 if self.scale is None else self.scale
@@ -291,17 +290,19 @@ class Shape:
         """Its points with the handle at a place, turned as at a time."""
         if len(starts) == 1:
             return there[None]
-        return np.clip(self._laid(there, starts, time, dt), 0.0, self.extent)
+        return np.clip(self.laid(there, starts, time, dt), 0.0, self.extent)
 
-    def _laid(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
+    def laid(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float = 1.0) -> np.ndarray:
+        """Its points, (n, 2), with the handle at a place, turned as at a time, also outside; see `wanted`."""
         handle, from_middle = self.handle, starts - self.middle(starts)
-        if self.goals is not None:
-            assert handle.to is not None
-            part = handle.passed(time)
-            return there + (1 - part) * from_middle + part * (self.goals - handle.to)
         angle, scale = handle.turn(time, dt)
-        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-        return there + scale * from_middle @ turn
+        if self.goals is not None:  # before they are turned
+            assert handle.to is not None
+            part, turned = handle.passed(time), math.radians(handle.rotate or 0.0)
+            from_middle = (1 - part) * from_middle + part / (handle.scale or 1.0) * _spun(
+                self.goals - handle.to, -turned
+            )
+        return there + scale * _spun(from_middle, angle)
 
 
 def beside_edges(places: np.ndarray, extent: Point) -> tuple[np.ndarray, np.ndarray]:
@@ -318,6 +319,12 @@ def spun(motion: np.ndarray, arms: np.ndarray) -> float:
     """How far the ends of arms (n, 2) move with the turn that their motion is in the mean."""
     turn = np.stack([-arms[:, 1], arms[:, 0]], axis=-1)
     return float((motion * turn).sum() / max(float((arms**2).sum()), 1e-30) * np.hypot(*arms.T).mean())
+
+
+def _spun(arms: np.ndarray, angle: float) -> np.ndarray:
+    """Arms (n, 2) turned by an angle, radians clockwise."""
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    return arms @ turn
 
 
 def area(loop: np.ndarray) -> float:

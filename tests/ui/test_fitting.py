@@ -73,7 +73,7 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
     assert [handle.to for handle in session.recipe.handle] == [handle.goal for handle in before.handle]
     assert session.tick == session.end
     assert not any(held.is_away for held in session.held)
-    assert robot.editor.messages.shown[-1].text.startswith("Fitted: 2 pairs, mean error 0.")
+    assert robot.editor.messages.shown[-1].text.startswith("Fitted: 2 handles, mean error 0.")
     robot.key("ctrl+z")
     robot.rest()
     assert session.recipe == before
@@ -104,6 +104,7 @@ def test_stopped_it_keeps_the_best_so_far(robot: Robot, widgets: Widgets) -> Non
     wait(robot)
     assert names(robot)[-1] == "Fit"
     assert 0 < process.part < 1
+    assert robot.editor.messages.shown[-1].text.startswith("Stopped; the best so far is kept: 2 handles, mean")
     assert all(np.hypot(*np.subtract(held.now, held.target)) < 4 * ARRIVED for held in robot.editor.session.held)
 
 
@@ -201,6 +202,7 @@ def test_a_fit_that_falls_short_is_no_success_and_told_of_until_it_is_undone(rob
     robot.rest()
     (message,) = robot.editor.messages.shown
     assert message.icon == "warn"
+    assert message.text.startswith("Fitted as well as it could be: 2 pairs. ")
     assert "Handle 1 ends 12 pixels from where it should be. Handle 1 and handle 2 cross" in message.text
     robot.key("ctrl+z")
     robot.frame(count=2)
@@ -212,5 +214,5 @@ def test_what_cannot_be_fitted_is_told(robot: Robot) -> None:
     robot.editor.session.edit("Outside", handle=far)
     robot.key("shift+g")
     wait(robot)
-    assert "no pair has its point in the picture" in robot.editor.messages.shown[-1].text
+    assert "no handle that is led holds anything of the picture" in robot.editor.messages.shown[-1].text
     assert names(robot)[-1] == "Outside"

@@ -103,7 +103,7 @@ def test_pairs_that_nobody_can_lead_are_refused(device: Device):
     with pytest.raises(UserError, match=r"70 pairs beside the recipe's 1 handles and pins; at most 64"):
         fit(device, np.repeat(PAIRS[:1], 70, axis=0))
     around = "[[handle]]\npoints = [[-0.5, 0.5], [1.5, 0.5]]\nto = [0.6, 0.5]\n"
-    with pytest.raises(UserError, match="no pair has its point in the picture"):
+    with pytest.raises(UserError, match="no handle that is led holds anything of the picture"):
         fit(device, None, recipe=RECIPE + around)
 
 
@@ -175,6 +175,50 @@ def test_what_was_pinned_after_it_had_been_moved_is_led_to_where_it_was_pinned(d
     until_then = Recipe.parse(RECIPE.replace("duration = 0.4", "duration = 0.36") + handle)
     moved, _, _ = arrived(device, until_then, np.array([[0.3, 0.42]]))
     assert found.trial.recipe.handle[1].to == pytest.approx(moved[0], abs=1e-5)
+
+
+@pytest.mark.parametrize("stroke", [False, True], ids=["at once", "after a stroke"])
+def test_a_line_keeps_the_shape_that_it_was_set_in(stroke: bool, device: Device):
+    """Measured apart from the fit: the points that it held, where they lay, moved and turned as was asked."""
+    moved = "[[handle]]\nat = [0.35, 0.35]\nto = [0.35, 0.46]\nduration = 0.3\nradius = 0.3\n"
+    if stroke:
+        moved = '[[stroke]]\ntool = "push"\nradius = 0.25\nsamples = [[0, 0.35, 0.3, 1.0], [7, 0.35, 0.42, 1.0]]\n'
+    line = (
+        "[[handle]]\npoints = [[0.2, 0.4], [0.5, 0.4]]\nto = [0.42, 0.5]\nstart = 0.4\nduration = 0.3\nrotate = 20.0\n"
+    )
+    asked = Recipe.parse(FREE + moved + line)
+    corners = np.linspace([0.2, 0.4], [0.5, 0.4], 11)  # where it is held
+    seen, _, _ = arrived(device, asked.edited(handle=asked.handle[:-1], duration=0.4), corners)
+    arms, angle = (seen - seen.mean(axis=0)) * EXTENT, np.radians(20)
+    assert np.ptp(arms[:, 1]) > 0.03  # it has been bent
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    found = fit(device, None, 1, FREE + moved + line)
+    recipe = Recipe.parse(found.trial.recipe.text())
+    ends, _, _ = arrived(device, recipe, corners)
+    off = (ends * EXTENT - (np.array([0.42, 0.5]) * EXTENT + arms @ turn)) * 64
+    assert np.hypot(*off.T).max() == pytest.approx(found.errors[-1], abs=0.01)
+    assert found.errors[-1] < 0.8
+    assert recipe.handle[-1].goals
+    assert recipe.handle[-1].start == (0.4 if stroke else 0.0)
+    assert recipe.fluid.viscosity == pytest.approx(0.03) if stroke else True
+
+
+def test_a_handle_that_has_let_go_before_the_end_is_left_as_it_is(device: Device):
+    gone = "[[handle]]\nat = [0.2, 0.5]\nto = [0.25, 0.5]\nduration = 0.1\nend = 0.2\n"
+    led = "[[handle]]\nat = [0.6, 0.5]\nto = [0.6, 0.44]\nstart = 0.3\nduration = 0.2\n"
+    found = fit(device, None, 1, FREE + gone + led)
+    assert found.trial.recipe.handle[0] == Recipe.parse(FREE + gone).handle[0]
+    assert found.told.startswith("1 handle, mean error")
+
+
+def test_a_pin_that_was_set_late_is_led_to_where_it_was_set(device: Device):
+    moved = "[[handle]]\nat = [0.35, 0.35]\nto = [0.35, 0.5]\nduration = 0.3\nradius = 0.3\n"
+    pin = "[[pin]]\nat = [0.35, 0.45]\nstart = 0.4\n"
+    until_then = Recipe.parse(FREE.replace("duration = 0.8", "duration = 0.4") + moved)
+    ((x, y),), _, _ = arrived(device, until_then, np.array([[0.35, 0.45]]))
+    recipe = fit(device, None, 1, FREE + moved + pin).trial.recipe
+    assert not recipe.pin
+    assert recipe.handle[1].to == pytest.approx((x, y), abs=1e-4)
 
 
 def test_what_is_led_after_strokes_is_fitted_after_them(device: Device):
@@ -272,6 +316,9 @@ def test_a_fit_is_told_in_a_line():
     trial = Trial(Recipe(), pairs.places, nothing, nothing, work=1.25, det=0.5, folds=3)
     told = Fitted(trial, pairs, np.array([0.25, 0.75, np.nan]), False, False, ()).told
     assert told == "2 pairs, mean error 0.5 pixels, most 0.75; work 1.25, least det J 0.5, 3 folds"
+    one = replace(trial, folds=1)
+    told = Fitted(one, pairs, np.array([0.5, np.nan]), False, False, (), "handle").told
+    assert told == "1 handle, mean error 0.5 pixels, most 0.5; work 1.25, least det J 0.5, 1 fold"
 
 
 def test_outlines_of_masks_are_fitted_and_written_as_a_curve(fluidwarp: Run, tmp_path: Path):
@@ -315,7 +362,10 @@ def test_outlines_of_masks_are_fitted_and_written_as_a_curve(fluidwarp: Run, tmp
         (["--masks", "a.png", "a.png", "-o", "f.toml"], "a.png has no outline: nothing of it is brighter than grey"),
         (["--pairs", "bad.csv", "-o", "f.toml"], "bad.csv, line 2: expected x0,y0,x1,y1"),
         (["--pairs", "p.csv", "-o", "f.toml", "--arrived", "f.txt"], "end with .csv, .pts, .tps"),
-        (["--pairs", "p.csv", "-o", "f.toml", "--time-limit", "0"], "cancelled; nothing half-written is left"),
+        (
+            ["--pairs", "p.csv", "-o", "f.toml", "--time-limit", "0"],
+            "--time-limit 0 has passed before anything was found",
+        ),
     ],
 )
 def test_what_cannot_be_fitted_ends_in_a_sentence(fluidwarp: Run, tmp_path: Path, words: list[str], said: str):

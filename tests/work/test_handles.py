@@ -140,6 +140,16 @@ def test_an_outline_goes_into_another_form_and_size(device: Device):
     assert warp.statistics().folds == 0
 
 
+def test_a_line_turns_on_its_way_to_its_goals_and_keeps_its_length():
+    points, goals = ((0.4, 0.5), (0.6, 0.5)), ((0.6, 0.5), (0.4, 0.5))
+    handle = Handle((0.5, 0.5), points=points, goals=goals, rotate=180.0, turned=((2.0, 270.0, 2.0),))
+    shape = Shape.of(handle, (1.0, 1.0))
+    half, there, after = (shape.wanted(shape.led, time, 0.1) for time in (0.5, 1.0, 2.0))
+    np.testing.assert_allclose(half[[0, -1]], [[0.5, 0.4], [0.5, 0.6]], atol=1e-12)
+    np.testing.assert_allclose(there[[0, -1]], goals, atol=1e-12)
+    np.testing.assert_allclose(after[[0, -1]], [[0.5, 0.7], [0.5, 0.3]], atol=1e-12)
+
+
 @pytest.mark.parametrize("cells", [64, 96])
 def test_what_of_a_line_is_outside_is_not_led(cells: int, device: Device):
     line = Handle((0.1, 0.5), (0.15, 0.55), duration=0.5, points=((-0.2, 0.5), (0.3, 0.5)))
@@ -592,10 +602,6 @@ def test_an_arrangement_without_contradiction_is_not_objected_to():
             "[[handle]]\npoints = [[0.5, 0.5], [0.6, 0.5]]\ngoals = [[0.5, 0.5]]",
             "handle[1]: 'points' has 2 places and 'goals' 1; give as many",
         ),
-        (
-            "[[handle]]\npoints = [[0.5, 0.5], [0.6, 0.5]]\ngoals = [[0.5, 0.5], [0.6, 0.6]]\nrotate = 3.0",
-            "handle[1]: give either 'goals', or 'rotate' and 'scale'",
-        ),
     ],
 )
 def test_a_wrong_handle_is_told_in_one_sentence(text: str, said: str):
@@ -609,7 +615,7 @@ def test_a_handle_of_no_number_is_refused():
     line = {"points": ((0.4, 0.5), (0.6, 0.5))}
     lines = line | {"closed": True}, line | {"goals": ((0.5, 0.5),)}, {"points": ((0.5, 0.5),)}
     turns = {"rotate": np.nan}, {"rotate": 1e6}, {"scale": 0.0}, {"scale": np.inf}
-    for each in (*wrong, *lines, *turns, line | {"goals": line["points"], "scale": 2.0}):
+    for each in (*wrong, *lines, *turns):
         parts: dict[str, Any] = {"at": (0.5, 0.5)} | each
         with pytest.raises(ValueError, match=r"handle|line"):
             Handle(**parts)
