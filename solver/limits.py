@@ -103,6 +103,16 @@ def places(points: object) -> np.ndarray:
     return array.astype(np.float64).reshape(-1, 2)
 
 
+def beside_edges(places: np.ndarray, extent: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """The nearest and farthest from the left and upper edges that places (n, 2) of a line may be led, (n, 2) each.
+
+    What is at an edge stays there, so no place comes more than `MOST_STRETCH` times as far from one, or as near.
+    """
+    near, far = np.clip(places, 0.0, extent), extent - np.clip(places, 0.0, extent)
+    least = np.maximum(near / MOST_STRETCH, extent - far * MOST_STRETCH)
+    return least, np.minimum(near * MOST_STRETCH, extent - far / MOST_STRETCH)
+
+
 def check_step(dt: float) -> float:
     """A time step, if it is one.
 

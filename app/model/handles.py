@@ -22,6 +22,7 @@ from solver.limits import (
     MOST_SCALE,
     MOST_STRETCH,
     MOST_TURNED,
+    beside_edges,
 )
 
 MOST_HANDLES = 64  # with the pins
@@ -299,7 +300,9 @@ def objections(
             continue
         if outside.any():
             yield f"{way.label} reaches out of the picture: what is outside is not led"
-        if (ends := way.after[beyond & ~outside]).size:
+        if not (ends := way.after[beyond & ~outside]).size and (short := way.short_of_edges(extent)) > ARRIVED:
+            yield f"{way.label} stays {short:.3g} longer sides short: what is at the picture's edge stays there"
+        if ends.size:
             yield f"{way.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
         elif (far := _lengths(way.after - way.before).max() / way.reach) > LARGEST_LEAD:
             more = "give it a larger reach (radius)"
@@ -348,6 +351,22 @@ class _Way:
             self.after = goal + scale * laid @ turn
         rounds = ([*line, line[0]] if led.closed else line for line in lines)
         self.reach = max(led.radius, max(_lengths(np.diff(line, axis=0)).sum() for line in rounds) / LONGEST_LINE)
+
+    def short_of_edges(self, extent: Point) -> float:
+        """How far what is farthest of its line stays from where it is led within the picture, as `beside_edges`."""
+        if not self.led.points:
+            return 0.0
+        before, after = (_between_corners(line, self.led.closed) for line in (self.before, self.after))
+        inside = ((before >= 0) & (before <= extent)).all(axis=1)
+        before, after = before[inside], np.clip(after[inside], 0.0, extent)
+        return float(_lengths(np.clip(after, *beside_edges(before, extent)) - after).max(initial=0.0))
+
+
+def _between_corners(line: np.ndarray, closed: bool) -> np.ndarray:
+    """Places all along a line of corners (n, 2)."""
+    line = np.concatenate([line, line[:1]]) if closed else line
+    parts = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
+    return np.concatenate([*((1 - parts) * here + parts * there for here, there in pairwise(line)), line[-1:]])
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

@@ -13,6 +13,12 @@ from app.work.replay import Replay
 from solver.warp.inverse import ForwardMap
 
 Line = tuple[Point, ...]
+FROZEN = "what it holds is frozen"
+HALTED = {  # why a handle halts, by `Handles.halts`
+    "strain": "the picture around it is bent as far as it bears; Fit leads all anew, which may bring it nearer",
+    "at odds": "what others hold is in its way; Fit leads all anew, which may bring it nearer",
+    "edge": "what is at the picture's edge stays there",
+}
 
 
 @dataclass(frozen=True)
@@ -98,11 +104,13 @@ def unmet(replay: Replay, within: float) -> Iterator[tuple[str, str]]:
     if not replay.handles.handles:
         return
     solid = replay.fluid.solid.get()
-    for (label, led), far, points in zip(replay.led, replay.handles.away, replay.handles.shapes, strict=True):
+    for (label, led), far, points, halt in zip(
+        replay.led, replay.handles.away, replay.handles.shapes, replay.handles.halts, strict=True
+    ):
         if not far <= within:
             held = points if led.points else points[:1]
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
-            why = ": what it holds is frozen" if (solid[rows, columns] == 255).any() else ""
+            why = f": {FROZEN}" if (solid[rows, columns] == 255).any() else f": {HALTED[halt]}" if halt else ""
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
             yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led{why}"
 

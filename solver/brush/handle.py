@@ -20,8 +20,8 @@ from solver.limits import (
     LEAST_STIFFNESS,
     LONGEST_LINE,
     MOST_SCALE,
-    MOST_STRETCH,
     MOST_TURNED,
+    beside_edges,
     check_type,
     numbers,
     places,
@@ -276,6 +276,11 @@ class Shape:
         time = max(time, handle.ready, handle.upright)
         return self._about(handle.wanted(self.middle(starts), time, dt, math.inf), starts, time, dt)
 
+    def is_held_by_edges(self, starts: np.ndarray) -> bool:
+        """True if it is a line that goes only a part of its way in the end, as what is at an edge stays there."""
+        due = self.due(starts, math.inf, 1.0)
+        return bool(self.handle.points) and bool((np.clip(due, *beside_edges(starts, self.extent)) != due).any())
+
     def away(self, places: np.ndarray, ends: np.ndarray) -> float:
         """How far what is farthest of it is from these places; of a ring, by how far it is turned and scaled."""
         left = places - ends
@@ -303,16 +308,6 @@ class Shape:
                 self.goals - handle.to, -turned
             )
         return there + scale * _spun(from_middle, angle)
-
-
-def beside_edges(places: np.ndarray, extent: Point) -> tuple[np.ndarray, np.ndarray]:
-    """The nearest and farthest from the left and upper edges that places (n, 2) of a line may be led, (n, 2) each.
-
-    What is at an edge stays there, so no place comes more than `MOST_STRETCH` times as far from one, or as near.
-    """
-    near, far = np.clip(places, 0.0, extent), extent - np.clip(places, 0.0, extent)
-    least = np.maximum(near / MOST_STRETCH, extent - far * MOST_STRETCH)
-    return least, np.minimum(near * MOST_STRETCH, extent - far / MOST_STRETCH)
 
 
 def spun(motion: np.ndarray, arms: np.ndarray) -> float:

@@ -291,6 +291,23 @@ class Handles:
         """
         return np.array([left for _, left in self.left(math.inf, 1.0)])
 
+    @property
+    def halts(self) -> list[str | None]:
+        """Why each comes no nearer to where it is led: "edge", if that is farther than a line goes beside the picture's
+        edge; "strain", if the map around it slows it down; "at odds", if it has let go; else None.
+        """
+        found = list[str | None]()
+        slower = self._slower(np.concatenate([np.zeros((0, 2)), *self.shapes]), np.arange(len(self._places)))
+        for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._lacks, strict=True):
+            starts = self._starts[rows]
+            if np.isnan(starts).any():
+                found.append(None)
+            elif shape.is_held_by_edges(starts):
+                found.append("edge")
+            else:
+                found.append("strain" if slower[rows].min() < 1 else "at odds" if waited > PATIENCE else None)
+        return found
+
     def left(self, time: float, dt: float) -> list[tuple[np.ndarray, float]]:
         """Where the points of each shall be, (k, 2) in longer sides, and how far it is from there, as `away`; once it
         has gone its first way, and at a time after that.
@@ -414,9 +431,12 @@ class Handles:
 
     def slower(self, numbers: np.ndarray) -> np.ndarray:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
+        return self._slower(self._places[numbers], numbers)
+
+    def _slower(self, places: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         if not len(numbers):
             return np.zeros(0)
-        least, most, area_left = self._strain.around(self._places[numbers], self._radii[numbers]).T
+        least, most, area_left = self._strain.around(places, self._radii[numbers]).T
         grown, local = self._grown(), self._locality(numbers)
         least = np.minimum(least, area_left) * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)

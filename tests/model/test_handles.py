@@ -150,6 +150,14 @@ def test_of_a_line_it_is_told_where_it_is_turned_and_what_only_an_outline_cannot
     assert said == "handle[1] is led inside out"
 
 
+def test_a_line_that_stays_short_beside_an_edge_is_told_of() -> None:
+    """By where the edge lets its nearest place go: four times as far from it."""
+    line = {"points": [[0.02, 0.3], [0.3, 0.5]], "at": [0.02, 0.3]}
+    assert [*objections([handle(**line, to=[0.07, 0.3])], [], (1.0, 1.0))] == []
+    (said,) = objections([handle(**line, to=[0.12, 0.3])], [], (1.0, 1.0))
+    assert said == "handle[1] stays 0.04 longer sides short: what is at the picture's edge stays there"
+
+
 def test_what_is_only_turned_is_on_its_way_too() -> None:
     assert handle(to=None, rotate=30, start=0.5, duration=1.0).span == (0.5, 1.5)
     assert handle(to=None, rotate=30, start=0.5, duration=1.0).spanning(1.0, 3.0)["duration"] == 2.0

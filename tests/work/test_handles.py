@@ -16,8 +16,8 @@ from app.model.schema import frozen
 from app.work.held import as_seen, held_in, unmet
 from app.work.replay import Replay
 from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
-from solver.brush.handle import Shape, beside_edges
-from solver.limits import MOST_STRETCH
+from solver.brush.handle import Shape
+from solver.limits import MOST_STRETCH, beside_edges
 from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
 
 BLACK = np.zeros((96, 128, 3), np.uint8)
@@ -193,6 +193,27 @@ def test_what_comes_no_nearer_lets_go(device: Device):
     for _ in range(40):
         handles.advance(DT)
     assert fluid.motion().largest_speed < 1e-4
+    assert set(handles.halts) <= {"strain", "at odds"}
+
+
+def test_why_a_line_stays_short_beside_the_edge_is_told(device: Device):
+    line = {"points": [[0.05, 0.3], [0.05, 0.7]], "to": [0.22, 0.5], "duration": 0.1}
+    replay = replay_of(device, handle=[line], fluid={"grid": 16}, duration=0.1)
+    replay.seek(4)
+    ((_, said),) = unmet(replay, ARRIVED)
+    assert said.endswith("away from where it is led: what is at the picture's edge stays there")
+    replay.release()
+
+
+def test_that_the_map_bears_no_more_is_told_and_what_may_mend_it(device: Device):
+    replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5])], fluid={"grid": 32}, duration=0.1)
+    folded = np.zeros((96, 128, 2), np.float32)
+    folded[:, 66, 0] = 1.5 / 128
+    replay.warp.set(folded)
+    replay.advance()
+    ((_, said),) = unmet(replay, ARRIVED)
+    assert said.endswith("bent as far as it bears; Fit leads all anew, which may bring it nearer")
+    replay.release()
 
 
 def test_a_fluid_handle_beside_local_ones_arrives(device: Device):
@@ -558,6 +579,7 @@ def test_what_cannot_be_met_is_objected_to():
         "handle[1] takes hold of nothing: (1.2, 0.5) is outside the picture",
         "handle[2] goes only to the picture's edge: (0.2, -0.5) is outside the picture",
         "handle[9] reaches out of the picture: what is outside is not led",
+        "handle[9] stays 0.1 longer sides short: what is at the picture's edge stays there",
         "handle[10] is led inside out",
         "handle[2] and handle[9] are led 5.1 times as far apart as they lie",
         "handle[3] and handle[4] cross each other's way",

@@ -159,18 +159,20 @@ def _handles(
         if in_hand:
             is_left = start.x > target.x
             across = (radius + ui.px(7)) * (-1 if is_left else 1)
-            _number(ui, held.label, ImVec2(target.x + across, target.y), is_left, ink, lines)
+            at = ImVec2(target.x + across, target.y)
+            _number(ui, held.label, at, is_left, selected or is_hovered, lines)
 
 
-def _number(ui: Ui, label: str, at: ImVec2, is_left: bool, ink: Colour, lines: imgui.ImDrawList) -> None:
+def _number(ui: Ui, label: str, at: ImVec2, is_left: bool, is_lit: bool, lines: imgui.ImDrawList) -> None:
     """What messages call a handle or a pin, beside its mark, away from where it came from; of handles the number and
-    the name.
+    the name. Lit it is a box of the accent.
     """
+    ground, ink = (packed(ui.palette.accent), ui.palette.on_accent) if is_lit else (packed(BLACK, 0.5), WHITE)
     words = in_words(label).removeprefix("handle ")
     imgui.push_font(ui.fonts.bold, 12.0)
     size, box = imgui.calc_text_size(words), ImVec2(ui.px(3), 0.0)
     at = ImVec2(at.x - (size.x if is_left else 0.0), at.y - size.y / 2)
-    lines.add_rect_filled(at - box, at + size + box, packed(BLACK, 0.5), ui.px(4))
+    lines.add_rect_filled(at - box, at + size + box, ground, ui.px(4))
     lines.add_text(at, packed(ink), words)
     imgui.pop_font()
 
