@@ -8,9 +8,12 @@
 // A spline times a weight that is zero on an edge is zero there too (Kantorovich and Krylov), as what crosses it is: the
 // values, that weight's inverse at their places, times the weight at p. It is the distance to the edge, where that is one of
 // four texels; a polynomial alone goes on to some value beyond, is cut off there, and from remap to remap folds the last texels.
+// The outermost of four are always as far from it, so nothing is divided.
+const vec4 FROM_EDGE = 1.0 / vec4(0.5, 1.5, 2.5, 3.5);
+
 vec4 to_edges(float p, float cell, float count, float walled) {
-    vec4 at = cell + vec4(-0.5, 0.5, 1.5, 2.5), near = mix(vec4(1.0), p / at, walled * float(cell <= 1.0));
-    return near * mix(vec4(1.0), (count - p) / (count - at), walled * float(cell >= count - 3.0));
+    vec4 near = mix(vec4(1.0), p * FROM_EDGE, walled * float(cell <= 1.0));
+    return near * mix(vec4(1.0), (count - p) * FROM_EDGE.wzyx, walled * float(cell >= count - 3.0));
 }
 
 // How much that changes with p.
