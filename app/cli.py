@@ -72,7 +72,7 @@ def main() -> None:
     except MemoryError:
         _fail("there is not enough memory; try a smaller --size or --grid", 1)
     except Exception as error:
-        if type(error).__name__ == "ContextError":
+        if any(kind.__name__ == "ContextError" for kind in type(error).__mro__):  # without the time to import it
             _fail(f"{error}; `fluidwarp doctor` tells more", 1)
         if os.environ.get("FLUIDWARP_TRACEBACK"):
             raise
@@ -148,6 +148,10 @@ Codec = Annotated[
     str | None,
     typer.Option(help="Another codec: h265 in .mp4, av1 in .webm, prores-422-hq in .mov; piz, dwaa ... in .exr."),
 ]
+Gpu = Annotated[
+    int | None,
+    typer.Option("--gpu", min=0, help="The graphics device to work on, by its number in `fluidwarp doctor`."),
+]
 MapKind = Annotated[str | None, typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]
 StGrid = Annotated[
     str | None, typer.Option("--grid", help="Where MAP's 0 and 1 lie, if it does not say: centres, corners or pixels.")
@@ -216,6 +220,7 @@ def render(
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    gpu: Gpu = None,
 ) -> None:
     """Warp a picture by a recipe: OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its
     frames. A clip is warped frame by frame, and keeps its sound.
@@ -244,11 +249,14 @@ def render(
     task = Task(recipe=recipe, edits=edits, picture=given[0] if given else None, outputs=outputs, max_pixels=max_pixels)
     if not given and cluster is not None:
         raise UserError("--cluster is for several pictures; name them after the recipe")
-    _perform(task, given, jobs, cluster)
+    _perform(task, given, jobs, cluster, gpu)
 
 
-def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None) -> None:
+def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gpu: int | None) -> None:
     """Do it for all that is given, one or many."""
+    if gpu is not None and cluster is not None:
+        raise UserError("--gpu is for this machine; start the workers of --cluster with FLUIDWARP_GPU set instead")
+    _choose(gpu)
     from app.progress import on_terminal
     from app.work.tasks import spread
     from solver.gl.device import Device
@@ -261,6 +269,14 @@ def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None) ->
     with ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None) as progress:
         report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
     _tell(*report.notices, *([report.verdict] if report.verdict else []))
+
+
+def _choose(gpu: int | None) -> None:
+    """Let this process, and all that it starts, draw on a graphics device."""
+    from solver.gl.context import GPU
+
+    if gpu is not None:
+        os.environ[GPU] = str(gpu)
 
 
 def _is_folder(output: Path) -> bool:
@@ -348,6 +364,7 @@ def fit(
         float | None, typer.Option(min=0, help="Seconds after which the best so far is taken.")
     ] = None,
     max_pixels: MaxPixels = 400_000_000,
+    gpu: Gpu = None,
 ) -> None:
     """Find handles that bring points to where they should be with the least work and without a fold.
 
@@ -361,6 +378,7 @@ def fit(
 
     job = FitJob(recipe, tuple(pairs or ()), masks, output, arrived, image, evaluations, local, max_pixels)
     job.check()
+    _choose(gpu)
     until = None if time_limit is None else monotonic() + time_limit
     with on_terminal(output.name, None, at_once=None) as progress, Device.headless() as device:
         asked = progress.cancel
@@ -401,6 +419,7 @@ def apply(
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    gpu: Gpu = None,
 ) -> None:
     """Warp pictures or clips by a map from fluidwarp or another program; several as `render` does."""
     from app.model.recipe import Recipe
@@ -419,7 +438,7 @@ def apply(
         quality=asked.output.quality,
         fps=asked.output.fps,
     )
-    _perform(order, pictures, jobs, cluster)
+    _perform(order, pictures, jobs, cluster, gpu)
 
 
 def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:
@@ -449,12 +468,14 @@ def convert(
     grid: StGrid = None,
     overscan: MapOverscan = None,
     max_pixels: MaxPixels = 400_000_000,
+    gpu: Gpu = None,
 ) -> None:
     """Write a warp map in another format."""
     from app.progress import on_terminal
     from app.work.applying import converted
 
     source = _map_source(map_, kind, grid, overscan, max_pixels)
+    _choose(gpu)
     with on_terminal(output.name, None) as progress:
         notices = converted(source, output, "offsets" if offsets else "st", invert, progress)
     _tell(*notices)
@@ -469,12 +490,14 @@ def gallery(
         bool,
         typer.Option("--strokes", help="Make three retouching jobs and three posters, done by brush strokes, instead."),
     ] = False,
+    gpu: Gpu = None,
 ) -> None:
     """Make the paper's figures again: results, animations and contact sheets."""
     from app.gallery import figures, retouching
     from app.progress import on_terminal
     from solver.gl.device import Device
 
+    _choose(gpu)
     with on_terminal("gallery", None) as progress, Device.headless() as device:
         measured = (retouching if strokes else figures).make(device, output, progress)
     for figure, numbers in measured.items():
