@@ -133,6 +133,12 @@ MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse larger pictures, cli
 Bits = Annotated[int | None, typer.Option(help="Bits a channel: 8, 16 (half in EXR) or 32; else the picture's own.")]
 Size = Annotated[int | None, typer.Option(help="Longer side of the result, in pixels.")]
 Quality = Annotated[int | None, typer.Option(help="1-100, of JPEG, WebP, AVIF and video.")]
+Filter = Annotated[
+    str | None,
+    typer.Option(
+        "--filter", help="Between pixels: catmull-rom (sharp), limited (the same, never rings), bilinear or nearest."
+    ),
+]
 Frames = Annotated[
     str | None,
     typer.Option(metavar="A-B", help="Only these frames of an animation, from 0 or by the numbers of its files."),
@@ -197,6 +203,7 @@ def render(
     overscan: Annotated[int, typer.Option(min=0, help="Pixels of the map beyond each side of the picture.")] = 0,
     map_size: Annotated[int | None, typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,
     size: Size = None,
+    filter_: Filter = None,
     grid: Annotated[int | None, typer.Option(help="Cells along the longer side.")] = None,
     solver: Annotated[str | None, typer.Option(help="mac, or paper for the paper's own scheme.")] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds to simulate.")] = None,
@@ -232,7 +239,7 @@ def render(
 
     tables = {
         "fluid": {"grid": grid, "solver": solver},
-        "output": {"size": size, "fps": fps, "quality": quality},
+        "output": {"size": size, "fps": fps, "quality": quality, "filter": filter_},
         "time": {"start": start, "end": end},
     }
     edits = Edits.of(tables, {"duration": duration, "amount": amount})
@@ -409,6 +416,7 @@ def apply(
     overscan: MapOverscan = None,
     edges: Annotated[str, typer.Option(help="transparent, black, clamp, mirror or wrap.")] = "transparent",
     size: Size = None,
+    filter_: Filter = None,
     fps: Annotated[float | None, typer.Option(help="Frames per second of a picture's animation.")] = None,
     quality: Quality = None,
     frames: Frames = None,
@@ -427,13 +435,15 @@ def apply(
     from app.work.jobs import Outputs
     from app.work.tasks import Edits
 
-    asked = Edits.of({"output": {"size": size, "fps": fps, "quality": quality}}, {"edges": edges}).applied(Recipe())
+    output_keys = {"size": size, "fps": fps, "quality": quality, "filter": filter_}
+    asked = Edits.of({"output": output_keys}, {"edges": edges}).applied(Recipe())
     order = Application(
         picture=pictures[0],
         outputs=Outputs(output, part=_part(frames), bits=bits, strip=strip, codec=codec, resume=resume),
         max_pixels=max_pixels,
         maps=_map_source(map_, kind, grid, overscan, max_pixels),
         edges=asked.edges,
+        filter=asked.output.filter,
         size=asked.output.size,
         quality=asked.output.quality,
         fps=asked.output.fps,

@@ -259,9 +259,7 @@ def test_a_device_is_chosen_and_one_that_is_not_there_is_told(
     ran = fluidwarp(folder, *words, "--gpu", "7")
     assert chosen == ["7"]
     assert ran.returncode == 1
-    assert ran.stderr == (
-        "fluidwarp: graphics device 7 is not there; there is 0 to 1; `fluidwarp doctor` tells more\n"
-    )
+    assert ran.stderr == ("fluidwarp: graphics device 7 is not there; there is 0 to 1; `fluidwarp doctor` tells more\n")
     assert not {path.name for path in folder.iterdir() if path.name.startswith("x.")}
 
 
