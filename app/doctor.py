@@ -63,11 +63,11 @@ def _version(name: str) -> str:
 
 
 def _headless() -> Iterator[Finding]:
-    found = _ask("app.doctor")
+    found = ask("app.doctor")
     if "error" in found:
         mend = "give FLUIDWARP_GPU another number" if "devices" in found else "install what is named above"
         yield Finding("OpenGL without a window", found["error"], mend, vital=True)
-        yield from _devices()
+        yield from devices()
         return
     yield Finding("OpenGL without a window", f"{found['version']}, {found['renderer']} ({found['vendor']})")
     yield Finding(
@@ -77,17 +77,17 @@ def _headless() -> Iterator[Finding]:
     )
     if found["is_software"]:
         yield Finding("speed", "a software rasteriser: everything works, at the speed of the processor")
-    yield from _devices()
+    yield from devices()
 
 
-def _devices() -> Iterator[Finding]:
+def devices() -> Iterator[Finding]:
     """Each graphics device that `--gpu` can choose, tried in a process of its own."""
     try:
         from solver.gl.context import GPU, MOST_GPUS
     except ImportError:  # as has been told
         return
-    for number in range(_ask("app.doctor", **{GPU: str(MOST_GPUS)}).get("devices", 0)):
-        found = _ask("app.doctor", **{GPU: str(number)})
+    for number in range(ask("app.doctor", **{GPU: str(MOST_GPUS)}).get("devices", 0)):
+        found = ask("app.doctor", **{GPU: str(number)})
         said = found.get("error") or f"{found['renderer']} ({found['vendor']})"
         yield Finding(f"--gpu {number}", said, "choose another device" if "error" in found else "")
 
@@ -100,7 +100,7 @@ def _window() -> Finding:
             "no display: neither WAYLAND_DISPLAY nor DISPLAY is set",
             "log in to a desktop for `fluidwarp edit`; `fluidwarp render` needs none",
         )
-    found = _ask("app.ui.probe")
+    found = ask("app.ui.probe")
     if "error" not in found:
         return Finding("window", f"{found['platform']}, OpenGL {found['opengl']}")
     words = found["error"]
@@ -122,7 +122,7 @@ def _encoder() -> Finding:
         return Finding("video", str(error), "pip install --force-reinstall imageio-ffmpeg")
 
 
-def _ask(module: str, **environment: str) -> dict:
+def ask(module: str, **environment: str) -> dict:
     """What `python -m module` prints as JSON, or {"error": why it did not}."""
     environment = {
         **os.environ, "PYTHONPATH": os.pathsep.join([str(Path(app.__path__[0]).parent), *sys.path]), **environment

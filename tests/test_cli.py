@@ -225,8 +225,8 @@ def test_doctor_lists_the_graphics_devices(monkeypatch: pytest.MonkeyPatch):
             environment[GPU], working
         )
 
-    monkeypatch.setattr(doctor, "_ask", answer)
-    found = {finding.name: (finding.said, finding.is_well) for finding in doctor._devices()}
+    monkeypatch.setattr(doctor, "ask", answer)
+    found = {finding.name: (finding.said, finding.is_well) for finding in doctor.devices()}
     assert found == {
         "--gpu 0": ("Card (Maker)", True), "--gpu 1": ("no driver", False), "--gpu 2": ("Card (Maker)", True)
     }  # fmt: skip

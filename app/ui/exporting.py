@@ -272,10 +272,9 @@ class ExportDialog(Dialog):
             recipe = recipe.edited(duration=max(session.target, 1) * recipe.fluid.dt)
         grid = min(recipe.fluid.grid * FINER[self.finer][1], 1024)
         own = max(self.picture.width, self.picture.height)
-        size, filter_ = None if self.size == own else self.size, FILTERS[self.filter][0]
         output = recipe.output.model_copy(
-            update={"size": size, "fps": self.fps, "quality": self.quality, "filter": filter_}
-        )
+            update={"size": None if self.size == own else self.size, "fps": self.fps, "quality": self.quality}
+        ).model_copy(update={"filter": FILTERS[self.filter][0]})
         part = recipe.time.model_copy(
             update={"start": self.start, "end": max(self.end, self.start), "ping_pong": self.returns}
         )

@@ -76,7 +76,7 @@ class Work(RuleBasedStateMachine):
         assert self.seen.setdefault(work.document.history.entries[work.document.history.index].number, now) == now
 
     @rule(tool=st.sampled_from(PAINTING), ends=st.tuples(PLACES, PLACES), ticks=st.integers(1, 3), back=st.booleans(),
-          radius=st.floats(0.02, 0.4), at=st.floats(0, 1))  # fmt: skip
+          radius=st.floats(0.25, 0.4), at=st.floats(0, 1))  # fmt: skip
     def paint(
         self, tool: str, ends: tuple[tuple[float, float], ...], ticks: int, back: bool, radius: float, at: float
     ) -> None:

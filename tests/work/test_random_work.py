@@ -7,7 +7,7 @@ from solver.gl.device import Device
 
 
 def test_random_work_is_undone_saved_and_opened_again_as_it_was(device: Device) -> None:
-    properties.check_session(device, 3, examples=4, acts=10)
+    properties.check_session(device, 3, examples=3, acts=6)
 
 
 def test_a_recipe_of_any_numbers_is_refused_or_played(device: Device) -> None:
