@@ -72,7 +72,7 @@ def main() -> None:
     except MemoryError:
         _fail("there is not enough memory; try a smaller --size or --grid", 1)
     except Exception as error:
-        if type(error).__name__ == "ContextError":
+        if any(kind.__name__ == "ContextError" for kind in type(error).__mro__):  # without the time to import it
             _fail(f"{error}; `fluidwarp doctor` tells more", 1)
         if os.environ.get("FLUIDWARP_TRACEBACK"):
             raise
@@ -133,6 +133,12 @@ MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse larger pictures, cli
 Bits = Annotated[int | None, typer.Option(help="Bits a channel: 8, 16 (half in EXR) or 32; else the picture's own.")]
 Size = Annotated[int | None, typer.Option(help="Longer side of the result, in pixels.")]
 Quality = Annotated[int | None, typer.Option(help="1-100, of JPEG, WebP, AVIF and video.")]
+Filter = Annotated[
+    str | None,
+    typer.Option(
+        "--filter", help="Between pixels: catmull-rom (sharp), limited (the same, never rings), bilinear or nearest."
+    ),
+]
 Frames = Annotated[
     str | None,
     typer.Option(metavar="A-B", help="Only these frames of an animation, from 0 or by the numbers of its files."),
@@ -147,6 +153,10 @@ Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's me
 Codec = Annotated[
     str | None,
     typer.Option(help="Another codec: h265 in .mp4, av1 in .webm, prores-422-hq in .mov; piz, dwaa ... in .exr."),
+]
+Gpu = Annotated[
+    int | None,
+    typer.Option("--gpu", min=0, help="The graphics device to work on, by its number in `fluidwarp doctor`."),
 ]
 MapKind = Annotated[str | None, typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]
 StGrid = Annotated[
@@ -193,6 +203,7 @@ def render(
     overscan: Annotated[int, typer.Option(min=0, help="Pixels of the map beyond each side of the picture.")] = 0,
     map_size: Annotated[int | None, typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,
     size: Size = None,
+    filter_: Filter = None,
     grid: Annotated[int | None, typer.Option(help="Cells along the longer side.")] = None,
     solver: Annotated[str | None, typer.Option(help="mac, or paper for the paper's own scheme.")] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds to simulate.")] = None,
@@ -216,6 +227,7 @@ def render(
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    gpu: Gpu = None,
 ) -> None:
     """Warp a picture by a recipe: OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its
     frames. A clip is warped frame by frame, and keeps its sound.
@@ -227,7 +239,7 @@ def render(
 
     tables = {
         "fluid": {"grid": grid, "solver": solver},
-        "output": {"size": size, "fps": fps, "quality": quality},
+        "output": {"size": size, "fps": fps, "quality": quality, "filter": filter_},
         "time": {"start": start, "end": end},
     }
     edits = Edits.of(tables, {"duration": duration, "amount": amount})
@@ -244,11 +256,14 @@ def render(
     task = Task(recipe=recipe, edits=edits, picture=given[0] if given else None, outputs=outputs, max_pixels=max_pixels)
     if not given and cluster is not None:
         raise UserError("--cluster is for several pictures; name them after the recipe")
-    _perform(task, given, jobs, cluster)
+    _perform(task, given, jobs, cluster, gpu)
 
 
-def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None) -> None:
+def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gpu: int | None) -> None:
     """Do it for all that is given, one or many."""
+    if gpu is not None and cluster is not None:
+        raise UserError("--gpu is for this machine; start the workers of --cluster with FLUIDWARP_GPU set instead")
+    _choose(gpu)
     from app.progress import on_terminal
     from app.work.tasks import spread
     from solver.gl.device import Device
@@ -261,6 +276,14 @@ def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None) ->
     with ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None) as progress:
         report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
     _tell(*report.notices, *([report.verdict] if report.verdict else []))
+
+
+def _choose(gpu: int | None) -> None:
+    """Let this process, and all that it starts, draw on a graphics device."""
+    from solver.gl.context import GPU
+
+    if gpu is not None:
+        os.environ[GPU] = str(gpu)
 
 
 def _is_folder(output: Path) -> bool:
@@ -348,6 +371,7 @@ def fit(
         float | None, typer.Option(min=0, help="Seconds after which the best so far is taken.")
     ] = None,
     max_pixels: MaxPixels = 400_000_000,
+    gpu: Gpu = None,
 ) -> None:
     """Find handles that bring points to where they should be with the least work and without a fold.
 
@@ -361,6 +385,7 @@ def fit(
 
     job = FitJob(recipe, tuple(pairs or ()), masks, output, arrived, image, evaluations, local, max_pixels)
     job.check()
+    _choose(gpu)
     until = None if time_limit is None else monotonic() + time_limit
     with on_terminal(output.name, None, at_once=None) as progress, Device.headless() as device:
         asked = progress.cancel
@@ -398,6 +423,7 @@ def apply(
     overscan: MapOverscan = None,
     edges: Annotated[str, typer.Option(help="transparent, black, clamp, mirror or wrap.")] = "transparent",
     size: Size = None,
+    filter_: Filter = None,
     fps: Annotated[float | None, typer.Option(help="Frames per second of a picture's animation.")] = None,
     quality: Quality = None,
     frames: Frames = None,
@@ -408,6 +434,7 @@ def apply(
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    gpu: Gpu = None,
 ) -> None:
     """Warp pictures or clips by a map from fluidwarp or another program; several as `render` does."""
     from app.model.recipe import Recipe
@@ -415,18 +442,20 @@ def apply(
     from app.work.jobs import Outputs
     from app.work.tasks import Edits
 
-    asked = Edits.of({"output": {"size": size, "fps": fps, "quality": quality}}, {"edges": edges}).applied(Recipe())
+    output_keys = {"size": size, "fps": fps, "quality": quality, "filter": filter_}
+    asked = Edits.of({"output": output_keys}, {"edges": edges}).applied(Recipe())
     order = Application(
         picture=pictures[0],
         outputs=Outputs(output, part=_part(frames), bits=bits, strip=strip, codec=codec, resume=resume),
         max_pixels=max_pixels,
         maps=_map_source(map_, kind, grid, overscan, max_pixels),
         edges=asked.edges,
+        filter=asked.output.filter,
         size=asked.output.size,
         quality=asked.output.quality,
         fps=asked.output.fps,
     )
-    _perform(order, pictures, jobs, cluster)
+    _perform(order, pictures, jobs, cluster, gpu)
 
 
 def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:
@@ -456,12 +485,14 @@ def convert(
     grid: StGrid = None,
     overscan: MapOverscan = None,
     max_pixels: MaxPixels = 400_000_000,
+    gpu: Gpu = None,
 ) -> None:
     """Write a warp map in another format."""
     from app.progress import on_terminal
     from app.work.applying import converted
 
     source = _map_source(map_, kind, grid, overscan, max_pixels)
+    _choose(gpu)
     with on_terminal(output.name, None) as progress:
         notices = converted(source, output, "offsets" if offsets else "st", invert, progress)
     _tell(*notices)
@@ -476,12 +507,14 @@ def gallery(
         bool,
         typer.Option("--strokes", help="Make three retouching jobs and three posters, done by brush strokes, instead."),
     ] = False,
+    gpu: Gpu = None,
 ) -> None:
     """Make the paper's figures again: results, animations and contact sheets."""
     from app.gallery import figures, retouching
     from app.progress import on_terminal
     from solver.gl.device import Device
 
+    _choose(gpu)
     with on_terminal("gallery", None) as progress, Device.headless() as device:
         measured = (retouching if strokes else figures).make(device, output, progress)
     for figure, numbers in measured.items():

@@ -63,9 +63,11 @@ def _version(name: str) -> str:
 
 
 def _headless() -> Iterator[Finding]:
-    found = _ask("app.doctor")
+    found = ask("app.doctor")
     if "error" in found:
-        yield Finding("OpenGL without a window", found["error"], "install what is named above", vital=True)
+        mend = "give FLUIDWARP_GPU another number" if "devices" in found else "install what is named above"
+        yield Finding("OpenGL without a window", found["error"], mend, vital=True)
+        yield from devices()
         return
     yield Finding("OpenGL without a window", f"{found['version']}, {found['renderer']} ({found['vendor']})")
     yield Finding(
@@ -75,6 +77,19 @@ def _headless() -> Iterator[Finding]:
     )
     if found["is_software"]:
         yield Finding("speed", "a software rasteriser: everything works, at the speed of the processor")
+    yield from devices()
+
+
+def devices() -> Iterator[Finding]:
+    """Each graphics device that `--gpu` can choose, tried in a process of its own."""
+    try:
+        from solver.gl.context import GPU, MOST_GPUS
+    except ImportError:  # as has been told
+        return
+    for number in range(ask("app.doctor", **{GPU: str(MOST_GPUS)}).get("devices", 0)):
+        found = ask("app.doctor", **{GPU: str(number)})
+        said = found.get("error") or f"{found['renderer']} ({found['vendor']})"
+        yield Finding(f"--gpu {number}", said, "choose another device" if "error" in found else "")
 
 
 def _window() -> Finding:
@@ -85,7 +100,7 @@ def _window() -> Finding:
             "no display: neither WAYLAND_DISPLAY nor DISPLAY is set",
             "log in to a desktop for `fluidwarp edit`; `fluidwarp render` needs none",
         )
-    found = _ask("app.ui.probe")
+    found = ask("app.ui.probe")
     if "error" not in found:
         return Finding("window", f"{found['platform']}, OpenGL {found['opengl']}")
     words = found["error"]
@@ -107,9 +122,11 @@ def _encoder() -> Finding:
         return Finding("video", str(error), "pip install --force-reinstall imageio-ffmpeg")
 
 
-def _ask(module: str) -> dict:
+def ask(module: str, **environment: str) -> dict:
     """What `python -m module` prints as JSON, or {"error": why it did not}."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(app.__path__[0]).parent), *sys.path])}
+    environment = {
+        **os.environ, "PYTHONPATH": os.pathsep.join([str(Path(app.__path__[0]).parent), *sys.path]), **environment
+    }  # fmt: skip
     try:
         ran = subprocess.run(
             [sys.executable, "-m", module], capture_output=True, text=True, timeout=PATIENCE, env=environment
@@ -125,14 +142,14 @@ def _ask(module: str) -> dict:
 def _probe_headless() -> dict:
     from dataclasses import asdict
 
-    from solver.gl.context import ContextError
+    from solver.gl.context import ContextError, NoSuchDevice
     from solver.gl.device import Device
 
     try:
         with Device.headless() as device:
             return asdict(device.limits) | {"is_software": device.limits.is_software}
     except ContextError as error:
-        return {"error": str(error)}
+        return {"error": str(error)} | ({"devices": error.there} if isinstance(error, NoSuchDevice) else {})
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from app.progress import Progress
 from app.ui import window
 from app.work.export import run
 from app.work.jobs import Job, Outputs
+from solver.gl.context import GPU, NoSuchDevice
 from solver.gl.device import Device
 from support.commands import Run
 
@@ -213,6 +214,60 @@ def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
     found = next(finding for finding in doctor.examine() if finding.name == "libraries")
     assert found.vital
     assert found.mend == "pip install no-such-library"
+
+
+def test_doctor_lists_the_graphics_devices(monkeypatch: pytest.MonkeyPatch):
+    """Each is asked in a process with its number; one that does not work is told, and is not the end of the list."""
+
+    def answer(module: str, **environment: str) -> dict[str, object]:
+        working = {"renderer": "Card", "vendor": "Maker"}
+        return {"99999": {"error": "not there", "devices": 3}, "1": {"error": "no driver"}}.get(
+            environment[GPU], working
+        )
+
+    monkeypatch.setattr(doctor, "ask", answer)
+    found = {finding.name: (finding.said, finding.is_well) for finding in doctor.devices()}
+    assert found == {
+        "--gpu 0": ("Card (Maker)", True), "--gpu 1": ("no driver", False), "--gpu 2": ("Card (Maker)", True)
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["render", "a.toml", "-o", "x.png"],
+        ["apply", "m.npy", "cat.png", "-o", "x.png"],
+        ["convert", "m.npy", "-o", "x.exr", "--invert"],
+        ["fit", "a.toml", "-o", "x.toml"],
+        ["gallery", "-o", "x"],
+    ],
+)
+def test_a_device_is_chosen_and_one_that_is_not_there_is_told(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch, words: list[str]
+):
+    chosen: list[str] = []
+
+    def headless(kind: type[Device]) -> Device:
+        chosen.append(os.environ[GPU])
+        raise NoSuchDevice(7, 2)
+
+    monkeypatch.setattr(Device, "headless", classmethod(headless))
+    monkeypatch.setenv(GPU, "1")
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    if words[0] == "fit":
+        (folder / "a.toml").write_text(RECIPE + "[[handle]]\nat = [0.3, 0.4]\nto = [0.4, 0.4]\n")
+    ran = fluidwarp(folder, *words, "--gpu", "7")
+    assert chosen == ["7"]
+    assert ran.returncode == 1
+    assert ran.stderr == ("fluidwarp: graphics device 7 is not there; there is 0 to 1; `fluidwarp doctor` tells more\n")
+    assert not {path.name for path in folder.iterdir() if path.name.startswith("x.")}
+
+
+def test_the_devices_of_a_cluster_are_chosen_there(folder: Path, fluidwarp: Run):
+    words = ["render", "a.toml", "cat.png", "-o", "all", "--cluster", "tcp://localhost:1", "--gpu", "0"]
+    ran = fluidwarp(folder, *words)
+    assert ran.returncode == 1
+    assert "start the workers of --cluster with FLUIDWARP_GPU set" in ran.stderr
 
 
 @pytest.mark.parametrize("words", [["cat.png"], ["frames.%04d.png"], ["./render"], ["edit", "cat.png"], ["edit"], []])

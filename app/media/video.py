@@ -168,6 +168,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     if late:  # or the first frame would be shown from the sound's start on
         filters = _delayed(late) + filters
     width, height, fps = _shown(file, filters)
+    colours = _colours(video)
     check_size(file, width, height, max_pixels)
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
     seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
@@ -185,8 +186,8 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
         is_steady=abs(_shortest(video) - 1) < 0.02 and file.suffix.lower() in SEEKABLE,
-        note=lost(file, _losses(told, video, fps)),
-        colours=_colours(video),
+        note=lost(file, [*_losses(told, video, fps), *(_mastering(file) if colours.is_high else [])]),
+        colours=colours,
         timecode=found[1] if (found := TIMECODE.search(told)) else None,
         file_size=seen.st_size,
         inode=(seen.st_dev, seen.st_ino),
@@ -223,6 +224,18 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     if tags := [tag for tag in re.findall(r"^    (\S+)\s*: ", head, re.MULTILINE) if tag.lower() not in OWN_TAGS]:
         losses.append(not_kept("tag", tags))
     return losses
+
+
+def _mastering(file: Path) -> list[str]:
+    """What the first frame tells of the display that it was graded on and of its lights, which is not kept."""
+    command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}", "-map", "0:v:0", "-frames:v", "1"]
+    done = subprocess.run(
+        [*command, "-vf", "showinfo", "-f", "null", "-"], stdin=subprocess.DEVNULL, capture_output=True
+    )
+    told = done.stderr.decode("utf-8", "replace")
+    kinds = {"Mastering display metadata": "mastering display", "Content light level metadata": "light levels"}
+    found = [name for sign, name in kinds.items() if sign in told]
+    return [f"its {' and '.join(found)} (HDR10) are not kept"] if found else []
 
 
 def _shortest(video: str) -> float:

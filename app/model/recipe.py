@@ -147,12 +147,15 @@ class Output(Model):
         quality: 1-100, of JPEG, WebP, AVIF and video.
         samples: places looked up along a side of each pixel: "auto", as many as the map stretches there; 1 is sharper,
             and shows steps where the map shrinks the picture.
+        filter: between pixels. "catmull-rom" is sharp, and overshoots beside hard edges, below zero too; "limited" is
+            the same without overshooting, for HDR; "bilinear" is softer; "nearest" keeps pixels as they are.
     """
 
     size: Annotated[int, Field(ge=1, le=32768)] | None = None
     fps: Annotated[float, Field(gt=0, le=1000)] = 30.0
     quality: Annotated[int, Field(ge=1, le=100)] = 90
     samples: Literal["auto", 1] = "auto"
+    filter: Literal["catmull-rom", "limited", "bilinear", "nearest"] = "catmull-rom"
 
 
 class Recipe(Model):

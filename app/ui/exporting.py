@@ -135,6 +135,12 @@ PRESETS = (
     ),
 )
 RATED = (".jpg", ".webp", ".avif", ".mp4", ".webm", ".%04d.jpg")  # endings of files that have a quality
+FILTERS = (  # of a recipe, their names, and what they are for
+    ("catmull-rom", "Sharp", "Overshoots a little beside hard edges."),
+    ("limited", "No ringing", "Sharp, and never darker or brighter than the pixels around; for HDR."),
+    ("bilinear", "Soft", "The mean of the pixels around."),
+    ("nearest", "Hard", "Each pixel as it is; for pixel art."),
+)
 PREVIEW = 640  # pixels along the longer side
 FINER = (("As seen", 1), ("2 x", 2))
 
@@ -156,6 +162,7 @@ class ExportDialog(Dialog):
         presets: those that there are for it.
         forward: the map tells where the points of the original go.
         offsets: an EXR or TIFF map holds offsets in pixels.
+        filter: which of `FILTERS`.
     """
 
     width, tallest = 500, 664
@@ -181,6 +188,9 @@ class ExportDialog(Dialog):
         self.quality = session.recipe.output.quality
         self.fps = session.recipe.output.fps
         self.clip = session.project.clip
+        self.filter = [name for name, *_ in FILTERS].index(session.recipe.output.filter)
+        # Beside lights that are many times as bright as white it shows, elsewhere hardly.
+        self._may_ring = self.picture.linear or self.filter > 0 or (self.clip is not None and self.clip.colours.is_high)
         self.start, self.end = 0.0, session.length * session.dt
         self.finer = 0
         self.folder = preferences.export_to
@@ -264,7 +274,7 @@ class ExportDialog(Dialog):
         own = max(self.picture.width, self.picture.height)
         output = recipe.output.model_copy(
             update={"size": None if self.size == own else self.size, "fps": self.fps, "quality": self.quality}
-        )
+        ).model_copy(update={"filter": FILTERS[self.filter][0]})
         part = recipe.time.model_copy(
             update={"start": self.start, "end": max(self.end, self.start), "ping_pong": self.returns}
         )
@@ -332,6 +342,12 @@ class ExportDialog(Dialog):
             self.quality = round(slid.value)
         if self.kind == MAP:
             self._ask_about_map(ui)
+        elif self._may_ring:
+            imgui.align_text_to_frame_padding()
+            ui.dim("Pixels")
+            imgui.same_line(0, ui.px(12))
+            names, uses = [name for _, name, _ in FILTERS], [use for *_, use in FILTERS]
+            self.filter = ui.segmented("filter", names, self.filter, -1, uses)
         if self.animation:
             seconds, clip = self._seconds, self.clip
             if clip is None or clip.fps is None:

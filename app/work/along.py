@@ -18,10 +18,10 @@ LookUp = Callable[[np.ndarray, Quality], np.ndarray]
 """Looks up pixels (h, w, 1 or 3), uint16 or float32."""
 
 
-def along(layers: Sequence[Layer], look_up: LookUp) -> tuple[Layer, ...]:
-    """Layers looked up in the quality that each allows: exact ones bit for bit from the nearest pixel."""
+def along(layers: Sequence[Layer], look_up: LookUp, quality: Quality) -> tuple[Layer, ...]:
+    """Layers looked up in a quality, but for the exact ones: bit for bit from the nearest pixel."""
     mixed = [layer for layer in layers if not layer.exact]
-    floats = _in_threes([layer.values.astype(np.float32, copy=False) for layer in mixed], look_up, "catmull-rom")
+    floats = _in_threes([layer.values.astype(np.float32, copy=False) for layer in mixed], look_up, quality)
     exact = [layer for layer in layers if layer.exact]
     # as whole numbers of 16 bits each, of which a GPU keeps every one
     split = [np.ascontiguousarray(layer.values).view(np.uint16) for layer in exact]

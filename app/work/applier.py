@@ -14,7 +14,7 @@ from app.work.export import Target, looked_up, opaque_value, with_alpha
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid
-from solver.resample.plan import Edges, GivenMap, Sampling, SamplingError
+from solver.resample.plan import Edges, GivenMap, Quality, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
@@ -30,9 +30,11 @@ class Applier:
         how: the pictures are looked up.
     """
 
-    def __init__(self, device: Device, edges: Edges, premultiplied: bool = False) -> None:
+    def __init__(
+        self, device: Device, edges: Edges, quality: Quality = "catmull-rom", premultiplied: bool = False
+    ) -> None:
         self._device = device
-        self.how = Sampling(edges=edges, premultiplied=premultiplied)
+        self.how = Sampling(quality, edges, premultiplied=premultiplied)
         self._sampler = Sampler(device)
         self._given: Displacement | None = None
         self._map: GivenMap | None = None

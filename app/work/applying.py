@@ -76,12 +76,13 @@ class Application(Piece):
     Attributes:
         maps: of a sequence, each map warps the frame of its number, or makes that frame of a picture's animation; where
             the frames have other numbers, they go in order. The last one stays.
-        edges, size, quality: as in a recipe's job.
+        edges, filter, size, quality: as in a recipe's job.
         fps: of a picture's animation; a clip keeps its own rate.
     """
 
     maps: MapSource
     edges: Edges = "transparent"
+    filter: Quality = "catmull-rom"
     size: int | None = None
     quality: int = 90
     fps: float = 30.0
@@ -121,7 +122,7 @@ class Application(Piece):
             mend = "write f.%04d.png or .mp4" if not self.outputs.is_animation else "write a picture, such as out.png"
             given = "several maps or a clip" if not self.outputs.is_animation else "one map and one picture"
             raise UserError(f"Cannot write {self._output}: {given} do not make {what}; {mend}.")
-        with Applier(device(), self.edges, source.picture.premultiplied) as applier:
+        with Applier(device(), self.edges, self.filter, source.picture.premultiplied) as applier:
             work = _Applying(self, source, applier, progress)
             count = work.write_frames() if self.outputs.is_animation else work.write_still()
             work.notices.extend(applier.notices(self.maps.path))
@@ -179,7 +180,8 @@ class _Applying:
             size = pixels.shape[1], pixels.shape[0]
         target = Target(size, self.applier.how, parts(size[1]), alpha and kind.alpha)
         found = self.applier.warped(given, pixels, target)
-        layers = along(picture.layers, partial(self._look_up, given, size)) if "layers" in kind.keeps else ()
+        look_up, quality = partial(self._look_up, given, size), self.applier.how.quality
+        layers = along(picture.layers, look_up, quality) if "layers" in kind.keeps else ()
         if picture.wide is None:
             return replace(picture.with_pixels(found), layers=layers)
         return picture.with_wide(found, layers)
@@ -255,7 +257,7 @@ class _Applying:
     def _record(self) -> Record:
         """What is known of the files of the sequence that is written."""
         order, outputs, clip = self.order, self.outputs, self.source.clip
-        how = order.edges, order.size, order.quality, outputs.bits, outputs.strip, outputs.codec
+        how = order.edges, order.filter, order.size, order.quality, outputs.bits, outputs.strip, outputs.codec
         common = digest_of(code(), how, replace(order.maps, path=Path()), self.source.picture)
         digest = cache(digest_of_file)
 

@@ -334,7 +334,8 @@ class _Export:
 
     @property
     def _how(self) -> Sampling:
-        return Sampling(edges=self.recipe.edges, samples=self.recipe.output.samples)
+        output = self.recipe.output
+        return Sampling(output.filter, self.recipe.edges, output.samples)
 
     @property
     def _has_own(self) -> bool:
@@ -368,7 +369,9 @@ class _Export:
             if not self._has_layers or "layers" not in keeps:
                 return still
             layers = picture.cropped().layers
-            return replace(still, layers=along(layers, partial(self._look_up, self.replay.seen, self.size)))
+            return replace(
+                still, layers=along(layers, partial(self._look_up, self.replay.seen, self.size), self._how.quality)
+            )
         given = displacement(self.replay, self.size, 0, False, self.progress.check)
         warp = GivenMap(self.device, widened(given, picture.margins))
         try:
@@ -376,7 +379,9 @@ class _Export:
             how = replace(self._how, premultiplied=picture.premultiplied)
             target = Target((width, height), how, parts(height), alpha=not self.job.is_animation)
             wide = looked_up(self.sampler, warp, picture.wide, target)
-            return picture.with_wide(wide, along(picture.layers, partial(self._look_up, warp, target.size)))
+            return picture.with_wide(
+                wide, along(picture.layers, partial(self._look_up, warp, target.size), how.quality)
+            )
         except SamplingError as error:
             raise UserError(f"The map cannot be applied: {error}.") from None
         finally:

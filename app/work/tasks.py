@@ -34,6 +34,7 @@ FLAGS = {  # by which the command line sets a key of the recipe
     "'fluid.grid'": "--grid", "'fluid.solver'": "--solver", "'output.size'": "--size", "'output.fps'": "--fps",
     "'output.quality'": "--quality", "'time.start'": "--from", "'time.end'": "--to", "'duration'": "--duration",
     "'amount'": "--amount", "time: 'end'": "--to", "'start'": "--from", "'edges'": "--edges",
+    "'output.filter'": "--filter",
 }  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from app.work.export import run
 from app.work.fit_job import Fit
 from app.work.jobs import Job
 from app.work.tasks import Piece
+from solver.gl.context import ContextError
 from solver.gl.device import Device
 
 SERVING = "from app.work.worker import serve; serve()"
@@ -100,6 +101,8 @@ def perform(work: Work, progress: Progress) -> Outcome:
     except MemoryError:
         little = "there is not enough memory for it"
         return Outcome(label, f"{little}; use fewer --jobs or a smaller --size", f"{little}; choose a smaller size")
+    except ContextError as error:
+        return Outcome(label, str(error), str(error))
     except Exception as error:
         return Outcome(label, f"{type(error).__name__}: {in_a_line(error)}", f"{what} failed: {in_a_line(error)}")
     return Outcome(label, notices=report.notices, verdict=report.verdict or "")

@@ -16,7 +16,7 @@
 // Defines: TAPS 1, 2 or 4 (nearest, bilinear, Catmull-Rom) a direction; LEAST_PAIRS, MOST_PAIRS of samples, or ONE;
 // PREPARED; WHOLE if u_source is all of the picture; ZOOMED unless u_zoom is 1; BOUNDED if there is an outside; OPAQUE if
 // there is no alpha; PREMULTIPLIED if u_raw is, and the result; LINEAR_LIGHT to encode; CODES if no value is infinite;
-// CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
+// LIMITED where what Catmull-Rom makes is kept within the range of the pixels that the places lie between; CLAMPED to 0-1; DITHER to 8 bits; GREY_ALPHA; PAIRED where a fragment is two neighbours in x, four bytes each, and a texel of u_displacement too: what
 // they have in common is done once, and a software rasteriser waits for the pixels of both at the same time.
 // reads: 30
 #ifndef TAPS
@@ -129,6 +129,20 @@ void both(float low, float high, vec2 there, out float mean[BLOCK], out float od
     }
 }
 
+#ifdef LIMITED
+// A sum whose weights add up to `part`, within the range of a block's pixels from its second to `last`, both ways.
+COLOR limited(COLOR sum, float part, float x[BLOCK], float y[BLOCK], ivec2 last) {
+    COLOR least = AT(x[1], y[1]), most = least;
+    for (int j = 1; j <= last.y; ++j)
+        for (int i = 1; i <= last.x; ++i) {
+            COLOR value = AT(x[i], y[j]);
+            least = min(least, value);
+            most = max(most, value);
+        }
+    return clamp(sum, part * least, part * most);
+}
+#endif
+
 // The mean of the picture over four sample points: `middle` with `offset` added or taken away along x and along y, in pixels
 // from the corner of the pixel `whole` (two parts, so that large pictures lose no precision). The two on one diagonal
 // weigh (1 + correlation) / 4 each, the others (1 - correlation) / 4, so that any parallelogram's second moments are
@@ -153,6 +167,13 @@ COLOR four_samples(vec2 whole, vec2 middle, vec2 offset, float correlation) {
 #ifdef BOUNDED
     vec2 some = there.xy + there.zw, odds = there.zw - there.xy;
     float part = 0.25 * (some.x * some.y + correlation * odds.x * odds.y);
+#else
+    const float part = 1.0;
+#endif
+#ifdef LIMITED
+    sum = limited(sum, part, x, y, ivec2(2) + ivec2(step(1.0, high)));
+#endif
+#ifdef BOUNDED
     sum = part > 0.0 ? sum : COLOR(0.0);  // nothing times infinity is not nothing
 #ifndef OPAQUE
     sum.a += (1.0 - part) * u_outside;
@@ -184,6 +205,9 @@ COLOR one_sample(vec2 whole, vec2 place) {
         for (int i = 0; i < TAPS; i += STRIDE)
             sum += weighed(x[i], y[j], wy[j] * wx[i], wy[j] * wx[min(i + 1, TAPS - 1)]);
     sum *= UNIT;
+#ifdef LIMITED
+    sum = limited(sum, 1.0, x, y, ivec2(2));
+#endif
 #endif
 #ifdef BOUNDED
     vec2 beyond = abs(whole + place - u_middle) - u_half;

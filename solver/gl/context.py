@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes.util
 import os
+import re
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
@@ -17,10 +18,22 @@ from solver.gl.fences import Fences
 from solver.gl.timing import Timings
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
+GPU = "FLUIDWARP_GPU"
+"""The variable of the environment that says which graphics device is drawn on without a window."""
+MOST_GPUS = 99_999
 
 
 class ContextError(RuntimeError):
     """No usable OpenGL 3.3; the message says why and what to install."""
+
+
+class NoSuchDevice(ContextError):
+    """There are no more than `there` graphics devices, and another one was asked for."""
+
+    def __init__(self, asked: int, there: int) -> None:
+        numbers = "none" if there == 0 else "only 0" if there == 1 else f"0 to {there - 1}"
+        super().__init__(f"graphics device {asked} is not there; there is {numbers}")
+        self.there = there
 
 
 @dataclass(frozen=True)
@@ -40,17 +53,30 @@ class Limits:
         return any(name in self.renderer.lower() for name in ("llvmpipe", "softpipe", "swiftshader"))
 
 
-def _standalone_contexts() -> Iterator[dict[str, Any]]:
-    """How a context without a window can be asked for on this system, the best first."""
+def _standalone_contexts(gpu: int | None) -> Iterator[dict[str, Any]]:
+    """How a context without a window can be asked for on this system, the best first; only EGL can choose a device."""
     if not sys.platform.startswith("linux"):
         yield {}  # WGL on Windows, CGL on macOS
         return
-    yield {"backend": "egl"}
+    chosen = {} if gpu is None else {"device_index": gpu}
+    yield {"backend": "egl", **chosen}
     if ctypes.util.find_library("EGL"):
         # Without the -dev packages only the versioned names exist.
-        yield {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1"}
-    if os.environ.get("DISPLAY"):
+        yield {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1", **chosen}
+    if gpu is None and os.environ.get("DISPLAY"):
         yield {"libgl": "libGL.so.1", "libx11": "libX11.so.6"}  # GLX
+
+
+def _chosen_gpu() -> int | None:
+    """The graphics device that the environment asks for. Raises `ContextError` where that is no number."""
+    said = os.environ.get(GPU, "")
+    if not said:
+        return None
+    if not said.isdecimal() or len(said) > 5:
+        raise ContextError(f"graphics device {said!r} was asked for; it must be a number from 0 to {MOST_GPUS}")
+    if not sys.platform.startswith("linux"):
+        raise ContextError(f"graphics device {said} was asked for; on this system its own settings choose the device")
+    return int(said)
 
 
 class Context:
@@ -93,19 +119,26 @@ class Context:
     def headless(cls) -> Self:
         """One of its own, with no window: through EGL on Linux, through the system's own way elsewhere.
 
+        Which of several devices EGL takes, the variable `GPU` of the environment says; processes that are started
+        inherit it.
+
         Raises:
             ContextError: if there is no OpenGL 3.3 driver; the message says what was tried and what to install.
+            NoSuchDevice: if there are fewer devices.
         """
-        reasons: list[str] = []
-        for settings in _standalone_contexts():
+        gpu, reasons = _chosen_gpu(), list[str]()
+        for settings in _standalone_contexts(gpu):
             try:
                 ctx = moderngl.create_context(require=330, standalone=True, **settings)
             except Exception as error:  # glcontext raises plain Exception
+                if gpu is not None and (found := re.search(r"but found (\d+) device", str(error))):
+                    raise NoSuchDevice(gpu, int(found[1])) from None
                 reasons.append(str(error))
             else:
                 return cls(ctx, owns_context=True)
         hint = f"; {INSTALL_HINT}" if sys.platform.startswith("linux") else ""
-        raise ContextError(f"no OpenGL 3.3 without a window ({', '.join(dict.fromkeys(reasons))}){hint}")
+        where = "" if gpu is None else f" on graphics device {gpu}"
+        raise ContextError(f"no OpenGL 3.3 without a window{where} ({', '.join(dict.fromkeys(reasons))}){hint}")
 
     def framebuffer(self, textures: tuple[moderngl.Texture, ...]) -> moderngl.Framebuffer:
         """The framebuffer that draws into several textures at once, kept until one of them is released."""

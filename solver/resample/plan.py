@@ -14,11 +14,11 @@ from solver.gl.field import Field
 from solver.warp.map import WarpMap
 from solver.warp.scaled import ScaledMap
 
-Quality = Literal["catmull-rom", "bilinear", "nearest"]
+Quality = Literal["catmull-rom", "limited", "bilinear", "nearest"]
 Edges = Literal["transparent", "black", "clamp", "mirror", "wrap"]
 
 MOST_SAMPLES = 8
-_TAPS = {"nearest": 1, "bilinear": 2, "catmull-rom": 4}
+_TAPS = {"nearest": 1, "bilinear": 2, "limited": 4, "catmull-rom": 4}
 REACH = 2  # pixels that the taps reach beyond a sample point
 KINDS = {np.dtype(np.uint8): ("f1", 255.0), np.dtype(np.uint16): ("nu2", 65535.0), np.dtype(np.float32): ("f4", 0.0)}
 TARGET_COMPONENTS = {1: 1, 2: 2, 3: 4, 4: 4}  # targets of three components are not promised by GL
@@ -33,7 +33,9 @@ class Sampling:
     """How a picture is looked up.
 
     Attributes:
-        quality: interpolation between pixels.
+        quality: interpolation between pixels. "limited" is Catmull-Rom, kept for each colour, times alpha, within the
+            range of the pixels that its sample points lie between: it does not ring, and is never below zero where
+            they are not.
         edges: what lies beyond the picture. "transparent" is black where the picture has no alpha.
         samples: points looked up along a side of each pixel of the result, 1 or an even number; "auto" follows the
             stretch s of the map in that direction there: 2 clamp(ceil(0.75 s), 1, 4), 1 where it shifts or enlarges.
@@ -135,14 +137,16 @@ class Plan:
         return self.how.quality != "nearest" and (self.is_curved or self.has_alpha != self.is_premultiplied)
 
     @property
-    def preparation(self) -> tuple[bool, bool, bool]:
+    def preparation(self) -> tuple[bool, bool, bool, bool]:
         """What the picture on the GPU depends on."""
-        return self.is_prepared, self.is_curved, self.is_premultiplied
+        return self.is_prepared, self.is_curved, self.is_premultiplied, self.is_packed
 
     @cached_property
     def is_packed(self) -> bool:
         """True if a texel of what is prepared holds two neighbours in x, 16 bits a colour: enough for opaque bytes."""
         if not (self.is_prepared and self.is_curved and self.picture.dtype == np.uint8 and self.channels >= 3):
+            return False
+        if self.how.quality == "limited":  # which looks at each pixel by itself
             return False
         return self.channels == 3 or bool((self.picture[..., 3] == 255).all())
 
@@ -206,7 +210,9 @@ class Plan:
             "PACKED": self.is_packed,
             "LINEAR_LIGHT": self.is_curved and self.is_prepared,
             "CODES": levels > 0,  # of 8 or 16 bits, and so neither infinite nor NaN
-            "CLAMPED": levels > 0 and self.how.quality == "catmull-rom",  # the only one that overshoots
+            "LIMITED": self.how.quality == "limited",
+            # What is limited may overshoot once it is divided by alpha.
+            "CLAMPED": levels > 0 and self.how.quality in ("catmull-rom", "limited"),
             "DITHER": dither and kind == "f1" and self.how.quality != "nearest",
             "OPAQUE": not self.has_alpha,
             "PREMULTIPLIED": self.is_premultiplied,

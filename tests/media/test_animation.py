@@ -650,6 +650,10 @@ def test_what_of_a_clip_is_not_understood_is_told(tmp_path: Path):
     )
     said = tagged(tmp_path / "pq.mp4", f"{ten},{hdr}smpte2084")
     assert said == "pq.mp4: its colours are BT.2020 PQ and are mixed as if BT.709"
+    graded = "log-level=none:hdr10=1:max-cll=1000,400:master-display=G(13250,34500)B(7500,3000)R(34000,16000)"
+    graded += "WP(15635,16450)L(10000000,1)"
+    said = tagged(tmp_path / "ten.mp4", f"{ten},{hdr}smpte2084", "-c:v", "libx265", "-x265-params", graded)
+    assert said.endswith("mixed as if BT.709; its mastering display and light levels (HDR10) are not kept")
     said = tagged(tmp_path / "lin.mkv", f"{ten},{hdr}linear")
     assert said == "lin.mkv: its colours are BT.2020 linear and are treated as BT.709"
     assert "BT.2020 HLG" in tagged(tmp_path / "hlg.mkv", f"{ten},{hdr}arib-std-b67")

@@ -23,6 +23,7 @@ from app.work.applying import Application, MapSource
 from app.work.export import run
 from app.work.jobs import Job, Outputs
 from solver.gl.device import Device
+from support.commands import Run
 from support.exr import Part, read_exr
 
 HEIGHT, WIDTH = 40, 56
@@ -145,6 +146,30 @@ def test_layers_go_where_the_colours_go_and_ids_stay_ids(device: Device, tmp_pat
         np.testing.assert_array_equal(seen[name].view(np.uint32)[sure], wanted[sure], err_msg=name)
 
 
+@pytest.mark.parametrize("filtered", [(), ("--filter", "limited")])
+def test_light_rings_below_zero_unless_that_is_limited(tmp_path: Path, fluidwarp: Run, filtered: tuple[str, ...]):
+    """Colours, layers and what lies beyond the window, by a recipe and by its map."""
+    lamps = {
+        name: np.where(noise(number, np.float32) < 0.1, 900, 0).astype(np.float32) for number, name in enumerate("RGB")
+    }
+    windows = {"dataWindow": window(0, 0, WIDTH - 1, HEIGHT - 1), "displayWindow": window(0, 0, WIDTH - 5, HEIGHT - 1)}
+    saved(tmp_path / "lamps.exr", (windows, {**lamps, "spec.R": lamps["R"]}))
+    (tmp_path / "a.toml").write_text(
+        'picture = "lamps.exr"\nduration = 0.1\nedges = "clamp"\n[fluid]\ngrid = 24\n[[force]]\nkind = "vortex"\n'
+        "point = [0.5, 0.5]\nradius = 0.4\nstrength = 9\nat = 0\n"
+    )
+    for words in (
+        ["render", "a.toml", "-o", "out.exr", "--codec", "none", "--map", "map.npy"],
+        ["apply", "map.npy", "lamps.exr", "-o", "out.exr", "--codec", "none", "--edges", "clamp"],
+    ):
+        ran = fluidwarp(tmp_path, *words, *filtered)
+        assert (ran.returncode, ran.stderr) == (0, "")
+        (found,) = read_exr(tmp_path / "out.exr")
+        assert all((plane.min() < -10) == (not filtered) for plane in found.channels.values())
+        assert all((plane.max() > 910) == (not filtered) for plane in found.channels.values())
+        np.testing.assert_array_equal(found.channels["spec.R"], found.channels["R"])
+
+
 def test_what_an_output_cannot_hold_is_told_in_a_line(device: Device, tmp_path: Path):
     source, _ = a_shot(tmp_path / "shot.exr")
     lost = "lacks the picture's channels Z, diffuse.G, diffuse.R, instance.id and 7 more"
@@ -219,12 +244,12 @@ def test_a_damaged_header_is_told(tmp_path: Path, count: int):
         read_picture(source)
 
 
+def window(*corners: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
+
+
 def windowed(path: Path) -> tuple[Path, np.ndarray]:
     """A picture of 56 x 40 at 10, 20, with 6 pixels more on the left, 4 below and none elsewhere; its red."""
-
-    def window(*corners: int) -> tuple[np.ndarray, np.ndarray]:
-        return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
-
     y, x = np.mgrid[0 : HEIGHT + 4, 0 : WIDTH + 6].astype(np.float32)
     planes = {"R": x / 64, "G": y / 64, "B": x * 0 + 0.5, "Z": noise(3, np.float32).repeat(2, 0).repeat(2, 1)[: len(x)]}
     planes["Z"] = np.ascontiguousarray(planes["Z"][:, : WIDTH + 6])

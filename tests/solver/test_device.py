@@ -7,10 +7,15 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import moderngl
 import numpy as np
 import pytest
 from PIL import Image
+
+from solver.gl.context import GPU, ContextError, NoSuchDevice
+from solver.gl.device import Device
 
 ROOT = Path(__file__).parents[2]
 NO_EGL = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere.json"}  # the loader is there, but no driver for it
@@ -62,6 +67,50 @@ def test_without_egl_the_display_serves():
         finally:
             screen.terminate()
     assert found["max_texture_size"] >= 4096
+
+
+@linux
+def test_a_device_that_is_not_there_is_named_with_those_that_are(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv(GPU, "99999")
+    with pytest.raises(NoSuchDevice, match=r"^graphics device 99999 is not there; there is (only 0|0 to \d+)$") as told:
+        Device.headless()
+    assert told.value.there >= 1
+    assert str(NoSuchDevice(2, 2)).endswith("there is 0 to 1")
+    assert str(NoSuchDevice(0, 0)).endswith("there is none")
+
+
+@linux
+@pytest.mark.parametrize(("asked", "wanted"), [("", None), ("0", 0), ("1", 1)])
+def test_the_environment_chooses_the_device(monkeypatch: pytest.MonkeyPatch, asked: str, wanted: int | None):
+    """Each way to a context is asked for it, and none is taken that could not choose."""
+    tried: list[dict[str, Any]] = []
+
+    def refuse(**settings: Any) -> None:
+        tried.append(settings)
+        raise Exception("eglInitialize failed (0x3001)")
+
+    monkeypatch.setattr(moderngl, "create_context", refuse)
+    monkeypatch.setenv(GPU, asked)
+    monkeypatch.setenv("DISPLAY", ":9")
+    with pytest.raises(ContextError, match="eglInitialize failed") as told:
+        Device.headless()
+    assert {settings.get("device_index") for settings in tried} == {wanted}
+    assert any(settings.get("backend") is None for settings in tried) == (wanted is None)
+    assert (f"on graphics device {wanted}" in str(told.value)) == (wanted is not None)
+
+
+@pytest.mark.parametrize("asked", ["-1", "one", "100000", "9" * 5000])
+def test_what_is_no_device_is_refused(monkeypatch: pytest.MonkeyPatch, asked: str):
+    monkeypatch.setenv(GPU, asked)
+    with pytest.raises(ContextError, match="must be a number from 0 to 99999"):
+        Device.headless()
+
+
+def test_no_device_is_chosen_where_the_system_does(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv(GPU, "0")
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(ContextError, match="on this system its own settings choose"):
+        Device.headless()
 
 
 # The command line, which tells what it draws with.

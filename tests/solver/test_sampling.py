@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from solver.gl.device import Device
 from solver.grid import Grid
-from solver.resample.plan import GivenMap, Plan, Sampling, SamplingError
+from solver.resample.plan import Edges, GivenMap, Plan, Sampling, SamplingError
 from solver.resample.sampler import Sampler
 from solver.resample.tiles import Piece
 from solver.resample.transfer import PictureTexture
@@ -104,6 +104,83 @@ def test_tiles_are_the_same_to_the_bit_where_only_a_corner_is_distorted(device: 
     for size in (None, (601, 523)):
         wanted = Sampler(device).apply(warp, picture, size)
         np.testing.assert_array_equal(Sampler(device, whole=30_000, tile=(96, 70)).apply(warp, picture, size), wanted)
+
+
+def catmull_rom(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values (h, w, c) at places, in pixels from the centre of the first: by the spline, and the least and the most of
+    the four pixels around, in float64. At the edges they go on."""
+
+    def weights(f: np.ndarray) -> list[np.ndarray]:
+        near = [1.5 * f**3 - 2.5 * f**2 + 1 for f in (f, 1 - f)]
+        far = [-0.5 * f**3 + 2.5 * f**2 - 4 * f + 2 for f in (1 + f, 2 - f)]
+        return [far[0], near[0], near[1], far[1]]
+
+    height, width = values.shape[:2]
+    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
+    total, around = np.zeros((*x.shape, values.shape[2])), []
+    for j, wy in enumerate(weights(y - top)):
+        for i, wx in enumerate(weights(x - left)):
+            value = values[np.clip(top + j - 1, 0, height - 1), np.clip(left + i - 1, 0, width - 1)].astype(float)
+            total += (wx * wy)[..., None] * value
+            around += [value] if {i, j} <= {1, 2} else []
+    return total, np.min(around, axis=0), np.max(around, axis=0)
+
+
+@pytest.mark.parametrize(("kind", "channels"), [("float", 1), ("float", 3), ("float", 4), ("16", 3), ("8", 3)])
+def test_what_is_limited_is_the_spline_within_the_pixels_around(device: Device, kind: str, channels: int) -> None:
+    """Against float64, of a few bright pixels on black; without the limit it rings below them and above."""
+    dtype, top = KINDS[kind]
+    bright = np.random.default_rng(5).random((48, 64, channels)) < 0.2
+    picture = (bright * (1000 if kind == "float" else 0.9 * top)).astype(dtype)
+    displacement = waves((64, 48), 0.05)
+    x, y = (places + displacement[..., axis] * 64 for axis, places in enumerate(np.meshgrid(range(64), range(48))))
+    spline, least, most = catmull_rom(picture, x, y)
+    assert (spline < least - 1e-3 * top).mean() > 0.05 < (spline > most + 1e-3 * top).mean()
+    how = Sampling("limited", "clamp", samples=1, linear_light=False, dither=False, premultiplied=True)
+    still = Sampler(device).apply(GivenMap(device, np.zeros((48, 64, 2), np.float32)), picture, how=how)
+    np.testing.assert_array_equal(still, picture)
+    found = Sampler(device).apply(GivenMap(device, displacement), picture, how=how)
+    wanted = np.clip(spline, least, most)
+    if channels == 4:
+        wanted[..., 3] = np.clip(wanted[..., 3], 0, None)
+        opaque = wanted[..., 3] > 1 - 1e-5
+        found, wanted = found[~opaque], wanted[~opaque]
+    np.testing.assert_allclose(found, wanted, atol=0.01 if kind == "float" else 0.51)
+
+
+@pytest.mark.parametrize(("edges", "channels"), [("transparent", 3), ("wrap", 4)])
+def test_what_is_limited_never_rings_however_many_places_a_pixel_has(
+    device: Device, edges: Edges, channels: int
+) -> None:
+    """Torn and zoomed: not below zero and not above the brightest, and in tiles the same to the bit."""
+    light = (noise((48, 64, channels), "float") < 0.1) * np.float32(60000.3)
+    light[..., 3:] /= np.float32(60000.3)
+    tiled = Sampler(device, whole=2000, tile=(43, 34))
+    for amplitude, size in ((0.3, None), (0.1, (150, 31))):
+        warp = GivenMap(device, waves((64, 48), amplitude))
+        rings, kept = (
+            Sampler(device).apply(warp, light, size, Sampling(quality, edges, premultiplied=True))
+            for quality in ("catmull-rom", "limited")
+        )
+        assert rings[..., :3].min() < -100
+        assert kept.min() >= 0
+        assert kept.max() <= light.max() * (1 + 2e-7)
+        how = Sampling("limited", edges, premultiplied=True)
+        np.testing.assert_array_equal(tiled.apply(warp, light, size, how), kept)
+
+
+def test_what_is_limited_stays_among_its_own_neighbours(device: Device) -> None:
+    """Four places a pixel: within the range of the nine pixels around its place."""
+    picture, displacement = noise((48, 64), "float"), waves((64, 48), 0.03)
+    found = Sampler(device).apply(GivenMap(device, displacement), picture, how=Sampling("limited", "clamp"))
+    x, y = (places + displacement[..., axis] * 64 for axis, places in enumerate(np.meshgrid(range(64), range(48))))
+    here = np.clip(np.round(y).astype(int), 0, 47), np.clip(np.round(x).astype(int), 0, 63)
+    least, most = (
+        extreme(picture, 3, mode="nearest")[here] for extreme in (ndimage.minimum_filter, ndimage.maximum_filter)
+    )
+    inner = (x > 1) & (x < 62) & (y > 1) & (y < 46)
+    assert (found >= least - 1e-6)[inner].all()
+    assert (found <= most + 1e-6)[inner].all()
 
 
 @pytest.mark.parametrize("edges", ["transparent", "mirror"])

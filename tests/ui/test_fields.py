@@ -15,14 +15,19 @@ from app.media import project as projects
 from app.media.animation import ANIMATIONS as CONTAINERS
 from app.media.formats import FORMATS
 from app.media.maps import MAP_ENDINGS
+from app.media.pictures import write_picture
+from app.model.picture import Picture
+from app.model.recipe import Output
 from app.model.strokes import BrushPath, Change
 from app.progress import Progress
 from app.ui.events import LEFT, Button, Move
 from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PRESETS, ExportDialog
+from app.ui.files import load_any
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from app.work.export import run
+from solver.gl.device import Device
 from support.commands import Run
 from support.editing import Robot, export_dialog
 from support.widgets import Widgets
@@ -290,6 +295,41 @@ def test_a_part_of_the_warp_is_exported_as_the_command_line_writes_it(
     projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "work.fluidwarp")
     assert fluidwarp(tmp_path, "render", "work.fluidwarp", "-o", "line.png").returncode == 0
     assert (tmp_path / "window.png").read_bytes() == (tmp_path / "line.png").read_bytes()
+
+
+def test_pixels_are_mixed_as_is_chosen(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a picture whose lights go beyond white; of others nobody is asked, unless the recipe says something else."""
+
+    def asked() -> ExportDialog:
+        robot.rest()
+        widgets.at.clear()
+        robot.key("ctrl+e")
+        robot.frame(count=2)
+        return robot.editor.dialogs.shown[-1]  # type: ignore[return-value]
+
+    write_picture(tmp_path / "a.exr", Picture(np.ones((48, 64, 3), np.float32)))
+    robot = Robot(device, load_any(tmp_path / "a.exr"))
+    widgets = Widgets(robot, monkeypatch)
+    dialog = asked()
+    assert dialog.job().recipe.output.filter == "catmull-rom"
+    for label, wanted in (
+        ("No ringing", "limited"),
+        ("Soft", "bilinear"),
+        ("Hard", "nearest"),
+        ("Sharp", "catmull-rom"),
+    ):
+        widgets.click(label)
+        assert dialog.job().recipe.output.filter == wanted
+    dialog.close()
+    write_picture(tmp_path / "b.png", Picture(np.ones((48, 64, 3), np.uint8)))
+    robot.editor.open(load_any(tmp_path / "b.png"))
+    for filter_ in ("catmull-rom", "limited"):
+        robot.editor.session.edit("Filter", output=Output(filter=filter_))
+        dialog = asked()
+        assert ("No ringing" in widgets.at) == (filter_ == "limited")
+        assert dialog.job().recipe.output.filter == filter_
+        dialog.close()
+    robot.close()
 
 
 @pytest.mark.parametrize("number", range(len(PRESETS)))

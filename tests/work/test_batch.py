@@ -32,6 +32,7 @@ from app.work.jobs import Outputs
 from app.work.replay import Replay
 from app.work.tasks import Edits, Task, spread
 from app.work.worker import Outcome, perform
+from solver.gl.context import NoSuchDevice
 from solver.gl.device import Device
 
 ROOT = Path(__file__).parents[2]
@@ -146,6 +147,15 @@ def test_an_error_is_told_in_the_words_of_the_command_line_and_of_the_window(fol
 
 
 # One after the other, and in processes ------------------------------------------------------------------------------
+
+
+def test_a_missing_device_is_told_as_it_is(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    def none() -> Device:
+        raise NoSuchDevice(7, 1)
+
+    monkeypatch.setattr(worker, "own_device", none)
+    told = perform(order(folder / "a.toml", folder / "p0.png", Outputs(folder / "x.png")), Progress())
+    assert told.error == told.in_window == "graphics device 7 is not there; there is only 0"
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

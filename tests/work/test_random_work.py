@@ -1,0 +1,14 @@
+"""The properties of tests/properties/work.py with few and always the same examples; nightly.py tries new ones."""
+
+from __future__ import annotations
+
+from properties import work as properties
+from solver.gl.device import Device
+
+
+def test_random_work_is_undone_saved_and_opened_again_as_it_was(device: Device) -> None:
+    properties.check_session(device, 3, examples=3, acts=6)
+
+
+def test_a_recipe_of_any_numbers_is_refused_or_played(device: Device) -> None:
+    assert properties.check_recipes(device, 0, examples=30)["played"] > 8
