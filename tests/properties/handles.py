@@ -22,7 +22,7 @@ def random_line(rng: np.random.Generator) -> Handle:
     middle, closed, turned = rng.uniform(0, 1, 2), rng.random() < 0.5, rng.random() < 0.3
     count, size, angle = int(rng.integers(3, 12)), rng.uniform(0.04, 0.2), rng.uniform(0, 2 * np.pi)
     if closed:
-        angles = angle + np.sort(rng.uniform(0, 1, count) + np.arange(count)) * np.pi / count
+        angles = angle + np.sort(rng.uniform(0, 1, count) + np.arange(count)) * 2 * np.pi / count
         corners = middle + size * rng.uniform(0.7, 1, (count, 1)) * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     else:
         along = np.linspace(-size, size, count)[:, None] * [np.cos(angle), np.sin(angle)]
