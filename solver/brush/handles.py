@@ -94,6 +94,7 @@ class Lead(NamedTuple):
             (2 m + r, 2 p + r) and (2 p + r, 2 p + r); see `_system`.
         wanted: how the fluid shall move at them all, (n, 2), longer sides / s.
         local: what of their motion carries the picture and not the fluid, (p, 2).
+        owners: of each push the number of its handle, (m,).
         bounds: how strong each may be, longer sides / s, (m,).
     """
 
@@ -108,6 +109,7 @@ class Lead(NamedTuple):
     system: np.ndarray
     wanted: np.ndarray
     local: np.ndarray
+    owners: np.ndarray
     bounds: np.ndarray
 
 
@@ -233,8 +235,8 @@ class Handles:
         shares = np.concatenate([shares, np.ones(len(rings))])
         solving = *_system(_with_rings(places, pushed, push, rings), soft, shares), wanted, carried
         self._places[listed] += wanted * dt  # where to look for them
-        bounds = FARTHEST_STEP * reaches / dt
-        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, *solving, bounds)
+        bounds = numbers[drawn], FARTHEST_STEP * reaches / dt
+        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, *solving, *bounds)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -513,7 +515,13 @@ class Handles:
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             lacks[loop] -= (lacks[loop] * arms).sum() / max((arms**2).sum(), 1e-30) * arms
         told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
-        lacking, spins = _strengths(lead, told)
+        strengths, count = lead.back @ np.linalg.solve(lead.system, told), 2 * len(lead.drawn)
+        lacking, spins = strengths[:count].reshape(-1, 2), strengths[count:]
+        # What strains is the force, much of which its own image takes back near an edge: it keeps the bound of a step.
+        over = np.hypot(*lacking.T) / lead.bounds
+        parts = np.ones(lead.owners.max() + 1)
+        np.minimum.at(parts, lead.owners, 1 / np.maximum(over, 1.0))
+        lacking *= parts[lead.owners, None]
         masks: dict[str, Any] = {}
         if attenuated:
             lacking *= found[lead.drawn, 2:3]
@@ -525,23 +533,6 @@ class Handles:
         stream = fluid.device.pass_("brush/handle_stream.frag", **attenuated)
         lead.pushes.draw(fluid.device, stream, self._stream, found[lead.drawn, 3], lacking, **masks)
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
-
-
-def _strengths(lead: Lead, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The forces of pushes and the turns of rings for what is lacking, under the least ridge, of those tried, that keeps
-    every push within its bound.
-
-    What strains is the force. To scale down what is beyond its bound would leave those beside it unbalanced, whose forces
-    nearly cancel it (Levenberg 1944).
-    """
-    system, ridge, count = lead.system, 0.0, 2 * len(lead.drawn)
-    while True:
-        strengths = lead.back @ np.linalg.solve(system, told)
-        forces = strengths[:count].reshape(-1, 2)
-        if not (np.hypot(*forces.T) > lead.bounds).any():
-            return forces, strengths[count:]
-        ridge = max(2 * ridge, RIDGE)
-        system = lead.system + ridge * np.eye(len(told))
 
 
 def _system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> tuple[np.ndarray, np.ndarray]:
