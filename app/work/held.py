@@ -17,6 +17,7 @@ FROZEN = "what it holds is frozen"
 HALTED = {  # why a handle halts, by `Handles.halts`
     "strain": "the picture around it is bent as far as it bears; Fit leads all anew, which may bring it nearer",
     "at odds": "what others hold is in its way; Fit leads all anew, which may bring it nearer",
+    "soft": "it gives way to the fluid; more stiffness, or Fit, may bring it nearer",
     "edge": "what is at the picture's edge stays there",
 }
 

@@ -294,9 +294,11 @@ class Handles:
     @property
     def halts(self) -> list[str | None]:
         """Why each comes no nearer to where it is led: "edge", if that is farther than a line goes beside the picture's
-        edge; "strain", if the map around it slows it down; "at odds", if it has let go; else None.
+        edge; "strain", if the map around it slows it down; where it has let go "soft", if nothing else is held, or
+        else "at odds"; else None.
         """
         found = list[str | None]()
+        let_go = "at odds" if len(self.handles) > 1 else "soft"
         slower = self._slower(np.concatenate([np.zeros((0, 2)), *self.shapes]), np.arange(len(self._places)))
         for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._lacks, strict=True):
             starts = self._starts[rows]
@@ -305,7 +307,7 @@ class Handles:
             elif shape.is_held_by_edges(starts):
                 found.append("edge")
             else:
-                found.append("strain" if slower[rows].min() < 1 else "at odds" if waited > PATIENCE else None)
+                found.append("strain" if slower[rows].min() < 1 else let_go if waited > PATIENCE else None)
         return found
 
     def left(self, time: float, dt: float) -> list[tuple[np.ndarray, float]]:

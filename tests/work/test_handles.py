@@ -216,6 +216,15 @@ def test_that_the_map_bears_no_more_is_told_and_what_may_mend_it(device: Device)
     replay.release()
 
 
+def test_what_lets_go_by_itself_is_not_said_to_be_in_another_s_way(device: Device):
+    soft = led_to([0.4, 0.5], [0.6, 0.5], stiffness=0.01, duration=0.1)
+    replay = replay_of(device, handle=[soft], fluid={"grid": 16, "viscosity": 1.0, "drag": 20.0}, duration=0.8)
+    replay.seek(48)
+    ((_, said),) = unmet(replay, ARRIVED)
+    assert said.endswith("it gives way to the fluid; more stiffness, or Fit, may bring it nearer")
+    replay.release()
+
+
 def test_a_fluid_handle_beside_local_ones_arrives(device: Device):
     """They press the picture together, which tells of no fold."""
     beside = [Handle((0.45, y), (0.53, y), 0.15, duration=0.4, local=1.0) for y in (0.3, 0.7)]
