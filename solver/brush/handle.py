@@ -279,7 +279,7 @@ class Shape:
     def is_held_by_edges(self, starts: np.ndarray) -> bool:
         """True if it is a line that goes only a part of its way in the end, as what is at an edge stays there."""
         due = self.due(starts, math.inf, 1.0)
-        return bool(self.handle.points) and bool((np.clip(due, *beside_edges(starts, self.extent)) != due).any())
+        return bool(self.handle.points) and not np.allclose(np.clip(due, *beside_edges(starts, self.extent)), due)
 
     def away(self, places: np.ndarray, ends: np.ndarray) -> float:
         """How far what is farthest of it is from these places; of a ring, by how far it is turned and scaled."""

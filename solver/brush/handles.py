@@ -450,7 +450,7 @@ class Handles:
         begun = np.flatnonzero(~np.isnan(self._starts[:, 0]))
         apart = self._places[numbers, None] - self._places[begun]
         meet = np.hypot(apart[..., 0], apart[..., 1]) < self._radii[numbers, None] + self._radii[begun]
-        return np.where(meet, self._local[begun], 0.0).max(axis=1)
+        return np.where(meet, self._local[begun], 0.0).max(axis=1, initial=0.0)
 
     def _grown(self) -> float:
         """How many times as large as in the original the area is that has grown most within a closed line."""

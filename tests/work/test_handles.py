@@ -221,7 +221,9 @@ def test_what_lets_go_by_itself_is_not_said_to_be_in_another_s_way(device: Devic
     replay = replay_of(device, handle=[soft], fluid={"grid": 16, "viscosity": 1.0, "drag": 20.0}, duration=0.8)
     replay.seek(48)
     ((_, said),) = unmet(replay, ARRIVED)
-    assert said.endswith("it gives way to the fluid; more stiffness, or Fit, may bring it nearer")
+    assert said.endswith(
+        "it gives way to the fluid, and wants more stiffness; Fit leads all anew, which may bring it nearer"
+    )
     replay.release()
 
 
