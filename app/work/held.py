@@ -14,11 +14,12 @@ from solver.warp.inverse import ForwardMap
 
 Line = tuple[Point, ...]
 FROZEN = "what it holds is frozen"
-HALTED = {  # why a handle halts, by `Handles.halts`
-    "strain": "the picture around it is bent as far as it bears; Fit leads all anew, which may bring it nearer",
-    "at odds": "what others hold is in its way; Fit leads all anew, which may bring it nearer",
+HALTED = {  # why a handle or a pin halts, by `Handles.halts`
+    "strain": "the picture around it is bent as far as it bears",
+    "at odds": "what others hold is in its way",
     "edge": "what is at the picture's edge stays there",
 }
+ANEW = "; Fit leads all anew, which may bring it nearer"
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,13 @@ def unmet(replay: Replay, within: float) -> Iterator[tuple[str, str]]:
         if not far <= within:
             held = points if led.points else points[:1]
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
-            why = f": {FROZEN}" if (solid[rows, columns] == 255).any() else f": {HALTED[halt]}" if halt else ""
+            why = ""
+            if (solid[rows, columns] == 255).any():
+                why = f": {FROZEN}"
+            elif halt and led.is_in_force(max(replay.tick - 1, 0), replay.recipe.fluid.dt):
+                # A fit leads what goes somewhere, and leaves pins as they are.
+                is_fitted = halt != "edge" and isinstance(led, RecipeHandle) and led.is_led
+                why = f": {HALTED[halt]}{ANEW if is_fitted else ''}"
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
             yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led{why}"
 

@@ -446,7 +446,7 @@ class Handles:
         begun = np.flatnonzero(~np.isnan(self._starts[:, 0]))
         apart = self._places[numbers, None] - self._places[begun]
         meet = np.hypot(apart[..., 0], apart[..., 1]) < self._radii[numbers, None] + self._radii[begun]
-        return np.where(meet, self._local[begun], 0.0).max(axis=1)
+        return np.where(meet, self._local[begun], 0.0).max(axis=1, initial=0.0)
 
     def _grown(self) -> float:
         """How many times as large as in the original the area is that has grown most within a closed line."""
@@ -528,11 +528,11 @@ class Handles:
 
 
 def _strengths(lead: Lead, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The forces of pushes and the turns of rings for what is lacking, under the least ridge, of those tried, that keeps
-    every push within its bound.
+    """The forces of pushes and the turns of rings for what is lacking, under the least ridge, of those tried, that
+    keeps every push within its bound.
 
-    What strains is the force. To scale down what is beyond its bound would leave those beside it unbalanced, whose forces
-    nearly cancel it (Levenberg 1944).
+    What strains is the force. To scale down what is beyond its bound would leave those beside it unbalanced, whose
+    forces nearly cancel it (Levenberg 1944).
     """
     system, ridge, count = lead.system, 0.0, 2 * len(lead.drawn)
     while True:

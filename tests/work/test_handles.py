@@ -216,6 +216,33 @@ def test_that_the_map_bears_no_more_is_told_and_what_may_mend_it(device: Device)
     replay.release()
 
 
+def test_only_what_a_fit_leads_is_told_of_it(device: Device):
+    """No pin, nothing that has let go; and what has not begun halts for no reason."""
+    led = led_to([0.4, 0.5], [0.6, 0.5])
+    replay = replay_of(
+        device, handle=[led, led | {"end": 0.0}, led | {"start": 5.0}], pin=[{"at": [0.5, 0.5]}],
+        fluid={"grid": 32}, duration=0.1,
+    )  # fmt: skip
+    replay.advance()
+    folded = np.zeros((96, 128, 2), np.float32)
+    folded[:, 66, 0] = 1.5 / 128
+    replay.warp.set(folded)
+    said = {label: sentence.partition("is led")[2] for label, sentence in unmet(replay, -1.0)}
+    bent = ": the picture around it is bent as far as it bears"
+    fit = "; Fit leads all anew, which may bring it nearer"
+    assert said == {"handle[1]": bent + fit, "handle[2]": "", "handle[3]": "", "pin[1]": bent}
+    replay.release()
+
+
+def test_handles_of_which_none_has_begun_have_no_reason(device: Device):
+    late = led_to([0.4, 0.5], [0.6, 0.5], start=5.0)
+    replay = replay_of(device, handle=[late], fluid={"grid": 16}, duration=0.1)
+    replay.advance()
+    ((_, said),) = unmet(replay, ARRIVED)
+    assert said.endswith("away from where it is led")
+    replay.release()
+
+
 def test_a_fluid_handle_beside_local_ones_arrives(device: Device):
     """They press the picture together, which tells of no fold."""
     beside = [Handle((0.45, y), (0.53, y), 0.15, duration=0.4, local=1.0) for y in (0.3, 0.7)]
