@@ -334,8 +334,12 @@ def _aimed(
         return _Aim(base, pairs, names, tuple(leads), pairs.places[:, 0])
     timed = _has_times(recipe)
     if not timed:  # all go at once: what is pinned later than that goes to where it was pinned
-        late = [RecipeHandle.model_validate(pin.model_dump() | {"keys": ()}) for pin in recipe.pin if pin.start > 0]
-        pins = tuple(pin for pin in recipe.pin if pin.start <= 0)
+        late = [
+            RecipeHandle.model_validate(pin.model_dump() | {"keys": ()})
+            for pin in recipe.pin
+            if pin.start > 0 and not pin.muted
+        ]
+        pins = tuple(pin for pin in recipe.pin if pin.start <= 0 or pin.muted)
         recipe = recipe.edited(handle=(*recipe.handle, *late), pin=pins)
     leads, names, places, begins, own, kept = [], [], [], [], [], list(recipe.handle)
     shapes = _shapes(recipe.handle, extent)
@@ -491,6 +495,7 @@ class _Search:
             self.low[-1] = self.high[-1] = np.log(own)
         first = listed(np.maximum(1.5 * ways, 0.25), 1.0, 0.8, own)
         self.is_free = self.high > self.low
+        self.fixed = [*least.tolist(), *np.exp(self.low[len(ways) : -1]).tolist(), base.fluid.viscosity]
         self.start = np.where(self.is_free, (first - self.low) / np.where(self.is_free, self.high - self.low, 1.0), 0)
         self.start = np.clip(self.start, 0, 1)
 
@@ -565,7 +570,11 @@ class _Search:
 
     def _recipe(self, base: Recipe, point: np.ndarray, part: float = 1.0) -> Recipe:
         """The recipe that a point of the cube stands for, its handles led a part of their ways."""
-        values = [_rounded(value) for value in np.exp(self.low + point * (self.high - self.low))]
+        searched = np.exp(self.low + point * (self.high - self.low)).tolist()
+        values = [
+            _rounded(value) if is_free else fixed
+            for value, is_free, fixed in zip(searched, self.is_free, self.fixed, strict=True)
+        ]
         count, handles = len(self.numbers), dict(enumerate(base.handle))
         for row, number in enumerate(self.numbers):
             (at, end), lead = self.pairs[number], self.aim.leads[number]
@@ -573,15 +582,14 @@ class _Search:
             values_of = {
                 "at": (float(at[0]), float(at[1])),
                 "to": (float(to[0]), float(to[1])),
-                "radius": values[row] if self.is_free[row] else lead.handle.radius,
+                "radius": values[row],
                 "stiffness": min(values[count + row], 1.0),
                 "duration": _rounded(
                     values[2 * count + row] * max(min(base.duration, lead.until) - lead.handle.start, 0.0)
                 ),
             }
             handles[self._slots[row]] = lead.handle.model_copy(update=lead.course(part) | values_of)
-        viscosity = values[-1] if self.is_free[-1] else base.fluid.viscosity
-        fluid = base.fluid.model_copy(update={"viscosity": viscosity})
+        fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
         return base.edited(handle=tuple(handles.values()), fluid=fluid)
 
     @property
