@@ -142,7 +142,7 @@ class Push:
         What goes on through a rim presses what is in it together by e to the power of the way over the rim's width.
         """
         far = max(math.hypot(*velocity) for velocity in self.local_velocities) * self.dt / self.tip.radius
-        return max(min(self.tip.hardness, (1 - far) / CORE), 0.0)
+        return max(min(self.tip.hardness, 1.0, (1 - far) / CORE), 0.0)
 
     @property
     def vectors(self) -> list[Point]:
