@@ -65,7 +65,8 @@ def _version(name: str) -> str:
 def _headless() -> Iterator[Finding]:
     found = ask("app.doctor")
     if "error" in found:
-        mend = "give FLUIDWARP_GPU another number" if os.environ.get("FLUIDWARP_GPU") else "install what is named above"
+        asked = os.environ.get("FLUIDWARP_GPU")
+        mend = "give FLUIDWARP_GPU another number, or none" if asked else "install what is named above"
         yield Finding("OpenGL without a window", found["error"], mend, vital=True)
         yield from devices()
         return

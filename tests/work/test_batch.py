@@ -158,6 +158,18 @@ def test_a_missing_device_is_told_as_it_is(folder: Path, monkeypatch: pytest.Mon
     assert told.error == told.in_window == "graphics device 7 is not there; there is only 0"
 
 
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="counts threads as Linux tells them")
+@pytest.mark.parametrize("first", ["app.cli", "app.work.worker"])
+def test_linear_algebra_has_one_thread(first: str):
+    """Of the command line and of its processes, whatever loads NumPy first."""
+    telling = f"import {first}, numpy as np, os; np.eye(400) @ np.eye(400); print(len(os.listdir('/proc/self/task')))"
+    bare = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    ran = subprocess.run(
+        [sys.executable, "-c", telling], cwd=ROOT, env=bare, capture_output=True, text=True, check=True
+    )
+    assert int(ran.stdout) == 1
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_one_that_fails_does_not_stop_the_others(folder: Path, jobs: int):
     """A line for each, and the same bytes as each gets alone."""

@@ -221,6 +221,23 @@ def test_a_pin_that_was_set_late_is_led_to_where_it_was_set(device: Device):
     assert recipe.handle[1].to == pytest.approx((x, y), abs=1e-4)
 
 
+def test_a_far_way_has_a_radius_as_large_as_it_needs(device: Device):
+    """Half of the way and more, where that leaves nothing to search; of what is turned about a point too."""
+    far = fit(device, np.array([[[0.0, 0.5], [1.0, 0.5]]]), 1, FREE.replace("grid = 32", "grid = 8")).trial.recipe
+    assert far.handle[0].radius == pytest.approx(0.505)
+    turned = "[[handle]]\nat = [0.2, 0.5]\nto = [0.8, 0.5]\nrotate = 20.0\nradius = 0.1\n"
+    ring = fit(device, None, 1, FREE.replace("grid = 32", "grid = 8") + turned).trial.recipe
+    assert ring.handle[0].radius > 0.3
+
+
+def test_a_muted_pin_stays_one(device: Device):
+    parts = "[[handle]]\nat = [0.6, 0.5]\nto = [0.6, 0.44]\n[[pin]]\nat = [0.2, 0.2]\nstart = 0.4\nmuted = true\n"
+    recipe = Recipe.parse(FREE.replace("grid = 32", "grid = 8") + parts)
+    found = fit(device, None, 1, FREE.replace("grid = 32", "grid = 8") + parts).trial.recipe
+    assert found.pin == recipe.pin
+    assert len(found.handle) == 1
+
+
 def test_what_is_led_after_strokes_is_fitted_after_them(device: Device):
     stroke = '[[stroke]]\ntool = "push"\nradius = 0.2\nsamples = [[0, 0.3, 0.5, 1.0], [5, 0.4, 0.5, 1.0]]\n'
     led = "[[handle]]\nat = [0.3, 0.4]\nstart = 0.4\nkeys = [[0.6, 0.4, 0.45]]\n"

@@ -224,6 +224,32 @@ def test_what_lets_go_by_itself_is_not_said_to_be_in_another_s_way(device: Devic
     assert said.endswith(
         "it gives way to the fluid, and wants more stiffness; Fit leads all anew, which may bring it nearer"
     )
+
+
+def test_only_what_a_fit_leads_is_told_of_it(device: Device):
+    """No pin, nothing that has let go; and what has not begun halts for no reason."""
+    led = led_to([0.4, 0.5], [0.6, 0.5])
+    replay = replay_of(
+        device, handle=[led, led | {"end": 0.0}, led | {"start": 5.0}], pin=[{"at": [0.5, 0.5]}],
+        fluid={"grid": 32}, duration=0.1,
+    )  # fmt: skip
+    replay.advance()
+    folded = np.zeros((96, 128, 2), np.float32)
+    folded[:, 66, 0] = 1.5 / 128
+    replay.warp.set(folded)
+    said = {label: sentence.partition("is led")[2] for label, sentence in unmet(replay, -1.0)}
+    bent = ": the picture around it is bent as far as it bears"
+    fit = "; Fit leads all anew, which may bring it nearer"
+    assert said == {"handle[1]": bent + fit, "handle[2]": "", "handle[3]": "", "pin[1]": bent}
+    replay.release()
+
+
+def test_handles_of_which_none_has_begun_have_no_reason(device: Device):
+    late = led_to([0.4, 0.5], [0.6, 0.5], start=5.0)
+    replay = replay_of(device, handle=[late], fluid={"grid": 16}, duration=0.1)
+    replay.advance()
+    ((_, said),) = unmet(replay, ARRIVED)
+    assert said.endswith("away from where it is led")
     replay.release()
 
 

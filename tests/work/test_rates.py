@@ -14,6 +14,8 @@ from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.work.replay import Replay
+from solver.brush.push import Push
+from solver.brush.tip import Tip
 from solver.gl.device import Device
 
 TICKS, DT = 10, 0.02
@@ -107,6 +109,11 @@ def test_a_quick_hard_local_push_folds_nothing_and_carries_as_far(radius: float,
         replay.seek(tick)
         assert replay.warp.statistics().det_min > 0
     replay.release()
+
+
+def test_a_local_push_is_at_most_fully_hard() -> None:
+    slow = Push(Tip((0.5, 0.5), (0.5001, 0.5), 0.3, hardness=3.0), 1 / 60, local=1.0)
+    assert slow.local_hardness == 1.0
 
 
 @pytest.mark.parametrize("slant", [0.0, 0.1])
