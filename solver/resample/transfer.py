@@ -33,7 +33,7 @@ class PictureTexture:
         self.piece: Piece = (0, 0, 0, 0)
         self._kind: tuple[object, ...] = ()  # channels and type of the texture
         self.prepared = FieldPool(device, "picture")
-        self._held: tuple[np.ndarray, bool, bool, bool] | None = None
+        self._held: tuple[np.ndarray, bool, bool, bool, bool] | None = None
 
     def textures(self, plan: Plan) -> tuple[moderngl.Texture, moderngl.Texture]:
         """What is interpolated, and the pixels as they are."""
