@@ -65,10 +65,9 @@ class Tally:
         self.inputs = self.branches = 0
 
     def add(self, said: str) -> None:
-        if found := re.findall(r"stat::number_of_executed_units: (\d+)", said):
-            self.inputs += int(found[-1])
-        elif found := re.findall(r"^#(\d+)", said, re.MULTILINE):  # a process that died told no last figures
-            self.inputs += int(found[-1])
+        last = re.findall(r"stat::number_of_executed_units: (\d+)", said)
+        last = last or re.findall(r"^#(\d+)", said, re.MULTILINE)  # of a process that died
+        self.inputs += int(last[-1]) if last else 0
         self.branches = max([self.branches, *map(int, re.findall(r"cov: (\d+)", said))])
 
 
