@@ -137,7 +137,7 @@ def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[
             image.seek(place)
             image.load()
             durations.append(Fraction(image.info.get("duration") or UNTOLD).limit_denominator(1000) / 1000)
-            alpha = alpha or _pixels(image, True)[..., 3].min() < 255
+            alpha = alpha or (image.has_transparency_data and _pixels(image, True)[..., 3].min() < 255)
         loops = image.info.get("loop")
         # a GIF tells how often it begins again, or nothing if it does not
         plays = loops or 0 if name != "GIF" else 1 if loops is None else loops + 1 if loops else 0
