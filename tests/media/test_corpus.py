@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import fuzz
-import guided
 import pytest
 from PIL import Image
+
+import fuzz
+import guided
 
 
 def test_what_the_fuzzer_has_kept_is_read_or_refused(tmp_path: Path) -> None:
