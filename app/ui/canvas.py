@@ -262,13 +262,13 @@ class Canvas:
         """
         left, top, right, bottom = seen
         size, step = self._texture.size, inputs["step"]
-        numbers = {name: inputs[name] for name in ("shown", "step", "extent")} | {"level": float(level)}
+        numbers: dict[str, Any] = {name: inputs[name] for name in ("shown", "step", "extent")} | {"level": float(level)}
         numbers |= {"origin": (inputs["origin"][0] - left, inputs["origin"][1] - top)}
         numbers |= {"apart": tuple(max(2**level / side, one) for side, one in zip(size, step, strict=True))}
         numbers["target_height"] = float(bottom - top)
         layer = self._fields.get("picture", (right - left, bottom - top), 4, "f1")
         if (drawn := (layer, self._drawn, self._texture.filter, edges, numbers)) != self._picture_drawn:
-            given = {name: inputs[name] for name in ("picture", "displacement")}
+            given: dict[str, Any] = {name: inputs[name] for name in ("picture", "displacement")}
             self.device.pass_("view/picture.frag", EDGES=edges).draw_into(
                 layer.framebuffer, ("displacement",), **given, **numbers
             )
