@@ -498,11 +498,14 @@ def test_a_key_that_is_held_steps_on(robot: Robot) -> None:
         assert session.target == tick
 
 
-def test_pictures_opened_before_take_no_more_than_their_budget(
-    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("bound", "most"), [("OPENED_BUDGET", 1000), ("OPENED_BUDGET", 30 * 3 * (40 + 41) + 1024), ("MOST_OPENED", 1)]
+)
+def test_works_opened_before_are_no_more_than_their_bounds(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bound: str, most: int
 ) -> None:
-    """The one before always stays."""
-    monkeypatch.setattr(workspace, "OPENED_BUDGET", 1000)
+    """The one before always stays; with the pixels, histories count."""
+    monkeypatch.setattr(workspace, bound, most)
     for number in range(3):
         write_picture(tmp_path / f"{number}.png", pattern(40 + number, 30))
         robot.drop(tmp_path / f"{number}.png")
