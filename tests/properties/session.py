@@ -215,7 +215,7 @@ class Work(RuleBasedStateMachine):
         recipe = replay.recipe.edited(picture="", duration=1.0)
         now, key = look_of(replay), (recipe.model_dump_json(), replay.tick)
         known = self.looks.setdefault(key, now)
-        wrong = [name for name, mine, theirs in zip(Look._fields, now, known, strict=True) if mine != theirs]
+        wrong = [name for name, mine, theirs in zip(Look.__annotations__, now, known, strict=True) if mine != theirs]
         assert not wrong, wrong
 
     # -- what is done ------------------------------------------------------------------------------------------------
@@ -336,7 +336,7 @@ class Work(RuleBasedStateMachine):
         self._did("Force")
         self._look()
 
-    @precondition(lambda self: bars(self.work.recipe))
+    @precondition(lambda self: bool(bars(self.work.recipe)))
     @rule(verb=st.sampled_from(sorted(BARS)), which=st.integers(0, 9), by=st.integers(-9, 9), again=st.booleans())
     def edit_bars(self, verb: str, which: int, by: int, again: bool) -> None:
         """`again`: the key that does it is pressed twice, and is one edit."""
