@@ -4,10 +4,10 @@
 
 Every so many strokes another picture is opened in the same editor, after the last one was saved; every so many of them
 some are undone and made again. What a work holds while it is painted on depends on its size: up to 400 MB of
-checkpoints, and as much of the work before it. So memory and the objects of OpenGL are looked at where there is the same
-to hold each time: when the work has been left, for a small picture that is opened twice and not touched. Both are told;
-ends with 0 if at the end they are within a tenth of what they were after the warm-up, which is over once a tenth is done
-and as many works are open as Undo comes back to at most.
+checkpoints, and as much of the work before it. So memory and the objects of OpenGL are looked at where there is the
+same to hold each time: when the work has been left, for a small picture that is opened twice and not touched. Both are
+told; ends with 0 if at the end they are within a tenth of what they were after the warm-up, which is over once a tenth
+is done and as many works are open as Undo comes back to at most.
 """
 
 from __future__ import annotations
