@@ -201,6 +201,14 @@ SMALL_AND_HARMFUL = {
     ),
     "tables in plenty": ("nope = [" + "{}," * 1_000_000 + "]", "line 1: the 200001th of its keys, values and brackets"),
     "keys in plenty": ("".join(f"a{key} = 1\n" for key in range(200_000)), "of its keys, values and brackets"),
+    "forces": (
+        "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\n" * 513,
+        "there are 513 forces; at most 512 work",
+    ),
+    "thin curve": (
+        "[[force]]\nkind = 'curve'\nradius = 1e-300\npoints = [[0, 0], [9, 9]]",
+        "line 1: force[1]: 'radius' (1e-300) is too small for so long a curve",
+    ),
     "formula": (
         "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\nformula = '" + "~" * 499 + "1'",
         "not allowed in a formula",
