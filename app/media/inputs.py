@@ -12,7 +12,7 @@ from typing import BinaryIO
 from app.errors import UserError
 
 MAX_PIXELS = 400_000_000  # of a picture that is unpacked, if nothing else is said
-MOST_TEXT = 128 * 2**20  # bytes of a recipe: strokes of a day
+MOST_TEXT = 64 * 2**20  # bytes of a recipe: twice as much as its most numbers take when they are saved
 SMALL = 2 * 2**20  # bytes that anything may unpack to
 MOST_UNPACKED = 20  # times its size that a larger member of an archive may unpack to; strokes come to 3
 MOST_INDEX = 16 * 2**20  # bytes of an archive's list of members

@@ -38,6 +38,7 @@ from solver.grid import Grid
 
 Falloff = Literal["smooth", "gaussian"]
 Strength = Annotated[float, Field(ge=-1e6, le=1e6)]
+MOST_PIECES = 20_000  # of a curve; around the edge of a picture, of a radius of two thousandths
 
 
 class _Force(Timed):
@@ -183,6 +184,12 @@ class CurveForce(_Push):
             raise ValueError(f"a curve needs at least two points, not {len(self.points)}")
         if len(set(self.points)) < 2:
             raise ValueError("all points of the curve are the same; a curve needs a length")
+        pieces = len(self.points) + 8 * sum(math.dist(*ends) for ends in pairwise(self.points)) / self.radius
+        if pieces > MOST_PIECES:
+            raise ValueError(
+                f"'radius' ({self.radius:g}) is too small for so long a curve: it is cut into eight pieces a radius, "
+                f"{MOST_PIECES} at most"
+            )
         if not isinstance(self.direction, str):
             _checked_direction(self.direction)
         return self

@@ -24,6 +24,7 @@ from app.model.validation import complaint
 VERSION = 5
 MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
+MOST_FORCES = 512  # each has a picture of itself as large as the grid: of 256 cells, 200 MB in all
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
 
 T = TypeVar("T")
@@ -215,6 +216,8 @@ class Recipe(Model):
             raise ValueError("a 'map' warps coordinates, and mode \"density\" has none; remove one of them")
         if self.amount != 1 and self.mode == "density":
             raise ValueError("'amount' scales a warp of coordinates, and mode \"density\" has none; remove one of them")
+        if len(self.force) > MOST_FORCES:
+            raise ValueError(f"there are {len(self.force)} forces; at most {MOST_FORCES} work")
         if len(self.handle) + len(self.pin) > MOST_HANDLES:
             raise ValueError(
                 f"there are {len(self.handle) + len(self.pin)} handles and pins; at most {MOST_HANDLES} work"

@@ -10,6 +10,7 @@ import re
 import struct
 import subprocess
 import sys
+import tomllib
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -31,6 +32,7 @@ from app.media.source import open_source
 from app.media.video import read_clip
 from app.model import toml
 from app.model.picture import Picture
+from app.model.schema import frozen
 from app.ui.preferences import Preferences
 from support.commands import Run
 
@@ -199,6 +201,14 @@ SMALL_AND_HARMFUL = {
     ),
     "tables in plenty": ("nope = [" + "{}," * 1_000_000 + "]", "line 1: the 200001th of its keys, values and brackets"),
     "keys in plenty": ("".join(f"a{key} = 1\n" for key in range(200_000)), "of its keys, values and brackets"),
+    "forces": (
+        "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\n" * 513,
+        "there are 513 forces; at most 512 work",
+    ),
+    "thin curve": (
+        "[[force]]\nkind = 'curve'\nradius = 1e-300\npoints = [[0, 0], [9, 9]]",
+        "line 1: force[1]: 'radius' (1e-300) is too small for so long a curve",
+    ),
     "formula": (
         "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\nformula = '" + "~" * 499 + "1'",
         "not allowed in a formula",
@@ -218,6 +228,52 @@ def test_samples_are_no_words() -> None:
     """Lists of numbers count as one, or a project of six minutes would not open again."""
     samples, pairs = "[100, 0.25, -0.5, 1.0], [101, 1e-3, 0.5, 1], ", toml.MOST_WORDS // 8
     assert len(toml.parsed(f"samples = [{samples * pairs}]", "a.toml")["samples"]) == 2 * pairs
+
+
+ROWS = {
+    "samples": "a = [{row}]",
+    "with others": "a = [ [1, 2], 'b', {row}, {{c = [{row}, []]}}, [[{row}]] ]  # [[{row}]]",
+    "over lines": "a = [\n{row},\n{row} ,\n]\n[[b]]\nc = [[{row}], [{row}]]",
+    "in a text": 'a = \'[{row}]\'\nb = """[{row}\n{row}]"""',
+    "in an empty list": "a = [{row},]",
+    "marked": "a = [{{'\ue0000' = 0}}, {row}]",
+    "marked by an escape": 'a = [{{"\\uE0000" = 0}}, {row}]',
+    "no list": "a = {row}",
+    "no commas": "a = [{row} {row}]",
+    "a header": "[{row}]\nb = 1",
+    "unclosed": "a = [{row}",
+    "a mistake after it": "a = [{row}, 1.]\nb = 2",
+}
+OTHERWISE = ("a header", "no commas")  # the mistake that the parser comes to first may be another
+NUMBERS = ["[0, 0.1, -0.25, 1.0]", "[100, 1e-3, 1E5, -0]", "[1_0, +0.5, 0, 1]", "[01, 0, 0, 1]", "[1e999, 9, 9, 9]"]
+
+
+@pytest.mark.parametrize("shape", ROWS)
+@pytest.mark.parametrize("numbers", NUMBERS)
+def test_long_rows_of_numbers_are_read_as_short_ones(shape: str, numbers: str) -> None:
+    """As the standard library reads them, of whose time they would take nearly all; or refused as it refuses them."""
+    text = ROWS[shape].format(row=", ".join([numbers] * 90))
+    try:
+        expected = frozen(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        said = re.escape(f"a.toml is not valid TOML: {error}".partition(" (at line")[0])
+        with pytest.raises(UserError, match=r"a\.toml is not valid TOML" if shape in OTHERWISE else said):
+            toml.parsed(text, "a.toml")
+    else:
+        assert repr(frozen(toml.parsed(text, "a.toml"))) == repr(expected)
+
+
+def test_samples_are_no_work_for_the_parser(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes 20 microseconds for each number: half a minute for a day's painting."""
+    given: list[str] = []
+    loads = tomllib.loads
+    monkeypatch.setattr(tomllib, "loads", lambda text: given.append(text) or loads(text))
+    told = toml.parsed(f"a = 1\n[[stroke]]\nsamples = [{'[1, 0.5, 0.25, 1.0], ' * 1000}]", "a.toml")
+    assert told["stroke"][0]["samples"] == ((1, 0.5, 0.25, 1.0),) * 1000
+    assert len(given[0]) < 100
+    row = "[0,0,0,0]," * 50_000
+    with pytest.raises(UserError, match=r"a\.toml, line 2: more than 2000000 numbers in lists"):
+        toml.parsed(f"a = [{row}\n{row * 10}]", "a.toml")
 
 
 def test_what_recipes_hold_is_looked_through_and_taken():
@@ -407,7 +463,7 @@ def test_files_are_of_a_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyP
     path = tmp_path / "a.toml"
     with path.open("wb") as stream:
         stream.truncate(10 * 2**40)  # on the disk it takes nothing
-    with pytest.raises(UserError, match=rf"{path}: it has more than 128 MB, the most that a recipe may have"):
+    with pytest.raises(UserError, match=rf"{path}: it has more than 64 MB, the most that a recipe may have"):
         read_recipe(path)
     with pytest.raises(UserError, match="has more than 5 bytes"):
         read_input(path, "file", 5)

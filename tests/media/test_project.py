@@ -138,7 +138,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(made: Project, tmp_path: Path) 
             for _ in range(200):
                 stream.write(b"#" * 2**20)
     assert path.stat().st_size < 2**20
-    with pytest.raises(UserError, match=r"work\.fluidwarp holds a recipe of more than 128 MB"):
+    with pytest.raises(UserError, match=r"work\.fluidwarp holds a recipe of more than 64 MB"):
         projects.load(path)
 
 
