@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 ROUNDS = 12  # in which those that would be too strong are weighed anew, a bound on the cost
-CLOSE = 1.01  # times its bound that none exceeds after that; by what one still does, all are less
+CLOSE = 1.01  # times its bound where that ends; by as much as one still exceeds it, all are less
 
 
 class Balance:
-    """The least squares of (H3) for pushes of handles and turns of rings, with every push within its bound.
+    """Least squares as (H3) for pushes of handles and turns of rings, weighed so that every push is within its bound.
 
     Args:
         influence: what each unknown does to each thing that is wanted, K, (n, k); of the unknowns the first 2 m are the
@@ -43,8 +43,9 @@ class Balance:
             over = self._over(found)
             if over.max() <= CLOSE:
                 break
-            # At rest this is the constrained minimum: where W is less than it was the bound is met, and 1 / W has grown
-            # by that bound's multiplier (Karush, Kuhn and Tucker).
+            # What is too strong counts less, and the others, solved for with it, make up for that: cut off by itself it
+            # would leave them unbalanced. (Where this comes to rest at the bounds it is the constrained minimum; it ends
+            # as soon as all are within.)
             shares = np.minimum(self._shares, shares / np.maximum(over, 1e-30))
             found = solved(system(self._influence, self._soft, shares), wanted)
         return found / max(self._over(found).max(), 1.0)
