@@ -210,9 +210,10 @@ class Handles:
         share = self._local[listed][pushed]
         side = min(self._fluid.grid.picture)
         wide = np.maximum(np.minimum(WIDE * radii, side), radii)
-        self._calm(places[pushed], wide[pushed], 1 - slower[pushed])
         numbers = np.repeat(np.arange(len(rows)), self._counts[in_force])
-        beside = _beside(places, radii, numbers, np.array(led)[numbers])[pushed]
+        is_led, is_away = np.array(led)[numbers], np.array([self._is_away(way) for way in ways])[numbers]
+        self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
+        beside = _beside(places, radii, numbers, is_led)[pushed]
         many = np.flatnonzero(beside)
         drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
         reaches = np.concatenate([radii[pushed], wide[pushed[many]]])
@@ -220,7 +221,7 @@ class Handles:
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
         # What halts lets go: at rest among others that flow by it would strain the map around it as if it were led.
-        firm = np.where(np.array(led)[numbers], np.maximum(slower, LEAST_STIFFNESS), 1.0)
+        firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
         soft = np.repeat(softs[pushed], 2)
         if share.any():  # what is local is shared out first: the fluid would else do all of it, going on by itself
@@ -404,7 +405,11 @@ class Handles:
         nearer = lacks < least / 2
         least, waited = np.where(nearer, lacks, least), np.where(nearer, 0.0, waited + dt)
         self._lacks[active] = np.stack([least, waited], axis=-1)
-        return np.where((waited > PATIENCE) & (lacks > 1 / max(self._warp.size)), 0.0, 1.0)
+        return np.where((waited > PATIENCE) & [self._is_away(way) for way in ways], 0.0, 1.0)
+
+    def _is_away(self, way: Way) -> bool:
+        """True if the farthest of a handle's points has more than a texel to go."""
+        return way.left > 1 / max(self._warp.size)
 
     def _wanted(
         self, active: list[int], rows: list[slice], slower: np.ndarray, ways: list[Way], dt: float
