@@ -43,9 +43,8 @@ class Balance:
             over = self._over(found)
             if over.max() <= CLOSE:
                 break
-            # What is too strong counts less, and the others, solved for with it, make up for that: cut off by itself it
-            # would leave them unbalanced. (Where this comes to rest at the bounds it is the constrained minimum; it ends
-            # as soon as all are within.)
+            # What is too strong counts less, and the others make up for it: cut off, it would leave them unbalanced. At
+            # rest on the bounds this is the constrained minimum; it ends as soon as all are within.
             shares = np.minimum(self._shares, shares / np.maximum(over, 1e-30))
             found = solved(system(self._influence, self._soft, shares), wanted)
         return found / max(self._over(found).max(), 1.0)
