@@ -2,10 +2,11 @@
 
     python tests/fuzz.py [--reader png ...] [--inputs 1000] [--seed 0] [--findings DIR]
 
-A reader may read what it is given or refuse it by a `UserError`. Anything else is a finding: another exception, a
-process that ends, more than `LONGEST` seconds, more than `MOST_MEMORY` bytes. The input of each is kept in DIR and
-named in the last lines; ends with 0 if there is none. Every input is a whole file, as fluidwarp itself writes it,
-with bytes or words changed, lost, doubled or put in from another; the same seed gives the same ones.
+A reader may read what it is given or refuse it by a `UserError` of at most two lines. Anything else is a finding:
+another exception, a process that ends, more than `LONGEST` seconds, more than `MOST_MEMORY` bytes. The input of each is
+kept in DIR and named in the last lines; ends with 0 if there is none. Every input is a whole file, as fluidwarp itself
+writes it, with bytes or words changed, lost, doubled or put in from another; the same seed gives the same ones.
+`guided.py` lets coverage choose among such inputs.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
+from itertools import islice
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -44,7 +46,9 @@ from app.work import journal  # noqa: E402
 LONGEST = 5.0  # seconds
 MOST_MEMORY = 2**30  # bytes beyond what a reader's process has before its first input
 PICTURES = ".png", ".jpg", ".webp", ".avif", ".tif", ".exr", ".gif", ".bmp", ".tga", ".ppm"
-CLIPS = ".mp4", ".webm", ".apng"
+CLIPS = ".mp4", ".webm", ".mov", ".mkv", ".apng"
+PAGES = ".tif", ".gif", ".webp"
+MOST_FRAMES = 8  # that are decoded of a clip
 SIZE = 24, 20
 MOST_PIXELS = 2**24  # that a picture may have here; what a person admits is another matter
 RECIPE = """version = 5
@@ -127,6 +131,34 @@ def make_clip(path: Path) -> None:
             write(np.roll(board(), number, axis=1))
 
 
+def make_pages(path: Path) -> None:
+    from PIL import Image
+
+    frames = [Image.fromarray(np.roll(board(), number, axis=1)) for number in range(3)]
+    frames[0].save(path, save_all=True, append_images=frames[1:])
+
+
+def make_deep(path: Path) -> None:
+    """16 bits with all that a picture may carry besides."""
+    pixels = np.dstack([board(), np.full(SIZE[::-1], 200, np.uint8)]).astype(np.uint16) * 257
+    chunks = {b"gAMA": (45455).to_bytes(4), b"cICP": bytes((9, 16, 0, 1)), b"cHRM": bytes(range(32))}
+    write_picture(path, Picture(pixels, dpi=(300.0, 300.0), texts={"Title": "A board"}, chunks=chunks, xmp=b"<x/>"))
+
+
+def make_layers(path: Path) -> None:
+    """Two parts, the data windows of which lie beside the display window; half and whole floats, numbers of objects."""
+    import OpenEXR
+
+    values = board().astype(np.float32) / 255
+    ids = np.arange(values[..., 0].size, dtype=np.uint32).reshape(SIZE[::-1])
+    first = {"RGB": values, "Z": values[..., 0], "diffuse.RGB": values.astype(np.float16)}
+    window = {"displayWindow": ((2, 1), (20, 15)), "dataWindow": ((0, 0), (SIZE[0] - 1, SIZE[1] - 1))}
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, **window}
+    parts = [OpenEXR.Part({**header, "name": "beauty", "owner": "nobody"}, first, "beauty")]
+    parts.append(OpenEXR.Part({**header, "name": "ids"}, {"id": ids}, "ids"))
+    OpenEXR.File(parts).write(str(path))
+
+
 def make_recipe(path: Path) -> None:
     path.write_text(RECIPE)
 
@@ -156,6 +188,25 @@ def make_journal(path: Path) -> None:
     path.write_bytes(b"".join(journal.beginning(origin, work)))
 
 
+def make_landmarks(path: Path) -> None:
+    places = "\n".join(f"{x:.2f} {y:.2f}" for x, y in np.random.default_rng(0).random((5, 2)) * SIZE)
+    path.write_text(f"version: 1\nn_points: 5\n{{\n{places}\n}}\n")
+
+
+def read_landmarks(path: Path) -> None:
+    """As both of the two files that are needed."""
+    read_pairs([path, path], SIZE)
+
+
+def read_frames(path: Path) -> None:
+    """A picture, or a clip and its first frames."""
+    clip = open_source(path, MOST_PIXELS).clip
+    if clip is not None:
+        with closing(clip.pictures()) as frames:
+            for _ in islice(frames, MOST_FRAMES):
+                pass
+
+
 def read_journal(path: Path) -> None:
     with suppress(journal.Damaged, journal.Newer):
         journal.read(path.read_bytes())
@@ -163,17 +214,33 @@ def read_journal(path: Path) -> None:
 
 Maker = Callable[[Path], None]
 READERS: dict[str, tuple[Maker, Callable[[Path], object]]] = {
-    **{f"picture{ending}": (make_picture, lambda path: open_source(path, MOST_PIXELS)) for ending in PICTURES},
-    **{f"clip{ending}": (make_clip, lambda path: open_source(path, MOST_PIXELS)) for ending in CLIPS},
+    **{f"picture{ending}": (make_picture, read_frames) for ending in PICTURES},
+    **{f"clip{ending}": (make_clip, read_frames) for ending in CLIPS},
+    **{f"pages{ending}": (make_pages, read_frames) for ending in PAGES},
+    "deep.png": (make_deep, read_frames),
+    "layers.exr": (make_layers, read_frames),
     **{
         f"map{ending}": (make_map, lambda path: read_map(path, max_pixels=MOST_PIXELS))
         for ending in (".exr", ".tif", ".flo", ".npy")
     },
     **{f"pairs{ending}": (make_pairs, lambda path: read_pairs([path], SIZE)) for ending in (".csv", ".tps")},
+    "pairs.pts": (make_landmarks, read_landmarks),
     "recipe.toml": (make_recipe, read_recipe),
     "project.fluidwarp": (make_project, lambda path: load(path, MOST_PIXELS)),
     "journal.txt": (make_journal, read_journal),
 }
+
+
+def judged(reader: str, path: Path) -> None:
+    """Let a reader read a file, or refuse it. Raises whatever else it does."""
+    try:
+        READERS[reader][1](path)
+    except UserError as error:
+        said = str(error)
+    else:
+        return
+    if len(said.splitlines()) > 2 or not said.replace("\n", " ").isprintable():
+        raise ValueError(f"not a message of two lines: {said!r}")
 
 
 def damaged(whole: bytes, dice: random.Random) -> bytes:
@@ -205,19 +272,16 @@ def damaged(whole: bytes, dice: random.Random) -> bytes:
 
 def read_all(reader: str, first: int, count: int, seed: int, path: Path) -> None:
     """Read one input after another from `path`; tells of each before and after it, for the process that waits."""
-    _, read = READERS[reader]
     whole = whole_file(reader, path.parent)
     path.write_bytes(whole)
-    read(path)  # or damage would show nothing
+    READERS[reader][1](path)  # or damage would show nothing
     start = _peak()
     for number in range(first, first + count):
         path.write_bytes(damaged(whole, random.Random(f"{reader} {seed} {number}")))
         print("read", number, flush=True)
         begun, told = time.perf_counter(), "fine"
         try:
-            read(path)
-        except UserError:
-            pass
+            judged(reader, path)
         except Exception as error:
             told = f"{type(error).__name__}: {error}".splitlines()[0]
         if (took := time.perf_counter() - begun) > LONGEST:

@@ -13,9 +13,13 @@ import random
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
-import properties
-from solver.gl.device import Device
+ROOT = Path(__file__).parent.parent
+sys.path[:0] = [path for path in (str(ROOT), str(ROOT / "tests")) if path not in sys.path]
+
+import properties  # noqa: E402
+from solver.gl.device import Device  # noqa: E402
 
 Check = Callable[[Device, int], dict[str, float]]
 

@@ -92,3 +92,9 @@ def test_the_installed_wheel_renders_without_the_source(built: Path):
     with Image.open(built / "coffee.png") as picture:
         assert picture.width == 96
         assert np.asarray(picture).std() > 20
+
+
+def test_the_nightly_script_finds_the_checks_of_all_rooms(tmp_path: Path):
+    shown = run(sys.executable, ROOT / "tests/nightly.py", "--seeds", "0", cwd=tmp_path)
+    rooms = {path.stem for path in (ROOT / "tests/properties").glob("*.py")} - {"__init__"}
+    assert {line.split(".")[0] for line in shown.splitlines()} == rooms

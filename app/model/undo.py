@@ -97,10 +97,14 @@ class History:
             self._index -= 1
 
     def amend(self, recipe: Recipe) -> None:
-        """Let the present be `recipe`, still as the same edit: the recording goes on while the fluid comes to rest."""
+        """Let the present be `recipe`, as one edit with what led to it; what could be redone is gone."""
         if recipe is self.recipe or recipe == self.recipe:
             return
         del self._entries[self._index + 1 :]
+        self.go_on(recipe)
+
+    def go_on(self, recipe: Recipe) -> None:
+        """Let the present be `recipe`, as no edit: the recording goes on. What can be redone stays."""
         before = self._entries[self._index - 1].recipe if self._index else None
         nbytes = _own_bytes(recipe, before)
         self._entries[self._index] = replace(self._entries[self._index], recipe=recipe, nbytes=nbytes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, floor
+from math import ceil, floor, log2
 from typing import Any
 
 import moderngl
@@ -59,6 +59,7 @@ class Canvas:
         self._still = device.field((1, 1), 2, "no displacement")
         self._fields = FieldPool(device, "canvas")
         self._drawn: object = None  # what the displacement was found for
+        self._picture_drawn: object = None  # and the picture through it
         self._masks_drawn: object = None  # and what is laid over it for the masks
         # The warp as it was last seen, shown on while it is made again on another grid.
         self._last: tuple[Field, tuple[float, ...]] | None = None
@@ -77,6 +78,7 @@ class Canvas:
         """Show another frame from now on, as `shown_pixels` makes it of a picture of the same size."""
         self._texture.write(pixels)
         self._is_reduced = False
+        self._picture_drawn = None
 
     def draw(
         self,
@@ -103,7 +105,7 @@ class Canvas:
             texture = replay.density.values.texture
         elif not state.before:
             displacement, shown = self._seen(session, state, viewport, seen)
-        self._filter(viewport, session.is_moving)
+        level = self._filter(viewport, session.is_moving)
         defines: dict[str, object] = {"EDGES": EDGES[session.recipe.edges]}
         inputs: dict[str, Any] = {
             "picture": texture,
@@ -114,6 +116,11 @@ class Canvas:
             "extent": session.extent,
             "target_height": float(height),
         }
+        corner = {"corner": (float(seen[0]), float(height - seen[3]))}
+        # At rest as an export has it. While things move one place a pixel is looked up, pressed together or not.
+        if displacement is not self._still and not (session.is_moving or state.is_scaling):
+            inputs |= {"seen": self._picture(seen, inputs, defines["EDGES"], level), **corner}
+            defines["SEEN"] = 1
         if state.before or state.split is not None:
             defines["SPLIT"] = 1
             inputs["split"] = 2.0 if state.before else state.split
@@ -123,7 +130,7 @@ class Canvas:
         self._add_overlays(defines, inputs, session, state, scale * density)
         if not state.before and (masks := self._masks(session, state, seen, inputs, scale * density)):
             defines["MASKS"] = 1
-            inputs |= {"masks": masks, "masks_corner": (float(seen[0]), float(height - seen[3]))}
+            inputs |= {"masks": masks, **corner}
         forces, velocity = state.overlays["forces"], state.overlays["velocity"]
         arrows: list[dict[str, Any]] = []
         if forces.shown and not state.before and replay.forces:
@@ -248,6 +255,26 @@ class Canvas:
         self._last = field, shown
         return self._last
 
+    def _picture(self, seen: Pixels, inputs: dict[str, Any], edges: object, level: int) -> Field:
+        """The picture through the displacement, at the pixels that are `seen`, drawn where it has changed.
+
+        `level`: how often the picture is halved for it.
+        """
+        left, top, right, bottom = seen
+        size, step = self._texture.size, inputs["step"]
+        numbers: dict[str, Any] = {name: inputs[name] for name in ("shown", "step", "extent")} | {"level": float(level)}
+        numbers |= {"origin": (inputs["origin"][0] - left, inputs["origin"][1] - top)}
+        numbers |= {"apart": tuple(max(2**level / side, one) for side, one in zip(size, step, strict=True))}
+        numbers["target_height"] = float(bottom - top)
+        layer = self._fields.get("picture", (right - left, bottom - top), 4, "f1")
+        if (drawn := (layer, self._drawn, self._texture.filter, edges, numbers)) != self._picture_drawn:
+            given: dict[str, Any] = {name: inputs[name] for name in ("picture", "displacement")}
+            self.device.pass_("view/picture.frag", EDGES=edges).draw_into(
+                layer.framebuffer, ("displacement",), **given, **numbers
+            )
+            self._picture_drawn = drawn
+        return layer
+
     def _masks(
         self, session: Session, state: EditorState, seen: Pixels, inputs: dict[str, Any], scale: float
     ) -> Field | None:
@@ -292,14 +319,16 @@ class Canvas:
             self._texture.build_mipmaps()
             self._is_reduced = True
 
-    def _filter(self, viewport: Viewport, moves: bool) -> None:
+    def _filter(self, viewport: Viewport, moves: bool) -> int:
+        """Choose how the picture is looked at; how often it is halved for that."""
         zoom = viewport.scale * viewport.density / self._shrunk
-        small = moderngl.LINEAR
+        small, level = moderngl.LINEAR, 0
         # Of a clip that runs, each frame would have to be reduced: up to a half nobody misses it.
         if zoom < (0.5 if moves and not self._is_reduced else 0.75):
             self._reduce()
-            small = moderngl.LINEAR_MIPMAP_NEAREST
+            small, level = moderngl.LINEAR_MIPMAP_NEAREST, max(round(-log2(zoom)), 0)
         self._texture.filter = (small, moderngl.NEAREST if zoom >= 6 else moderngl.LINEAR)
+        return level
 
     def _add_overlays(
         self, defines: dict[str, object], inputs: dict[str, object], session: Session, state: EditorState, scale: float

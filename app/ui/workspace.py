@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,8 @@ from app.work.recovery import Found
 from app.work.session import Session
 from solver.gl.device import Device
 
-# Bytes of pixels of the pictures that were open before, to which Undo comes back.
+# What was open before, to which Undo comes back: works, and bytes of their pixels and histories.
+MOST_OPENED = 16
 OPENED_BUDGET = 2**30
 
 
@@ -63,6 +66,11 @@ class Work:
             canvas.show(self.pixels)
         session.clip_frames = self.reel.frames
         return self.reel.take_words()
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that it holds when it is asleep, roughly."""
+        return self.session.project.picture.pixels.nbytes + self.session.document.history.nbytes
 
     @property
     def awaits_frame(self) -> bool:
@@ -134,7 +142,7 @@ class Workspace:
             self._close(old)
         kept = self._works[: self._index + 1]
         replaced = kept.pop() if kept and kept[-1].session is self.placeholder and not self.is_dirty else None
-        while len(kept) > 1 and sum(old.session.project.picture.pixels.nbytes for old in kept) > OPENED_BUDGET:
+        while len(kept) > 1 and (len(kept) > MOST_OPENED or sum(old.nbytes for old in kept) > OPENED_BUDGET):
             self._close(kept.pop(0))
         self._leave()
         self._works = [*kept, Work(session, canvas)]
@@ -205,9 +213,11 @@ class Workspace:
 
     def release_left(self) -> None:
         """Free what drew works that have been left; before a frame is drawn."""
-        for canvas in self._left:
-            canvas.release()
-        self._left.clear()
+        if self._left:
+            for canvas in self._left:
+                canvas.release()
+            self._left.clear()
+            _hand_back()
 
     def _put_to_sleep(self, work: Work) -> None:
         if (canvas := work.sleep()) is not None:
@@ -218,6 +228,8 @@ class Workspace:
             self.session.stop_recording()
             self.session.forget_grid()
             self.keep()
+            if not self.is_dirty:  # nothing of it would be lost: no thread has to wait for more
+                self._journals.close(self.session)
 
     def _turn_to(self, index: int) -> None:
         self._index = index
@@ -229,3 +241,19 @@ class Workspace:
     def _close(self, work: Work) -> None:
         self._journals.close(work.session)
         self._put_to_sleep(work)
+
+
+def _hand_back() -> None:
+    """Let the system have the memory that has been freed.
+
+    glibc keeps what lies below anything that is still in use: of the checkpoints that a software rasteriser has in
+    memory, up to 400 MB a work, nearly all.
+    """
+    if (trim := _malloc_trim()) is not None:
+        trim(0)
+
+
+@cache
+def _malloc_trim() -> ctypes._NamedFuncPointer | None:
+    """That of the C library of this process; None where it has none, as only glibc does."""
+    return getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None

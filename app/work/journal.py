@@ -138,7 +138,12 @@ def continuation(work: Work, before: Work) -> bytes:
     old = old[dropped:]
     kept = next((number for number, pair in enumerate(zip(old, new, strict=False)) if pair[0] is not pair[1]), None)
     kept = min(len(old), len(new)) if kept is None else kept
-    same = not dropped and kept == before.index == work.index == len(new) - 1 and old[kept].name == new[kept].name
+    same = (
+        not dropped
+        and kept == before.index == work.index < len(old) == len(new)
+        and old[kept].name == new[kept].name
+        and all(mine is theirs for mine, theirs in zip(old[kept + 1 :], new[kept + 1 :], strict=True))
+    )
     if same and work.is_grid_automatic == before.is_grid_automatic:
         # The same edit, while the fluid comes to rest.
         return _line({"amend": _difference(new[kept].recipe, old[kept].recipe)})
@@ -225,7 +230,7 @@ def _followed(work: Work, record: dict[str, Any]) -> Work:
     if "amend" in record:
         entry = entries[work.index]
         amended = replace(entry, recipe=_changed(entry.recipe, record["amend"]))
-        return replace(work, entries=(*entries[: work.index], amended))
+        return replace(work, entries=(*entries[: work.index], amended, *entries[work.index + 1 :]))
     del entries[: record.get("drop", 0)]
     del entries[record.get("keep", len(entries)) :]
     for name, nbytes, changes in record.get("add", ()):

@@ -374,6 +374,7 @@ class Replay:
         here, canvas, pictures = self.recipe.masks_at(self.tick), self.masks.canvas, self.small_pictures
         left = remaining(here, before.masks_at(self.tick) if before is not None else ())
         assert left is not None
+        # What is thawed and frozen again at once is held anew: so each is applied by itself, as where a hand does it.
         for edit, first in left:
             if isinstance(edit, MaskStroke):
                 for hand in range(first, edit.last_tick + 1):
@@ -387,7 +388,6 @@ class Replay:
                     )
                 except (ValueError, UserError) as error:
                     raise UserError(f"mask[{self.recipe.mask.index(edit) + 1}]: {error}") from None
-        if left:
             with self.device.stage("brush"):
                 self._apply_masks()
 

@@ -576,7 +576,7 @@ class Session:
             self._live = self._live.edited(duration=ticks * self.dt)
             self._is_heard = False
             if self.made is None:
-                self.document.history.amend(self._live)
+                self.document.history.go_on(self._live)
                 self._base = self._live
         self._step()
 

@@ -2,7 +2,7 @@
 // that are solid or thicker than the fluid at its tip, for all of it alike. Were it less beside them only, what the brush
 // moves would flow back there through a single cell, many times faster than the brush, and tear the map.
 // u_motion: from probe; u_viscosity: cells, lengths^2 / s; u_solid: cells.
-// reads: 49
+// reads: 193
 #include "lib/brush.glsl"
 #include "lib/images.glsl"
 #include "lib/crowding.glsl"

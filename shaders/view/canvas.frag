@@ -1,18 +1,16 @@
 // Canvas: what lies under a pixel of the screen: the picture through the warp map, on a checkerboard, with its overlays.
 //   colour(x) = picture(x + D(x)),  x = (pixel - u_origin) u_step  in 0-1 of the picture
 // u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering, over u_shown: left, top, width and
-// height, 0-1 of the picture; u_extent: width and height in longer sides. EDGES: beyond the picture it is 0 transparent,
-// 1 black, 2 as at its edge (the sampler clamps), 3 mirrored, 4 repeated. SPLIT: left of u_split the picture is as it was. CHECKER: something may be transparent; u_tile: side of a
-// square of the checkerboard, pixels.
+// height, 0-1 of the picture; u_extent: width and height in longer sides. EDGES: see lib/beyond.glsl. SPLIT: left of u_split
+// the picture is as it was. CHECKER: something may be transparent; u_tile: side of a square of the checkerboard, pixels.
+// SEEN: u_seen, what picture.frag draws, is what is seen of it, its first pixel at u_corner.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. MASKS: u_masks, what masks.frag draws,
-// its first pixel at u_masks_corner. ROOM: a tint where u_room, over the picture, swells or shrinks.
+// its first pixel at u_corner too. ROOM: a tint where u_room, over the picture, swells or shrinks.
 // SELECTED: dashes of half u_dash pixels along the edge of where u_selected is 1/2 or more, u_dash_width pixels wide to each side.
 // The colours are told apart by those who do not see red and green apart (Okabe and Ito).
 // reads: 2, and up to 13 with overlays
-#ifndef EDGES
-#define EDGES 2
-#endif
+#include "lib/beyond.glsl"
 uniform sampler2D u_picture;
 uniform sampler2D u_displacement;
 uniform vec2 u_origin;
@@ -35,7 +33,12 @@ uniform float u_pixel;
 #endif
 #ifdef MASKS
 uniform sampler2D u_masks;
-uniform vec2 u_masks_corner;
+#endif
+#ifdef SEEN
+uniform sampler2D u_seen;
+#endif
+#if defined(MASKS) || defined(SEEN)
+uniform vec2 u_corner;
 #endif
 #ifdef SELECTED
 uniform sampler2D u_selected;
@@ -48,26 +51,14 @@ uniform float u_room_opacity;
 #endif
 layout(location = 0) out vec4 out_colour;
 
-float inside(vec2 place) { return float(all(greaterThanEqual(place, vec2(0.0))) && all(lessThanEqual(place, vec2(1.0)))); }
-
 #ifdef SELECTED
 // Beyond the picture nothing is selected, so that its edge is one too.
 bool selected(vec2 place) { return inside(place) * texture(u_selected, place).r >= 0.5; }
 #endif
 
 vec4 look_up(vec2 place) {
-#if EDGES == 3
-    place = 1.0 - abs(mod(place, 2.0) - 1.0);
-#elif EDGES == 4
-    place = fract(place);
-#endif
-    vec4 colour = texture(u_picture, place);
-#if EDGES == 0
-    colour *= inside(place);
-#elif EDGES == 1
-    if (inside(place) < 0.5) colour = vec4(0.0, 0.0, 0.0, 1.0);
-#endif
-    return colour;
+    place = repeated(place);
+    return bounded(texture(u_picture, place), place);
 }
 
 void main() {
@@ -80,7 +71,15 @@ void main() {
 #endif
     vec2 place = x;
     if (warped) place += texture(u_displacement, (x - u_shown.xy) / u_shown.zw).rg / u_extent;
+#ifdef SEEN
+    vec4 colour = texture(u_seen, (gl_FragCoord.xy - u_corner) / vec2(textureSize(u_seen, 0)));
+#ifdef SPLIT
+    vec4 unwarped = look_up(x);
+    if (!warped) colour = unwarped;
+#endif
+#else
     vec4 colour = look_up(place);
+#endif
 #ifdef CHECKER
     if (colour.a < 0.999) {
         vec2 tile = floor(gl_FragCoord.xy / u_tile);
@@ -90,7 +89,7 @@ void main() {
     vec3 seen = colour.rgb;
     if (warped) {
 #ifdef MASKS
-        vec4 masks = texture(u_masks, (gl_FragCoord.xy - u_masks_corner) / vec2(textureSize(u_masks, 0)));
+        vec4 masks = texture(u_masks, (gl_FragCoord.xy - u_corner) / vec2(textureSize(u_masks, 0)));
         seen = (1.0 - masks.a) * seen + masks.rgb;
 #endif
 #ifdef GRID

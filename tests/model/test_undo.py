@@ -128,7 +128,7 @@ def test_a_sample_takes_170_bytes_and_what_is_there_already_none():
     assert grown(many, many.edited(name="other")) < 1100
 
 
-def test_a_recording_that_goes_on_is_the_same_edit():
+def test_an_edit_that_is_joined_to_the_one_before_is_the_same_edit():
     history = History(Recipe())
     history.commit("Push", Recipe(name="a"))
     history.commit("Other", Recipe(name="b"))
@@ -138,3 +138,17 @@ def test_a_recording_that_goes_on_is_the_same_edit():
     history.amend(Recipe(name="c"))
     assert [(entry.name, entry.recipe.name) for entry in history.entries] == [("Open", ""), ("Push", "c")]
     assert (history.undo_name, history.can_redo) == ("Push", False)
+
+
+def test_a_recording_that_goes_on_is_the_same_edit_and_loses_nothing():
+    history = History(Recipe())
+    history.commit("Push", Recipe(name="a"))
+    history.commit("Other", Recipe(name="b"))
+    history.undo()
+    history.go_on(Recipe(name="c"))
+    assert [(entry.name, entry.recipe.name) for entry in history.entries] == [
+        ("Open", ""),
+        ("Push", "c"),
+        ("Other", "b"),
+    ]
+    assert (history.undo_name, history.redo_name) == ("Push", "Other")

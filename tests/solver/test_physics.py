@@ -292,6 +292,22 @@ def test_a_brush_spares_what_is_thicker_and_does_less_beside_it(device: Device) 
     brush.release()
 
 
+def test_a_tip_between_two_cells_does_what_it_does_a_hair_to_either_side(device: Device) -> None:
+    """What is thicker than at the tip is spared: the tip's own viscosity goes over from cell to cell without a step."""
+    grid = Grid(24, 24)
+    brush, fluid, drawn = Brush(device), Fluid(device, grid), []
+    fluid.set_viscosity(np.broadcast_to(np.where(np.arange(24) == 12, 0.1, 1e-3), (24, 24)))
+    for x in (0.5 - 1e-6, 0.5 + 1e-6):
+        velocity = device.upload(np.zeros((24, 24, 2), np.float32), "velocity")
+        brush.make_up(fluid, Push(Tip((x, 0.49), (x, 0.5), radius=0.3), 1 / 60), velocity)
+        drawn.append(velocity.get())
+        velocity.release()
+    assert np.abs(drawn[0]).max() > 0.01
+    np.testing.assert_allclose(drawn[1], drawn[0], atol=1e-3 * np.abs(drawn[0]).max())
+    for item in (fluid, brush):
+        item.release()
+
+
 def test_between_fluid_and_local_a_push_is_a_mixture(device: Device) -> None:
     tip = Tip((0.5, 0.3), (0.51, 0.295), radius=0.15)
     flowing, half, local = (pushed(device, Push(tip, 1 / 60, local=part))[0] for part in (0.0, 0.5, 1.0))

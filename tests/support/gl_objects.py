@@ -63,10 +63,26 @@ def _count(kind: str) -> int:
     """How many names of this kind are an object's."""
     library = ctypes.CDLL(find_library("EGL") or "libEGL.so.1")
     library.eglGetProcAddress.restype = ctypes.c_void_p
-    is_one = ctypes.CFUNCTYPE(ctypes.c_ubyte, ctypes.c_uint)(library.eglGetProcAddress(f"glIs{kind}".encode()))
-    found = name = last = 0
+
+    def function(name: str, result: type[ctypes.c_uint] | type[ctypes.c_ubyte] | None, *arguments: Any) -> Any:
+        return ctypes.CFUNCTYPE(result, *arguments)(library.eglGetProcAddress(name.encode()))
+
+    one = ctypes.c_uint()
+    if kind in ("Program", "Shader"):
+        words = () if kind == "Program" else (0x8B30,)  # GL_FRAGMENT_SHADER
+        one.value = function(f"glCreate{kind}", ctypes.c_uint, *(ctypes.c_uint for _ in words))(*words)
+        function(f"glDelete{kind}", None, ctypes.c_uint)(one)
+    else:
+        plural = kind.replace("Query", "Querie") + "s"
+        for verb in ("Gen", "Delete"):
+            function(f"gl{verb}{plural}", None, ctypes.c_int, ctypes.c_void_p)(1, ctypes.addressof(one))
+    is_one = function(f"glIs{kind}", ctypes.c_ubyte, ctypes.c_uint)
+    found = name = 0
+    last = (
+        one.value
+    )  # a driver that goes on counting has none beyond it, and one that does not gives the first free one
     while name < last + UNUSED:
         name += 1
         if is_one(name):
-            found, last = found + 1, name
+            found, last = found + 1, max(name, last)
     return found

@@ -148,6 +148,6 @@ def test_masks_are_drawn_as_it_is_written_down(device: Device, name: str, golden
 
 def test_masks_lie_over_the_picture_by_their_part(device: Device, picture: np.ndarray) -> None:
     masks = np.random.default_rng(5).uniform(0, 0.5, (SIDE, SIDE, 4)).astype(np.float32)
-    found = drawn(device, picture, MASKS=1, masks=device.upload(masks), masks_corner=(0.0, 0.0))
+    found = drawn(device, picture, MASKS=1, masks=device.upload(masks), corner=(0.0, 0.0))
     over = masks[::-1]
     np.testing.assert_allclose(found, (1 - over[..., 3:]) * picture[..., :3] + over[..., :3], atol=1e-6)

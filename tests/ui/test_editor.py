@@ -43,6 +43,8 @@ from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
 from solver.brush.masks import ZERO
 from solver.gl.device import Device
+from solver.resample.plan import Sampling
+from solver.resample.sampler import Sampler
 from support.commands import Run
 from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project, write_foreign_map
 
@@ -70,6 +72,23 @@ def test_push_carries_the_picture_along(robot: Robot) -> None:
     # What is now under the pointer came from about where the stroke began.
     assert warp[height // 2, round(0.54 * width)][0] == pytest.approx(-0.15, abs=0.04)
     assert np.abs(robot.canvas().astype(int) - before).mean() > 1
+
+
+def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(robot: Robot) -> None:
+    """One place a pixel would pick some of the squares that share it."""
+    robot.key("ctrl+1")
+    session, view = robot.editor.session, robot.editor.view
+    y, x = np.mgrid[0:180, 0:240] / 240
+    bent = x + 0.1 * np.sin(7 * y) - 0.5
+    session.replay.warp.set(np.stack([0.15 * np.tanh(bent / 0.03), 0 * y], axis=-1).astype(np.float32))
+    robot.see()
+    size = round(view.rect.width), round(view.rect.height)
+    sampler = Sampler(robot.device)
+    exported = sampler.apply(session.seen, pattern().pixels, size, Sampling("bilinear", "clamp")).astype(int)
+    sampler.release()
+    seen = robot.canvas()
+    off = np.abs(seen - exported[: len(seen)]).max(axis=2)
+    assert off.mean() < 1.3  # 1.9 by one place a pixel
 
 
 def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
@@ -479,11 +498,14 @@ def test_a_key_that_is_held_steps_on(robot: Robot) -> None:
         assert session.target == tick
 
 
-def test_pictures_opened_before_take_no_more_than_their_budget(
-    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("bound", "most"), [("OPENED_BUDGET", 1000), ("OPENED_BUDGET", 30 * 3 * (40 + 41) + 1024), ("MOST_OPENED", 1)]
+)
+def test_works_opened_before_are_no_more_than_their_bounds(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bound: str, most: int
 ) -> None:
-    """The one before always stays."""
-    monkeypatch.setattr(workspace, "OPENED_BUDGET", 1000)
+    """The one before always stays; with the pixels, histories count."""
+    monkeypatch.setattr(workspace, bound, most)
     for number in range(3):
         write_picture(tmp_path / f"{number}.png", pattern(40 + number, 30))
         robot.drop(tmp_path / f"{number}.png")

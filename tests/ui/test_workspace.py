@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import platform
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
+from threading import enumerate as enumerate_threads
 
 import numpy as np
+import pytest
 
 from app.media.pictures import write_picture
 from app.media.project import from_picture
@@ -13,6 +16,7 @@ from app.ui.files import fresh_recipe, load_any
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
 from support.gl_objects import living
+from support.resources import resident
 
 DRAWN_WITH = "Texture", "Framebuffer", "Buffer", "Query"
 
@@ -61,3 +65,39 @@ def test_many_works_need_no_more_of_the_gpu_than_a_few(device: Device, tmp_path:
     assert np.array_equal(robot.warp(), warps[1])
     robot.close()
     assert living(device, *DRAWN_WITH) == before
+
+
+def test_saved_work_that_is_left_keeps_no_thread(device: Device, tmp_path: Path) -> None:
+    """Nor does Undo lose it: what is done to it then is in a journal again."""
+    write_picture(tmp_path / "other.png", pattern(100, 80))
+    robot = Robot(device, small_project(tmp_path), journals=tmp_path / "journals")
+    robot.drag((0.3, 0.5), (0.6, 0.4), 2)
+    robot.rest()
+    assert robot.editor.files.save_as(tmp_path / "a.fluidwarp")
+    robot.drop(tmp_path / "other.png")
+    robot.until(lambda: not journal_threads())
+    robot.editor.do("undo")
+    robot.drag((0.3, 0.5), (0.6, 0.6), 2)
+    robot.rest()
+    robot.until(lambda: not robot.editor.journals.are_behind)
+    assert len(list((tmp_path / "journals").glob("*/work.journal"))) == 1
+    robot.close()
+
+
+def journal_threads() -> list[Thread]:
+    return [thread for thread in enumerate_threads() if thread.name == "journal"]
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc can be asked")
+def test_the_system_has_what_left_works_had(robot: Robot, tmp_path: Path) -> None:
+    """Memory that was freed between blocks that are still in use, as checkpoints of a software rasteriser are."""
+    write_picture(tmp_path / "other.png", pattern(100, 80))
+    blocks = [np.ones(100_000, np.uint8) for _ in range(1280)]
+    robot.drop(tmp_path / "other.png")
+    pins = blocks[::32]
+    del blocks
+    before = resident()
+    robot.drop(tmp_path / "other.png")
+    robot.frame()
+    assert len(pins) == 40
+    assert resident() < before - 64 * 2**20  # of 118; the new work takes some

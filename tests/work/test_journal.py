@@ -195,3 +195,11 @@ def test_a_stroke_is_written_once() -> None:
     before = Work(history.entries, history.index, history.entries[0].recipe)
     work = Work((*history.entries[:-1], amended), history.index, before.saved)
     assert len(continuation(work, before)) < 60
+    # and where what comes after it can be redone
+    before = replace(before, index=9)
+    longer = replace(before.entries[9], recipe=before.recipe.edited(duration=9.0))
+    work = replace(before, entries=(*before.entries[:9], longer, *before.entries[10:]))
+    line = continuation(work, before)
+    assert len(line) < 60
+    found = read(b"".join(beginning(ORIGIN, before)) + line)[1]
+    assert (found.index, found.entries) == (9, work.entries)

@@ -1,14 +1,14 @@
-"""The properties of tests/properties/work.py with few and always the same examples; nightly.py tries new ones."""
+"""The properties of `session.py` and `work.py` with few and always the same examples; `nightly.py` tries new ones."""
 
 from __future__ import annotations
 
-from properties import work as properties
+from properties import session, work
 from solver.gl.device import Device
 
 
 def test_random_work_is_undone_saved_and_opened_again_as_it_was(device: Device) -> None:
-    properties.check_session(device, 3, examples=3, acts=6)
+    session.check_session(device, 3, examples=6, acts=16)
 
 
 def test_a_recipe_of_any_numbers_is_refused_or_played(device: Device) -> None:
-    assert properties.check_recipes(device, 0, examples=30)["played"] > 8
+    assert work.check_recipes(device, 0, examples=30)["played"] > 8
