@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver.brush.balance import Balance, solved, system
 from solver.brush.brush import Brush
 from solver.brush.handle import Handle, Shape, area, spun
 from solver.brush.listed import draw_listed
@@ -90,12 +91,10 @@ class Lead(NamedTuple):
         drawn: of each push the number of its point, (m,).
         rings: r of them.
         loops: which of them are closed lines.
-        back, system: what gives the strengths of pushes and of turns of rings for what the pushed and rings lack,
-            (2 m + r, 2 p + r) and (2 p + r, 2 p + r); see `_system`.
+        balance: what gives the strengths of pushes and of turns of rings, 2 m + r, for what the pushed and rings lack,
+            2 p + r.
         wanted: how the fluid shall move at them all, (n, 2), longer sides / s.
         local: what of their motion carries the picture and not the fluid, (p, 2).
-        owners: of each push the number of its handle, (m,).
-        bounds: how strong each may be, longer sides / s, (m,).
     """
 
     places: np.ndarray
@@ -105,12 +104,9 @@ class Lead(NamedTuple):
     drawn: np.ndarray
     rings: list[Ring]
     loops: list[slice]
-    back: np.ndarray
-    system: np.ndarray
+    balance: Balance
     wanted: np.ndarray
     local: np.ndarray
-    owners: np.ndarray
-    bounds: np.ndarray
 
 
 class Handles:
@@ -212,31 +208,34 @@ class Handles:
                 self._brush.expand(self._fluid, tip, (1 - local) * growth)
         pushed = np.flatnonzero(is_pushed)
         share = self._local[listed][pushed]
-        self._calm(places[pushed], radii[pushed], 1 - slower[pushed])
+        side = min(self._fluid.grid.picture)
+        wide = np.maximum(np.minimum(WIDE * radii, side), radii)
         numbers = np.repeat(np.arange(len(rows)), self._counts[in_force])
-        beside = _beside(places, radii, numbers, np.array(led)[numbers])[pushed]
-        many, side = np.flatnonzero(beside), min(self._fluid.grid.picture)
+        is_led, is_away = np.array(led)[numbers], np.array([self._is_away(way) for way in ways])[numbers]
+        self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
+        beside = _beside(places, radii, numbers, is_led)[pushed]
+        many = np.flatnonzero(beside)
         drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
-        reaches = np.concatenate([radii[pushed], np.maximum(np.minimum(WIDE * radii, side), radii)[pushed[many]]])
+        reaches = np.concatenate([radii[pushed], wide[pushed[many]]])
         shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
         # What halts lets go: at rest among others that flow by it would strain the map around it as if it were led.
-        firm = np.where(np.array(led)[numbers], np.maximum(slower, LEAST_STIFFNESS), 1.0)
+        firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
         soft = np.repeat(softs[pushed], 2)
         if share.any():  # what is local is shared out first: the fluid would else do all of it, going on by itself
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], share[:, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
-            back, system = _system(both, soft)
-            carried = part * (back @ np.linalg.solve(system, wanted[pushed].ravel())).reshape(-1, 2)
+            carried = part * solved(system(both, soft), wanted[pushed].ravel()).reshape(-1, 2)
             wanted = wanted - np.einsum("iajb,jb->ia", local, carried)
-        soft = np.concatenate([soft, softs[[ring.centre for ring in rings]]])
-        shares = np.concatenate([shares, np.ones(len(rings))])
-        solving = *_system(_with_rings(places, pushed, push, rings), soft, shares), wanted, carried
+        centres = [ring.centre for ring in rings]
+        soft, shares = np.concatenate([soft, softs[centres]]), np.concatenate([shares, np.ones(len(rings))])
+        owners = [np.concatenate([np.repeat(numbers[each], 2), numbers[centres]]) for each in (pushed, drawn)]
+        influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * reaches / dt
+        balance = Balance(influence, soft, shares, (owners[0], owners[1]), bounds)
         self._places[listed] += wanted * dt  # where to look for them
-        bounds = numbers[drawn], FARTHEST_STEP * reaches / dt
-        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, *solving, *bounds)
+        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, balance, wanted, carried)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
@@ -406,7 +405,11 @@ class Handles:
         nearer = lacks < least / 2
         least, waited = np.where(nearer, lacks, least), np.where(nearer, 0.0, waited + dt)
         self._lacks[active] = np.stack([least, waited], axis=-1)
-        return np.where((waited > PATIENCE) & (lacks > 1 / max(self._warp.size)), 0.0, 1.0)
+        return np.where((waited > PATIENCE) & [self._is_away(way) for way in ways], 0.0, 1.0)
+
+    def _is_away(self, way: Way) -> bool:
+        """True if the farthest of a handle's points has more than a texel to go."""
+        return way.left > 1 / max(self._warp.size)
 
     def _wanted(
         self, active: list[int], rows: list[slice], slower: np.ndarray, ways: list[Way], dt: float
@@ -517,13 +520,8 @@ class Handles:
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             lacks[loop] -= (lacks[loop] * arms).sum() / max((arms**2).sum(), 1e-30) * arms
         told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
-        strengths, count = lead.back @ np.linalg.solve(lead.system, told), 2 * len(lead.drawn)
+        strengths, count = lead.balance.strengths(told), 2 * len(lead.drawn)
         lacking, spins = strengths[:count].reshape(-1, 2), strengths[count:]
-        # What strains is the force, much of which its own image takes back near an edge: it keeps the bound of a step.
-        over = np.hypot(*lacking.T) / lead.bounds
-        parts = np.ones(lead.owners.max() + 1)
-        np.minimum.at(parts, lead.owners, 1 / np.maximum(over, 1.0))
-        lacking *= parts[lead.owners, None]
         masks: dict[str, Any] = {}
         if attenuated:
             lacking *= found[lead.drawn, 2:3]
@@ -535,12 +533,6 @@ class Handles:
         stream = fluid.device.pass_("brush/handle_stream.frag", **attenuated)
         lead.pushes.draw(fluid.device, stream, self._stream, found[lead.drawn, 3], lacking, **masks)
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
-
-
-def _system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """W K' and K W K' + diag(soft) of (H3): forces are the first times the second's inverse times what is wanted."""
-    back = (shares * influence).T
-    return back, influence @ back + np.diag(soft)
 
 
 def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.ndarray) -> np.ndarray:

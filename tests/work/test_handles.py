@@ -384,6 +384,30 @@ def test_what_halts_lets_go(to: tuple[float, float] | None, least: float, most: 
         thing.release()
 
 
+@pytest.mark.parametrize("to", [(0.6, 0.5), (0.4, 0.5), None], ids=["on its way", "there", "pin"])
+def test_what_halts_on_its_way_calms_the_fluid_as_far_as_it_may_set_it_going(
+    to: tuple[float, float] | None, device: Device
+):
+    """What coasts past it would strain the map further: here two radii off. What has arrived lets strokes flow by."""
+    grid, speeds = Grid(32, 32), []
+    folded = np.zeros((128, 128, 2), np.float32)
+    folded[:, 66, 0] = 1.5 / 128
+    for moved in (0 * folded, folded):
+        fluid, warp = Fluid(device, grid), WarpMap(device, grid, (128, 128))
+        handles = Handles(fluid, warp, [Handle((0.388, 0.5), to, 0.2, duration=0.0)])
+        for _ in range(3):
+            handles.advance(DT)
+        warp.set(warp.read((128, 128)) + moved + (0 if to else 2 / 128))  # the pin is carried off
+        fluid.set_velocity(
+            lambda x, y, t: (np.sin(np.pi * x) * np.cos(np.pi * y), -np.cos(np.pi * x) * np.sin(np.pi * y))
+        )
+        handles.advance(0.001)
+        speeds.append(np.hypot(*np.moveaxis(fluid.faces().get(), -1, 0))[14:18, 24:28].mean())
+        for thing in (handles, warp, fluid):
+            thing.release()
+    assert (speeds[1] < 0.9 * speeds[0]) == (to == (0.6, 0.5))
+
+
 HANDLES = [
     led_to([0.3, 0.4], [0.4, 0.5], rotate=20.0, turned=[[0.5, 0.0, 1.1], [0.6, 10.0, 1.0]]),
     led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=0.5, stiffness=0.8),

@@ -1,0 +1,78 @@
+"""How strong pushes are that together do what is wanted of them, none stronger than a step bears: (H3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+ROUNDS = 12  # in which those that would be too strong are weighed anew, a bound on the cost
+CLOSE = 1.01  # times its bound where that ends; by as much as one still exceeds it, all are less
+
+
+class Balance:
+    """Least squares as (H3) for pushes of handles and turns of rings, weighed so that every push is within its bound.
+
+    Args:
+        influence: what each unknown does to each thing that is wanted, K, (n, k); of the unknowns the first 2 m are the
+            forces of m pushes, the others are not bounded.
+        soft: what is added to the squares of each that is wanted, (n,).
+        shares: what the unknowns count there, W, (k,).
+        owners: of each that is wanted, (n,), and of each unknown, (k,), the number of its handle.
+        bounds: of pushes, (m,).
+    """
+
+    def __init__(
+        self,
+        influence: np.ndarray,
+        soft: np.ndarray,
+        shares: np.ndarray,
+        owners: tuple[np.ndarray, np.ndarray],
+        bounds: np.ndarray,
+    ) -> None:
+        self._influence, self._soft, self._shares, self._owners = influence, soft, shares, owners
+        self._bounds = np.concatenate([np.repeat(bounds, 2), np.full(len(shares) - 2 * len(bounds), np.inf)])
+        self._of_all = system(influence, soft, shares)
+
+    def strengths(self, wanted: np.ndarray) -> np.ndarray:
+        """Of all unknowns, (k,), for what is wanted, (n,)."""
+        found = solved(self._of_all, wanted)
+        if self._over(found).max(initial=0.0) <= 1:
+            return found
+        wanted, shares = self._as_one(wanted), self._shares
+        found = solved(self._of_all, wanted)
+        for _ in range(ROUNDS):
+            over = self._over(found)
+            if over.max() <= CLOSE:
+                break
+            # What is too strong counts less, and the others make up for it: cut off, it would leave them unbalanced. At
+            # rest on the bounds this is the constrained minimum; it ends as soon as all are within.
+            shares = np.minimum(self._shares, shares / np.maximum(over, 1e-30))
+            found = solved(system(self._influence, self._soft, shares), wanted)
+        return found / max(self._over(found).max(), 1.0)
+
+    def _as_one(self, wanted: np.ndarray) -> np.ndarray:
+        """What is wanted of each handle, all in the proportion that its own pushes would bear if it were alone."""
+        wanted, (rows, columns) = wanted.copy(), self._owners
+        for owner in np.unique(rows):
+            mine, own = rows == owner, columns == owner
+            alone = system(self._influence[np.ix_(mine, own)], self._soft[mine], self._shares[own])
+            wanted[mine] /= max(self._over(solved(alone, wanted[mine]), own).max(initial=0.0), 1.0)
+        return wanted
+
+    def _over(self, found: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """How many times its bound each of some unknowns is."""
+        bounds, over = self._bounds[which], np.zeros(len(found))
+        pushes = np.isfinite(bounds)
+        over[pushes] = np.repeat(np.hypot(*found[pushes].reshape(-1, 2).T), 2) / bounds[pushes]
+        return over
+
+
+def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """W K' and K W K' + diag(soft) of (H3)."""
+    back = (shares * influence).T
+    return back, influence @ back + np.diag(soft)
+
+
+def solved(both: tuple[np.ndarray, np.ndarray], wanted: np.ndarray) -> np.ndarray:
+    """The first of a `system` times the second's inverse times what is wanted."""
+    back, matrix = both
+    return back @ np.linalg.solve(matrix, wanted)

@@ -1,0 +1,69 @@
+"""Pushes that are not strong enough for what is wanted do it as well as they can, together; one handle's go as one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import Grid
+from solver.brush.balance import Balance
+from solver.brush.pushes import Pushes
+
+
+@pytest.fixture
+def influence() -> np.ndarray:
+    """Of eight pushes, close together, on one another."""
+    places = 0.4 + 0.2 * np.random.default_rng(3).random((8, 2))
+    return Pushes(Grid(32, 32), places, np.full(8, 0.25)).influence(places).reshape(16, 16)
+
+
+def balance(influence: np.ndarray, owners: np.ndarray, bound: float) -> Balance:
+    each = np.repeat(owners, 2)
+    return Balance(influence, np.full(16, 1e-4), np.ones(16), (each, each), np.full(8, bound))
+
+
+def sizes(strengths: np.ndarray) -> np.ndarray:
+    return np.hypot(*strengths.reshape(-1, 2).T)
+
+
+def test_what_is_within_bounds_is_least_squares(influence: np.ndarray):
+    wanted = np.random.default_rng(1).normal(size=16)
+    found = balance(influence, np.arange(8), np.inf).strengths(wanted)
+    np.testing.assert_allclose(
+        found, np.linalg.solve(influence.T @ influence + 1e-4 * np.eye(16), influence.T @ wanted), rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_pushes_beside_those_at_their_bounds_make_up_for_them(seed: int, influence: np.ndarray):
+    """More is done than by cutting off what is too strong, or all in proportion."""
+    wanted = 0.3 * np.random.default_rng(seed).normal(size=16)
+    free, found = (balance(influence, np.arange(8), bound).strengths(wanted) for bound in (np.inf, 1.0))
+    over = np.maximum(np.repeat(sizes(free), 2), 1.0)
+    assert sizes(free).max() > 2
+    assert sizes(found).max() <= 1 + 1e-9
+    left, cut, less = (np.linalg.norm(wanted - influence @ each) for each in (found, free / over, free / over.max()))
+    assert left < 0.8 * min(cut, less)
+
+
+def test_all_of_one_handle_goes_in_the_same_proportion(influence: np.ndarray):
+    wanted = np.random.default_rng(1).normal(size=16)
+    strong, weak = (balance(influence, np.zeros(8, int), bound).strengths(wanted) for bound in (np.inf, 0.1))
+    np.testing.assert_allclose(weak, strong * 0.1 / sizes(strong).max(), rtol=1e-6)
+
+
+def test_a_handle_that_is_too_weak_slows_none_far_from_it():
+    places = np.array([[0.2, 0.2], [0.8, 0.8]])
+    influence = Pushes(Grid(32, 32), places, np.full(2, 0.25)).influence(places).reshape(4, 4)
+    each = np.repeat(np.arange(2), 2)
+    found = Balance(influence, np.full(4, 1e-4), np.ones(4), (each, each), np.ones(2)).strengths(
+        np.array([3.0, 0.0, 0.5, 0.0])
+    )
+    np.testing.assert_allclose(found, [1, 0, 0.5, 0], atol=0.01)
+
+
+def test_turns_of_rings_are_not_bounded():
+    found = Balance(np.eye(3), np.zeros(3), np.ones(3), (np.zeros(3), np.zeros(3)), np.full(1, 1.0)).strengths(
+        np.array([0.0, 2.0, 3.0])
+    )
+    np.testing.assert_allclose(found, [0, 1, 1.5])
