@@ -8,12 +8,20 @@ from typing import Any
 from app.errors import UserError
 from app.model.handles import MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin, labelled
 from app.model.mask_edits import MaskStroke
-from app.model.recipe import Recipe
+from app.model.recipe import MOST_FORCES, Recipe
+from app.model.schema import written
 from app.model.strokes import Change, Stroke
+from app.model.toml import MOST_NUMBERS, MOST_WORDS
 from app.model.tools import Made
 
 TIMED = ("stroke", "handle", "pin", "change", "mask")
 """The parts of a recipe that are cut off where the work goes on before their end."""
+
+LONGEST_GESTURE = 50_000  # moves of the pointer: minutes of the fastest mouse
+ROOM = (
+    100,
+    8 * LONGEST_GESTURE,
+)  # words and numbers that there is to be room for before one: half of it for holding still
 
 
 def cut_off(recipe: Recipe, tick: int) -> Recipe:
@@ -72,6 +80,25 @@ def check_room(recipe: Recipe, line: bool) -> None:
         raise UserError(f"There are {MOST_HANDLES} handles and pins already; remove one to set another.")
     if line and sum(bool(each.points) for each in led) >= MOST_LINES:
         raise UserError(f"There are {MOST_LINES} lines already; remove one to set another.")
+
+
+def check_size(recipe: Recipe, before: Recipe | None = None) -> None:
+    """Raise `UserError` if a recipe that an edit makes of another is too large to be read again.
+
+    Args:
+        before: what was edited, which may be made smaller at any size; None if the recipe is to have room for one more
+            gesture.
+    """
+    size, room = written(recipe), (0, 0) if before else ROOM
+    most = MOST_WORDS - room[0], MOST_NUMBERS - room[1]
+    if before is not None:
+        most = tuple(map(max, most, written(before)))
+    if any(part > limit for part, limit in zip(size, most, strict=True)):
+        raise UserError(
+            "This work is as large as one may be. Undo something, or export the warp as a map and begin anew with that."
+        )
+    if before is not None and len(recipe.force) > max(MOST_FORCES, len(before.force)):
+        raise UserError(f"There would be {len(recipe.force)} forces; at most {MOST_FORCES} work.")
 
 
 def with_change(recipe: Recipe, tick: int, settings: dict[str, Any], lasts: bool) -> Recipe:

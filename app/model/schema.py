@@ -61,6 +61,22 @@ def plain(model: BaseModel) -> dict[str, Any]:
     return dict(sorted(told.items(), key=lambda item: (_rank(item[1]), _HEADS.get(item[0], len(_HEADS)))))
 
 
+def written(value: Any) -> tuple[int, int]:
+    """(keys, values and brackets, numbers in lists) that a model, or part of one, takes in TOML, or a few more.
+
+    As `app.model.toml` counts them: a fraction is two words, and a comma after a list is one more number.
+    """
+    if isinstance(value, BaseModel):
+        parts = [written(getattr(value, name)) for name in value.model_fields_set]
+        return 5 + sum(1 + words for words, _ in parts), sum(numbers for _, numbers in parts)
+    if not isinstance(value, tuple) or not value:
+        return 2, 0
+    if isinstance(value[0], (BaseModel, str)):
+        parts = [written(part) for part in value]
+        return 1 + sum(words for words, _ in parts), sum(numbers for _, numbers in parts)
+    return 2, 1 + len(value) * (len(value[0]) if isinstance(value[0], tuple) else 1)
+
+
 _HEADS = {
     head: rank for rank, head in enumerate(("version", "name", "kind", "tool", "tick", "muted", "repeat", "every"))
 }

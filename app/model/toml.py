@@ -20,7 +20,7 @@ LONGEST_WORD = 200  # characters of a number, or of a key without quotes
 LONGEST_STRING = 10_000
 MOST_WORDS = 200_000  # keys, values and brackets, but for those of lists of numbers; a stroke has about 20
 MOST_NUMBERS = 2_000_000  # in lists of them; of an hour's painting there are 432,000, four to a tick
-LONG = 1000  # characters of lists of numbers that are worth being read by json
+LONG = 200  # characters of lists of numbers that are worth being read by json
 _MARK = "\ue000"  # begins what stands where they were, a character that nobody writes
 _MARKED = re.compile(rf"{_MARK}|\\[uU]0*+[eE]000")
 

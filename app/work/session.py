@@ -22,7 +22,17 @@ from app.media.clip import Clip, rate_of
 from app.media.project import Project
 from app.model.bars import Changed, Which, with_changed
 from app.model.document import Document
-from app.model.edits import TIMED, check_room, cut_off, with_change, with_led, with_made, with_taken
+from app.model.edits import (
+    LONGEST_GESTURE,
+    TIMED,
+    check_room,
+    check_size,
+    cut_off,
+    with_change,
+    with_led,
+    with_made,
+    with_taken,
+)
 from app.model.handles import ARRIVED, MOST_OBJECTIONS, RecipeHandle, RecipePin, is_inside, objections
 from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.recipe import Recipe
@@ -249,11 +259,12 @@ class Session:
             held: what was taken hold of, by a tool that does that.
 
         Raises:
-            UserError: if there is nothing to take hold of, or too much is held already.
+            UserError: if there is nothing to take hold of, too much is held already, or the work is too large.
         """
         if tool.gesture is None:
             return
         self.release()
+        check_size(self._base)
         if held is not None and not self._can_take(held.led):
             return
         if tool.name == "handle" and held is None:
@@ -283,6 +294,9 @@ class Session:
         if self._gesture is not None:
             self._gesture.move(x, y, pressure, shift)
             self._hear(self._gesture)
+            if len(self._gesture.path) >= LONGEST_GESTURE:
+                self.release()
+                self.notice = "That is as long as a stroke may be. Press again to go on."
 
     def release(self) -> None:
         """The pointer went up: the gesture becomes an entry of the history, and the fluid comes to rest by itself."""
@@ -667,6 +681,7 @@ class Session:
         for edit in edits:
             masks = with_edit(masks, edit)
         recipe = self._base.edited(mask=masks)
+        check_size(recipe, self._base)
         try:
             self.replay.use(recipe, keep=self._live is self._base)
         except UserError:
@@ -691,17 +706,17 @@ class Session:
         self.release()
         base, lasts = self._base, settings.keys() <= {"viscosity", "drag", "walls"}
         if not (base.stroke or base.change or base.mask) and self.target == 0 and lasts:
-            self._use(base.edited(fluid=base.fluid.model_copy(update=settings)))
+            self._use_edited(base.edited(fluid=base.fluid.model_copy(update=settings)))
             return
         tick = self._go_on()
         self.playing = self.coasting = False
-        self._use(with_change(self._base, tick, settings, lasts))
+        self._use_edited(with_change(self._base, tick, settings, lasts))
         self._send(self.end)
 
     def preview(self, **parts: Any) -> None:
         """Replace parts of the recipe, without an entry in the history yet."""
         self.release()
-        self._use(self._base.edited(**parts))
+        self._use_edited(self._base.edited(**parts))
 
     def commit(self, name: str) -> None:
         """Make what was previewed an entry of the history."""
@@ -731,6 +746,7 @@ class Session:
         """
         self.release()
         recipe = self._base.edited(**with_changed(self._base, which, changed))
+        check_size(recipe, self._base)
         self.replay.check_forces(recipe)
         at_end, coasts = self.target >= self.end, self.coasting
         self.coasting = False
@@ -858,6 +874,10 @@ class Session:
         self._beyond = max(min(moment, self.length) - self.end, 0)
         self._target = self.end
         self._approach(time.perf_counter() + RETURN)
+
+    def _use_edited(self, recipe: Recipe) -> None:
+        check_size(recipe, self._base)
+        self._use(recipe)
 
     def _use(self, recipe: Recipe) -> None:
         """Simulate another recipe; what differs in the past is made again over the next frames."""

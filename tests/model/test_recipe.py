@@ -11,8 +11,12 @@ from pydantic import ValidationError
 from app.errors import UserError
 from app.media.opening import shipped_recipes
 from app.media.recipes import read_recipe
+from app.model import toml
 from app.model.recipe import DensitySettings, FluidSettings, Output, Playback, Recipe
+from app.model.schema import written
 from app.model.strokes import Change, Dab, Stroke
+
+ROOT = Path(__file__).parents[2]
 
 FULL = """
 version = 1
@@ -398,3 +402,19 @@ def test_the_images_of_a_stroke_lie_about_the_picture_s_middle(symmetry: str, wa
     assert [mirrored for _, mirrored in found] == [mirrored for *_, mirrored in wanted]
     for (dab, _), (x, y, _) in zip(found, wanted, strict=True):
         assert dab == pytest.approx((x, y, x, y, 0.5))
+
+
+def check_written(recipe: Recipe, monkeypatch: pytest.MonkeyPatch) -> None:
+    words, numbers = written(recipe)
+    monkeypatch.setattr(toml, "MOST_WORDS", words)
+    monkeypatch.setattr(toml, "MOST_NUMBERS", numbers)
+    assert Recipe.parse(recipe.text()) == recipe
+
+
+@pytest.mark.parametrize("path", sorted(ROOT.glob("assets/*/*.toml")), ids=lambda path: path.stem)
+def test_no_recipe_takes_more_words_and_numbers_than_are_counted(path: Path, monkeypatch: pytest.MonkeyPatch):
+    check_written(Recipe.parse(path.read_text("utf-8")), monkeypatch)
+
+
+def test_nor_does_one_with_everything(monkeypatch: pytest.MonkeyPatch):
+    check_written(Recipe.parse(FULL), monkeypatch)

@@ -11,10 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.errors import UserError
 from app.media import project as projects
+from app.model import edits, toml
+from app.model.bars import Which
 from app.model.forces import VortexForce
-from app.model.mask_edits import InvertMask, MaskStroke
+from app.model.mask_edits import InvertMask, MaskStroke, mask_edit
 from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
+from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
@@ -26,6 +30,10 @@ from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
 from support.editing import small_project
 
+TRIANGLE = {
+    "kind": "fill", "of": "frozen", "tick": 0, "amount": 1.0,
+    "outline": ((0.2, 0.2), (0.8, 0.2), (0.5, 0.8)),
+}  # fmt: skip
 PAINTING = [tool for tool in TOOLS if tool.gesture is not None]
 
 
@@ -52,6 +60,50 @@ def paint(
         session.move(start[0] + (end[0] - start[0]) * part, start[1] + (end[1] - start[1]) * part)
         session.advance(1)
     session.release()
+
+
+@pytest.mark.parametrize(("limit", "most"), [("MOST_WORDS", 250), ("MOST_NUMBERS", 200)])
+def test_whatever_can_be_painted_can_be_opened_again(
+    limit: str, most: int, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (edits, toml):
+        monkeypatch.setattr(module, limit, most)
+    monkeypatch.setattr(edits, "ROOM", (40, 60))
+    full = pytest.raises(UserError, match="as large as one may be")
+
+    def paint_on() -> None:
+        for number in range(40):
+            tool = ("thicken", "push", "handle")[number % 3]
+            paint(session, tool, (0.2 + number / 40, 0.3), (0.5, 0.6), ticks=2)
+            session.pause()
+
+    with full:
+        paint_on()
+    kept = session.recipe
+    assert kept.stroke
+    assert kept.mask
+    assert Recipe.parse(kept.text()) == kept
+    with full:
+        session.edit_masks("Fill", *40 * [mask_edit(TRIANGLE)])
+    with full:
+        session.edit("Add", stroke=40 * kept.stroke)
+    strokes: list[Which] = [("stroke", number) for number in range(len(kept.stroke))]
+    longer = {"samples": 99 * kept.stroke[0].samples, "muted": True, "repeat": 2, "every": 9}
+    with full:
+        session.edit_bars("Stretch", strokes, lambda one: one.model_copy(update=longer))
+    assert session.recipe == kept
+    session.edit_bars("Delete", [("stroke", 0)], lambda one: None)
+    assert len(session.recipe.stroke) == len(kept.stroke) - 1
+
+
+def test_a_stroke_that_is_as_long_as_one_may_be_ends_and_says_so(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.work.session.LONGEST_GESTURE", 4)
+    paint(session, "push", (0.3, 0.3), (0.6, 0.6), ticks=20)
+    assert session.notice == "That is as long as a stroke may be. Press again to go on."
+    (stroke,) = session.recipe.stroke
+    assert 4 <= len(stroke.samples) < 10
 
 
 @pytest.mark.long
