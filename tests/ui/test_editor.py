@@ -91,6 +91,30 @@ def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(ro
     assert off.mean() < 1.3  # 1.9 by one place a pixel
 
 
+def test_the_picture_at_rest_is_drawn_in_parts_and_ends_as_if_drawn_at_once(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each frame draws one part, magnified and amplified too; none is wanted once all are drawn."""
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.see()
+    canvas = robot.editor.canvas
+    for zoom, amount in ((1.0, 1.0), (7.3, 1.2)):
+        robot.editor.commands.zoom_to(zoom)
+        robot.editor.session.set_amount(amount)
+        robot.frame(count=2)
+        assert canvas.is_unfinished
+        assert robot.editor.wants_frame()
+        seen = robot.pixels()
+        monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+        monkeypatch.setattr("app.ui.canvas.ROWS", 10_000)
+        canvas.show(shown_pixels(pattern(), canvas.largest))  # as if it were another
+        robot.frame()
+        assert not canvas.is_unfinished
+        np.testing.assert_array_equal(robot.pixels(), seen)
+        monkeypatch.undo()
+
+
 def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
     """A row of the present entry's ground; also after steps back and forth."""
     ground = np.array([67, 55, 37])
