@@ -74,14 +74,21 @@ def test_push_carries_the_picture_along(robot: Robot) -> None:
     assert np.abs(robot.canvas().astype(int) - before).mean() > 1
 
 
-def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(robot: Robot) -> None:
-    """One place a pixel would pick some of the squares that share it."""
+def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One place a pixel would pick some of the squares that share it. It is drawn over several frames as if at once."""
     robot.key("ctrl+1")
     session, view = robot.editor.session, robot.editor.view
     y, x = np.mgrid[0:180, 0:240] / 240
     bent = x + 0.1 * np.sin(7 * y) - 0.5
     session.replay.warp.set(np.stack([0.15 * np.tanh(bent / 0.03), 0 * y], axis=-1).astype(np.float32))
     robot.see()
+    while robot.editor.clock.settling:
+        robot.frame()
+    canvas = robot.editor.canvas
+    assert canvas.is_unfinished
+    assert robot.editor.wants_frame()
     size = round(view.rect.width), round(view.rect.height)
     sampler = Sampler(robot.device)
     exported = sampler.apply(session.seen, pattern().pixels, size, Sampling("bilinear", "clamp")).astype(int)
@@ -89,30 +96,12 @@ def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(ro
     seen = robot.canvas()
     off = np.abs(seen - exported[: len(seen)]).max(axis=2)
     assert off.mean() < 1.3  # 1.9 by one place a pixel
-
-
-def test_the_picture_at_rest_is_drawn_in_parts_and_ends_as_if_drawn_at_once(
-    robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each frame draws one part, magnified and amplified too; none is wanted once all are drawn."""
-    robot.drag((0.4, 0.5), (0.55, 0.5))
-    robot.rest()
-    robot.see()
-    canvas = robot.editor.canvas
-    for zoom, amount in ((1.0, 1.0), (7.3, 1.2)):
-        robot.editor.commands.zoom_to(zoom)
-        robot.editor.session.set_amount(amount)
-        robot.frame(count=2)
-        assert canvas.is_unfinished
-        assert robot.editor.wants_frame()
-        seen = robot.pixels()
-        monkeypatch.setattr("app.ui.canvas.PARTS", 1)
-        monkeypatch.setattr("app.ui.canvas.ROWS", 10_000)
-        canvas.show(shown_pixels(pattern(), canvas.largest))  # as if it were another
-        robot.frame()
-        assert not canvas.is_unfinished
-        np.testing.assert_array_equal(robot.pixels(), seen)
-        monkeypatch.undo()
+    monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+    monkeypatch.setattr("app.ui.canvas.ROWS", 10_000)
+    canvas.show(shown_pixels(pattern(), canvas.largest))  # as if it were another
+    robot.frame()
+    assert not canvas.is_unfinished
+    np.testing.assert_array_equal(robot.canvas(), seen)
 
 
 def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
