@@ -190,25 +190,25 @@ class Canvas:
 
     def _draw_small(self, target: moderngl.Framebuffer, session: Session) -> None:
         """Draw all of the picture as it is now into a small framebuffer, with nothing laid over it."""
-        width, height = target.size
-        texture, displacement = self._texture, self._fields.get("thumbnail", target.size, 2)
+        (width, height), edges = target.size, EDGES[session.recipe.edges]
+        inputs: dict[str, Any] = {"shown": WHOLE, "extent": session.extent, "target_height": float(height)}
+        inputs |= {"origin": (0.0, 0.0), "step": (1 / width, 1 / height)}
+        defines: dict[str, object] = {"EDGES": edges}
         if (density := session.replay.density) is not None:
-            texture, displacement = density.values.texture, self._still
+            inputs |= {"picture": density.values.texture, "displacement": self._still}
         else:
+            displacement = self._fields.get("thumbnail's displacement", target.size, 2)
             session.seen.draw(displacement, (0.0, 0.0), displacement.texel)
-        self._reduce()
-        self._texture.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
-        self.device.pass_("view/canvas.frag", EDGES=EDGES[session.recipe.edges]).draw_into(
-            target,
-            ("displacement",),
-            picture=texture,
-            displacement=displacement,
-            shown=WHOLE,
-            origin=(0.0, 0.0),
-            step=(1 / width, 1 / height),
-            extent=session.extent,
-            target_height=float(height),
-        )
+            self._reduce()
+            self._texture.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
+            inputs |= {"picture": self._texture, "displacement": displacement}
+            layer, level = self._fields.get("thumbnail", target.size, 4, "f1"), _halvings(width / self._texture.width)
+            apart = self._apart(inputs["step"], level)
+            averaged = self.device.pass_("view/picture.frag", EDGES=edges)
+            averaged.draw_into(layer.framebuffer, ("displacement",), **inputs, level=float(level), apart=apart)
+            defines["SEEN"] = 1
+            inputs |= {"seen": layer, "corner": (0.0, 0.0)}
+        self.device.pass_("view/canvas.frag", **defines).draw_into(target, ("displacement",), **inputs)
 
     def release(self) -> None:
         self._texture.release()
@@ -295,11 +295,10 @@ class Canvas:
             level: how often the picture is halved.
         """
         left, top, right, bottom = seen
-        height, size, step = bottom - top, self._texture.size, inputs["step"]
+        height, step = bottom - top, inputs["step"]
         numbers: dict[str, Any] = {"shown": lattice.shown, "step": step, "extent": inputs["extent"]}
         numbers |= {"origin": (inputs["origin"][0] - left, inputs["origin"][1] - top), "level": float(level)}
-        numbers |= {"apart": tuple(max(2**level / side, one) for side, one in zip(size, step, strict=True))}
-        numbers["target_height"] = float(height)
+        numbers |= {"apart": self._apart(step, level), "target_height": float(height)}
         warp, edges = session.seen, EDGES[session.recipe.edges]
         displacement = self._fields.get("displacement", lattice.size, 2)
         layer = self._fields.get("picture", (right - left, height), 4, "f1")
@@ -321,6 +320,10 @@ class Canvas:
             )
             self._parts += 1
         return None if self.is_unfinished else layer
+
+    def _apart(self, step: tuple[float, float], level: int) -> tuple[float, ...]:
+        """How far apart samples of the picture, so often halved, may be, 0-1 of it, for pixels a `step` apart."""
+        return tuple(max(2**level / side, one) for side, one in zip(self._texture.size, step, strict=True))
 
     def _masks(
         self, session: Session, state: EditorState, seen: Pixels, inputs: dict[str, Any], scale: float
@@ -373,7 +376,7 @@ class Canvas:
         # Of a clip that runs, each frame would have to be reduced: up to a half nobody misses it.
         if zoom < (0.5 if moves and not self._is_reduced else 0.75):
             self._reduce()
-            small, level = moderngl.LINEAR_MIPMAP_NEAREST, max(round(-log2(zoom)), 0)
+            small, level = moderngl.LINEAR_MIPMAP_NEAREST, _halvings(zoom)
         self._texture.filter = (small, moderngl.NEAREST if zoom >= 6 else moderngl.LINEAR)
         return level
 
@@ -426,6 +429,11 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
         light = shown.pixels[..., :-1] - np.clip(straight[..., :-1], 0, 1) * straight[..., -1:]
         colours = np.minimum(colours.astype(np.uint16) + to_bits(light, 8, dither=False), 255).astype(np.uint8)
     return np.ascontiguousarray(np.concatenate([colours, pixels[..., 3:]], axis=2))
+
+
+def _halvings(zoom: float) -> int:
+    """How often the picture is halved to be seen at `zoom` pixels a texel."""
+    return max(round(-log2(zoom)), 0)
 
 
 def _in_pixels(rect: Rect, density: float) -> Pixels:
