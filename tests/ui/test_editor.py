@@ -104,6 +104,19 @@ def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(
     np.testing.assert_array_equal(robot.canvas(), seen)
 
 
+def test_one_fold_of_the_warp_is_told_when_it_comes_up(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once all is at rest, and only once until there is none."""
+    replay, messages = robot.editor.session.replay, robot.editor.messages
+    y, x = np.mgrid[0:180, 0:240] / 240
+    bump = -(x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.02**2)
+    monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+    one = ["The warp folds over itself in 1 of 6912 places."]
+    for height, told in ((0.9, []), (1.1, one), (1.1, one), (0.9, [])):
+        replay.warp.set(np.stack([height * bump, 0 * y], axis=-1).astype(np.float32))
+        robot.frame(count=2)
+        assert [message.text for message in messages.shown] == told
+
+
 def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
     """A row of the present entry's ground; also after steps back and forth."""
     ground = np.array([67, 55, 37])
