@@ -15,7 +15,17 @@ import numpy as np
 from pydantic import Field, TypeAdapter, model_validator
 
 from app.model.areas import Area, Part, Seen, as_it_was
-from app.model.sampling import FINEST, SOURCE, NamedPictures, PictureName, SmallPictures, intensity, strips, to_grid
+from app.model.sampling import (
+    FINEST,
+    ROWS_AT_ONCE,
+    SOURCE,
+    NamedPictures,
+    PictureName,
+    SmallPictures,
+    intensity,
+    strips,
+    to_grid,
+)
 from app.model.schema import Model, Radius, Several
 from app.model.strokes import BrushPath, Tick
 from solver.grid import Grid
@@ -238,18 +248,32 @@ def as_grey(words: np.ndarray, of: MaskName) -> np.ndarray:
 
 def _softened(words: np.ndarray, reaches: Sequence[int]) -> np.ndarray:
     """Three running means along each axis, each over `reach` texels to both sides; the border is repeated."""
-    values = words.astype(np.int64)
     for reach in reaches:
-        count = 2 * reach + 1
-        for _ in range(3 if reach else 0):
-            sums = np.cumsum(np.pad(values, ((reach + 1, reach), (0, 0)), "edge"), axis=0)
-            values = (sums[count:] - sums[:-count] + reach) // count
-        values = values.T
-    return values.astype(words.dtype)
+        words = words.T.copy()  # so that what is added up lies side by side
+        for first in range(0, len(words) if reach else 0, ROWS_AT_ONCE):
+            strip, count = words[first : first + ROWS_AT_ONCE], 2 * reach + 1
+            for _ in range(3):
+                # A sum that wraps around is taken from another one: what is between them does not.
+                padded = np.pad(strip, ((0, 0), (reach + 1, reach)), "edge")
+                sums = np.cumsum(padded, axis=1, dtype=np.uint32)
+                strip = (sums[:, count:] - sums[:, :-count] + np.uint32(reach)) // np.uint32(count)
+            words[first : first + ROWS_AT_ONCE] = strip
+    return words
 
 
 def _grown(words: np.ndarray, radius: float, canvas: Grid) -> np.ndarray:
     """The largest word within a disc, longer sides; beyond the border there is nothing."""
+    result, margin = np.empty_like(words), int(radius / canvas.spacing[1])
+    rows = max(ROWS_AT_ONCE, 4 * margin)  # at most half as many again are gone through for what reaches into them
+    for first in range(0, len(words), rows):
+        start = max(first - margin, 0)
+        grown = _grown_strip(words[start : first + rows + margin], radius, canvas)
+        result[first : first + rows] = grown[first - start : first - start + rows]
+    return result
+
+
+def _grown_strip(words: np.ndarray, radius: float, canvas: Grid) -> np.ndarray:
+    """The same of so few rows that a processor has them at hand."""
     (hx, hy), (height, width), result = canvas.spacing, words.shape, words.copy()
     margin = min(int(radius / hx), width)
     # The largest of 1, 2, 4 ... words from each on to the right: two of them that overlap make any width.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import ceil, floor, log2
-from typing import Any
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
@@ -29,11 +29,27 @@ FORCE_COLOUR = (1.0, 0.87, 0.2)
 RESTING = 0.5  # how strong a force is shown while it does not act
 GRID_LINES = 24.0
 MOVING = 4  # pixels of the screen to one for which the warp is found while things move: nobody sees the difference
+PARTS = 8  # frames the picture at rest is spread over: as many as samples a side that a pixel may have in picture.frag
+ROWS = 16  # pixels high are its strips, so that what is pressed together lies in those of several frames
 
 WHOLE = 0.0, 0.0, 1.0, 1.0
 
 Pixels = tuple[int, int, int, int]
 """Left, top, right, bottom."""
+
+
+class Lattice(NamedTuple):
+    """Texels that the displacement is found for: (texel + origin) step is a place, 0-1 of the picture."""
+
+    size: tuple[int, int]
+    origin: tuple[float, float]
+    step: tuple[float, float]
+
+    @property
+    def shown(self) -> tuple[float, ...]:
+        """Left, top, width and height, 0-1 of the picture."""
+        (width, height), (x, y), (across, down) = self
+        return x * across, y * down, width * across, height * down
 
 
 class Canvas:
@@ -58,9 +74,10 @@ class Canvas:
         self._is_reduced = True  # the smaller versions of the texture are of what is in it
         self._still = device.field((1, 1), 2, "no displacement")
         self._fields = FieldPool(device, "canvas")
-        self._drawn: object = None  # what the displacement was found for
-        self._picture_drawn: object = None  # and the picture through it
-        self._masks_drawn: object = None  # and what is laid over it for the masks
+        self._drawn: object = None  # what the displacement was found for while things moved
+        self._resting: object = None  # what it and the picture through it are drawn for at rest,
+        self._parts = PARTS  # of which there are so many parts
+        self._masks_drawn: object = None  # what the layer of the masks was drawn for
         # The warp as it was last seen, shown on while it is made again on another grid.
         self._last: tuple[Field, tuple[float, ...]] | None = None
         self._selected: Field | None = None
@@ -74,11 +91,16 @@ class Canvas:
         """Pixels along a side of the picture that are shown."""
         return min(LARGEST, self.device.limits.max_texture_size)
 
+    @property
+    def is_unfinished(self) -> bool:
+        """The next frame draws more of the picture at rest."""
+        return self._parts < PARTS
+
     def show(self, pixels: np.ndarray) -> None:
         """Show another frame from now on, as `shown_pixels` makes it of a picture of the same size."""
         self._texture.write(pixels)
         self._is_reduced = False
-        self._picture_drawn = None
+        self._resting = None
 
     def draw(
         self,
@@ -97,30 +119,31 @@ class Canvas:
         for strip in _around(seen, _in_pixels(viewport.canvas, density)):
             target.clear(*palette.ground, viewport=_from_below(strip, height))
         self.device.fences.hold()
+        # What is not looked at now is not gone on with.
+        if self.is_unfinished and (visible is None or state.before):
+            self._resting, self._parts = None, PARTS
         if visible is None:
             return
         replay = session.replay
-        texture, displacement, shown = self._texture, self._still, WHOLE
-        if replay.density is not None:
-            texture = replay.density.values.texture
-        elif not state.before:
-            displacement, shown = self._seen(session, state, viewport, seen)
         level = self._filter(viewport, session.is_moving)
         defines: dict[str, object] = {"EDGES": EDGES[session.recipe.edges]}
         inputs: dict[str, Any] = {
-            "picture": texture,
-            "displacement": displacement,
-            "shown": shown,
+            "picture": self._texture,
+            "displacement": self._still,
+            "shown": WHOLE,
             "origin": (rect.x * density, rect.y * density),
             "step": (1 / (rect.width * density), 1 / (rect.height * density)),
             "extent": session.extent,
             "target_height": float(height),
         }
         corner = {"corner": (float(seen[0]), float(height - seen[3]))}
-        # At rest as an export has it. While things move one place a pixel is looked up, pressed together or not.
-        if displacement is not self._still and not (session.is_moving or state.is_scaling):
-            inputs |= {"seen": self._picture(seen, inputs, defines["EDGES"], level), **corner}
-            defines["SEEN"] = 1
+        if replay.density is not None:
+            inputs["picture"] = replay.density.values.texture
+        elif not state.before:
+            inputs["displacement"], inputs["shown"], picture = self._seen(session, state, viewport, seen, inputs, level)
+            if picture is not None:
+                inputs |= {"seen": picture, **corner}
+                defines["SEEN"] = 1
         if state.before or state.split is not None:
             defines["SPLIT"] = 1
             inputs["split"] = 2.0 if state.before else state.split
@@ -167,25 +190,25 @@ class Canvas:
 
     def _draw_small(self, target: moderngl.Framebuffer, session: Session) -> None:
         """Draw all of the picture as it is now into a small framebuffer, with nothing laid over it."""
-        width, height = target.size
-        texture, displacement = self._texture, self._fields.get("thumbnail", target.size, 2)
+        (width, height), edges = target.size, EDGES[session.recipe.edges]
+        inputs: dict[str, Any] = {"shown": WHOLE, "extent": session.extent, "target_height": float(height)}
+        inputs |= {"origin": (0.0, 0.0), "step": (1 / width, 1 / height)}
+        defines: dict[str, object] = {"EDGES": edges}
         if (density := session.replay.density) is not None:
-            texture, displacement = density.values.texture, self._still
+            inputs |= {"picture": density.values.texture, "displacement": self._still}
         else:
+            displacement = self._fields.get("thumbnail's displacement", target.size, 2)
             session.seen.draw(displacement, (0.0, 0.0), displacement.texel)
-        self._reduce()
-        self._texture.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
-        self.device.pass_("view/canvas.frag", EDGES=EDGES[session.recipe.edges]).draw_into(
-            target,
-            ("displacement",),
-            picture=texture,
-            displacement=displacement,
-            shown=WHOLE,
-            origin=(0.0, 0.0),
-            step=(1 / width, 1 / height),
-            extent=session.extent,
-            target_height=float(height),
-        )
+            self._reduce()
+            self._texture.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
+            inputs |= {"picture": self._texture, "displacement": displacement}
+            layer, level = self._fields.get("thumbnail", target.size, 4, "f1"), _halvings(width / self._texture.width)
+            apart = self._apart(inputs["step"], level)
+            averaged = self.device.pass_("view/picture.frag", EDGES=edges)
+            averaged.draw_into(layer.framebuffer, ("displacement",), **inputs, level=float(level), apart=apart)
+            defines["SEEN"] = 1
+            inputs |= {"seen": layer, "corner": (0.0, 0.0)}
+        self.device.pass_("view/canvas.frag", **defines).draw_into(target, ("displacement",), **inputs)
 
     def release(self) -> None:
         self._texture.release()
@@ -224,56 +247,83 @@ class Canvas:
         return fields
 
     def _seen(
-        self, session: Session, state: EditorState, viewport: Viewport, seen: Pixels
-    ) -> tuple[Field, tuple[float, ...]]:
-        """The displacement to show, and where it lies: left, top, width and height, 0-1 of the picture.
+        self, session: Session, state: EditorState, viewport: Viewport, seen: Pixels, inputs: dict[str, Any], level: int
+    ) -> tuple[Field, tuple[float, ...], Field | None]:
+        """The displacement to show, where it lies, 0-1 of the picture, and the picture through it if that is drawn.
 
         Found for the pixels of the screen only, so that it costs no more at any zoom and on any picture.
         """
         warp = session.seen
         if session.is_rebuilding and self._last is not None:
-            return self._last
+            return *self._last, None
         if warp.is_untouched:
             self._last = self._still, WHOLE
-            return self._last
+            return *self._last, None
         (left, top, right, bottom), rect, density = seen, viewport.rect, viewport.density
+
+        def lattice(apart: int) -> Lattice:
+            # One more on every side, to be interpolated between.
+            return Lattice(
+                (-(-(right - left) // apart) + 2, -(-(bottom - top) // apart) + 2),
+                ((left - rect.x * density) / apart - 1, (top - rect.y * density) / apart - 1),
+                (apart / (rect.width * density), apart / (rect.height * density)),
+            )
+
         # Of a picture that is magnified, as far apart as what is exported of it is found too.
         whole = ceil(rect.width * density), ceil(rect.height * density)
         apart = max(1, whole[0] // warp.size_for(self.size, whole)[0])
-        if moves := session.is_moving or state.is_scaling:
-            apart = max(apart, MOVING)
-        # One more on every side, to be interpolated between.
-        size = -(-(right - left) // apart) + 2, -(-(bottom - top) // apart) + 2
-        origin = (left - rect.x * density) / apart - 1, (top - rect.y * density) / apart - 1
-        step = apart / (rect.width * density), apart / (rect.height * density)
-        shown = origin[0] * step[0], origin[1] * step[1], size[0] * step[0], size[1] * step[1]
-        # Two are kept: each stroke begins and ends a movement.
-        field = self._fields.get("displacement, moving" if moves else "displacement", size, 2)
-        if (drawn := (field, warp, warp.version, shown)) != self._drawn:
-            warp.draw(field, origin, step, coarsely=moves)
+        if not (session.is_moving or state.is_scaling):
+            at_rest = lattice(apart)
+            if (picture := self._picture(session, at_rest, apart, seen, inputs, level)) is not None:
+                self._last = self._fields["displacement"], at_rest.shown
+                return *self._last, picture
+        moving = lattice(max(apart, MOVING))
+        field = self._fields.get("displacement, moving", moving.size, 2)
+        if (drawn := (field, warp, warp.version, moving)) != self._drawn:
+            warp.draw(field, moving.origin, moving.step, coarsely=True)
             self._drawn = drawn
-        self._last = field, shown
-        return self._last
+        self._last = field, moving.shown
+        return *self._last, None
 
-    def _picture(self, seen: Pixels, inputs: dict[str, Any], edges: object, level: int) -> Field:
-        """The picture through the displacement, at the pixels that are `seen`, drawn where it has changed.
+    def _picture(
+        self, session: Session, lattice: Lattice, apart: int, seen: Pixels, inputs: dict[str, Any], level: int
+    ) -> Field | None:
+        """The picture at the pixels that are `seen` as an export has it; None until the last part has been drawn.
 
-        `level`: how often the picture is halved for it.
+        Args:
+            lattice: of the displacement for it, `apart` pixels from one texel to the next.
+            level: how often the picture is halved.
         """
         left, top, right, bottom = seen
-        size, step = self._texture.size, inputs["step"]
-        numbers: dict[str, Any] = {name: inputs[name] for name in ("shown", "step", "extent")} | {"level": float(level)}
-        numbers |= {"origin": (inputs["origin"][0] - left, inputs["origin"][1] - top)}
-        numbers |= {"apart": tuple(max(2**level / side, one) for side, one in zip(size, step, strict=True))}
-        numbers["target_height"] = float(bottom - top)
-        layer = self._fields.get("picture", (right - left, bottom - top), 4, "f1")
-        if (drawn := (layer, self._drawn, self._texture.filter, edges, numbers)) != self._picture_drawn:
-            given: dict[str, Any] = {name: inputs[name] for name in ("picture", "displacement")}
-            self.device.pass_("view/picture.frag", EDGES=edges).draw_into(
-                layer.framebuffer, ("displacement",), **given, **numbers
+        height, step = bottom - top, inputs["step"]
+        numbers: dict[str, Any] = {"shown": lattice.shown, "step": step, "extent": inputs["extent"]}
+        numbers |= {"origin": (inputs["origin"][0] - left, inputs["origin"][1] - top), "level": float(level)}
+        numbers |= {"apart": self._apart(step, level), "target_height": float(height)}
+        warp, edges = session.seen, EDGES[session.recipe.edges]
+        displacement = self._fields.get("displacement", lattice.size, 2)
+        layer = self._fields.get("picture", (right - left, height), 4, "f1")
+        if (drawn := (displacement, layer, warp, warp.version, self._texture.filter, edges, numbers)) != self._resting:
+            self._resting, self._parts = drawn, 0
+        if self.is_unfinished:
+            strips = [(first, min(first + ROWS, height)) for first in range(self._parts * ROWS, height, PARTS * ROWS)]
+            # Of the displacement a strip takes what lies beside its pixels too, to be interpolated between.
+            rows = [(start // apart, -(-end // apart) + 2) for start, end in strips]
+            regions = [(0, first, lattice.size[0], end - first) for first, end in rows]
+            warp.draw(displacement, lattice.origin, lattice.step, regions=regions)
+            displacement.texture.filter = moderngl.LINEAR, moderngl.LINEAR
+            self.device.pass_("view/picture.frag", EDGES=edges)(
+                layer,
+                region=[(0, height - end, right - left, end - start) for start, end in strips],
+                picture=self._texture,
+                displacement=displacement,
+                **numbers,
             )
-            self._picture_drawn = drawn
-        return layer
+            self._parts += 1
+        return None if self.is_unfinished else layer
+
+    def _apart(self, step: tuple[float, float], level: int) -> tuple[float, ...]:
+        """How far apart samples of the picture, so often halved, may be, 0-1 of it, for pixels a `step` apart."""
+        return tuple(max(2**level / side, one) for side, one in zip(self._texture.size, step, strict=True))
 
     def _masks(
         self, session: Session, state: EditorState, seen: Pixels, inputs: dict[str, Any], scale: float
@@ -326,7 +376,7 @@ class Canvas:
         # Of a clip that runs, each frame would have to be reduced: up to a half nobody misses it.
         if zoom < (0.5 if moves and not self._is_reduced else 0.75):
             self._reduce()
-            small, level = moderngl.LINEAR_MIPMAP_NEAREST, max(round(-log2(zoom)), 0)
+            small, level = moderngl.LINEAR_MIPMAP_NEAREST, _halvings(zoom)
         self._texture.filter = (small, moderngl.NEAREST if zoom >= 6 else moderngl.LINEAR)
         return level
 
@@ -379,6 +429,11 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
         light = shown.pixels[..., :-1] - np.clip(straight[..., :-1], 0, 1) * straight[..., -1:]
         colours = np.minimum(colours.astype(np.uint16) + to_bits(light, 8, dither=False), 255).astype(np.uint8)
     return np.ascontiguousarray(np.concatenate([colours, pixels[..., 3:]], axis=2))
+
+
+def _halvings(zoom: float) -> int:
+    """How often the picture is halved to be seen at `zoom` pixels a texel."""
+    return max(round(-log2(zoom)), 0)
 
 
 def _in_pixels(rect: Rect, density: float) -> Pixels:

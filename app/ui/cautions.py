@@ -1,4 +1,4 @@
-"""What of the handles cannot be met, told as soon as it comes up: the sentences of the command line."""
+"""What of the handles cannot be met, and that the warp folds, told as soon as it comes up, as by the command line."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ Led = tuple[tuple[RecipeHandle, ...], tuple[RecipePin, ...]]
 
 
 class Cautions:
-    """Tells, each time once, which handles contradict each other, and which have come to rest where they should not."""
+    """Tells, each time once, which handles contradict each other, and which have come to rest where they should not.
+
+    And that the warp folds over itself, once until it does not any more.
+    """
 
     def __init__(self, workspace: Workspace, messages: Messages) -> None:
         self._workspace, self._messages = workspace, messages
         self._session: Session | None = None
         self._led: Led | None = None  # what the known ones are of
+        self._folds = False  # as was known last
         self._known: set[str] = set()  # sentences, and what is unmet by its label: how far it is changes
 
     def look(self) -> None:
@@ -29,7 +33,8 @@ class Cautions:
             return
         said = {each: each for each in session.objections} | session.unmet
         if session is not self._session:
-            self._session, self._known = session, set()
+            self._session, self._known, self._folds = session, set(), False
+        self._look_at_folds(session)
         new = [sentence for key, sentence in said.items() if key not in self._known]
         led = _led(session)
         # While it moves, or is looked at before its end, nobody can tell what will be unmet.
@@ -42,6 +47,18 @@ class Cautions:
             self._messages.caution(
                 " ".join([*words, *rest]), lambda: session is self._workspace.session and _led(session) == led
             )
+
+    def _look_at_folds(self, session: Session) -> None:
+        # A frame that draws the picture at rest has enough to do.
+        if session.is_moving or self._workspace.canvas.is_unfinished:
+            return
+        folds, places = session.folds
+        if folds and not self._folds:
+            self._messages.caution(
+                f"The warp folds over itself in {folds} of {places} places.",
+                lambda: session is self._workspace.session and self._folds,
+            )
+        self._folds = folds > 0
 
 
 def _led(session: Session) -> Led:

@@ -210,7 +210,7 @@ class Editor:
         """True while something moves by itself."""
         busy = self.quality.is_measuring or self.quality.is_preparing
         waits = self.backend.is_behind or bool(self._later or self._once_typed)
-        return busy or waits or self.session.is_moving or self.clock.settling
+        return busy or waits or self.session.is_moving or self.clock.settling or self.canvas.is_unfinished
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""

@@ -19,6 +19,7 @@ from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError, printable
 from app.media.clip import WHOLE, FrameRange, rate_of
+from app.media.formats import FORMATS
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
 from app.model.handles import in_words
@@ -89,6 +90,11 @@ def _depths(ending: str, *bits: int) -> tuple[Variant, ...]:
 
 def _as_it_is(ending: str, animated: bool = False) -> tuple[Variant, ...]:
     return (Variant("", ending, animated=animated),)
+
+
+def _holds_light(file: FileKind) -> bool:
+    """Whether a kind of picture file holds linear light in floats."""
+    return 32 in FORMATS[file.variants[0].ending].bits
 
 
 PICTURES = (
@@ -179,6 +185,8 @@ class ExportDialog(Dialog):
         self._take_up(preferences.export_as)
         if session.project.clip is not None:
             self.kind = ANIMATION
+        if session.project.picture.linear and not _holds_light(PICTURES[self.format[PICTURE]]):
+            self.format[PICTURE] = next(number for number, file in enumerate(PICTURES) if file.name == "EXR")
         self.returns = session.recipe.time.ping_pong
         # No clip is played backwards.
         self.presets = [preset for preset in PRESETS if not (preset.returns and session.project.clip)]
@@ -218,6 +226,13 @@ class ExportDialog(Dialog):
     @property
     def file_kind(self) -> FileKind:
         return KINDS[self.kind][1][self.format[self.kind]]
+
+    @property
+    def use(self) -> str:
+        """What the kind of file is good for, of this picture."""
+        if self.kind == PICTURE and self.picture.linear and not _holds_light(self.file_kind):
+            return "What is brighter than white becomes white; EXR and TIFF keep it."
+        return self.file_kind.use
 
     @property
     def how(self) -> Variant:
@@ -331,7 +346,7 @@ class ExportDialog(Dialog):
         if len(variants := self.file_kind.variants) > 1:
             labels, now = [variant.label for variant in variants], self.variant[self.kind][chosen]
             self.variant[self.kind][chosen] = ui.segmented("variant", labels, now, -1)
-        ui.dim(self.file_kind.use)
+        ui.dim(self.use)
         own = max(self.picture.width, self.picture.height)
         width, height = (round(side * self.size / own) for side in (self.picture.width, self.picture.height))
         unit, shown = Unit(" pixels", self.picture.width / own), f"{width} x {height} pixels"

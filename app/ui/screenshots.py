@@ -63,6 +63,8 @@ class OffscreenEditor:
     def picture(self) -> np.ndarray:
         """What is seen, (h, w, 3) uint8, top row first."""
         self.frame()
+        while self.editor.canvas.is_unfinished:
+            self.frame()
         data = np.frombuffer(self.target.read(components=3, alignment=1), np.uint8)
         return data.reshape(self.size[1], self.size[0], 3)[::-1].copy()
 

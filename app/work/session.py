@@ -102,6 +102,7 @@ class Session:
         self._marks: tuple[object, list[Held]] = (None, [])
         self._objections: tuple[object, tuple[str, ...]] = (None, ())
         self._unmet: tuple[object, dict[str, str]] = (None, {})
+        self._folds: tuple[object, tuple[int, int]] = (None, (0, 0))
         # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
         self._base = project.recipe
         self._live = project.recipe
@@ -392,6 +393,21 @@ class Session:
         if self._unmet[0] != seen:
             self._unmet = seen, dict(unmet(replay, ARRIVED))
         return self._unmet[1]
+
+    @property
+    def folds(self) -> tuple[int, int]:
+        """In how many places the warp folds over itself at this moment, and of how many, two a cell along each axis.
+
+        Reads back from the GPU; an export, which may take longer, looks at more of them.
+        """
+        warp = self.replay.warp
+        if warp.is_untouched:
+            return 0, 0
+        if self._folds[0] != (seen := (warp, warp.version)):
+            width, height = warp.coarse_size
+            found = warp.statistics((2 * width, 2 * height))
+            self._folds = seen, (found.folds, found.places)
+        return self._folds[1]
 
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:
         """Set something about the handle or pin that messages call so, from its start on, and let it arrive.

@@ -7,6 +7,7 @@ from typing import Any
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
+from solver.gl.passes import Region
 from solver.gl.reduction import Reduction
 from solver.grid import Grid
 from solver.warp.state import FACTOR
@@ -78,10 +79,11 @@ class Factors:
         origin: tuple[float, float],
         step: tuple[float, float],
         moved: Field | None = None,
+        regions: list[Region] | None = None,
     ) -> Field:
         """Draw the product with every factor scaled at (fragment + origin) step, 0-1 of the picture, after `moved`.
 
-        The map must be held nowhere.
+        The map must be held nowhere. It is drawn in `regions`, by default everywhere.
 
         Returns:
             The one of both targets that holds it.
@@ -92,7 +94,7 @@ class Factors:
             inputs: dict[str, Any] = {"factor": factor, "amount": amount, "picture": self.picture}
             inputs |= {"origin": origin, "step": step} | ({} if moved is None else {"moved": moved})
             follow = self.device.pass_("warp/follow_factor.frag", **({"FIRST": 1} if moved is None else {}))
-            follow(target, **inputs)
+            follow(target, region=regions, **inputs)
             moved, target, other = target, other, target
         return other
 

@@ -444,6 +444,7 @@ class WarpMap:
         exact: bool = False,
         moved: Field | None = None,
         coarsely: bool = False,
+        regions: list[Region] | None = None,
     ) -> None:
         """Draw the displacement at (fragment + origin) step, 0-1 of the picture.
 
@@ -451,16 +452,17 @@ class WarpMap:
             exact: not to be looked at between its texels.
             moved: another displacement of `target`'s size, after which this one is drawn.
             coarsely: the accumulated map need not be looked up more exactly than `target` will be, linearly.
+            regions: of `target`, where it is drawn; by default everywhere.
         """
         # Its own texels must not be farther apart than those of the target.
         linear = coarsely and all(side * n >= 1.0 for side, n in zip(step, self.size, strict=True))
         cubic = {} if exact else {"LINEAR": 1} if linear else {"CUBIC": 1}
         if moved is None:
-            self._compose(target, origin, step, **cubic)
+            self._compose(target, origin, step, regions, **cubic)
         else:
             compose = self.device.pass_("warp/compose.frag", FROM=1, **self._defines() | cubic)
             inputs: dict[str, Any] = self._parts() | {"from": moved}
-            compose(target, **inputs, origin=origin, step=step)
+            compose(target, region=regions, **inputs, origin=origin, step=step)
 
     def draw_held(
         self, target: Field, regions: list[Region], now: Field, corner: tuple[int, int], before: Field
@@ -522,11 +524,16 @@ class WarpMap:
         return still, window
 
     def _compose(
-        self, target: Field, origin: tuple[float, float], step: tuple[float, float], **defines: object
+        self,
+        target: Field,
+        origin: tuple[float, float],
+        step: tuple[float, float],
+        regions: list[Region] | None = None,
+        **defines: object,
     ) -> None:
-        for is_near, regions in self._frozen.parts([(0, 0, *target.size)], origin, step):
+        for is_near, parts in self._frozen.parts(regions or [(0, 0, *target.size)], origin, step):
             compose = self.device.pass_("warp/compose.frag", **self._defines(is_near) | defines)
-            compose(target, region=regions, **self._parts(), origin=origin, step=step)
+            compose(target, region=parts, **self._parts(), origin=origin, step=step)
 
     @property
     def _levels(self) -> list[Level]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from solver.gl.field import Field, FieldPool
+from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.limits import places
 from solver.warp.map import WarpMap
@@ -64,10 +65,15 @@ class ScaledMap:
         return field
 
     def draw(
-        self, target: Field, origin: tuple[float, float], step: tuple[float, float], coarsely: bool = False
+        self,
+        target: Field,
+        origin: tuple[float, float],
+        step: tuple[float, float],
+        coarsely: bool = False,
+        regions: list[Region] | None = None,
     ) -> None:
         """As `WarpMap.draw`."""
-        self._draw(target, origin, step, exact=False, coarsely=coarsely)
+        self._draw(target, origin, step, exact=False, coarsely=coarsely, regions=regions)
 
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
         """As `WarpMap.read`."""
@@ -95,25 +101,26 @@ class ScaledMap:
         step: tuple[float, float],
         exact: bool,
         coarsely: bool = False,
+        regions: list[Region] | None = None,
     ) -> None:
         warp, amount, fields = self.warp, self.amount, self._fields
         if amount == 0:
             target.clear()
             return
         if amount == 1:
-            warp.draw(target, origin, step, exact, coarsely=coarsely)
+            warp.draw(target, origin, step, exact, coarsely=coarsely, regions=regions)
             return
         before, whole = None, fields.get("whole", target.size, 2)
         bent: dict[str, Any] = {}
         if amount > 1:  # first all of it, and a part of it after that
             amount, before = amount - 1, fields.get("before", target.size, 2)
-            warp.draw(before, origin, step, exact, coarsely=coarsely)
+            warp.draw(before, origin, step, exact, coarsely=coarsely, regions=regions)
             bent = {"scaled": before, "unscaled": before}
-        warp.draw(whole, origin, step, exact, before, coarsely)
+        warp.draw(whole, origin, step, exact, before, coarsely, regions)
         # Beside what is held the factors, of two texels a cell, are far from the map's own slopes.
         if not warp.factors.is_one and warp.held is None:
             for name, part in (("scaled", amount), ("unscaled", 1.0)):
                 targets = fields.get(name, target.size, 2), fields.get(f"{name}, too", target.size, 2)
-                bent[name] = warp.factors.draw(targets, part, warp.submap, origin, step, before)
+                bent[name] = warp.factors.draw(targets, part, warp.submap, origin, step, before, regions)
         scale = self.device.pass_("warp/scale.frag", **({"BENT": 1} if bent else {}))
-        scale(target, displacement=whole, amount=amount, **bent)
+        scale(target, region=regions, displacement=whole, amount=amount, **bent)

@@ -7,6 +7,7 @@ import pytest
 from scipy import ndimage
 
 from app.errors import UserError
+from app.model import mask_edits
 from app.model.mask_edits import (
     FeatherMask,
     FillMask,
@@ -49,8 +50,11 @@ def done(edit: WholeEdit, before: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("of", KINDS)
 @pytest.mark.parametrize("radius", [0.01, 0.05, 0.1234, 0.3, 2.0])
-def test_grow_and_shrink_are_the_largest_and_the_smallest_within_a_disc(of: MaskName, radius: float) -> None:
+def test_grow_and_shrink_are_the_largest_and_the_smallest_within_a_disc(
+    of: MaskName, radius: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Beyond the border there is nothing that either could come from."""
+    monkeypatch.setattr(mask_edits, "ROWS_AT_ONCE", 5)
     before = words(of)
     (hx, hy), reach = CANVAS.spacing, min(int(radius / CANVAS.h) + 1, 62)
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
@@ -74,7 +78,8 @@ def test_a_disc_may_reach_a_whole_number_of_rows(rows: int) -> None:
 
 
 @pytest.mark.parametrize("of", KINDS)
-def test_feather_is_three_means(of: MaskName) -> None:
+def test_feather_is_three_means(of: MaskName, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mask_edits, "ROWS_AT_ONCE", 5)
     before = words(of)
     after = done(FeatherMask(kind="feather", tick=0, of=of, radius=0.15), before)
     wanted = before.astype(float)

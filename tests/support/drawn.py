@@ -32,21 +32,29 @@ class Drawn:
             self._note_shape(monkeypatch, name)
         for name in ("menu_item", "combo", "begin_menu", "text_unformatted", "input_text"):
             self._note_words(monkeypatch, name)
-        tooltip, draw_into = Ui.tooltip, Pass.draw_into
+        tooltip, call, draw_into = Ui.tooltip, Pass.__call__, Pass.draw_into
 
         def told(ui: Ui, title: str, key: str = "", more: str = "", at_once: bool = False, above: bool = False) -> None:
             self.lines.append(f"tooltip | {title} | {ui.shown(key)} | {more} | {at_once}")
             tooltip(ui, title, key, more, at_once, above)
 
-        def drawing(self_: Pass, framebuffer: Any, smooth: Any = (), **inputs: Any) -> None:
-            if self_.shader.startswith("view/"):
-                what = self_.shader.removeprefix("view/").removesuffix(".frag")
+        def note(shader: str, inputs: dict[str, Any]) -> None:
+            if shader.startswith("view/"):
+                what = shader.removeprefix("view/").removesuffix(".frag")
                 numbers = {name: value for name, value in inputs.items() if isinstance(value, (float, tuple))}
                 self.lines += [f"{what} {name} {_told(value, 4)}" for name, value in numbers.items()]
                 self.lines.append(f"{what} | {sorted(inputs)}")
+
+        def calling(self_: Pass, target: Any, **inputs: Any) -> None:
+            note(self_.shader, inputs)
+            call(self_, target, **inputs)
+
+        def drawing(self_: Pass, framebuffer: Any, smooth: Any = (), **inputs: Any) -> None:
+            note(self_.shader, inputs)
             draw_into(self_, framebuffer, smooth, **inputs)
 
         monkeypatch.setattr(Ui, "tooltip", told)
+        monkeypatch.setattr(Pass, "__call__", calling)
         monkeypatch.setattr(Pass, "draw_into", drawing)
 
     def _note_shape(self, monkeypatch: pytest.MonkeyPatch, name: str) -> None:

@@ -107,6 +107,8 @@ class Robot:
     def pixels(self) -> np.ndarray:
         """What is seen, (h, w, 3) uint8, top row first."""
         assert self.target.size == self.size, "nothing is seen before `see`"
+        while self.editor.canvas.is_unfinished:
+            self.frame()
         data = np.frombuffer(self.target.read(components=3, alignment=1), np.uint8)
         return data.reshape(self.size[1], self.size[0], 3)[::-1].copy()
 

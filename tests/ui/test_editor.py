@@ -74,14 +74,21 @@ def test_push_carries_the_picture_along(robot: Robot) -> None:
     assert np.abs(robot.canvas().astype(int) - before).mean() > 1
 
 
-def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(robot: Robot) -> None:
-    """One place a pixel would pick some of the squares that share it."""
+def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One place a pixel would pick some of the squares that share it. It is drawn over several frames as if at once."""
     robot.key("ctrl+1")
     session, view = robot.editor.session, robot.editor.view
     y, x = np.mgrid[0:180, 0:240] / 240
     bent = x + 0.1 * np.sin(7 * y) - 0.5
     session.replay.warp.set(np.stack([0.15 * np.tanh(bent / 0.03), 0 * y], axis=-1).astype(np.float32))
     robot.see()
+    while robot.editor.clock.settling:
+        robot.frame()
+    canvas = robot.editor.canvas
+    assert canvas.is_unfinished
+    assert robot.editor.wants_frame()
     size = round(view.rect.width), round(view.rect.height)
     sampler = Sampler(robot.device)
     exported = sampler.apply(session.seen, pattern().pixels, size, Sampling("bilinear", "clamp")).astype(int)
@@ -89,6 +96,25 @@ def test_at_rest_a_picture_that_is_pressed_together_is_seen_as_it_is_exported(ro
     seen = robot.canvas()
     off = np.abs(seen - exported[: len(seen)]).max(axis=2)
     assert off.mean() < 1.3  # 1.9 by one place a pixel
+    monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+    monkeypatch.setattr("app.ui.canvas.ROWS", 10_000)
+    canvas.show(shown_pixels(pattern(), canvas.largest))  # as if it were another
+    robot.frame()
+    assert not canvas.is_unfinished
+    np.testing.assert_array_equal(robot.canvas(), seen)
+
+
+def test_one_fold_of_the_warp_is_told_when_it_comes_up(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once all is at rest, and only once until there is none."""
+    replay, messages = robot.editor.session.replay, robot.editor.messages
+    y, x = np.mgrid[0:180, 0:240] / 240
+    bump = -(x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.02**2)
+    monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+    one = ["The warp folds over itself in 1 of 6912 places."]
+    for height, told in ((0.9, []), (1.1, one), (1.1, one), (0.9, [])):
+        replay.warp.set(np.stack([height * bump, 0 * y], axis=-1).astype(np.float32))
+        robot.frame(count=2)
+        assert [message.text for message in messages.shown] == told
 
 
 def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:

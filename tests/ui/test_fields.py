@@ -21,7 +21,7 @@ from app.model.recipe import Output
 from app.model.strokes import BrushPath, Change
 from app.progress import Progress
 from app.ui.events import LEFT, Button, Move
-from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PRESETS, ExportDialog
+from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PICTURES, PRESETS, ExportDialog
 from app.ui.files import load_any
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences
@@ -455,6 +455,25 @@ def test_the_next_export_begins_with_the_kind_of_the_last(robot: Robot, tmp_path
     assert (dialog.kind, dialog.ending) == (ANIMATION, ".webm")
     preferences.export_as = "Something of another version"
     assert ExportDialog(editor.session, editor.exports, editor.chooser, preferences).kind == PICTURE
+
+
+def test_of_linear_light_a_kind_is_proposed_that_holds_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Any other says what it loses; of a picture of 8 bits, each says what it is good for."""
+    editor, eight = robot.editor, robot.editor.session.project.picture
+
+    def asked(picture: Picture, last: str) -> ExportDialog:
+        monkeypatch.setattr(editor.session, "project", replace(editor.session.project, picture=picture))
+        return ExportDialog(editor.session, editor.exports, editor.chooser, Preferences(export_as=last))
+
+    light = Picture(np.ones((9, 12, 3), np.float32))
+    for last, ending in (("", ".exr"), ("Picture PNG", ".exr"), ("Picture TIFF", ".tif")):
+        assert asked(light, last).ending == ending
+    assert asked(eight, "").ending == ".png"
+    for picture, keeping in ((light, {"TIFF", "EXR"}), (eight, {file.name for file in PICTURES})):
+        dialog = asked(picture, "")
+        for number, file in enumerate(PICTURES):
+            dialog.format[PICTURE] = number
+            assert (dialog.use == file.use) == (file.name in keeping)
 
 
 SLIDERS = """

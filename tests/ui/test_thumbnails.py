@@ -47,6 +47,20 @@ def test_each_state_is_small_what_was_seen(robot: Robot) -> None:
     assert np.abs(pictures[1] - pictures[0]).mean() > 3
 
 
+def test_what_is_pressed_together_is_averaged_as_on_the_canvas(robot: Robot) -> None:
+    session, thumbnails = robot.editor.session, robot.editor.canvas.thumbnails
+    y, x = np.mgrid[0:180, 0:240] / 240
+    moved = 0.35 * np.tanh((x + 0.1 * np.sin(7 * y) - 0.5) / 0.09)
+    session.replay.warp.set(np.stack([moved, 0 * y], axis=-1).astype(np.float32))
+    robot.see()
+    thumbnails.take(0, session)
+    picture = pixels(thumbnails.of(0))
+    rect = robot.editor.view.rect
+    y0, x0 = round(rect.y), round(rect.x)
+    seen = robot.pixels()[y0 : y0 + round(rect.height), x0 : x0 + round(rect.width)]
+    assert np.abs(small(seen, picture) - picture)[:50].mean() < 6.5  # 7.7 by one place a pixel
+
+
 def test_what_is_made_after_undo_has_a_picture_of_its_own(robot: Robot) -> None:
     history, thumbnails = robot.editor.session.document.history, robot.editor.canvas.thumbnails
     robot.drag((0.3, 0.5), (0.6, 0.5))
