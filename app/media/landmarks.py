@@ -50,9 +50,9 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
 
     CSV has x0, y0, x1, y1 in pixels from the picture's top-left corner, y down, between commas, semicolons or tabs; in
     the latter two a comma is that of decimals. A header gives their order, and may name one column more, `curve`:
-    places of one name are the corners of a polyline and of the one it should become, which need not have as many (x0 and
-    y0, or x1 and y1, may be empty), and both are divided evenly along their lengths. .pts counts pixels from 1, as is the
-    custom, so that (1, 1) is the middle of the first; .tps counts y from the picture's lower edge.
+    places of one name are the corners of a polyline and of the one it should become, which need not have as many (x0
+    and y0, or x1 and y1, may be empty), and both are divided evenly along their lengths. .pts counts pixels from 1, as
+    is the custom, so that (1, 1) is the middle of the first; .tps counts y from the picture's lower edge.
 
     Raises:
         UserError: naming the file and the line, or if they are not two sets of as many landmarks.
