@@ -122,7 +122,7 @@ class Fitted:
         if trial.folds:
             shape = f"{trial.folds} place{' folds' if trial.folds == 1 else 's fold'}"
         else:
-            shape = f"nothing folds, and no part grows to over {1 / trial.det:.3g} times its area"
+            shape = f"nothing folds, and the picture grows to {1 / trial.det:.3g} times its area at most"
         met = f"mean error {errors.mean():.3g} pixels, most {errors.max():.3g}"
         return f"{len(errors)} {self.noun}{several}, {met}; {shape}"
 
@@ -639,7 +639,7 @@ class _Search:
             raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:
             others = f" beside the recipe's {taken} handles and pins" if taken else ""
-            raise UserError(f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together")
+            raise UserError(f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together; leave some out")
         return numbers
 
     def _reachable(self) -> np.ndarray:

@@ -338,7 +338,7 @@ def test_a_fit_is_told_in_a_line():
     assert told == "1 handle, mean error 0.5 pixels, most 0.5; 1 place folds"
     flat = replace(trial, folds=0, det=0.8)
     told = Fitted(flat, pairs, np.array([0.5, np.nan]), False, True, ()).told
-    assert told.endswith("most 0.5; nothing folds, and no part grows to over 1.25 times its area")
+    assert told.endswith("most 0.5; nothing folds, and the picture grows to 1.25 times its area at most")
 
 
 def test_outlines_of_masks_are_fitted_and_written_as_a_curve(fluidwarp: Run, tmp_path: Path):
