@@ -639,7 +639,9 @@ class _Search:
             raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:
             others = f" beside the recipe's {taken} handles and pins" if taken else ""
-            raise UserError(f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together; leave some out")
+            raise UserError(
+                f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together; leave some out"
+            )
         return numbers
 
     def _reachable(self) -> np.ndarray:
