@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import csv
 import os
-import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -16,7 +16,7 @@ from app.media.files import replacing
 from app.media.inputs import read_input
 from app.media.outlines import SPACING, paired
 
-MOST_BYTES = 4 * 2**20
+MOST_BYTES = 2**20
 FARTHEST = 1e6  # pixels: nobody's landmark lies beyond
 ENDINGS = (".csv", ".pts", ".tps")
 
@@ -48,15 +48,16 @@ class Pairs(NamedTuple):
 def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
     """The correspondences in a CSV file, a .tps file of two specimens, or two files of one set of landmarks each.
 
-    CSV has x0, y0, x1, y1 in pixels from the picture's top-left corner, y down; .pts counts pixels from 1, as is the
-    custom, so that (1, 1) is the middle of the first; .tps counts y from the picture's lower edge. With a header, CSV
-    may have a column `curve`: places of one name are the corners of a polyline and of the one it should become, which
-    need not have as many (x0 and y0, or x1 and y1, may be empty), and both are divided evenly along their lengths.
+    CSV has x0, y0, x1, y1 in pixels from the picture's top-left corner, y down, between commas, semicolons or tabs; in
+    the latter two a comma is that of decimals. A header gives their order, and may name one column more, `curve`:
+    places of one name are the corners of a polyline and of the one it should become, which need not have as many (x0
+    and y0, or x1 and y1, may be empty), and both are divided evenly along their lengths. .pts counts pixels from 1, as
+    is the custom, so that (1, 1) is the middle of the first; .tps counts y from the picture's lower edge.
 
     Raises:
         UserError: naming the file and the line, or if they are not two sets of as many landmarks.
     """
-    files = " and ".join(str(path) for path in paths)
+    files, has = " and ".join(str(path) for path in paths), "has" if len(paths) == 1 else "have"
     if len(paths) == 1 and check_ending(paths[0]) == ".csv":
         pixels, curves = _read_csv(paths[0], _lines(paths[0]), SPACING * max(size))
         if not len(pixels):
@@ -67,12 +68,12 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
         sets += _read(path, size)
     if len(sets) != 2:
         found = f"{len(sets)} sets of landmarks" if len(sets) != 1 else "one set of landmarks"
-        said = f"{files} has {found}; pairs need two, where the points are and where they should be"
+        said = f"{files} {has} {found}; pairs need two, where the points are and where they should be"
         raise UserError(said, in_window=f"{said}: drop two files at once")
     if len(sets[0]) != len(sets[1]):
         raise UserError(f"{files}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}")
     if not len(sets[0]):
-        raise UserError(f"{files} has no pairs")
+        raise UserError(f"{files} {has} no pairs")
     return Pairs.points(np.stack(sets, axis=1) / size)
 
 
@@ -89,7 +90,8 @@ def write_pairs(path: Path, pairs: Pairs, size: Size) -> None:
         case ".csv":
             lines = [",".join(COLUMNS), *(",".join(map(_shown, pair)) for pair in pixels.reshape(-1, 4))]
             if any(pairs.curves):
-                lines = [f"{curve},{line}" for curve, line in zip((CURVE, *pairs.curves), lines, strict=True)]
+                names = (CURVE, *map(_quoted, pairs.curves))
+                lines = [f"{name},{line}" for name, line in zip(names, lines, strict=True)]
         case ".pts":
             rows = (f"{_shown(x)} {_shown(y)}" for x, y in pixels[:, 1] + 0.5)
             lines = ["version: 1", f"n_points: {len(pixels)}", "{", *rows, "}"]
@@ -107,6 +109,11 @@ def check_ending(path: Path) -> str:
     if (ending := path.suffix.lower()) not in ENDINGS:
         raise UserError(f"{path}: pairs are in files that end with {', '.join(ENDINGS)}")
     return ending
+
+
+def _quoted(name: str) -> str:
+    """A name as CSV has it: what would part it, or make a remark of its line, is in quotes."""
+    return '"' + name.replace('"', '""') + '"' if any(each in name for each in '\t;,"#') else name
 
 
 def _shown(number: float) -> str:
@@ -139,12 +146,12 @@ def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tup
     """Pairs (n, 2, 2) in pixels and the curve of each, whose points are so many pixels apart at most."""
     columns, groups = list(COLUMNS), dict[tuple[str, int], tuple[list[list[float]], list[list[float]]]]()
     for first, (number, line) in enumerate(lines):
-        words = re.split(r"\s*[,;\t]\s*", line)
+        words = _words(line, (len(columns),) if first else (len(COLUMNS), len(COLUMNS) + 1))
         if first == 0 and not any(map(_is_number, words)):
-            if CURVE in (named := [word.lower() for word in words]):
-                if sorted(named) != sorted((CURVE, *COLUMNS)):
-                    raise _bad(path, number, f"expected the columns {CURVE},{','.join(COLUMNS)}, and not {line[:40]!r}")
-                columns = named
+            columns = [word.lower() for word in words]
+            if sorted(columns) not in (sorted(COLUMNS), sorted((CURVE, *COLUMNS))):
+                named = f"{','.join(COLUMNS)} in any order, and perhaps {CURVE}"
+                raise _bad(path, number, f"expected numbers, or the columns {named}; and not {line[:40]!r}")
             continue
         wanted = ",".join(columns)
         if len(words) != len(columns):
@@ -166,10 +173,28 @@ def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tup
     return np.concatenate(pairs), tuple(curves)
 
 
+def _words(line: str, counts: tuple[int, ...]) -> list[str]:
+    """What is between the tabs, semicolons or commas of a line, whichever give one of these counts.
+
+    Between the former two a number may have a decimal comma.
+    """
+    words = list[str]()
+    for separator in filter(line.__contains__, "\t;,"):
+        try:
+            words = [word.strip() for word in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+        except csv.Error:  # a word that is too long
+            continue
+        if len(words) in counts:
+            pointed = words if separator == "," else [word.replace(",", ".", 1) for word in words]
+            return [point if _is_number(point) else word for word, point in zip(words, pointed, strict=True)]
+    return words
+
+
 def _read_pts(path: Path, lines: Lines) -> np.ndarray:
     count = None
     for number, line in lines:
         key, _, value = (part.strip() for part in line.partition(":"))
+        key = key.lower()
         if key == "n_points":
             count = _count(path, number, value)
         elif line == "{":

@@ -18,9 +18,9 @@ from app.ui.workspace import Workspace
 from app.work.export_process import FitProcess
 from app.work.fit_job import Fit
 from app.work.fitting import DURATION, EVALUATIONS
+from app.work.held import FIT
 from app.work.session import Session
 
-FIT = "Fit"  # what the history calls it
 TOLD = 6  # notices in a message
 
 

@@ -118,11 +118,13 @@ class Fitted:
     def told(self) -> str:
         """The result in a line."""
         errors, trial = self.errors[np.isfinite(self.errors)], self.trial
-        several, folds = "s" * (len(errors) != 1), "s" * (trial.folds != 1)
-        return (
-            f"{len(errors)} {self.noun}{several}, mean error {errors.mean():.3g} pixels, most {errors.max():.3g}; "
-            f"work {trial.work:.3g}, least det J {trial.det:.3g}, {trial.folds} fold{folds}"
-        )
+        several = "s" * (len(errors) != 1)
+        if trial.folds:
+            shape = f"{trial.folds} place{' folds' if trial.folds == 1 else 's fold'}"
+        else:
+            shape = f"nothing folds, and the picture grows to {1 / trial.det:.3g} times its area at most"
+        met = f"mean error {errors.mean():.3g} pixels, most {errors.max():.3g}"
+        return f"{len(errors)} {self.noun}{several}, {met}; {shape}"
 
 
 def fitted(
@@ -637,7 +639,9 @@ class _Search:
             raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:
             others = f" beside the recipe's {taken} handles and pins" if taken else ""
-            raise UserError(f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together")
+            raise UserError(
+                f"there are {len(numbers)} {self.noun}s{others}; at most {MOST_HANDLES} work together; leave some out"
+            )
         return numbers
 
     def _reachable(self) -> np.ndarray:

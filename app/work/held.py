@@ -16,10 +16,12 @@ Line = tuple[Point, ...]
 FROZEN = "what it holds is frozen"
 HALTED = {  # why a handle or a pin halts, by `Handles.halts`
     "strain": "the picture around it is bent as far as it bears",
+    "frozen": "the picture between it and what is frozen is bent as far as it bears",
     "at odds": "what others hold is in its way",
     "soft": "it gives way to the fluid, and wants more stiffness",
     "edge": "what is at the picture's edge stays there",
 }
+FIT = "Fit"  # what the history calls an edit by a fit
 ANEW = "; Fit leads all anew, which may bring it nearer"
 
 
@@ -99,13 +101,13 @@ def as_seen(held: list[Held], replay: Replay) -> list[Held]:
     return seen
 
 
-def unmet(replay: Replay, within: float) -> Iterator[tuple[str, str]]:
+def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[tuple[str, str]]:
     """Which handles are farther than `within` longer sides from where they are led, by what messages call them, and a
-    sentence of how far each is.
+    sentence of how far each is; whether they have just been fitted, which is not said to help again.
     """
     if not replay.handles.handles:
         return
-    solid = replay.fluid.solid.get()
+    solid = replay.fluid.solid.get() == 255
     for (label, led), far, points, halt in zip(
         replay.led, replay.handles.away, replay.handles.shapes, replay.handles.halts, strict=True
     ):
@@ -113,14 +115,23 @@ def unmet(replay: Replay, within: float) -> Iterator[tuple[str, str]]:
             held = points if led.points else points[:1]
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
             why = ""
-            if (solid[rows, columns] == 255).any():
+            if solid[rows, columns].any():
                 why = f": {FROZEN}"
             elif halt and led.is_in_force(max(replay.tick - 1, 0), replay.recipe.fluid.dt):
+                if halt == "strain" and _nearest_of(solid, replay, held) < led.radius:
+                    halt = "frozen"
                 # A fit leads what goes somewhere, and leaves pins as they are.
-                is_fitted = halt != "edge" and isinstance(led, RecipeHandle) and led.is_led
-                why = f": {HALTED[halt]}{ANEW if is_fitted else ''}"
+                helps = halt != "edge" and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
+                why = f": {HALTED[halt]}{ANEW if helps else ''}"
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
             yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led{why}"
+
+
+def _nearest_of(solid: np.ndarray, replay: Replay, places: np.ndarray) -> float:
+    """How far the nearest solid cell is from any of these places, longer sides; infinite where none is solid."""
+    rows, columns = np.nonzero(solid)
+    cells = (np.stack([columns, rows], axis=-1) + 0.5) * replay.grid.spacing
+    return min((float(np.hypot(*(cells - place).T).min(initial=np.inf)) for place in places), default=np.inf)
 
 
 def _fractions(places: np.ndarray, extent: Point, closed: bool = False) -> Line:

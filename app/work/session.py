@@ -42,7 +42,7 @@ from app.model.timeline import NEARLY, Timeline, moment_at
 from app.model.tools import Made, Press, Tool, Touch
 from app.model.windows import detail_for
 from app.work.gesture import OpenGesture, kept_near
-from app.work.held import Held, as_seen, held_in, unmet
+from app.work.held import FIT, Held, as_seen, held_in, unmet
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.map import WarpMap
@@ -389,9 +389,10 @@ class Session:
         replay = self.replay
         if self.is_moving or self.tick != self.end or not replay.recipe.leads:
             return {}
-        seen = replay, replay.recipe, replay.tick, replay.warp.version
+        is_fitted = self.document.history.undo_name == FIT
+        seen = replay, replay.recipe, replay.tick, replay.warp.version, is_fitted
         if self._unmet[0] != seen:
-            self._unmet = seen, dict(unmet(replay, ARRIVED))
+            self._unmet = seen, dict(unmet(replay, ARRIVED, is_fitted))
         return self._unmet[1]
 
     @property

@@ -293,8 +293,8 @@ class Handles:
     @property
     def halts(self) -> list[str | None]:
         """Why each comes no nearer to where it is led: "edge", if that is farther than a line goes beside the picture's
-        edge; "strain", if the map around it slows it down; where it has let go "soft", if nothing else is held, or
-        else "at odds"; else None.
+        edge; "strain", if the map around it slows it down so far that it would let go by that alone; where it has let
+        go "soft", if nothing else is held, or else "at odds"; else None.
         """
         found = list[str | None]()
         let_go = "at odds" if len(self.handles) > 1 else "soft"
@@ -306,7 +306,8 @@ class Handles:
             elif shape.is_held_by_edges(starts):
                 found.append("edge")
             else:
-                found.append("strain" if slower[rows].min() < 1 else let_go if waited > PATIENCE else None)
+                is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
+                found.append("strain" if is_strained else let_go if waited > PATIENCE else None)
         return found
 
     def left(self, time: float, dt: float) -> list[tuple[np.ndarray, float]]:

@@ -15,7 +15,7 @@ PAIRS = np.array([[[0.25, 0.5], [0.3, 0.4]], [[0.1, 0.9], [0.1, 0.85]], [[1 / 3,
 POINTS = Pairs.points(PAIRS)
 
 CSV = "x0,y0,x1,y1\n50,50,60,40\n# a remark\n20;90;20;85\n\n66.66666667\t66.66666667\t80\t70\n"
-FROM_PTS = "version: 1\nn_points: 3\n{\n50.5 50.5\n20.5 90.5\n67.16666667 67.16666667\n}\n"
+FROM_PTS = "Version: 1\nn_points: 3\n{\n50.5 50.5\n20.5 90.5\n67.16666667 67.16666667\n}\n"
 TO_PTS = "version: 1\r\nn_points:  3\r\n{\r\n60.5 40.5\r\n20.5 85.5\r\n80.5 70.5\r\n}\r\n"
 # As tpsDig2 writes it, y from below; the last landmark of each is on a curve.
 TPS = (
@@ -32,6 +32,26 @@ def test_the_same_pairs_are_read_from_every_format(tmp_path: Path) -> None:
         found = read_pairs([tmp_path / name for name in given], SIZE)
         np.testing.assert_allclose(found.places, PAIRS, atol=1e-10, err_msg=str(given))
         assert found.curves == POINTS.curves
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "X1,y1, X0 ,y0\n30,40.5,10,20\n",  # the header tells the order
+        '"10";"20";"30";"40,5"\n',
+        "10,0\t20\t30\t40,5\r\n",
+        'curve;x0;y0;x1;y1\n;10;20;30;"40,5"\n',
+    ],
+)
+def test_csv_of_other_programs_is_read(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8-sig", newline="")
+    np.testing.assert_allclose(read_pairs([tmp_path / "a.csv"], SIZE).places[0] * SIZE, [(10, 20), (30, 40.5)])
+
+
+def test_a_long_line_of_spaces_is_told_at_once(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("1,2,3,4\n1" + " " * 500_000 + "x\n")
+    with pytest.raises(UserError, match="line 2: expected x0,y0,x1,y1"):
+        read_pairs([tmp_path / "a.csv"], SIZE)
 
 
 @pytest.mark.parametrize("name", ["out.csv", "out.tps"])
@@ -68,6 +88,13 @@ def test_both_sides_of_a_curve_are_divided_evenly_along_their_lengths(tmp_path: 
     np.testing.assert_allclose(found.places[1:, 1] * SIZE, [(100 + 16 * k, 80) for k in range(6)])
 
 
+def test_a_name_that_would_part_its_line_comes_back(tmp_path: Path) -> None:
+    names = "a,b", "a;b", '"', "#", "1,5"
+    places = np.linspace(0.1, 0.5, 10)[:, None, None] * np.ones((2, 2))
+    write_pairs(tmp_path / "out.csv", Pairs(places, tuple(np.repeat(names, 2))), SIZE)
+    assert list(dict.fromkeys(read_pairs([tmp_path / "out.csv"], SIZE).curves)) == list(names)
+
+
 def test_a_closed_curve_has_its_first_place_once(tmp_path: Path) -> None:
     square, far = [(20, 20), (60, 20), (60, 60), (20, 60), (20, 20)], 30
     rows = "".join(f"box,{x},{y},{x + far},{y}\n" for x, y in square)
@@ -95,7 +122,7 @@ def test_curves_come_back_as_they_were_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("a.csv", "curve,x0,y0\na,1,2\n", "line 1: expected the columns curve,x0,y0,x1,y1"),
+        ("a.csv", "curve,x0,y0\na,1,2\n", "in any order, and perhaps curve; and not 'curve,x0,y0'"),
         ("a.csv", "curve,x0,y0,x1,y1\n,1,2,,\n", "line 2: expected curve,x0,y0,x1,y1, and not ',1,2,,'"),
         ("a.csv", "curve,x0,y0,x1,y1\na,1,2,3,\n", "line 2: expected curve,x0,y0,x1,y1"),
         ("a.csv", "curve,x0,y0,x1,y1\na,1,2,3,4\n", "the curve 'a' needs two different places on both sides"),
@@ -111,6 +138,10 @@ def test_curves_come_back_as_they_were_written(tmp_path: Path) -> None:
         ("a.csv", "x0,y0,x1,y1\nx0,y0,x1,y1\n", "line 2: expected"),
         ("a.csv", "1,2,x,4\n1,2,3,4\n", "line 1: expected x0,y0,x1,y1"),
         ("a.pts", "version: 1\nn_points: many\n{\n", "line 2: expected how many points"),
+        ("a.csv", "Label,X,Y,Slice\n1,10,20,1\n", "line 1: expected numbers, or the columns x0,y0,x1,y1 in any order"),
+        ("a.csv", "10 20 30 40\n", "line 1: expected numbers, or the columns"),
+        ("a.csv", "x0,y0,x1,y1,curve,x0\n", "line 1: expected numbers, or the columns"),
+        ("a.csv", "10,5;20,5\n", "line 1: expected x0,y0,x1,y1, and not '10,5;20,5'"),
         ("a.csv", "1,2,nan,4\n", "line 1: no pixel lies at"),
         ("a.csv", "1,2,1e9,4\n", "line 1: no pixel lies at"),
         ("a.csv", "x0,y0,x1,y1\n", "has no pairs"),

@@ -332,10 +332,13 @@ def test_a_fit_is_told_in_a_line():
     nothing, pairs = np.zeros(0), Pairs.points(PAIRS)
     trial = Trial(Recipe(), pairs.places, nothing, nothing, work=1.25, det=0.5, folds=3)
     told = Fitted(trial, pairs, np.array([0.25, 0.75, np.nan]), False, False, ()).told
-    assert told == "2 pairs, mean error 0.5 pixels, most 0.75; work 1.25, least det J 0.5, 3 folds"
+    assert told == "2 pairs, mean error 0.5 pixels, most 0.75; 3 places fold"
     one = replace(trial, folds=1)
     told = Fitted(one, pairs, np.array([0.5, np.nan]), False, False, (), "handle").told
-    assert told == "1 handle, mean error 0.5 pixels, most 0.5; work 1.25, least det J 0.5, 1 fold"
+    assert told == "1 handle, mean error 0.5 pixels, most 0.5; 1 place folds"
+    flat = replace(trial, folds=0, det=0.8)
+    told = Fitted(flat, pairs, np.array([0.5, np.nan]), False, True, ()).told
+    assert told.endswith("most 0.5; nothing folds, and the picture grows to 1.25 times its area at most")
 
 
 def test_outlines_of_masks_are_fitted_and_written_as_a_curve(fluidwarp: Run, tmp_path: Path):

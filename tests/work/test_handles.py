@@ -213,7 +213,40 @@ def test_that_the_map_bears_no_more_is_told_and_what_may_mend_it(device: Device)
     replay.advance()
     ((_, said),) = unmet(replay, ARRIVED)
     assert said.endswith("bent as far as it bears; Fit leads all anew, which may bring it nearer")
+    ((_, said),) = unmet(replay, ARRIVED, is_fitted=True)
+    assert said.endswith("bent as far as it bears")
     replay.release()
+
+
+@pytest.mark.parametrize(
+    ("det", "said"), [(0.88, "where it is led"), (0.82, "the picture around it is bent as far as it bears")]
+)
+def test_a_map_that_only_slows_a_handle_down_does_not_keep_it_from_its_goal(device: Device, det: float, said: str):
+    """Bent so that it goes .74 as fast, and .07 as fast."""
+    replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5])], fluid={"grid": 32}, duration=0.1)
+    swollen = np.zeros((96, 128, 2), np.float32)
+    swollen[..., 0] = (det - 1) * ((np.arange(128) + 0.5) / 128 - 0.5)
+    replay.warp.set(swollen)
+    replay.advance()
+    ((_, told),) = unmet(replay, ARRIVED, is_fitted=True)
+    assert told.endswith(said)
+    replay.release()
+
+
+def test_what_is_frozen_beside_a_handle_is_told(device: Device):
+    """Farther off than it reaches it is not."""
+    frozen_disc = {"kind": "path", "points": [[0.65, 0.5]], "radius": 0.05, "hardness": 1.0}
+    folded = np.zeros((96, 128, 2), np.float32)
+    folded[:, 64, 0] = 1.5 / 128
+    for at, between in (0.5, True), (0.35, False):
+        led = led_to([at, 0.5], [at, 0.4], radius=0.2)
+        replay = replay_of(device, handle=[led], freeze=[frozen_disc], fluid={"grid": 32}, duration=0.1)
+        replay.warp.set(folded)
+        replay.advance()
+        ((_, said),) = unmet(replay, ARRIVED)
+        assert ("the picture between it and what is frozen is bent" in said) == between
+        assert "bent as far as it bears" in said
+        replay.release()
 
 
 def test_what_lets_go_by_itself_is_not_said_to_be_in_another_s_way(device: Device):
