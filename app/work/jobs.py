@@ -212,6 +212,13 @@ class Job:
         if self.clip is not None and self.has_frames:
             self.clip.check(outputs.part)
         outputs.check()
+        width, height = result_size(self.recipe, self.picture)
+        if outputs.file is not None and width * height > max(MAX_PIXELS, self.picture.width * self.picture.height):
+            large = f"a result of {width} x {height} pixels"
+            raise UserError(
+                f"'output.size' makes {large}; ask for at most {MAX_PIXELS}, by --size or there",
+                in_window=f"{large} is too large; choose a smaller size",
+            )
         if self.clip is not None and self.recipe.mode == "density":
             raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
         for path in outputs.files:

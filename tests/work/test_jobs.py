@@ -31,6 +31,13 @@ def test_a_size_keeps_its_proportions_and_at_least_a_pixel() -> None:
     assert result_size(Recipe(output=Output(size=200)), PICTURE) == (200, 120)
 
 
+def test_a_result_of_too_many_pixels_is_refused_before_the_work(tmp_path: Path) -> None:
+    job(tmp_path, Recipe(output=Output(size=25_800)), file="a.png").check()
+    with pytest.raises(UserError, match=r"'output\.size' makes a result of 32768 x 19661 pixels; ask for at most"):
+        job(tmp_path, Recipe(output=Output(size=32_768)), file="a.png").check()
+    job(tmp_path, Recipe(output=Output(size=32_768)), maps=MapOutput(tmp_path / "m.npy", size=100)).check()
+
+
 def test_what_is_an_animation_and_what_has_frames(tmp_path: Path) -> None:
     cases: list[tuple[dict[str, Any], bool, bool, str]] = [
         ({"file": "a.png"}, False, False, "a.png"),
