@@ -369,7 +369,7 @@ BAD = {
     "T = 0": (["T0.toml", "-o", "x.png"], "T0.toml, line 1: 'duration' must be greater than 0"),
     "unknown key": (["key.toml", "-o", "x.png"], "key.toml, line 6: force[1] \"x\": unknown key 'radios'"),
     "wrong type": (["type.toml", "-o", "x.png"], "type.toml, line 2: 'fluid.grid' must be a whole number, not \"64\""),
-    "radius 0": (["radius.toml", "-o", "x.png"], "'radius' must be at least 1e-06, not 0"),
+    "radius 0": (["radius.toml", "-o", "x.png"], "'radius' must be greater than 0, not 0"),
     "newer": (["newer.toml", "-o", "x.png"], "install a newer fluidwarp"),
     "not a recipe": (["cat.bin", "-o", "x.png"], "not text"),
 }  # fmt: skip

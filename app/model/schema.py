@@ -30,8 +30,8 @@ def _without_nul(name: str) -> str:
 FileName = Annotated[str, Field(min_length=1), AfterValidator(_without_nul)]
 """The name of a file, relative to the recipe's folder."""
 
-Radius = Annotated[float, Field(ge=1e-6, le=10)]
-"""A radius, in longer sides of the picture; no pixel sees a smaller one, and the square of a tiny one is 0."""
+Radius = Annotated[float, Field(gt=0, le=10)]
+"""A radius, in longer sides of the picture."""
 
 Item = TypeVar("Item")
 Several = Annotated[tuple[Item, ...], Field(fail_fast=True)]

@@ -9,11 +9,12 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from app.model.schema import Fraction01, Model, Place, Radius, Several
+from app.model.schema import Fraction01, Model, Place, Several
 
 ToolName = Literal["push", "curve", "twirl", "bloat", "pinch", "thicken", "thin", "freeze", "thaw", "smooth", "restore"]
 Symmetry = Literal["none", "left-right", "up-down", "both", "radial"]
 FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1 / 200 of such a cell
+SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
 LATEST = 10_000_000  # tick
 MOST_TIMES = 1000  # that a stroke repeats
 Tick = Annotated[int, Field(ge=0, le=LATEST)]
@@ -54,7 +55,7 @@ class BrushPath(Model):
     """
 
     tool: ToolName
-    radius: Radius = 0.08
+    radius: Annotated[float, Field(ge=SMALLEST_RADIUS, le=10)] = 0.08
     hardness: Fraction01 = 0.5
     strength: Annotated[float, Field(ge=0, le=100)] = 1.0
     reverse: bool = False
