@@ -113,8 +113,9 @@ def test_a_stroke_goes_on_beyond_the_edges_by_half_a_picture(session: Session) -
 def test_a_fit_is_offered_but_straight_after_one(session: Session) -> None:
     """Of a handle that is too soft for its goal."""
     soft = RecipeHandle(at=(0.4, 0.5), to=(0.6, 0.5), stiffness=0.01, duration=0.05)
+    session.edit("Quality", fluid=session.recipe.fluid.model_copy(update={"dt": 0.1, "grid": 16}))
     for name, is_offered in ("Handle", True), (FIT, False):
-        session.edit(name, handle=(soft,), duration=0.6 if is_offered else 0.62)
+        session.edit(name, handle=(soft,), duration=0.8 if is_offered else 0.9)
         session.seek(session.end)
         session.settle()
         (said,) = session.unmet.values()
