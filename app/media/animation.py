@@ -121,7 +121,7 @@ def animation_writer(
                 yield lambda frame, number=None: write(straight(frame))
             return
         given, sound = _sound(container, options, rate)
-        if options.timecode is not None and container.even | (container.name == "FFV1"):
+        if options.timecode is not None and container.sound:
             sound = [*sound, "-metadata", f"timecode={options.timecode}"]
         encoding = container.encoding(options.codec)
         with _Video(temporary, str(path), encoding, rate, container.even, options, (given, sound), cancel) as video:

@@ -63,7 +63,7 @@ class Clip(ABC):
         fps: frames a second; None where the recipe says it.
         frames: about how many there are; None where that is not known.
         start: the number of the first.
-        sound: the codec of its first sound track; None if it is silent.
+        sounds: the codecs of its sound tracks.
         late: seconds from the file's start, as a rule its sound's, to the first frame; 0 where ffmpeg does not say.
         durations: of the frames, in steps of 1 / fps, where they differ.
         loops: how often it is played, 0 for ever.
@@ -83,7 +83,7 @@ class Clip(ABC):
     fps: Fraction | None
     frames: int | None = None
     start: int = 0
-    sound: str | None = None
+    sounds: tuple[str, ...] = ()
     late: float = 0.0
     durations: tuple[int, ...] | None = None
     loops: int = 0
@@ -93,6 +93,11 @@ class Clip(ABC):
     is_linked: bool = True
     is_steady: bool = True
     note: str = ""
+
+    @property
+    def sound(self) -> str | None:
+        """The codec of its first sound track; None if it is silent."""
+        return next(iter(self.sounds), None)
 
     def moment(self, number: int) -> int:
         """When a frame is shown, in steps of 1 / fps after the first."""

@@ -224,14 +224,27 @@ def check_animation(
         )
 
 
-def unheld_of_clip(path: str | os.PathLike[str], codec: str | None, clip: Clip) -> str:
-    """What of a clip's depth and of its colours' resolution a video's format has no room for, in a sentence, or ""."""
-    container = ANIMATIONS.get(Path(path).suffix.lower())
-    if container is None or container.passes > 1 or is_sequence(path):
-        return ""
+def unheld_of_clip(
+    path: str | os.PathLike[str], codec: str | None, clip: Clip, size: tuple[int, int] | None = None
+) -> str:
+    """What of a clip's sound, time code, depth and colours' resolution a format has no room for, in a sentence, or "".
+
+    size: of the result, of which some formats have no odd sides.
+    """
+    container = None if is_sequence(path) else ANIMATIONS.get(Path(path).suffix.lower())
+    if container is None or not container.sound:
+        has = {"sound": clip.sound, "time code": clip.timecode}
+        losses = [f"its {name} is not kept" for name, told in has.items() if told is not None]
+    else:
+        other = dict.fromkeys(sound for sound in clip.sounds if sound not in (*container.sound, "none"))
+        losses = [f"its sound ({' '.join(other)}) becomes {container.sound[0]}"] if other else []
+        if container.even and size is not None and (size[0] % 2 or size[1] % 2):
+            losses.append(f"its last pixels are repeated, as {container.name} has no odd sides")
+    if container is None or container.passes > 1:
+        return lost(clip.path, losses)
     options = container.encoding(codec)(Stream(clip.alpha, clip.bits, colours=clip.colours))
     (bits, chroma), (room, kept) = map(_depth, (clip.pixel_format, options[options.index("-pix_fmt") + 1]))
-    losses = [f"its {bits} bits a channel become {room}"] if bits > room else []
+    losses += [f"its {bits} bits a channel become {room}"] if bits > room else []
     losses += [f"its colours of 4:{chroma} become 4:{kept}"] if chroma > kept else []
     return lost(clip.path, losses)
 

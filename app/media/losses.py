@@ -17,7 +17,7 @@ def lost(file: Path, losses: Sequence[str]) -> str:
     return f"{file.name}: {'; '.join(losses)}" if losses else ""
 
 
-def _few(names: Sequence[str]) -> str:
+def few(names: Sequence[str]) -> str:
     """Some of the names that a file gives to its parts, for a message: no control characters, not too many or long."""
     shown = ["".join(letter if letter.isprintable() else "?" for letter in name[:40]) for name in names[:4]]
     return ", ".join(shown) + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
@@ -25,7 +25,7 @@ def _few(names: Sequence[str]) -> str:
 
 def counted(kind: str, names: Sequence[str]) -> str:
     """Some parts of a file, as "channels A, B"."""
-    return f"{kind}{'s' * (len(names) > 1)} {_few(names)}"
+    return f"{kind}{'s' * (len(names) > 1)} {few(names)}"
 
 
 def not_kept(kind: str, names: Sequence[str]) -> str:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, FrameRange
-from app.media.files import check_numbers, numbered_files
+from app.media.files import NUMBER, check_numbers, numbered_files
 from app.media.inputs import MAX_PIXELS
+from app.media.losses import lost
 from app.media.pictures import read_picture
 from app.media.record import digest_of_file
 from app.model.picture import Picture
@@ -84,6 +86,7 @@ def read_sequence(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) ->
         UserError: if there is none, or the first cannot be read.
     """
     files = numbered_files(path)
+    negative = _negative(Path(path))
     start = next(iter(files))
     first = read_picture(files[start], max_pixels)
     width, height, bits, channels = _shape(first)
@@ -103,7 +106,14 @@ def read_sequence(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) ->
         files=files,
         max_pixels=max_pixels,
     )
-    return clip, first
+    return clip, replace(first, note="; ".join(filter(None, [first.note, lost(Path(path), negative)])))
+
+
+def _negative(path: Path) -> list[str]:
+    """That files with numbers below 0 are no frames, where there are some."""
+    before, after = (re.escape(part) for part in NUMBER.split(path.name)[:: NUMBER.groups + 1])
+    count = sum(re.fullmatch(f"{before}-\\d+{after}", name) is not None for name in os.listdir(path.parent))
+    return [f"of {count} files with numbers below 0 none is used"] if count else []
 
 
 def _without_name(note: str) -> str:

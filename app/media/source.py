@@ -12,6 +12,7 @@ from app.media.clip import Clip, coded
 from app.media.files import is_sequence
 from app.media.formats import ENDINGS
 from app.media.inputs import MAX_PIXELS
+from app.media.losses import lost
 from app.media.pages import read_pages
 from app.media.pictures import read_picture
 from app.media.sequence import read_sequence
@@ -40,7 +41,10 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS, animated: bool = True)
     """
     if is_sequence(path) and not os.path.lexists(path):
         clip, picture = read_sequence(path, max_pixels)
-        return Source(picture, clip if animated else None)
+        if animated or len(clip.files) == 1:
+            return Source(picture, clip if animated else None)
+        first = f"of its {len(clip.files)} frames only the first is used"
+        return Source(replace(picture, note="; ".join([*filter(None, [picture.note]), lost(path, [first])])))
     if path.suffix.lower() not in CLIP_ENDINGS:
         picture = read_picture(path, max_pixels)
         clip = read_pages(path, picture, max_pixels) if animated else None

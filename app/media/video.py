@@ -39,6 +39,12 @@ UNKEPT = {
 }  # fmt: skip
 # What every file has of its own, and the time code, which is kept.
 OWN_TAGS = {"major_brand", "minor_version", "compatible_brands", "encoder", "creation_time", "timecode"}
+# Of a track: what is written anew, counted by the muxer, or kept otherwise.
+OWN_TRACK_TAGS = {*OWN_TAGS, "handler_name", "vendor_id", "duration", "alpha_mode", "rotate"}
+COUNTED = re.compile("bps|number_of_|_statistics_|duration|source_id", re.IGNORECASE)
+# What is applied, is of the encoding, or told by `_mastering`; ffmpegs write the names with and without spaces.
+OWN_SIDE_DATA = {"displaymatrix", "cpb", "cpbproperties", "masteringdisplaymetadata", "contentlightlevelmetadata"}
+TRACK = re.compile(r"^( *)Stream #0:\d+(?:\[\w+\])?(?:\((\w+)\))?: (Video|Data): .*\n((?:\1 +.*\n)*)", re.MULTILINE)
 TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULTILINE | re.IGNORECASE)
 
 
@@ -178,7 +184,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         height=height,
         fps=fps,
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
-        sound=next(iter(_sound_codecs(told)), None),
+        sounds=tuple(_sound_codecs(told)),
         late=late,
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
         pixel_format=pixel_format,
@@ -223,7 +229,25 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     head = told.partition("Input #0")[2].partition("Duration: ")[0]
     if tags := [tag for tag in re.findall(r"^    (\S+)\s*: ", head, re.MULTILINE) if tag.lower() not in OWN_TAGS]:
         losses.append(not_kept("tag", tags))
-    return losses
+    return losses + _losses_of_tracks(told)
+
+
+def _losses_of_tracks(told: str) -> list[str]:
+    """What belongs to the tracks of pictures and of time codes, and is not carried over."""
+    tags: dict[str, None] = {}
+    sides: dict[str, None] = {}
+    for _, language, kind, lines in TRACK.findall(told):
+        if kind == "Video" and language not in ("", "und"):
+            tags["language"] = None
+        metadata, _, side_data = lines.partition("Side data:")
+        for tag in re.findall(r"^ +(\S[^:]*?) *: ", metadata, re.MULTILINE):
+            if tag.lower() not in OWN_TRACK_TAGS and not COUNTED.match(tag):
+                tags[tag] = None
+        for side in re.findall(r"^ +(\w[^:,\n]*)[:,]", side_data, re.MULTILINE):
+            if side.replace(" ", "").lower() not in OWN_SIDE_DATA:
+                sides[side] = None
+    losses = [not_kept("track's tag", list(tags))] if tags else []
+    return losses + ([not_kept("data block", list(sides))] if sides else [])
 
 
 def _mastering(file: Path) -> list[str]:

@@ -210,7 +210,7 @@ class _Applying:
                 with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
             )
         )
-        self.notices += [unheld_of_clip(self.output, outputs.codec, clip)] if clip else []
+        self.notices += [unheld_of_clip(self.output, outputs.codec, clip, self.size)] if clip else []
         first = max(first, start)
         wanted = len(range(count)[first - start : None if last is None else last + 1 - start]) if count else None
         progress.total = wanted and wanted * passes(self.output)

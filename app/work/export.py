@@ -175,7 +175,7 @@ class _Export:
         output, clip = self.outputs.file, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture, **self._along)):
             self.pictures.notice(said)
-        if output is not None and clip is not None and (said := unheld_of_clip(output, self.outputs.codec, clip)):
+        if clip is not None and output and (said := unheld_of_clip(output, self.outputs.codec, clip, self.size)):
             self.pictures.notice(said)
 
     def _steps_for_stills(self) -> int:

@@ -529,6 +529,7 @@ class WarpMap:
         origin: tuple[float, float],
         step: tuple[float, float],
         regions: list[Region] | None = None,
+        /,
         **defines: object,
     ) -> None:
         for is_near, parts in self._frozen.parts(regions or [(0, 0, *target.size)], origin, step):

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -23,8 +24,9 @@ from app.media import animation, encoders, ffmpeg, files
 from app.media.animation import AnimationOptions, animation_writer, frame_order, reordered
 from app.media.clip import USUAL, Colours
 from app.media.depth import to_bits
-from app.media.encoders import check_animation, crf_of, is_animation
+from app.media.encoders import check_animation, crf_of, is_animation, unheld_of_clip
 from app.media.pictures import read_picture
+from app.media.sequence import PictureSequence
 from app.media.video import read_clip
 from app.model.picture import Picture
 
@@ -561,7 +563,7 @@ def test_a_turned_clip_is_read_upright(tmp_path: Path):
     command = [ffmpeg.executable(), "-v", "error", "-display_rotation", "-90", "-i", str(plain), "-c", "copy"]
     subprocess.run([*command, str(turned)], check=True)
     clip = read_clip(turned)
-    assert (clip.width, clip.height) == (48, 64)
+    assert (clip.width, clip.height, clip.note) == (48, 64, "")
     upright = next(read_clip(plain).read_frames())
     assert np.abs(next(clip.read_frames()).astype(int) - np.rot90(upright, -1)).mean() < 1
 
@@ -714,6 +716,38 @@ def test_what_else_a_clip_holds_is_told(tmp_path: Path):
         == "a.mkv: its chapters are not kept; its attachments are not kept; its tags title, ARTIST are not kept"
     )
     assert read_clip(generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=1")).note == ""
+
+
+def test_what_belongs_to_a_track_is_told(tmp_path: Path):
+    further = ["-metadata:s:v:0", "title=A take", "-metadata:s:v:0", "language=fra", "-timecode", "01:00:00:00"]
+    source = "testsrc=s=64x48:r=10:d=0.1,format=yuvj420p"
+    stereo = generate(
+        tmp_path / "a.mkv", source, "-c:v", "mjpeg", *further, "-metadata:s:v:0", "stereo_mode=left_right"
+    )
+    assert read_clip(stereo).note == (
+        "a.mkv: its track's tags language, title, stereo_mode are not kept; its data block Stereo 3D is not kept"
+    )
+    reel = ["-c:v", "mjpeg", "-timecode", "01:00:00:00", "-metadata:s:v:0", "reel_name=A001C002"]
+    assert read_clip(generate(tmp_path / "a.mov", source, *reel)).note == "a.mov: its track's tag reel_name is not kept"
+
+
+def test_sound_and_times_that_a_format_has_no_room_for_are_told(tmp_path: Path):
+    clip = PictureSequence(
+        **{"path": Path("a.mov"), "width": 63, "height": 48, "bits": 8, "alpha": False, "pixel_format": "yuv420p"},
+        **{"fps": Fraction(24), "files": {}, "channels": 3, "max_pixels": 1},
+        sounds=("aac", "pcm_s24le", "none"),
+        timecode="01:00:00:00",
+    )
+    for name in ("a.gif", "a.apng", "a.%04d.png"):
+        assert unheld_of_clip(name, None, clip) == "a.mov: its sound is not kept; its time code is not kept"
+    assert unheld_of_clip("a.mp4", None, clip) == "a.mov: its sound (pcm_s24le) becomes aac"
+    assert unheld_of_clip("a.webm", None, clip) == "a.mov: its sound (aac pcm_s24le) becomes opus"
+    assert unheld_of_clip("a.mov", None, clip) == ""
+    assert unheld_of_clip("a.mkv", None, replace(clip, sounds=()), (63, 48)) == ""
+    assert unheld_of_clip("a.mov", None, clip, (64, 48)) == ""
+    assert unheld_of_clip("a.mov", None, clip, (63, 48)) == (
+        "a.mov: its last pixels are repeated, as ProRes has no odd sides"
+    )
 
 
 def test_a_rate_that_varies_is_told(tmp_path: Path):

@@ -312,3 +312,39 @@ def test_data_beside_the_display_window_are_told(tmp_path: Path):
     picture = read_picture(tmp_path / "far.exr")
     assert not picture.pixels.any()
     assert picture.note == "far.exr: pixels that all lie outside of its display window are not kept"
+
+
+def test_what_is_made_of_a_picture_as_it_was_is_told(tmp_path: Path):
+    path = tmp_path / "a.exr"
+    colours = {name: noise(number, np.uint32) for number, name in enumerate("RGB")}
+    OpenEXR.File({"preview": OpenEXR.PreviewImage(np.zeros((4, 5, 4), np.uint8))}, colours).write(str(path))
+    assert read_picture(path).note == (
+        "a.exr: its preview is not kept; its colours of whole numbers (uint) become floats"
+    )
+    path.write_bytes(mipmapped(np.array([[1, 2], [3, 4]], np.float32), np.array([[2.5]], np.float32)))
+    picture = read_picture(path)
+    assert picture.note == "a.exr: its smaller versions (mipmaps) are not kept"
+    assert picture.pixels[..., 0].tolist() == [[1, 2], [3, 4]]
+
+
+def mipmapped(*levels: np.ndarray) -> bytes:
+    """An EXR of one tile a level, by "OpenEXR File Layout": OpenEXR's module writes no levels."""
+    corner = levels[0].shape[0] - 1
+    box, side = struct.pack("<4i", 0, 0, corner, corner), struct.pack("<f", 1)
+    attributes = {
+        "channels": ("chlist", b"Y\0" + struct.pack("<iB3xii", 2, 0, 1, 1) + b"\0"),
+        "compression": ("compression", b"\0"), "dataWindow": ("box2i", box), "displayWindow": ("box2i", box),
+        "lineOrder": ("lineOrder", b"\0"), "pixelAspectRatio": ("float", side),
+        "screenWindowCenter": ("v2f", bytes(8)), "screenWindowWidth": ("float", side),
+        "tiles": ("tiledesc", struct.pack("<IIB", corner + 1, corner + 1, 1)),
+    }  # fmt: skip
+    data = struct.pack("<II", 20000630, 2 | 0x200)
+    for name, (kind, value) in attributes.items():
+        data += name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+    data += b"\0"
+    chunks = [
+        struct.pack("<5i", 0, 0, number, number, level.nbytes) + level.tobytes() for number, level in enumerate(levels)
+    ]
+    at = len(data) + 8 * len(levels)
+    places = [at + sum(map(len, chunks[:number])) for number in range(len(levels))]
+    return data + struct.pack(f"<{len(levels)}Q", *places) + b"".join(chunks)

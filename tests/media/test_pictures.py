@@ -442,6 +442,58 @@ def test_what_of_a_png_is_not_kept_is_told(tmp_path: Path):
     assert read_picture(path).note == "a.png: what it says of its number of significant bits is not kept"
 
 
+def test_every_chunk_of_a_png_is_kept_or_told(tmp_path: Path):
+    path = tmp_path / "a.png"
+    for name, data in {"oFFs": bytes(9), "sPLT": b"n\0\x08" + bytes(6), "prVt": b"a private one"}.items():
+        assert with_chunks(path, **{name: data}) == f"a.png: its chunk {name} is not kept"
+    assert with_chunks(path, iDOT=bytes(28), tEXt=b"Author\0A", iTXt=b"Title\0\0\0\0\0T") == ""
+    assert with_chunks(path, tEXt=b"Author\0A", zTXt=b"Author\0\0" + zlib.compress(b"B")) == (
+        "a.png: of several texts under one name only the last is kept: Author"
+    )
+    wide = struct.pack(">IIB", 2, 1, 0)  # no unit: only the shape of a pixel
+    assert with_chunks(path, pHYs=wide) == "a.png: the shape of its pixels (2:1) is not kept"
+    assert with_chunks(path, pHYs=struct.pack(">IIB", 1, 1, 0)) == ""
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8])
+def test_the_key_of_a_grey_png_is_in_its_own_bits(tmp_path: Path, bits: int):
+    codes = np.random.default_rng(bits).integers(0, 2**bits, (4, 8), np.uint8)
+    packed = np.packbits(np.unpackbits(codes[..., None], axis=2)[..., 8 - bits :].reshape(4, -1), axis=1)
+    head = struct.pack(">IIBBBBB", 8, 4, bits, 0, 0, 0, 0)
+    rows = zlib.compress(np.insert(packed, 0, 0, axis=1).tobytes())
+    chunks = {b"IHDR": head, b"tRNS": struct.pack(">H", 1), b"IDAT": rows, b"IEND": b""}
+    (tmp_path / "a.png").write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + b"".join(
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+            for kind, data in chunks.items()
+        )
+    )
+    pixels = read_picture(tmp_path / "a.png").pixels
+    np.testing.assert_array_equal(pixels[..., 0], codes.astype(int) * 255 // (2**bits - 1))
+    np.testing.assert_array_equal(pixels[..., 1], np.where(codes == 1, 0, 255))
+
+
+def test_every_segment_of_a_jpeg_is_kept_or_told(tmp_path: Path):
+    path = tmp_path / "a.jpg"
+    Image.fromarray(smooth(3)).save(path, comment=b"a", dpi=(300, 300), exif=exif_bytes(), progressive=True)
+    plain = path.read_bytes()
+    assert read_picture(path).note == ""
+
+    def told(*segments: tuple[int, bytes], after: bytes = b"") -> str:
+        added = b"".join(bytes([255, kind]) + struct.pack(">H", len(data) + 2) + data for kind, data in segments)
+        path.write_bytes(plain[:2] + added + plain[2:] + after)
+        return read_picture(path).note
+
+    assert told((0xED, b"Photoshop 3.0\0" + bytes(12)), (0xEB, b"JP\0\0")) == (
+        "a.jpg: its segments APP13 Photoshop 3.0, APP11 JP are not kept"
+    )
+    assert told((0xFE, b"another")) == "a.jpg: of its 2 comments only the last is kept"
+    assert told((0xE1, b"http://ns.adobe.com/xap/1.0/\0<x/>")) == ""
+    assert told(after=b"\0\0\0\x18ftypmp42") == "a.jpg: the 12 bytes after its end are not kept"
+    assert told(after=bytes(7)) == ""
+
+
 def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     import imagecodecs
 
@@ -487,6 +539,44 @@ def test_what_of_a_tiff_is_lost_is_told(tmp_path: Path):
         writer.write(smooth(3), photometric="rgb")
         writer.write(smooth(3)[::2, ::2], photometric="rgb", subfiletype=1)
     assert read_picture(path).note == ""
+
+
+def test_every_tag_of_a_tiff_is_kept_or_told(tmp_path: Path):
+    path = tmp_path / "a.tif"
+    texts = [(0x010D, "s", 0, "a document", True), (0x011D, "s", 0, "a page", True), (0x013C, "s", 0, "a host", True)]
+    further = [(318, "2I", 2, (3127, 10000, 3290, 10000), True), (33550, "d", 3, (1.0, 1.0, 0.0), True)]
+    tifffile.imwrite(path, smooth(3), photometric="rgb", extratags=texts + further, resolution=(300, 300))
+    picture = read_picture(path)
+    assert picture.note == "a.tif: its tags WhitePoint, ModelPixelScaleTag are not kept"
+    write_picture(tmp_path / "b.tif", picture)
+    with tifffile.TiffFile(tmp_path / "b.tif") as tiff:
+        tags = {tag.code: tag.value for tag in tiff.pages.first.tags}
+    assert [tags[code] for code, *_ in texts] == ["a document", "a page", "a host"]
+    tifffile.imwrite(path, smooth(3), photometric="rgb", resolution=(2, 1), resolutionunit="NONE")
+    assert read_picture(path).note == "a.tif: the shape of its pixels (1:2) is not kept"
+
+
+def test_further_samples_of_a_tiff_are_no_colours(tmp_path: Path):
+    path = tmp_path / "a.tif"
+    grey, inks = noise(3, np.uint8), noise(4, np.uint8)
+    tifffile.imwrite(path, grey, photometric="minisblack", planarconfig="contig", extrasamples=["unassalpha", 0])
+    picture = read_picture(path)
+    np.testing.assert_array_equal(picture.pixels, grey[..., :2])
+    assert picture.note == "a.tif: of its 3 samples a pixel only the first 2 are used"
+    pixels = np.dstack([inks, inks[..., 0]])
+    tifffile.imwrite(path, pixels, photometric="separated", planarconfig="contig", extrasamples=["unassalpha"])
+    said = "a.tif: of its 5 samples a pixel only the first 4 are used; its inks (CMYK) become RGB"
+    assert read_picture(path).note == said
+
+
+@pytest.mark.parametrize("spread", [256, 257])
+def test_a_palette_of_8_bits_is_one(tmp_path: Path, spread: int):
+    colours = np.random.default_rng(0).integers(0, 256, (3, 256), np.uint16)
+    codes = noise(1, np.uint8)[..., 0]
+    tifffile.imwrite(tmp_path / "a.tif", codes, photometric="palette", colormap=colours * np.uint16(spread))
+    pixels = read_picture(tmp_path / "a.tif").pixels
+    assert pixels.dtype == np.uint8
+    np.testing.assert_array_equal(pixels, np.moveaxis(colours, 0, -1)[codes])
 
 
 # What belongs to a picture ------------------------------------------------------------------------------------------

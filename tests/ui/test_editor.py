@@ -303,6 +303,8 @@ def test_honey_comes_to_rest_by_itself_and_putty_stops_with_the_brush(robot: Rob
         moved[feel] = np.abs(robot.warp() - released).max()
     assert moved["putty"] < 0.01
     assert moved["honey"] > moved["putty"]
+    while robot.editor.canvas.is_unfinished:
+        robot.frame()
     assert not robot.editor.wants_frame() or robot.editor.clock.settling
 
 

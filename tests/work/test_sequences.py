@@ -16,6 +16,7 @@ import pytest
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.pictures import read_picture, write_picture
+from app.media.source import open_source
 from app.model.picture import Picture
 from support.commands import Run
 
@@ -324,3 +325,14 @@ def test_what_is_nowhere_cannot_be_turned_round_or_flow(folder: Path, fluidwarp:
     (folder / "b.toml").write_text('map = "m.npy"\n' + RECIPE)
     ran = fluidwarp(folder, "render", "b.toml", "plate.1001.exr", "-o", "w.png")
     assert (ran.returncode, "1 of its pixels are NaN" in ran.stderr) == (1, True)
+
+
+def test_what_of_a_sequence_is_not_used_is_told(folder: Path):
+    assert open_source(folder / "plate.####.exr").picture.note == ""
+    assert open_source(folder / "plate.####.exr", animated=False).picture.note == (
+        "plate.####.exr: of its 4 frames only the first is used"
+    )
+    (folder / "plate.-001.exr").touch()
+    assert open_source(folder / "plate.####.exr").picture.note == (
+        "plate.####.exr: of 1 files with numbers below 0 none is used"
+    )

@@ -16,6 +16,7 @@ from app.media import project as projects
 from app.model import edits, toml
 from app.model.bars import Which
 from app.model.forces import VortexForce
+from app.model.handles import RecipeHandle
 from app.model.mask_edits import InvertMask, MaskStroke, mask_edit
 from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.model.recipe import Recipe
@@ -23,6 +24,7 @@ from app.model.strokes import Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
+from app.work.held import FIT
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.session import Session
@@ -158,6 +160,18 @@ def test_a_stroke_goes_on_beyond_the_edges_by_half_a_picture(session: Session) -
     painted = session.recipe.mask[-1]
     assert isinstance(painted, MaskStroke)
     assert painted.samples[-1][1:3] == (1.5, -0.5)
+
+
+def test_a_fit_is_offered_but_straight_after_one(session: Session) -> None:
+    """Of a handle that is too soft for its goal."""
+    soft = RecipeHandle(at=(0.4, 0.5), to=(0.6, 0.5), stiffness=0.01, duration=0.05)
+    session.edit("Quality", fluid=session.recipe.fluid.model_copy(update={"dt": 0.1, "grid": 16}))
+    for name, is_offered in ("Handle", True), (FIT, False):
+        session.edit(name, handle=(soft,), duration=0.8 if is_offered else 0.9)
+        session.seek(session.end)
+        session.settle()
+        (said,) = session.unmet.values()
+        assert ("Fit leads all anew" in said) == is_offered
 
 
 def test_a_slider_that_is_dragged_is_one_edit(session: Session) -> None:

@@ -97,10 +97,13 @@ def read(file: Path, max_pixels: int) -> Picture:
             ]
         else:
             losses.append(not_kept("further part", [part.texts.get("name", "")]))
+        losses += [loss for loss in part.losses if loss not in losses]
         if part.subsampled:
             losses.append(not_kept("channel", part.subsampled))
     if turned := [layer.name for layer in layers if any(MOTION.fullmatch(word) for word in layer.name.split("."))]:
         losses.append(f"the arrows of its {counted('channel', turned)} are moved and not turned")
+    if any(own.channels[name].dtype == np.uint32 for name in colours):
+        losses.append("its colours of whole numbers (uint) become floats")
     wide = np.stack([own.shown(name, margins) for name in colours], axis=-1, dtype=np.float32)
     left, top, right, bottom = margins
     inside = wide[top : len(wide) - bottom, left : wide.shape[1] - right]
@@ -126,6 +129,7 @@ class _Part:
     """One part of an EXR: its channels (h, w) in their own type, in the data window, and what its header says.
 
     windows: of the data and of the display, (left, top, right, bottom) each, the last pixels among them.
+    losses: what of it is not kept, in words.
     """
 
     channels: Mapping[str, np.ndarray]
@@ -135,6 +139,7 @@ class _Part:
     texts: Mapping[str, str]
     attributes: Mapping[str, Any]
     chromaticities: tuple[float, ...] | None
+    losses: Sequence[str]
 
     def shown(self, name: str, margins: Window) -> np.ndarray:
         """A channel in the display window and margins around it, 0 where there is no data."""
@@ -197,9 +202,17 @@ def _parts(file: Path, max_pixels: int) -> list[_Part]:
                     if key not in LAYOUT and value.kind not in ("string", "preview")  # of the picture as it was
                 },
                 tuple(float(value) for value in primaries) if primaries is not None else None,
+                _unkept(raw),
             )
         )
     return parts
+
+
+def _unkept(raw: Mapping[str, Raw]) -> list[str]:
+    """What is made of a part's picture as it was, and so would not be true of the result."""
+    has_levels = "tiles" in raw and raw["tiles"].data[-1] & 15  # the mode, after the size of a tile
+    losses = ["its smaller versions (mipmaps) are not kept"] if has_levels else []
+    return losses + (["its preview is not kept"] if any(value.kind == "preview" for value in raw.values()) else [])
 
 
 def _headers(file: Path, max_pixels: int) -> list[Any]:

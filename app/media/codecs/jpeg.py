@@ -2,14 +2,48 @@
 
 from __future__ import annotations
 
-from functools import partial
+import re
+import struct
 from pathlib import Path
 from typing import Any
 
 from app.media.codecs import pillow
+from app.media.losses import not_kept
 from app.model.picture import Picture
 
-read = partial(pillow.read, "JPEG")
+START_OF_SCAN, END, COMMENT = 0xDA, 0xD9, 0xFE
+APPLICATION = range(0xE0, 0xF0)
+MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")  # in a scan: neither a stuffed byte nor a restart
+# What is kept, of the encoding or a thumbnail, or told as further pictures.
+UNDERSTOOD = ("JFIF", "JFXX", "Exif", "http://ns.adobe.com/xap/1.0/", "ICC_PROFILE", "MPF", "Adobe", "Ducky")
+
+
+def read(file: Path, max_pixels: int) -> Picture:
+    """Read a JPEG, the first of its pictures."""
+    with pillow.opened("JPEG", file, max_pixels) as image:
+        return pillow.picture_of(image, file, _losses(file.read_bytes(), getattr(image, "n_frames", 1) > 1))
+
+
+def _losses(data: bytes, is_many: bool) -> list[str]:
+    """What the segments of a JPEG hold, or follows its end, that is not kept (ITU T.81, B.1.1)."""
+    at, comments, unknown, end = 2, 0, dict[str, None](), len(data)
+    while (found := MARKER.search(data, at)) and (kind := data[found.start() + 1]) != END:
+        if found.end() + 2 > len(data):
+            break
+        body = found.end() + 2
+        at = body - 2 + struct.unpack_from(">H", data, found.end())[0]
+        comments += kind == COMMENT
+        if kind in APPLICATION:
+            name = data[body : min(at, body + 40)].partition(b"\0")[0].decode("latin-1")
+            if name not in UNDERSTOOD:
+                unknown[f"APP{kind - APPLICATION.start} {name}"] = None
+    else:
+        end = found.end() if found else end
+    losses = [not_kept("segment", list(unknown))] if unknown else []
+    losses += [f"of its {comments} comments only the last is kept"] if comments > 1 else []
+    if data[end:].strip(b"\0\xff\r\n") and not is_many:  # what pads a file is nothing
+        losses.append(f"the {len(data) - end} bytes after its end are not kept")
+    return losses
 
 
 def write(path: Path, picture: Picture, quality: int) -> None:

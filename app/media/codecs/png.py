@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +13,16 @@ import numpy as np
 from app.media.codecs import ZLIB_LEVEL, pillow
 from app.media.codecs.decoding import quiet
 from app.media.codecs.metadata import sized_exif
-from app.media.losses import REC709, unusual_colours
+from app.media.losses import REC709, few, not_kept, unusual_colours
 from app.model.picture import Picture
 
 UNKEPT_CHUNKS = {b"bKGD": "background colour", b"sBIT": "number of significant bits"}
 COLOUR_CHUNKS = {b"cICP": 4, b"gAMA": 4, b"cHRM": 32, b"sRGB": 1, b"mDCV": 24, b"cLLI": 8}  # and their lengths
+TEXT_CHUNKS = (b"tEXt", b"zTXt", b"iTXt")
+# What is kept otherwise, is made anew (tIME, iDOT, hIST), or is of frames that are told themselves.
+UNDERSTOOD = {
+    b"IHDR", b"PLTE", b"IDAT", b"tRNS", b"iCCP", b"pHYs", b"eXIf", b"tIME", b"acTL", b"fcTL", b"fdAT", b"iDOT", b"hIST",
+}  # fmt: skip
 USUAL_GAMMA = range(45000, 46000)  # 1 / 2.2, as sRGB has it on the whole
 
 
@@ -24,11 +30,13 @@ def read(file: Path, max_pixels: int) -> Picture:
     """Read a PNG in its depth."""
     with pillow.opened("PNG", file, max_pixels) as image:
         chunks, unkept = _chunks(file)
-        losses = _colours_lost(chunks, image.info.get("icc_profile") is not None)
-        if unkept:
-            losses.append(f"what it says of its {', '.join(unkept)} is not kept")
-        pixels = None
-        if _bits(file) == 16:
+        losses = _colours_lost(chunks, image.info.get("icc_profile") is not None) + unkept
+        if (shape := image.info.get("aspect", (1, 1)))[0] != shape[1]:
+            losses.append(f"the shape of its pixels ({shape[0]}:{shape[1]}) is not kept")
+        pixels, bits = None, _bits(file)
+        if image.mode == "L" and bits in (2, 4) and isinstance(key := image.info.get("transparency"), int):
+            image.info["transparency"] = key * 255 // (2**bits - 1)  # Pillow spreads the pixels, and not their key
+        if bits == 16:
             import imagecodecs
 
             with quiet():
@@ -42,9 +50,11 @@ def _bits(file: Path) -> int:
 
 
 def _chunks(file: Path) -> tuple[dict[bytes, bytes], list[str]]:
-    """The chunks of a PNG that say what its colours mean, and in words those that are not kept."""
+    """The chunks of a PNG that say what its colours mean, and in words what of the others is not kept."""
     found: dict[bytes, bytes] = {}
     unkept: dict[str, None] = {}
+    unknown: dict[str, None] = {}
+    texts: list[str] = []
     with file.open("rb") as stream:
         stream.seek(8)
         while len(head := stream.read(8)) == 8 and (kind := head[4:]) != b"IEND":
@@ -54,8 +64,16 @@ def _chunks(file: Path) -> tuple[dict[bytes, bytes], list[str]]:
                 unkept[UNKEPT_CHUNKS[kind]] = None
             if COLOUR_CHUNKS.get(kind) == length:
                 found[kind] = stream.read(length)
+            elif kind in TEXT_CHUNKS:
+                texts.append(stream.read(min(length, 80)).partition(b"\0")[0].decode("latin-1"))
+            elif kind not in UNKEPT_CHUNKS and kind not in UNDERSTOOD:
+                unknown[kind.decode("latin-1")] = None
             stream.seek(end)
-    return found, list(unkept)
+    losses = [f"what it says of its {', '.join(unkept)} is not kept"] if unkept else []
+    losses += [not_kept("chunk", list(unknown))] if unknown else []
+    if repeated := [text for text, count in Counter(texts).items() if count > 1]:
+        losses.append(f"of several texts under one name only the last is kept: {few(repeated)}")
+    return found, losses
 
 
 def _colours_lost(chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:

@@ -19,12 +19,19 @@ from app.media.codecs import ZLIB_LEVEL
 from app.media.codecs.cmyk import INK, cmyk_to_rgb
 from app.media.codecs.metadata import EXIF_IFD, ORIENTATION, exif_of, upright, upright_dpi, upright_exif, upright_xmp
 from app.media.inputs import check_size
-from app.media.losses import lost
+from app.media.losses import lost, not_kept
 from app.model.picture import Picture
 
 DESCRIPTION, GPS_IFD = 0x010E, 0x8825
-# description, make, model, software, date, artist, copyright: what of a TIFF's first directory is not about its layout
-TEXTS = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
+# Document, description, make, model, page, software, date, artist, host, copyright: what of a TIFF's first directory is
+# not about its layout.
+TEXTS = (0x010D, DESCRIPTION, 0x010F, 0x0110, 0x011D, 0x0131, 0x0132, 0x013B, 0x013C, 0x8298)
+# What says how the samples are stored, has a place of its own in a picture, or is of smaller versions of it.
+UNDERSTOOD = {
+    *range(254, 267), 273, 274, *range(277, 285), *range(288, 294), 296, 297, 317, *range(320, 326), 330,
+    *range(332, 335), *range(336, 348), *range(512, 522), *range(529, 533), 559, 700, 34675, EXIF_IFD, GPS_IFD, *TEXTS,
+}  # fmt: skip
+COLOURS = {"MINISBLACK": 1, "MINISWHITE": 1, "PALETTE": 1, "SEPARATED": 4}
 # Descriptions in which tifffile, ImageJ and OME keep the shape, which readers believe and a result would belie.
 LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
 
@@ -65,24 +72,27 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
             raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
         losses = _losses(tiff) if place is None else []
+        if unkept := [tag.name for tag in page.tags if tag.code not in UNDERSTOOD]:
+            losses.append(not_kept("tag", unkept))
         pixels = page.asarray()
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
     pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
     pixels = plain_depth(file, pixels)
     icc = tags.get(34675)
+    colours = COLOURS.get(photometric, 3)
+    used = colours + bool(page.extrasamples and photometric not in ("PALETTE", "SEPARATED"))
+    if pixels.shape[2] > used:  # further samples are masks and spot colours
+        losses.append(f"of its {pixels.shape[2]} samples a pixel only the first {used} are used")
+        pixels = pixels[..., :used]
     if photometric == "PALETTE":
-        pixels = np.moveaxis(np.asarray(tags[320], np.uint16), 0, -1)[pixels[..., 0]]
+        pixels = _palette(tags[320])[pixels[..., 0]]
     elif photometric == "SEPARATED":
         losses.append(INK)
-        pixels, icc = cmyk_to_rgb(pixels[..., :4], icc)
+        pixels, icc = cmyk_to_rgb(pixels, icc)
     elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
         pixels = np.iinfo(pixels.dtype).max - pixels
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
-    if pixels.shape[2] > 4:  # further samples are masks and spot colours
-        taken = 4 if page.extrasamples else 3
-        losses.append(f"of its {pixels.shape[2]} samples a pixel only the first {taken} are used")
-        pixels = pixels[..., :taken]
 
     premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
     exif = Image.Exif()
@@ -99,6 +109,8 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     orientation = int(tags.get(ORIENTATION, 1))
     unit = {2: 1.0, 3: 2.54}.get(int(tags.get(296, 2)))
     resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]
+    if unit is None and len(set(resolution)) > 1:
+        losses.append(f"the shape of its pixels ({resolution[1]:g}:{resolution[0]:g}) is not kept")
     return Picture(
         upright(pixels, orientation),
         icc=bytes(icc) if icc is not None else None,
@@ -108,6 +120,13 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         premultiplied=premultiplied,
         note=lost(file, losses),
     )
+
+
+def _palette(table: Any) -> np.ndarray:
+    """A colour map (n, 3): of 8 bits where it is that, spread to 16 by 256 or by 257 as writers do, else of 16."""
+    colours = np.moveaxis(np.asarray(table, np.uint16), 0, -1)
+    high, low = colours >> 8, colours & 255
+    return high.astype(np.uint8) if not low.any() or (low == high).all() else colours
 
 
 def _losses(tiff: Any) -> list[str]:
