@@ -9,6 +9,7 @@ run nothing is left that it would not have left by itself. Ends with 0 if that w
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import os
 import random
 import shutil
@@ -17,8 +18,8 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from itertools import count
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -107,29 +108,28 @@ def prepare(folder: Path, result: str, has_old: bool) -> None:
     assert ended(begun(act, folder, endless=False)) == 0, (folder / SAID).read_text("utf-8")
 
 
-def begun(act: Act, folder: Path, endless: bool) -> int:
-    """The number of a process that does it, leading a group of its own."""
-    number = os.fork()
-    if number:
-        return number
-    status = 1
-    try:
+def begun(act: Act, folder: Path, endless: bool) -> ForkProcess:
+    """A process that does it, leading a group of its own."""
+
+    def lead() -> None:
         os.setsid()
         said = os.open(folder / SAID, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(said, 1)
         os.dup2(said, 2)
         os.environ["TMPDIR"] = tempfile.tempdir = str(folder / "tmp")
         act(folder, endless)
-        status = 0
-    except SystemExit as ended:
-        status = ended.code if isinstance(ended.code, int) else 0
-    finally:
-        os._exit(status)
+
+    process = multiprocessing.get_context("fork").Process(target=lead)
+    process.start()
+    return process
 
 
-def ended(number: int) -> int:
-    """Its exit status, once all of its group have ended."""
-    status = os.waitpid(number, 0)[1]
+def ended(process: ForkProcess) -> int:
+    """Its exit status, negative of a signal, once all of its group have ended."""
+    process.join()
+    number, status = process.pid, process.exitcode
+    assert number is not None
+    assert status is not None
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         try:
@@ -207,10 +207,9 @@ class Killing:
         before = files_in(folder)
         process = begun(act, folder, endless=True)
         time.sleep(self._dice.uniform(0, 0.5 if self._of == "saving" else 1.05 * lasts))
-        with suppress(ProcessLookupError):
-            os.kill(process, signal.SIGKILL)
+        process.kill()
         wrong = None
-        if os.WIFSIGNALED(ended(process)):
+        if ended(process) == -signal.SIGKILL:
             wrong = harmed(before, wanted, folder)
             self.halfway += bool(set(files_in(folder)) - {*before, *wanted, BACKUP})
             if ended(begun(act, folder, endless=False)):
