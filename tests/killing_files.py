@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import count
 from multiprocessing.context import ForkProcess
 from pathlib import Path
@@ -200,6 +201,7 @@ class Killing:
     def kill(self) -> list[str] | None:
         """What is wrong after one; None if it came too late."""
         result, has_old, resumes = self._dice.choice(RESULTS), self._dice.random() < 0.7, self._dice.random() < 0.5
+        kills_all = self._dice.random() < 0.5  # an editor's export process too, which would else tidy up after it
         act = {"saving": save, "rendering": render(result, resumes), "exporting": export(result)}[self._of]
         lasts, wanted = self._undisturbed(act, result)
         folder = self._root / "killed"
@@ -207,6 +209,9 @@ class Killing:
         before = files_in(folder)
         process = begun(act, folder, endless=True)
         time.sleep(self._dice.uniform(0, 0.5 if self._of == "saving" else 1.05 * lasts))
+        with suppress(ProcessLookupError):  # no group yet, or none any more
+            if kills_all and process.pid is not None:
+                os.killpg(process.pid, signal.SIGKILL)
         process.kill()
         wrong = None
         if ended(process) == -signal.SIGKILL:

@@ -588,6 +588,14 @@ def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(
     assert here(folder) == {"a.toml", "cat.png", "in.mkv"}
 
 
+@pytest.mark.parametrize("words", [["render", "a.toml"], ["apply", "m.npy", "cat.png"]])
+def test_a_result_of_more_pixels_than_are_read_is_refused(fluidwarp: Run, folder: Path, words: list[str]) -> None:
+    ran = fluidwarp(folder, *words, "-o", "x.png", "--size", "32768")
+    assert ran.returncode
+    assert re.search(r"--size.* asks for a result of \d+ x \d+ pixels, and at most 400000000 are made", ran.stderr)
+    assert not (folder / "x.png").exists()
+
+
 @pytest.mark.parametrize("words", [["render", "a.toml", "-o", "x.png"], ["apply", "m.npy", "cat.png", "-o", "x.png"]])
 def test_a_limit_below_one_pixel_is_refused(folder: Path, fluidwarp: Run, words: list[str]):
     for limit in ("-1", "0"):

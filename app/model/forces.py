@@ -323,7 +323,7 @@ class VortexForce(_Force):
             r, radius = np.hypot(x, y), self.radius
             if self.falloff == "gaussian":
                 return self.strength * (radius / 2) ** 2 * _profile(r, radius, "gaussian")
-            return self.strength * radius**2 / 8 * np.maximum(1 - (r / radius) ** 2, 0.0) ** 4
+            return self.strength * radius**2 / 8 * np.maximum(1 - _in_radii(r, radius) ** 2, 0.0) ** 4
 
         return _curl(grid, centre, stream)
 
@@ -431,8 +431,13 @@ def _unit(direction: tuple[float, float]) -> np.ndarray:
 def _profile(r: np.ndarray, radius: float, falloff: Falloff) -> np.ndarray:
     """1 in the centre, falling off with the distance r."""
     if falloff == "gaussian":
-        return np.exp(-2 * (r / radius) ** 2)
-    return np.maximum(1 - (r / radius) ** 2, 0.0) ** 3
+        return np.exp(-2 * _in_radii(r, radius) ** 2)
+    return np.maximum(1 - _in_radii(r, radius) ** 2, 0.0) ** 3
+
+
+def _in_radii(r: np.ndarray, radius: float) -> np.ndarray:
+    """Distances in radii, 40 at most, where nothing is left of either falloff: of a tiny radius they would overflow."""
+    return np.minimum(r, 40 * radius) / radius
 
 
 def _slope(r: np.ndarray, radius: float, falloff: Falloff) -> np.ndarray:

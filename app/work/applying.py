@@ -30,7 +30,7 @@ from app.progress import Progress
 from app.work.along import along
 from app.work.applier import Applier, inverted
 from app.work.export import Kept, Report, Target, steps_for, write_all
-from app.work.jobs import longer_side
+from app.work.jobs import check_result, longer_side
 from app.work.states import code
 from app.work.tasks import Piece
 from app.work.threads import prefetch
@@ -114,6 +114,7 @@ class Application(Piece):
         assert self.picture is not None
         progress.enter("reading")
         source = open_source(self.picture, self.max_pixels, self.outputs.is_animation)
+        check_result(self._size(source.picture), source.picture)
         check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
         if source.clip is not None:
             check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)

@@ -212,13 +212,8 @@ class Job:
         if self.clip is not None and self.has_frames:
             self.clip.check(outputs.part)
         outputs.check()
-        width, height = result_size(self.recipe, self.picture)
-        if outputs.file is not None and width * height > max(MAX_PIXELS, self.picture.width * self.picture.height):
-            large = f"a result of {width} x {height} pixels"
-            raise UserError(
-                f"'output.size' makes {large}; ask for at most {MAX_PIXELS}, by --size or there",
-                in_window=f"{large} is too large; choose a smaller size",
-            )
+        if outputs.file is not None:
+            check_result(result_size(self.recipe, self.picture), self.picture, "--size, or 'output.size',")
         if self.clip is not None and self.recipe.mode == "density":
             raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
         for path in outputs.files:
@@ -243,6 +238,16 @@ def longer_side(size: tuple[int, int], longest: int) -> tuple[int, int]:
     """A size of the same proportions, its longer side `longest` pixels."""
     width, height = (max(1, round(side * longest / max(size))) for side in size)
     return width, height
+
+
+def check_result(size: tuple[int, int], picture: Picture, by: str = "--size") -> None:
+    """Raise `UserError` for more pixels than are read, and than the picture has; `by` says what asks for them."""
+    if size[0] * size[1] > max(MAX_PIXELS, picture.width * picture.height):
+        large = f"a result of {size[0]} x {size[1]} pixels"
+        raise UserError(
+            f"{by} asks for {large}, and at most {MAX_PIXELS} are made; ask for less",
+            in_window=f"{large} is too large; choose a smaller size",
+        )
 
 
 def result_size(recipe: Recipe, picture: Picture) -> tuple[int, int]:

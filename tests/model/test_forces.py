@@ -346,6 +346,16 @@ def test_a_curve_s_push_across_it_is_the_profile(falloff: str, pictures: Picture
     np.testing.assert_allclose(line[:, 80, 0], wanted, rtol=2e-2, atol=1e-8)
 
 
+@pytest.mark.parametrize("falloff", ["smooth", "gaussian"])
+@pytest.mark.parametrize("kind", ["point", "vortex", "source"])
+def test_a_radius_next_to_nothing_is_no_overflow(kind: str, falloff: str, pictures: Pictures) -> None:
+    keys = {"direction": [1, 0]} if kind == "point" else {}
+    tiny = force(kind=kind, point=[0.503, 0.503], radius=1e-308, falloff=falloff, **keys)
+    with np.errstate(over="raise", invalid="raise"):
+        made = tiny.divergence(WIDE, pictures) if kind == "source" else tiny.faces(WIDE, pictures)
+    assert np.isfinite(made).all()
+
+
 def test_a_source_smaller_than_a_cell_still_makes_room(pictures: Pictures) -> None:
     tiny = force(kind="source", point=[0.503, 0.503], radius=0.001, room="everywhere").divergence(WIDE, pictures)
     assert tiny.max() > 0.85
