@@ -208,6 +208,8 @@ def _read_pts(path: Path, lines: Lines) -> np.ndarray:
         if line == "}":
             if count not in (None, len(rows)):
                 raise _bad(path, number, f"n_points says {count}, and there are {len(rows)}")
+            for more, line in lines:
+                raise _bad(path, more, f"one set of landmarks ends with }}, and not {line[:40]!r} after it")
             return np.reshape(rows, (-1, 2))
         rows.append(_numbers(path, number, line, line.split(), 2, "x y"))
     raise UserError(f"{path} ends in the middle of its points: it has no }}")

@@ -55,7 +55,7 @@ class Cautions:
         folds, places = session.folds
         if folds and not self._folds:
             self._messages.caution(
-                f"The warp folds over itself in {folds} of {places} places.",
+                f"The warp folds over itself in {folds} of {places} places. Undo, or Restore it there.",
                 lambda: session is self._workspace.session and self._folds,
             )
         self._folds = folds > 0

@@ -149,6 +149,11 @@ def test_curves_come_back_as_they_were_written(tmp_path: Path) -> None:
         ("a.pts", "version: 1\nn_points: 2\n{\n1 2\n}\n", "line 5: n_points says 2, and there are 1"),
         ("a.pts", "n_points: 1\n{\n1 2 3\n}\n", "line 3: expected x y"),
         ("a.pts", "n_points: 1\n{\n1 2\n", "ends in the middle"),
+        (
+            "a.pts",
+            "n_points: 1\n{\n1 2\n}\n\nn_points: 1\n{\n3 4\n}\n",
+            "line 6: one set of landmarks ends with }, and",
+        ),
         ("a.pts", "version: 1\n", "no { before its points"),
         ("a.pts", "hello\n", "line 1: expected version"),
         ("a.tps", "LM=1\n1 2\n", "has one set"),

@@ -110,7 +110,7 @@ def test_one_fold_of_the_warp_is_told_when_it_comes_up(robot: Robot, monkeypatch
     y, x = np.mgrid[0:180, 0:240] / 240
     bump = -(x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.02**2)
     monkeypatch.setattr("app.ui.canvas.PARTS", 1)
-    one = ["The warp folds over itself in 1 of 6912 places."]
+    one = ["The warp folds over itself in 1 of 6912 places. Undo, or Restore it there."]
     for height, told in ((0.9, []), (1.1, one), (1.1, one), (0.9, [])):
         replay.warp.set(np.stack([height * bump, 0 * y], axis=-1).astype(np.float32))
         robot.frame(count=2)
