@@ -18,6 +18,7 @@ GRACE = 0.2  # seconds that a job has to notice Ctrl+C between two of its steps
 INTERRUPTED = 130
 
 _undoing: list[Callable[[], object]] = []
+_beginning = threading.Lock()
 
 
 def never() -> bool:
@@ -94,9 +95,17 @@ class Progress:
 
 def abandon() -> None:
     """Undo everything that is half done, for a process that is about to end at once."""
+    _beginning.acquire(timeout=GRACE)  # never released: nothing begins any more
     for undo in reversed(_undoing):
         with suppress(OSError):
             undo()
+
+
+@contextmanager
+def beginning() -> Iterator[None]:
+    """Begin another process, and say how it is undone, in the block: `abandon` waits until that is known."""
+    with _beginning:
+        yield
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from contextlib import ExitStack
 
 from app.errors import Cancelled, UserError
 from app.media.files import cannot_write
-from app.progress import if_abandoned, never
+from app.progress import beginning, if_abandoned, never
 
 PATIENCE = 0.1  # seconds between two looks at the wish to stop
 
@@ -54,20 +54,22 @@ class Ffmpeg:
     ) -> None:
         self._label, self._doing, self._cancel = label, doing, cancel
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__; a pipe could fill and block
-        self._process = subprocess.Popen(
-            [executable(), "-hide_banner", "-nostats", "-loglevel", "error", "-y", *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._complaints,
-            bufsize=0,
-            pipesize=1 << 18,
-            start_new_session=True,  # Ctrl+C is ours to handle
-        )
+        self._ending = ExitStack()
+        command = [executable(), "-hide_banner", "-nostats", "-loglevel", "error", "-y", *arguments]
+        with beginning():
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._complaints,
+                bufsize=0,
+                pipesize=1 << 18,
+                start_new_session=True,  # Ctrl+C is ours to handle
+            )
+            self._ending.enter_context(if_abandoned(self._end))
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._stdin, self._stdout = self._process.stdin, self._process.stdout
-        self._ending = ExitStack()
-        self._ending.enter_context(if_abandoned(self._process.kill))
         os.set_blocking(self._stdout.fileno(), False)
         self._watcher: threading.Thread | None = None
         self._ended = threading.Event()
@@ -78,11 +80,15 @@ class Ffmpeg:
     def __exit__(self, *exception: object) -> None:
         self._ended.set()
         self._ending.close()
-        self._process.kill()
-        self._process.wait()
+        self._end()
         self._stdin.close()
         self._stdout.close()
         self._complaints.close()
+
+    def _end(self) -> None:
+        """End it, so that it makes no file any more."""
+        self._process.kill()
+        self._process.wait()
 
     def feed(self, data: memoryview) -> None:
         """Write all of `data`, bytes, to its standard input."""
