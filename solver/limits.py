@@ -48,6 +48,20 @@ def numbers(what: str, values: object, count: int) -> tuple[float, ...]:
     return tuple(array.astype(float).tolist())
 
 
+def rows_of(what: str, rows: object, count: int) -> np.ndarray:
+    """Rows of so many finite numbers, none beyond `LARGEST_SPEED`, as float64 (n, count).
+
+    Raises:
+        ValueError: if a row has more or fewer of them, or they are of another kind.
+    """
+    array = real_array(what, rows)
+    if array.shape == (0,):
+        return np.zeros((0, count))
+    check_shape(what, array, (len(array), count) if array.ndim else (0, count))
+    check_size(what, array)
+    return array.astype(np.float64)
+
+
 def real_array(what: str, values: object) -> np.ndarray:
     """Values as an array.
 

@@ -252,7 +252,7 @@ def picture_names(recipe: Recipe) -> list[str]:
         elif isinstance(data, str) and key in PICTURE_KEYS and data not in found and data != "source":
             found.append(data)
 
-    visit({key: value for key, value in plain(recipe).items() if key not in ("stroke", "change")})
+    visit(plain(recipe.edited(stroke=(), change=(), handle=(), pin=())))  # which name none, and may have many numbers
     return found
 
 

@@ -40,7 +40,10 @@ class Leading:
             way |= {"duration": one.duration, "local": one.local, "rotate": one.rotate, "scale": one.scale}
             way |= {"turned": one.turned}
             way |= {"to": one.to and self._within(one.to)}
-            way |= {"keys": tuple((time, *self._within((x, y))) for time, x, y in one.keys or ())}
+            if one.keys:
+                times, *place = np.array(one.keys).T
+                keys = np.stack([times, *(np.clip(place, 0.0, 1.0) * np.array(extent)[:, None])], axis=-1)
+                way |= {"keys": keys.tolist()}
             way |= {"goals": np.multiply(one.goals, extent) if one.goals else ()}
         return Handle(at, radius=one.radius, start=one.start, end=one.let_go, stiffness=one.stiffness, **way)
 

@@ -285,7 +285,11 @@ class Replay:
                     self.handles.make_up(velocity)
 
         pushes, motions = acting(self.forces, self.fluid, self.tick * dt, dt, self)
-        self.fluid.step(dt, pushes, steer if brushwork.is_leading or leads else None)
+        try:
+            self.fluid.step(dt, pushes, steer if brushwork.is_leading or leads else None)
+        except ValueError as error:  # of numbers that no key is alone in: many at once, each within its own bounds
+            mend = "make their strength less, or let fewer of them act at once"
+            raise UserError(f"At {self.tick * dt:.6g} s {error}; {mend}") from None
         with self.device.stage("brush"):  # what is local carries the picture besides the fluid
             brushwork.carry(scene)
             if leads:

@@ -25,6 +25,7 @@ from solver.limits import (
     check_type,
     numbers,
     places,
+    rows_of,
 )
 
 SAME = 1e-9  # of the way from one led point of a line to the next: what a length is off by its rounding
@@ -86,7 +87,7 @@ class Handle(Course):
         for name in ("keys", "turned"):
             keys = getattr(self, name)
             check_type("a handle's keys", keys, Iterable)
-            object.__setattr__(self, name, tuple(numbers("a handle's key", key, 3) for key in keys))
+            object.__setattr__(self, name, tuple(map(tuple, rows_of("the keys of a handle", (*keys,), 3).tolist())))
         for number in (self.radius, self.start, self.duration, self.end, self.stiffness, self.local):
             check_type("a number of a handle", number)
         self._check_line()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from typing import Any
 
@@ -12,6 +13,8 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Pass
 from solver.grid import Grid
+
+BLOCK = 2**17  # pairs of an image and a place that are looked at in one go: of lines there are four millions
 
 
 class Pushes:
@@ -37,19 +40,25 @@ class Pushes:
 
     def influence(self, places: np.ndarray) -> np.ndarray:
         """The velocities at places (n, 2) for their forces, (n, a, m, b): the curl of (1 - q)^5 (1 + 5 q) (F x r)."""
-        x, y, q = self._apart(places)
-        far = np.maximum(1 - q, 0.0)
-        across = far**4
-        along, across = far * across * (1 + 5 * q), 30 * across
-        return self._together(along - across * y * y, across * x * y, along - across * x * x)
+
+        def matrices(x: np.ndarray, y: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            far = np.maximum(1 - q, 0.0)
+            across = far**4
+            along, across = far * across * (1 + 5 * q), 30 * across
+            return along - across * y * y, across * x * y, along - across * x * x
+
+        return self._at(places, matrices)
 
     def local_influence(self, places: np.ndarray) -> np.ndarray:
         """The same of local brushes, (1 - q^2)^3: as in carry.frag, images in one edge take off what points at it."""
-        x, _, q = self._apart(places)
         both = self._mirrors.sum(axis=1)
-        weight = np.maximum(1 - q**2, 0.0) ** 3 * (both >= 0)
-        across, down = (weight * ((both > 0) | (mirror < 0)) for mirror in self._mirrors.T)
-        return self._together(across, np.zeros_like(x), down)
+
+        def matrices(x: np.ndarray, y: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            weight = np.maximum(1 - q**2, 0.0) ** 3 * (both >= 0)
+            across, down = (weight * ((both > 0) | (mirror < 0)) for mirror in self._mirrors.T)
+            return across, np.zeros_like(x), down
+
+        return self._at(places, matrices)
 
     def draw(
         self, device: Device, shader: Pass, target: Field, viscosities: np.ndarray, forces: np.ndarray, **inputs: Any
@@ -57,6 +66,13 @@ class Pushes:
         """Add what a shader draws of them, with viscosities at their tips (m,) and forces (m, 2); see `draw_listed`."""
         each = viscosities[self._numbers], self._mirrors * forces[self._numbers]
         draw_listed(device, shader, target, self._grid, self._middles, self._radii, *each, **inputs)
+
+    def _at(self, places: np.ndarray, matrices: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarray:
+        """What all images do at places (n, 2), from the entries of each one's matrix there, some places at a time."""
+        several = max(BLOCK // max(len(self._radii), 1), 1)
+        starts = range(0, max(len(places), 1), several)
+        blocks = (places[start : start + several] for start in starts)
+        return np.concatenate([self._together(*matrices(*self._apart(block))) for block in blocks])
 
     def _apart(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """From each image to each place, in radii: x, y, and how far."""
