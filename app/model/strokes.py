@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator
 from itertools import pairwise
 from math import cos, hypot, inf, pi, sin
@@ -17,6 +18,7 @@ FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1
 SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
 LATEST = 10_000_000  # tick
 MOST_TIMES = 1000  # that a stroke repeats
+MOST_ACTS = 1000  # in one tick, all strokes and their times together; each takes a millisecond
 Tick = Annotated[int, Field(ge=0, le=LATEST)]
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
@@ -97,7 +99,7 @@ class BrushPath(Model):
             return ()
         if self.tool == "curve":
             return self._joined(self.samples) if tick == self.last_tick else ()
-        inside = [sample for sample in self.samples if sample[0] == tick]
+        inside = list(self.samples[bisect_left(self.samples, (tick,)) : bisect_left(self.samples, (tick + 1,))])
         before = None if tick == self.first_tick else self._interpolated(tick - 1)
         after = [] if inside else [self._interpolated(tick)]
         return self._joined(([before] if before else []) + inside + after)
@@ -132,16 +134,17 @@ class BrushPath(Model):
         """The length of the path up to where the pieces of `at(tick)` begin, in units of `extent`'s sides."""
         if tick <= self.first_tick:
             return 0.0
-        passed = [sample for sample in self.samples if sample[0] < tick]
+        passed = list(self.samples[: bisect_left(self.samples, (tick,))])
         passed.append(self._interpolated(min(tick - 1, self.last_tick)))
         return sum(hypot((b[1] - a[1]) * extent[0], (b[2] - a[2]) * extent[1]) for a, b in pairwise(passed))
 
     def _interpolated(self, tick: int) -> tuple[int, float, float, float]:
         """Where the pointer was at the end of `tick`, which lies between the first and the last."""
-        earlier = [sample for sample in self.samples if sample[0] <= tick][-1]
+        number = bisect_left(self.samples, (tick + 1,))
+        earlier = self.samples[number - 1]
         if earlier[0] == tick:
             return earlier
-        later = next(sample for sample in self.samples if sample[0] > tick)
+        later = self.samples[number]
         part = (tick - earlier[0]) / (later[0] - earlier[0])
         x, y, pressure = (a + (b - a) * part for a, b in zip(earlier[1:], later[1:], strict=True))
         return tick, x, y, pressure

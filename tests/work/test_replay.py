@@ -9,12 +9,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.strokes import Stroke
+from app.model.strokes import MOST_ACTS, Sample, Stroke
 from app.work.observing import whereabouts
 from app.work.replay import Replay
+from solver import energy
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -346,3 +348,41 @@ def test_until_anything_is_done_time_alone_passes(device: Device):
         replay.release()
     assert found[0].any()
     np.testing.assert_array_equal(found[0], found[1])
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [
+        (MOST_ACTS + 1, "^At 0 s more than 1000 strokes act at once; let some begin later"),
+        (2, r"^At 0\S* s the forces and brushes of this step are beyond all measure; make their strength less"),
+    ],
+)
+def test_strokes_that_are_too_much_together_are_refused_in_a_sentence(
+    device: Device, count: int, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As hundreds of the strongest in one place are; here the fluid bears less, which takes no time to exceed."""
+    monkeypatch.setattr(energy, "LARGEST_SPEED", 1e-3)
+    stroke = Stroke(tool="push", strength=100.0, samples=((0, 0.2, 0.5, 1.0), (1, 0.6, 0.5, 1.0)))
+    replay = Replay(device, Recipe.parse("[fluid]\ngrid = 16").edited(stroke=count * (stroke,)), pictures())
+    with pytest.raises(UserError, match=said):
+        replay.seek(3)
+    replay.release()
+
+
+def test_a_long_stroke_is_searched_not_read_through_at_each_of_its_ticks() -> None:
+    """Of half a million samples, a thousand times in a tick; but for what it has travelled, of a push."""
+    stroke = Stroke(
+        tool="twirl", samples=((0, 0.1, 0.2, 1.0), (2, 0.5, 0.2, 0.5), (2, 0.6, 0.2, 0.5), (9, 0.6, 0.9, 1.0))
+    )
+    looked: list[int] = []
+
+    class Samples(tuple[Sample, ...]):
+        def __iter__(self) -> Iterator[Sample]:
+            looked.append(1)
+            return super().__iter__()
+
+    seen = stroke.model_copy(update={"samples": Samples(stroke.samples)})
+    for tick in range(-1, 11):
+        assert seen.at(tick) == stroke.at(tick)
+    assert [len(seen.at(tick)) for tick in (0, 1, 2, 3, 9, 10)] == [1, 1, 2, 1, 1, 0]
+    assert not looked
