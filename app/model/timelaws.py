@@ -12,6 +12,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 from typing import Annotated, Any, Literal, Protocol, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -94,10 +95,9 @@ class Keyframes:
 
     def _integral(self, t: float) -> float:
         """From the first key to t; negative before it."""
-        times = [time for time, _ in self.keys]
-        k = bisect_right(times, t) - 1
+        k = bisect_right(self.keys, t, key=itemgetter(0)) - 1
         if k < 0:
-            return (t - times[0]) * self.keys[0][1]
+            return (t - self.keys[0][0]) * self.keys[0][1]
         ta, va = self.keys[k]
         if k == len(self.keys) - 1 or self.interpolation == "hold":
             return self._areas[k] + (t - ta) * va

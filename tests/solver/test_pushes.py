@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 
 from solver import Device, Grid
@@ -38,3 +40,16 @@ def test_what_is_local_of_handles_is_carried_as_it_is_reckoned(device: Device):
     for axis, wanted in enumerate(at_faces([pushes.local_influence(each) for each in FACES])):
         inside = FACES[axis][:, axis] > 0  # but on the walls
         np.testing.assert_allclose(motion.get()[::7, ::7, axis].ravel()[inside], wanted[inside], atol=2e-5)
+
+
+def test_many_pushes_are_reckoned_a_block_at_a_time() -> None:
+    """Of 16 lines there were six millions of pairs, and arrays of a gigabyte; each place is as by itself."""
+    places = np.random.default_rng(0).random((256, 2))
+    pushes = Pushes(Grid(32, 32), places, np.ones(256))
+    tracemalloc.start()
+    together = pushes.influence(places)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 8 * together.nbytes
+    alone = [pushes.influence(place[None]) for place in places[::85]]
+    np.testing.assert_array_equal(together[::85], np.concatenate(alone))
