@@ -18,7 +18,6 @@ FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1
 SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
 LATEST = 10_000_000  # tick
 MOST_TIMES = 1000  # that a stroke repeats
-MOST_ACTS = 1000  # in one tick, all strokes and their times together; each takes a millisecond
 Tick = Annotated[int, Field(ge=0, le=LATEST)]
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""

@@ -21,7 +21,7 @@ from app.model.mask_edits import ClearMask, MaskStroke, edited, remaining
 from app.model.masks import solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import FINEST, SmallPictures, channels
-from app.model.strokes import FINEST_DETAIL, MOST_ACTS, Act, Change
+from app.model.strokes import FINEST_DETAIL, Act, Change
 from app.model.windows import FLOWING, FlowWindow, may_have_windows
 from app.work.brushwork import Brushwork, Scene
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
@@ -265,12 +265,7 @@ class Replay:
             if change.tick == self.tick:
                 self._change(change)
         leads = any(led.is_in_force(self.tick, dt) for _, led in self.led)
-        acts = list(islice((act for stroke in self.recipe.stroke for act in stroke.acts(self.tick)), MOST_ACTS + 1))
-        if len(acts) > MOST_ACTS:
-            raise UserError(
-                f"At {self.tick * dt:.6g} s more than {MOST_ACTS} strokes act at once; let some begin later, or repeat "
-                "less often"
-            )
+        acts = [act for stroke in self.recipe.stroke for act in stroke.acts(self.tick)]
         self._follow([act for act in acts if act.stroke.tool in FLOWING], leads)
         self._set_parameters(self.settings)
         scene, brushwork, painted = self._scene(part), self._brushwork, False
