@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -135,9 +136,10 @@ def _read(path: Path, size: Size) -> list[np.ndarray]:
 def _lines(path: Path) -> Lines:
     """The numbered lines of a file that say something."""
     try:
-        text = read_input(path, "file of pairs", MOST_BYTES).decode("utf-8-sig")
+        data = read_input(path, "file of pairs", MOST_BYTES)
+        text = data.decode("utf-16" if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
     except UnicodeDecodeError:
-        raise UserError(f"Cannot read {path}: it is not text, or not saved as UTF-8.") from None
+        raise UserError(f"Cannot read {path}: it is not text, or not saved as UTF-8 or UTF-16.") from None
     lines = ((number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
     return ((number, line) for number, line in lines if line and not line.startswith("#"))
 

@@ -48,6 +48,16 @@ def test_csv_of_other_programs_is_read(tmp_path: Path, text: str) -> None:
     np.testing.assert_allclose(read_pairs([tmp_path / "a.csv"], SIZE).places[0] * SIZE, [(10, 20), (30, 40.5)])
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_text_of_two_bytes_a_letter_is_read_by_its_mark(tmp_path: Path, encoding: str) -> None:
+    """As Excel's "Unicode Text" is; without the mark nothing tells it from damage."""
+    (tmp_path / "a.csv").write_text("\ufeffx0\ty0\tx1\ty1\r\n10\t20\t30\t40,5\r\n", encoding, newline="")
+    np.testing.assert_allclose(read_pairs([tmp_path / "a.csv"], SIZE).places[0] * SIZE, [(10, 20), (30, 40.5)])
+    (tmp_path / "a.csv").write_bytes((tmp_path / "a.csv").read_bytes()[:-1])
+    with pytest.raises(UserError, match="not saved as UTF-8 or UTF-16"):
+        read_pairs([tmp_path / "a.csv"], SIZE)
+
+
 def test_a_long_line_of_spaces_is_told_at_once(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("1,2,3,4\n1" + " " * 500_000 + "x\n")
     with pytest.raises(UserError, match="line 2: expected x0,y0,x1,y1"):
