@@ -82,7 +82,7 @@ def run_tests(tree: Path, tests: tuple[str, ...], limit: float) -> Ran:
 
 
 def run_mutant(tree: Path, mutant: Mutant, limit: float) -> Ran:
-    """Put a mutant into a copy of the tree, run its tests, and undo it; one that is no Python is broken, not noticed."""
+    """Put a mutant into a copy of the tree, run its tests, and undo it; no Python at all is broken, not noticed."""
     path, text = tree / mutant.file, mutant.text_in(tree)
     before, times = path.read_bytes(), path.stat()
     try:
