@@ -236,6 +236,16 @@ def test_a_compression_that_there_is_not(tmp_path: Path):
         write_picture(tmp_path / "a.png", Picture(np.zeros((8, 8, 3), np.float32)), codec="piz")
 
 
+@pytest.mark.parametrize("part", [0.5, 0.99])
+def test_pixels_that_are_missing_are_told_as_that(tmp_path: Path, part: float):
+    source = tmp_path / "a.exr"
+    write_picture(source, Picture(np.random.default_rng(1).random((40, 50, 3), np.float32)))
+    data = source.read_bytes()
+    source.write_bytes(data[: int(part * len(data))])
+    with pytest.raises(UserError, match=r"truncated or damaged \(pixel data is missing\); get it again"):
+        read_picture(source)
+
+
 @pytest.mark.parametrize("count", [9, 30, 200, 400])
 def test_a_damaged_header_is_told(tmp_path: Path, count: int):
     source, _ = a_shot(tmp_path / "shot.exr")
