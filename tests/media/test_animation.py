@@ -815,6 +815,25 @@ def test_a_clip_that_is_cut_while_it_is_read_is_a_failure_of_its_own(tmp_path: P
     assert raised.value.status == 65
 
 
+@pytest.mark.parametrize(("kept", "said"), [(1.0, "ffmpeg says no"), (0.5, "it changed while it was read")])
+def test_what_fails_of_a_clip_that_has_changed_is_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: float, said: str
+):
+    """Whatever ffmpeg says of it then; of one that has not it is what ffmpeg says."""
+    path = generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=1", "-c:v", "mjpeg")
+    clip = read_clip(path)
+
+    def failing(*_: object) -> Iterator[bytes]:
+        if kept < 1:
+            os.truncate(path, round(kept * path.stat().st_size))
+        yield from ()
+        raise UserError("ffmpeg says no.")
+
+    monkeypatch.setattr(ffmpeg.Ffmpeg, "blocks", failing)
+    with pytest.raises(UserError, match=said):
+        list(clip.read_frames())
+
+
 def test_a_clip_that_is_written_anew_in_its_place_has_changed(tmp_path: Path):
     """It may be as long as before by the time all is read."""
     path = generate(tmp_path / "a.mkv", NOISE, "-c:v", "mjpeg", "-q:v", "2")

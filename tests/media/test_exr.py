@@ -13,7 +13,7 @@ import pytest
 from app.errors import UserError
 from app.media.codecs.exr import COMPRESSIONS
 from app.media.displacement import Displacement
-from app.media.maps import write_map
+from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.source import open_source
 from app.model.picture import Picture
@@ -234,6 +234,17 @@ def test_a_compression_that_there_is_not(tmp_path: Path):
         write_picture(tmp_path / "a.exr", Picture(np.zeros((8, 8, 3), np.float32)), codec="h264")
     with pytest.raises(UserError, match=r"a\.png: a picture has no codec"):
         write_picture(tmp_path / "a.png", Picture(np.zeros((8, 8, 3), np.float32)), codec="piz")
+
+
+@pytest.mark.parametrize("part", [0.5, 0.99])
+def test_pixels_that_are_missing_are_told_as_that(tmp_path: Path, part: float):
+    source = tmp_path / "a.exr"
+    write_picture(source, Picture(np.random.default_rng(1).random((40, 50, 3), np.float32)))
+    data = source.read_bytes()
+    source.write_bytes(data[: int(part * len(data))])
+    for reading in (read_picture, read_map):
+        with pytest.raises(UserError, match=r"truncated or damaged \(pixel data is missing\); get it again"):
+            reading(source)
 
 
 @pytest.mark.parametrize("count", [9, 30, 200, 400])

@@ -82,12 +82,16 @@ def run_tests(tree: Path, tests: tuple[str, ...], limit: float) -> Ran:
 
 
 def run_mutant(tree: Path, mutant: Mutant, limit: float) -> Ran:
-    """Put a mutant into a copy of the tree, run its tests, and undo it."""
-    path = tree / mutant.file
+    """Put a mutant into a copy of the tree, run its tests, and undo it; no Python at all is broken, not noticed."""
+    path, text = tree / mutant.file, mutant.text_in(tree)
     before, times = path.read_bytes(), path.stat()
     try:
-        path.write_text(mutant.text_in(tree), "utf-8")
+        if path.suffix == ".py":
+            compile(text, mutant.file, "exec")
+        path.write_text(text, "utf-8")
         return run_tests(tree, mutant.tests, limit)
+    except SyntaxError as error:
+        return Ran("broken", 0.0, f"{mutant.name}: {error}")
     finally:
         path.write_bytes(before)
         os.utime(path, (times.st_atime, times.st_mtime))  # the compiled file is of that time

@@ -363,6 +363,30 @@ def test_result_of_another_size_follows_the_map(device: Device) -> None:
         assert np.abs(back - sampler.apply(warp, picture, None, Sampling(edges="clamp")))[4:-4, 4:-4].max() < 0.01
 
 
+@pytest.mark.parametrize("size", [(40, 60), (90, 30), (240, 50)])
+def test_a_result_of_other_proportions_is_looked_up_by_each_side_for_itself(
+    device: Device, size: tuple[int, int]
+) -> None:
+    """A smooth picture pressed or drawn out along one side, through a map and without, at the very places."""
+    height, width = 80, 120
+
+    def wave(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return (0.5 + 0.4 * np.sin(7 * x) * np.cos(5 * y)).astype(np.float32)
+
+    def centres(columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
+        x, y = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+        return x, y
+
+    for moved in (0.0, 0.04):
+        warp = GivenMap(device, np.full((height, width, 2), (moved, -moved), np.float32))
+        found = Sampler(device).apply(warp, wave(*centres(width, height)), size, Sampling(edges="clamp"))
+        assert found.shape == size[::-1]
+        x, y = centres(*size)
+        inside = slice(size[1] // 6, -size[1] // 6), slice(size[0] // 6, -size[0] // 6)
+        np.testing.assert_allclose(found[inside], wave(x + moved, y - 1.5 * moved)[inside], atol=0.006)
+        warp.release()
+
+
 @pytest.mark.parametrize("factor", [1.5, 2.0, 3.2])
 def test_enlarging_is_pillows_bicubic(device: Device, factor: float) -> None:
     """Where nothing is shrunk, one place a pixel: sharp as Pillow's resize, whose bicubic is Catmull-Rom's."""

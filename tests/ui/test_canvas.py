@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
+from app.model.picture import srgb_to_linear
 from app.ui.canvas import EDGES
 from solver.gl.device import Device
 from support.golden import Golden, told
@@ -151,3 +152,28 @@ def test_masks_lie_over_the_picture_by_their_part(device: Device, picture: np.nd
     found = drawn(device, picture, MASKS=1, masks=device.upload(masks), corner=(0.0, 0.0))
     over = masks[::-1]
     np.testing.assert_allclose(found, (1 - over[..., 3:]) * picture[..., :3] + over[..., :3], atol=1e-6)
+
+
+@pytest.mark.parametrize(("across", "down"), [(4, 1), (1, 4), (4, 2), (2, 4)])
+def test_a_pixel_at_rest_is_the_mean_of_what_is_under_it_along_each_side(
+    device: Device, across: int, down: int
+) -> None:
+    """Of as many texels across and down: in light, and of none that lie beside it."""
+    columns, rows = SIDE * across, SIDE * down
+    code = np.random.default_rng(4).uniform(0, 1, (rows, columns, 4)).astype(np.float32)
+    code[..., 3] = 1
+    target, still = device.field((SIDE, SIDE), 4), device.upload(np.zeros((1, 1, 2), np.float32))
+    device.pass_("view/picture.frag", EDGES=EDGES["clamp"])(
+        target,
+        picture=device.upload(code),
+        displacement=still,
+        shown=(0.0, 0.0, 1.0, 1.0),
+        extent=(1.0, 1.0),
+        origin=(0.0, 0.0),
+        step=(1 / SIDE, 1 / SIDE),
+        apart=(1 / columns, 1 / rows),
+        level=0.0,
+        target_height=float(SIDE),
+    )
+    light = srgb_to_linear(code[..., :3]).reshape(SIDE, down, SIDE, across, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(srgb_to_linear(target.get()[::-1, :, :3]), light, atol=2e-3)

@@ -8,6 +8,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from threading import Semaphore
 from typing import Any
 
 import numpy as np
@@ -236,6 +237,41 @@ def test_a_clip_that_is_longer_than_its_file_tells_is_played_on():
             time.sleep(0.001)
         assert reel.frames == frames
     reel.close()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slow(Counted):
+    """Of it a frame comes when somebody lets it."""
+
+    let: Semaphore
+
+    def pictures(self, part: FrameRange = WHOLE, *_: Any, **others: Any) -> Generator[tuple[int, Picture], None, None]:
+        for each in super().pictures(part):
+            self.let.acquire()
+            yield each
+
+
+@pytest.mark.parametrize("runs", [True, False])
+def test_the_newest_frame_before_it_stands_in_for_one_that_is_late(runs: bool) -> None:
+    """While it runs; one that is looked for is not shown as another that lies farther on."""
+    let = Semaphore(0)
+    clip = Slow(path=Path("a"), width=2, height=2, bits=8, alpha=False, pixel_format="", fps=RATE, frames=9, let=let)
+    reel = Reel(clip, lambda picture: picture.pixels)
+
+    def stands_in() -> int | None:
+        return found[0] if (found := reel.best()) else None
+
+    for wanted, come in ((0, 3), (4, 0)):
+        reel.want(wanted, runs)
+        let.release(come) if come else None
+        deadline = time.monotonic() + 60
+        while reel.best() is None and time.monotonic() < deadline:
+            time.sleep(0.001)
+    while stands_in() != 2 and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert stands_in() == 2
+    reel.close()
+    let.release(99)
 
 
 def test_numbered_files_that_are_not_all_there_are_told_of(robot: Robot, tmp_path: Path):

@@ -21,6 +21,7 @@ from app.media.displacement import Displacement
 from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import Project
+from app.model.forces import VortexForce
 from app.model.mask_edits import MaskStroke
 from app.model.picture import Picture
 from app.model.recipe import Recipe
@@ -1267,6 +1268,21 @@ def test_the_forces_of_a_recipe_are_shown(robot: Robot, tmp_path: Path) -> None:
     assert part["vortex"] > 0.02
     assert part["source"] > 0.02
     assert part["corner"] == 0
+
+
+@pytest.mark.parametrize(("name", "is_seen"), [("forces", True), ("velocity", False)])
+def test_what_pushes_a_fluid_at_rest_is_seen_as_forces_and_not_as_its_velocity(
+    robot: Robot, name: str, is_seen: bool
+) -> None:
+    robot.editor.session.edit("A force", force=(VortexForce(kind="vortex", point=(0.5, 0.5), strength=1.0),))
+    robot.rest()
+    robot.see()
+    robot.move(900, 20)
+    robot.frame(count=2)
+    without = robot.canvas().astype(int)
+    robot.editor.state.overlays[name].shown = True
+    robot.frame(Move(901.0, 20.0))
+    assert (np.abs(robot.canvas() - without).max() > 20) == is_seen
 
 
 def test_the_time_of_each_stage_is_that_of_one_step(robot: Robot) -> None:

@@ -21,6 +21,7 @@ from app.model.presets import PUTTY, WATER
 from app.model.tools import TOOL, TOOLS, Press
 from app.ui.chooser import FileChooser
 from app.ui.clock import FRAMES, HOVERING, PACE
+from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
 from app.ui.exporting import ANIMATION, ExportDialog
 from app.ui.files import load_any
@@ -29,9 +30,10 @@ from app.ui.panels.hud import BEHIND
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
+from app.ui.widgets import Ui
 from solver.gl.device import Device
 from solver.gl.passes import Pass
-from support.editing import Robot, export_dialog, pattern, small_project
+from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project
 from support.widgets import Widgets
 
 
@@ -841,3 +843,46 @@ def test_waking_lasts_longer_than_the_hover_delays(robot: Robot) -> None:
 
     style = imgui.get_style()
     assert max(style.hover_stationary_delay + style.hover_delay_short, style.hover_delay_normal) < HOVERING
+
+
+def test_every_button_that_shows_a_key_does_what_the_key_does(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of those that lie around the picture."""
+    drawn, told, done = imgui.invisible_button, Ui.tooltip, list[str]()
+    last, pressed, keys = "", "", dict[str, str]()
+
+    def button(name: str, *more: Any) -> bool:
+        nonlocal last
+        last = name
+        return drawn(name, *more) or name == pressed
+
+    def tooltip(ui: Ui, title: str, key: str = "", *more: Any, **named: Any) -> None:
+        nonlocal last
+        if last and key in BY_KEY:
+            keys[last] = key
+        last = ""
+        told(ui, title, key, *more, **named)
+
+    monkeypatch.setattr(imgui, "invisible_button", button)
+    monkeypatch.setattr(Ui, "tooltip", tooltip)
+    monkeypatch.setattr(Editor, "do", lambda editor, name: done.append(name))
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=2)  # so that there is something to undo
+    robot.frame()
+    by_action = set[str]()
+    for name, key in dict(keys).items():
+        pressed = name
+        robot.frame(Move(700.0 + len(done) % 2, 20.0))
+        pressed = ""
+        assert done in ([], [BY_KEY[key].name]), name
+        by_action |= set(done)
+        done.clear()
+    assert {"undo", "split", "inspector", "fit", "actual", "zoom_in", "zoom_out", "lanes", "play"} <= by_action
+
+
+def test_the_statistics_are_of_the_map_also_before_the_first_step(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words, dim = list[str](), Ui.dim
+    monkeypatch.setattr(Ui, "dim", lambda ui, text, *more, **named: (words.append(text), dim(ui, text, *more, **named)))
+    robot.key("ctrl+i")
+    robot.frame(count=3)
+    assert "det J  1.00 to 1.00    folds 0" in words

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.ui.actions import ACTIONS
+from app.ui.editor import Editor
 from app.ui.events import Key, Mods
 from app.ui.key_sheet import KeySheet
 from app.ui.keymap import Keymap
@@ -156,3 +157,19 @@ def test_a_row_that_is_clicked_waits_for_its_key(robot: Robot, sheet: KeySheet) 
     assert sheet.is_listening
     robot.key("ctrl+shift+k")
     assert robot.editor.keys.of("open") == "ctrl+shift+k"
+
+
+@pytest.mark.parametrize(
+    ("chord", "times"), [("[", 4), ("shift+[", 4), (";", 4), ("=", 4), ("left", 4), ("y", 1), ("t", 1), ("ctrl+i", 1)]
+)
+def test_what_goes_by_steps_is_done_again_while_its_key_is_held_and_nothing_else(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, chord: str, times: int
+) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(Editor, "do", lambda editor, name: done.append(name))
+    *held, key = chord.split("+")
+    mods = Mods("ctrl" in held, "shift" in held)
+    robot.frame(*(Key(key, True, mods, repeat=number > 0) for number in range(4)))
+    robot.frame(count=4)
+    robot.frame(Key(key, False, mods))
+    assert done == [BY_KEY[chord].name] * times

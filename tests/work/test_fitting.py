@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from app.media.recipes import read_recipe
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
+from app.work import fitting
 from app.work.fit_job import FitJob
 from app.work.fitting import LEAST_DET, Fitted, Trial, fitted
 from app.work.replay import Replay
@@ -268,6 +270,19 @@ def test_many_pairs_arrive_with_values_in_common(device: Device):
     found = fit(device, np.stack([places, moved], axis=1), 6, FREE)
     assert found.errors.max() < 0.2
     assert len({(handle.radius, handle.duration) for handle in found.trial.recipe.handle}) == 1
+
+
+def test_no_more_is_tried_than_was_asked_for(device: Device, monkeypatch: pytest.MonkeyPatch):
+    """On the coarse grid: of its parts each takes its share of what the ones before have left."""
+    tried: list[int] = []
+
+    def counted(device: Device, recipe: Recipe, *given: Any, **named: Any) -> Replay:
+        tried.append(recipe.fluid.grid)
+        return Replay(device, recipe, *given, **named)
+
+    monkeypatch.setattr(fitting, "Replay", counted)
+    fit(device, PAIRS, 9, RECIPE.replace("grid = 32", "grid = 66").replace("duration = 0.4", "duration = 0.08"))
+    assert 7 <= tried.count(fitting.COARSE_GRID) <= 9
 
 
 def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device):

@@ -441,6 +441,28 @@ def test_what_halts_on_its_way_calms_the_fluid_as_far_as_it_may_set_it_going(
     assert (speeds[1] < 0.9 * speeds[0]) == (to == (0.6, 0.5))
 
 
+def test_of_several_that_halt_each_calms_the_fluid_about_it(device: Device):
+    grid, folded, speeds = Grid(32, 32), np.zeros((128, 128, 2), np.float32), []
+    folded[:, 66, 0] = 1.5 / 128
+    for moved in (0 * folded, folded):
+        fluid, warp = Fluid(device, grid), WarpMap(device, grid, (128, 128))
+        ways = [Handle((0.388, y), (0.6, y), 0.2, duration=0.0) for y in (0.15, 0.85)]
+        handles = Handles(fluid, warp, ways)
+        for _ in range(3):
+            handles.advance(DT)
+        warp.set(warp.read((128, 128)) + moved)
+        fluid.set_velocity(
+            lambda x, y, t: (np.sin(np.pi * x) * np.cos(np.pi * y), -np.cos(np.pi * x) * np.sin(np.pi * y))
+        )
+        handles.advance(0.001)
+        speed = np.hypot(*np.moveaxis(fluid.faces().get(), -1, 0))
+        speeds.append([speed[rows, 24:28].mean() for rows in (slice(1, 4), slice(28, 31))])
+        for thing in (handles, warp, fluid):
+            thing.release()
+    ratio = np.divide(speeds[1], speeds[0])
+    assert ratio.max() < 0.92
+
+
 HANDLES = [
     led_to([0.3, 0.4], [0.4, 0.5], rotate=20.0, turned=[[0.5, 0.0, 1.1], [0.6, 10.0, 1.0]]),
     led_to([0.7, 0.6], [0.6, 0.7], start=0.2, local=0.5, stiffness=0.8),

@@ -14,6 +14,7 @@ from app.errors import UserError
 from app.model.picture import Picture
 from app.model.recipe import Output, Playback, Recipe
 from app.work import jobs
+from app.work.applying import Application, MapSource
 from app.work.jobs import Job, MapOutput, Outputs, longer_side, result_size
 
 PICTURE = Picture(np.zeros((60, 100, 3), np.uint8))
@@ -106,3 +107,43 @@ def test_outputs_are_renamed_together() -> None:
         maps=MapOutput(Path("x/m.npy"), overscan=3),
     )  # fmt: skip
     assert moved.files == [Path("x/a.png"), Path("x/s.json"), Path("x/m.npy")]
+
+
+def test_all_that_is_asked_of_an_animation_is_told_to_its_writer(tmp_path: Path) -> None:
+    """Each by itself beside what it is else, so that none is another's or nobody's."""
+    usual = Outputs(tmp_path / "a.mov").animation(3, Fraction(25), None, PICTURE, None)
+    like = replace(PICTURE, texts={"Title": "A"})
+    cases: list[tuple[dict[str, Any], dict[str, Any]]] = [
+        ({"bits": 10}, {"bits": 10}),
+        ({"codec": "prores-4444"}, {"codec": "prores-4444"}),
+        ({"resume": True}, {"resumed": True}),
+        ({"part": (3, 8)}, {"frames": 6}),
+    ]
+    for asked, told in cases:
+        found = Outputs(tmp_path / "a.mov", **asked).animation(3, Fraction(25), None, PICTURE, None)
+        assert found == replace(usual, **told)
+    assert Outputs(tmp_path / "a.mov").animation(3, Fraction(25), 70, PICTURE, None) == replace(usual, quality=70)
+    for strip, kept in ((False, {"Title": "A"}), (True, {})):
+        found = Outputs(tmp_path / "a.mov", strip=strip).animation(3, Fraction(25), None, like, None)
+        assert found.like is not None
+        assert found.like.texts == kept
+
+
+@pytest.mark.parametrize(
+    ("maps", "outputs", "said"),
+    [
+        ("map.txt", {"file": "a.png"}, r"map\.txt: a map's name must end in one of"),
+        ("map.npy", {"file": "a.xyz"}, r"a\.xyz"),
+        ("map.npy", {"file": "gone/a.png"}, "gone"),
+        ("map.npy", {"file": "map.npy"}, r"map\.npy"),
+        ("map.npy", {"file": "a.png", "part": (0, 3)}, "--frames is for an animation"),
+    ],
+)
+def test_what_keeps_a_map_from_being_applied_is_told_before_the_work(
+    tmp_path: Path, maps: str, outputs: dict[str, Any], said: str
+) -> None:
+    """Each of its checks, where all the others are content."""
+    given = outputs | {"file": tmp_path / outputs["file"]}
+    with pytest.raises(UserError, match=said):
+        Application(maps=MapSource(tmp_path / maps), outputs=Outputs(**given), picture=tmp_path / "in.png").check()
+    Application(maps=MapSource(tmp_path / "map.npy"), outputs=Outputs(tmp_path / "a.png"), picture=None).check()
