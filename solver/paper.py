@@ -12,7 +12,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.grid import Grid
-from solver.limits import check_size, check_step, check_type
+from solver.limits import check_finite, check_size, check_step, check_type
 from solver.params import FluidParams
 from solver.scheme import Residuals, Scheme
 from solver.warp.map import WarpMap
@@ -215,6 +215,7 @@ class PaperWarpMap(WarpMap):
 
     def advance_prescribed(self, velocity: Vector, dt: float, time: float = 0.0) -> None:
         """Carry the map from `time` to `time + dt` by a function (x, y, t) or an array (ny, nx, 2), at cell centres."""
+        check_finite("a time", time)
         array = at_centres("a velocity", velocity, self.grid, time + 0.5 * check_step(dt))
         field = self.device.upload(array, "prescribed velocity")
         self.advance(field, dt)

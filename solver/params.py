@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 from numbers import Integral
 from typing import Any, Literal, NamedTuple
 
-from solver.limits import check_type, numbers
+from solver.limits import check_finite, check_type, numbers
 
 
 class NoSlip(NamedTuple):
@@ -86,7 +85,7 @@ class FluidParams:
         sweeps: Jacobi sweeps of the paper's own scheme (solver "paper"), for viscosity and for pressure each.
 
     Raises:
-        ValueError: for a drag that is negative or not finite, or numbers of cycles or sweeps that are none.
+        ValueError: for a drag that is negative or beyond `LARGEST_SPEED`, or numbers of cycles or sweeps that are none.
     """
 
     walls: Walls = Walls()
@@ -96,8 +95,8 @@ class FluidParams:
 
     def __post_init__(self) -> None:
         check_type("what the walls are", self.walls, Walls)
-        check_type("a drag", self.drag)
-        if not 0 <= self.drag < inf:
+        check_finite("a drag", self.drag)
+        if self.drag < 0:
             raise ValueError(f"a drag of {self.drag} was asked for; it must be finite and not negative")
         for what, count in (("pressure cycles", self.pressure_cycles), ("sweeps", self.sweeps)):
             if count is not None and not (isinstance(count, Integral) and count >= 1):

@@ -504,7 +504,7 @@ class Sitting:
         for _ in range(self.dice.randint(0, 2)):
             self.hand.key("shift+m")
         self.stroke()
-        self.hand.key(self.dice.choice(("Return", "shift+Return", "escape", "ctrl+shift+i")))
+        self.hand.key(self.dice.choice(("Return", "shift+Return", "escape", "i", "ctrl+shift+i")))
 
     def handle(self) -> None:
         """Place a handle or a pin; delete it, turn it, or leave it."""

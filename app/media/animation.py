@@ -21,7 +21,7 @@ from app.media.depth import to_bits
 from app.media.encoders import ANIMATIONS, SIX_BITS, Container, Encoding, Stream, check_animation, lossless
 from app.media.files import cannot_write, is_sequence, numbered, replacing, temporary_beside, temporary_file
 from app.media.pictures import write_picture
-from app.media.video import sound_codecs
+from app.media.video import sound_tracks
 from app.model.picture import Picture
 from app.progress import never
 
@@ -238,16 +238,17 @@ def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple
     sound, start = how.sound, how.sound_from
     if sound is None or not container.sound:
         return [], []
-    tracks = [(track, codec) for track, codec in enumerate(sound_codecs(sound)) if codec != "none"]
+    tracks = [(number, track) for number, track in enumerate(sound_tracks(sound)) if track.codec != "none"]
     if not tracks:
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
     length = [] if how.frames is None else ["-t", f"{float(how.frames / rate):.6f}"]
     options: list[str] = []
-    for number, (track, codec) in enumerate(tracks):
+    for number, (place, track) in enumerate(tracks):
         # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
-        chosen = ("-c", "copy", "-copypriorss", "0") if codec in container.sound else container.encoder
-        options += ["-map", f"1:a:{track}"]
+        chosen = ("-c", "copy", "-copypriorss", "0") if track.codec in container.sound else container.encoder
+        options += ["-map", f"1:a:{place}"]
+        options += [f"-metadata:s:a:{number}", f"title={track.name}"] if track.name else []
         for name, value in zip(chosen[::2], chosen[1::2], strict=True):
             options += [f"{name}:a:{number}", value]
     return [*begin, *length, "-i", f"file:{sound}"], options

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from app.errors import UserError
+from app.media.clip import Clip, frame_of
 from app.media.displacement import cropped, folds
 from app.media.maps import read_map
 from app.media.pictures import read_picture
+from app.media.project import frame_numbers
 from app.model.picture import Picture
+from app.model.recipe import Recipe
 from app.model.sampling import SOURCE
 
 
@@ -20,22 +24,25 @@ class Pictures:
     Args:
         source: the picture that is warped.
         folder: where relative names of auxiliary pictures start from.
+        clip: the one that `source` is the first frame of.
     """
 
-    def __init__(self, source: Picture, folder: str | Path = ".") -> None:
+    def __init__(self, source: Picture, folder: str | Path = ".", clip: Clip | None = None) -> None:
         self.source = source
+        self.clip = clip
         self.folder = Path(folder)
         self.notices: list[str] = [source.note] if source.note else []
         self._read: dict[str, Picture] = {}
         self._maps: dict[str, np.ndarray] = {}
+        self._frame = lru_cache(2)(lambda frame: frame_of(clip, clip.start + frame) if clip else source)
 
-    def load(self, name: str) -> Picture:
-        """The picture called `name`, or the source itself.
+    def load(self, name: str, frame: int = 0) -> Picture:
+        """The picture called `name`, or the source itself; of a clip so many frames after its first.
 
         One whose size is not the source's is fitted to it, and a notice says so. Raises UserError if it cannot be read.
         """
         if name == SOURCE:
-            return self.source
+            return self._frame(frame) if frame else self.source
         if name not in self._read:
             picture = self._read[name] = read_picture(self.folder / name)
             if picture.note:
@@ -77,10 +84,14 @@ class Pictures:
         self._maps.pop(name, None)
         self._read.pop(name, None)
 
-    def values(self) -> list[np.ndarray]:
-        """The pixels of all that was read so far and the values of maps, the source first, the others by name."""
+    def values(self, recipe: Recipe) -> list[np.ndarray]:
+        """The pixels of all that was read so far and the values of maps, the source first, the others by name; and what
+        stands for the frames of a clip that a recipe looks at.
+        """
         read = [self._read[name].pixels for name in sorted(self._read)]
-        return [self.source.pixels, *read, *(self._maps[name] for name in sorted(self._maps))]
+        maps, clip = [self._maps[name] for name in sorted(self._maps)], self.clip
+        told = [clip.digest(clip.start + frame) for frame in frame_numbers(recipe)] if clip else []
+        return [self.source.pixels, *read, *maps, np.frombuffer("".join(told).encode(), np.uint8)]
 
     def notice(self, text: str) -> None:
         """Note something the user should hear of, once."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 
+from app.errors import UserError
 from app.media.record import digest_of_file
 from app.model.picture import Picture
 from app.model.timeline import frame_rate
@@ -64,6 +66,7 @@ class Clip(ABC):
         frames: about how many there are; None where that is not known.
         start: the number of the first.
         sounds: the codecs of its sound tracks.
+        roles: what these are marked as, besides default, such as comment or forced.
         late: seconds from the file's start, as a rule its sound's, to the first frame; 0 where ffmpeg does not say.
         durations: of the frames, in steps of 1 / fps, where they differ.
         loops: how often it is played, 0 for ever.
@@ -84,6 +87,7 @@ class Clip(ABC):
     frames: int | None = None
     start: int = 0
     sounds: tuple[str, ...] = ()
+    roles: tuple[str, ...] = ()
     late: float = 0.0
     durations: tuple[int, ...] | None = None
     loops: int = 0
@@ -167,6 +171,15 @@ class Clip(ABC):
 def rate_of(clip: Clip | None, fps: float) -> Fraction:
     """Frames a second: the clip's own, or `fps` where it has none."""
     return (clip and clip.fps) or frame_rate(fps)
+
+
+def frame_of(clip: Clip, number: int) -> Picture:
+    """One frame of a clip. Raises `UserError`."""
+    with closing(clip.pictures_from(number)) as pictures:
+        found = next(pictures, None)
+    if found is None:
+        raise UserError(f"Cannot read {clip.path}: it has no frame {number}; choose an earlier one.")
+    return replace(found[1], chunks={**found[1].chunks, **coded(clip.colours)})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,6 +43,22 @@ def _strip_to_bits(pixels: np.ndarray, bits: int, noise: np.random.Generator | N
     return np.minimum(values + offset, top).astype(np.uint8 if bits == 8 else np.uint16)
 
 
+def mixed(one: np.ndarray, other: np.ndarray, share: float, *, premultiplied: bool = False) -> np.ndarray:
+    """One picture (h, w, c) dissolved into another of its kind: of that a `share` between 0 and 1, in linear light."""
+    out = np.empty_like(one)
+    rows = max(1, 500_000 // max(1, one[0].size))
+    for top in range(0, len(one), rows):
+        first, second = (to_bits(part[top : top + rows], 32) for part in (one, other))
+        first, second = (1 - share) * first, share * second
+        mix = first + second
+        if one.shape[2] in (2, 4) and not premultiplied:
+            weights = first[..., -1:], second[..., -1:]
+            colours = (first[..., :-1] * weights[0] / (1 - share), second[..., :-1] * weights[1] / share)
+            np.divide(sum(colours), mix[..., -1:], out=mix[..., :-1], where=mix[..., -1:] > 0)
+        out[top : top + rows] = to_bits(mix, 8 * one.dtype.itemsize, dither=False)
+    return out
+
+
 def over(pixels: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:
     """Pixels (h, w, 2 or 4) uint8 over an opaque 8-bit RGB colour, as programs do it: in the values, not the light."""
     alpha = pixels[..., -1:].astype(np.float32) / 255

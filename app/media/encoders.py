@@ -125,7 +125,7 @@ class Container:
     """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
-    is turned into the first one, by the options `encoder`, in pairs.
+    is turned into the first one, by the options `encoder`, in pairs. `roles` is what sound can be marked as.
     """
 
     name: str
@@ -133,6 +133,7 @@ class Container:
     even: bool = False
     sound: tuple[str, ...] = ()
     encoder: tuple[str, ...] = ()
+    roles: tuple[str, ...] = ()
     passes: int = 1
 
     def encoding(self, codec: str | None) -> Encoding:
@@ -146,6 +147,9 @@ LARGEST = {
     "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (FORMATS[".webp"].longest,) * 2,
 }  # fmt: skip
 
+# What ffmpeg's muxers were seen to write down and its readers to find again.
+ROLES = ("dub", "comment", "forced", "hearing impaired", "visual impaired")
+
 ANIMATIONS = {
     ".mp4": Container(
         "MP4",
@@ -153,6 +157,7 @@ ANIMATIONS = {
         even=True,
         sound=("aac", "mp3", "ac3"),
         encoder=("-c", "aac", "-b", "192k"),
+        roles=(*ROLES, "captions", "descriptions"),
     ),
     ".webm": Container(
         "WebM",
@@ -160,9 +165,14 @@ ANIMATIONS = {
         even=True,
         sound=("opus", "vorbis"),
         encoder=("-c", "libopus", "-b", "128k"),
+        roles=("forced",),
     ),
     ".mkv": Container(
-        "FFV1", {"ffv1": lossless}, sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"), encoder=("-c", "flac")
+        "FFV1",
+        {"ffv1": lossless},
+        sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"),
+        encoder=("-c", "flac"),
+        roles=(*ROLES, "original"),
     ),
     ".mov": Container(
         "ProRes",
@@ -238,6 +248,8 @@ def unheld_of_clip(
     else:
         other = dict.fromkeys(sound for sound in clip.sounds if sound not in (*container.sound, "none"))
         losses = [f"its sound ({' '.join(other)}) becomes {container.sound[0]}"] if other else []
+        if dropped := [role for role in clip.roles if role not in container.roles]:
+            losses.append(f"what its sound is marked as ({', '.join(dropped)}) is not kept")
         if container.even and size is not None and (size[0] % 2 or size[1] % 2):
             losses.append(f"its last pixels are repeated, as {container.name} has no odd sides")
     if container is None or container.passes > 1:

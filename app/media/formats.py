@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 from collections.abc import Callable
@@ -13,7 +14,8 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.codecs import avif, exr, jpeg, other, pillow, png, tiff, webp
-from app.media.losses import REC709, counted
+from app.media.files import is_sequence
+from app.media.losses import REC709, counted, few
 from app.model.picture import Picture
 
 
@@ -133,17 +135,37 @@ def check_picture_output(
         )
 
 
+def profile_name(icc: bytes) -> str:
+    """What an ICC profile calls itself; "" if it is damaged."""
+    from PIL import ImageCms
+
+    try:
+        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc))).strip() or "unnamed"
+    except (ImageCms.PyCMSError, OSError):
+        return ""
+
+
 def unheld(
-    path: str | os.PathLike[str], picture: Picture, *, with_layers: bool = True, with_margins: bool = True
+    path: str | os.PathLike[str],
+    picture: Picture,
+    *,
+    with_layers: bool = True,
+    with_margins: bool = True,
+    animated: bool = False,
 ) -> str:
     """What of a picture the file `path` does not hold, in a sentence; "" if nothing.
 
     with_layers, with_margins: whether these were warped, as they are for a still that shows its own pixels.
+    animated: it holds all frames, unless it is one of a sequence.
     """
     own, kind = picture.chromaticities, FORMATS.get(Path(path).suffix.lower())
+    if animated and not is_sequence(path):
+        kind = None
     keeps, losses = kind.keeps if kind else frozenset[str](), []
     if own is not None and not np.allclose(own, REC709, atol=1e-3) and "chromaticities" not in keeps:
         losses.append("cannot tell the primaries (chromaticities) of the picture, and is read as BT.709")
+    if picture.icc and "icc" not in keeps and (name := profile_name(picture.icc)) and "sRGB" not in name:
+        losses.append(f"cannot hold the picture's colour profile ({few([name])}), and is read as sRGB")
     if picture.layers and not (with_layers and "layers" in keeps):
         losses.append(f"lacks the picture's {counted('channel', [layer.name for layer in picture.layers])}")
     if picture.wide is not None and not (with_margins and "wide" in keeps):

@@ -6,6 +6,7 @@ import hashlib
 import os
 import tempfile
 import zipfile
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -19,6 +20,7 @@ from app.media.recipes import read_recipe
 from app.media.source import Source, open_source
 from app.model.picture import Picture
 from app.model.recipe import Recipe
+from app.model.sampling import SOURCE
 from app.model.schema import plain
 
 SUFFIX = ".fluidwarp"
@@ -240,20 +242,30 @@ def _is_plain(name: str) -> bool:
 
 def picture_names(recipe: Recipe) -> list[str]:
     """The names of all pictures of a recipe, its own first."""
-    found = [recipe.picture] if recipe.picture else []
+    named = (value for key, value in _values(recipe) if isinstance(value, str) and key in PICTURE_KEYS)
+    return list(dict.fromkeys([*filter(None, [recipe.picture]), *(name for name in named if name != SOURCE)]))
 
-    def visit(data: Any, key: str = "") -> None:
+
+def frame_numbers(recipe: Recipe) -> list[int]:
+    """Which frames of a clip a recipe looks at besides the first, counted from that."""
+    return sorted({value for key, value in _values(recipe) if key == "frame"} - {0})
+
+
+def _values(recipe: Recipe) -> Iterator[tuple[str, Any]]:
+    """What a recipe sets, each number and text with its key; but for strokes and the like, which may have many."""
+
+    def visit(data: Any, key: str = "") -> Iterator[tuple[str, Any]]:
         if isinstance(data, dict):
             for name, value in data.items():
-                visit(value, name)
+                yield from visit(value, name)
         elif isinstance(data, (list, tuple)):
             for value in data:
-                visit(value, key)
-        elif isinstance(data, str) and key in PICTURE_KEYS and data not in found and data != "source":
-            found.append(data)
+                yield from visit(value, key)
+        else:
+            yield key, data
 
-    visit(plain(recipe.edited(stroke=(), change=(), handle=(), pin=())))  # which name none, and may have many numbers
-    return found
+    painted = tuple(edit for edit in recipe.mask if edit.kind != "stroke")
+    return visit(plain(recipe.edited(stroke=(), change=(), handle=(), pin=(), mask=painted)))
 
 
 def _renamed(data: Any, names: dict[str, str], key: str = "") -> Any:

@@ -44,7 +44,9 @@ OWN_TRACK_TAGS = {*OWN_TAGS, "handler_name", "vendor_id", "duration", "alpha_mod
 COUNTED = re.compile("bps|number_of_|_statistics_|duration|source_id", re.IGNORECASE)
 # What is applied, is of the encoding, or told by `_mastering`; ffmpegs write the names with and without spaces.
 OWN_SIDE_DATA = {"displaymatrix", "cpb", "cpbproperties", "masteringdisplaymetadata", "contentlightlevelmetadata"}
-TRACK = re.compile(r"^( *)Stream #0:\d+(?:\[\w+\])?(?:\((\w+)\))?: (Video|Data): .*\n((?:\1 +.*\n)*)", re.MULTILINE)
+TRACK = re.compile(
+    r"^( *)Stream #0:\d+(?:\[\w+\])?(?:\(([^)\n]*)\))?: (Video|Audio|Data): (.*)\n((?:\1 +.*\n)*)", re.MULTILINE
+)
 TIMECODE = re.compile(r"^\s+timecode\s*: (\d\d:\d\d:\d\d[:;.]\d\d)\s*$", re.MULTILINE | re.IGNORECASE)
 
 
@@ -174,7 +176,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     if late:  # or the first frame would be shown from the sound's start on
         filters = _delayed(late) + filters
     width, height, fps = _shown(file, filters)
-    colours = _colours(video)
+    colours, sounds = _colours(video), _sounds(told)
     check_size(file, width, height, max_pixels)
     length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
     seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
@@ -184,7 +186,8 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         height=height,
         fps=fps,
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
-        sounds=tuple(_sound_codecs(told)),
+        sounds=tuple(track.codec for track in sounds),
+        roles=tuple(dict.fromkeys(role for track in sounds for role in track.roles)),
         late=late,
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
         pixel_format=pixel_format,
@@ -236,7 +239,9 @@ def _losses_of_tracks(told: str) -> list[str]:
     """What belongs to the tracks of pictures and of time codes, and is not carried over."""
     tags: dict[str, None] = {}
     sides: dict[str, None] = {}
-    for _, language, kind, lines in TRACK.findall(told):
+    for _, language, kind, _, lines in TRACK.findall(told):
+        if kind == "Audio":
+            continue
         if kind == "Video" and language not in ("", "und"):
             tags["language"] = None
         metadata, _, side_data = lines.partition("Side data:")
@@ -285,16 +290,37 @@ def _colours(video: str) -> Colours:
     return Colours(primaries, transfer, "bt2020nc" if primaries == "bt2020" else "bt709")
 
 
-def sound_codecs(path: str | os.PathLike[str]) -> list[str]:
-    """The codecs of a file's sound tracks; raises `UserError` when it has neither picture nor sound."""
+@dataclass(frozen=True)
+class SoundTrack:
+    """A sound track, as ffmpeg tells of it.
+
+    Attributes:
+        codec: "none" where ffmpeg knows none for it.
+        name: what an MP4 or MOV calls it; ffmpeg takes it over as a title from other containers only.
+        roles: what it is for, such as comment or forced, besides default.
+    """
+
+    codec: str
+    name: str
+    roles: tuple[str, ...]
+
+
+def sound_tracks(path: str | os.PathLike[str]) -> list[SoundTrack]:
+    """The sound tracks of a file; raises `UserError` when it has neither picture nor sound."""
     told = _banner(Path(path))
     if "Stream #0" not in told:
         raise UserError(f"Cannot read {path}: there is neither picture nor sound in it; give the name of a clip.")
-    return _sound_codecs(told)
+    return _sounds(told)
 
 
-def _sound_codecs(told: str) -> list[str]:
-    return re.findall(r"Stream #0.*: Audio: (\w+)", told)
+def _sounds(told: str) -> list[SoundTrack]:
+    tracks = []
+    for _, _, kind, words, lines in TRACK.findall(told):
+        if kind == "Audio":
+            codec, name = re.match(r"\w+", words), re.search(r"^ +name +: (.*?) *$", lines, re.MULTILINE)
+            roles = [role for role in re.findall(r" \(([a-z ]+)\)", words) if role != "default"]
+            tracks.append(SoundTrack(codec[0] if codec else "none", name[1] if name else "", tuple(roles)))
+    return tracks
 
 
 def _late(told: str, video: str) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated, Literal
 
 import numpy as np
@@ -28,11 +28,13 @@ class Area(Model):
         window: a rectangle or an ellipse.
         outline: the corners of an area, as fractions of the picture; what it winds around an odd number of times.
         segment: what is chosen by colour or brightness, in the picture as it is seen at this moment.
+        invert: what lies outside of that instead.
     """
 
     window: Window | None = None
     outline: Annotated[Several[Point], Field(min_length=3)] | None = None
     segment: Segment | None = None
+    invert: bool = False
 
     def coverage(self, grid: Grid, pictures: NamedPictures, seen: Seen = as_it_was) -> np.ndarray:
         """How much of each cell lies in the area, (ny, nx) in [0, 1].
@@ -47,7 +49,7 @@ class Area(Model):
             covered *= _inside(places(self.outline, grid), grid)
         if self.segment is not None:
             covered *= seen(self.segment.chosen(SOURCE, grid, pictures), grid)
-        return covered
+        return 1 - covered if self.invert else covered
 
 
 class Part(Area):
@@ -64,6 +66,18 @@ class Part(Area):
         if self.combine == "add":
             return np.maximum(covered, share)
         return np.minimum(covered, 1 - share if self.combine == "subtract" else share)
+
+    def outside(self) -> Part:
+        """What leaves, of all but what is covered before it, all but what is covered with it (De Morgan's laws)."""
+        if self.combine == "intersect":
+            return self.model_copy(update={"combine": "add", "invert": not self.invert})
+        return self.model_copy(update={"combine": "add" if self.combine == "subtract" else "subtract"})
+
+
+def inverted(parts: Sequence[Part]) -> tuple[Part, ...]:
+    """The parts that cover what these leave out; the first begins with nothing."""
+    first = parts[0].model_copy(update={"invert": not parts[0].invert})
+    return first, *(part.outside() for part in parts[1:])
 
 
 def _inside(corners: np.ndarray, grid: Grid) -> np.ndarray:

@@ -19,6 +19,7 @@ from app.model.sampling import (
     FINEST,
     ROWS_AT_ONCE,
     SOURCE,
+    FrameNumber,
     NamedPictures,
     PictureName,
     SmallPictures,
@@ -140,12 +141,14 @@ class PictureMask(_Edit):
 
     Attributes:
         picture: "source", as it is seen at this moment, or a file.
+        frame: of a clip that is "source", the one whose brightness it is; 0 is the first.
         white: decades of thickness that white stands for; black is none.
         invert: white is black and black is white.
     """
 
     kind: Literal["picture"]
     picture: PictureName = SOURCE
+    frame: FrameNumber = 0
     white: Decades = THICKEST
     invert: bool = False
 
@@ -232,7 +235,7 @@ def edited(
         case PictureMask():
             own, made = edit.picture == SOURCE, np.full_like(words, zero)
             on = grid if own else canvas
-            grey = to_grid(intensity((pictures if own else pictures.full).load(edit.picture)), on)
+            grey = to_grid(intensity((pictures if own else pictures.full).load(edit.picture, edit.frame)), on)
             grey = seen(grey, on) if own else grey
             for rows, part in strips(1 - grey if edit.invert else grey, canvas):
                 made[rows] = wanted(edit.white * part if edit.of == "thickness" else part)

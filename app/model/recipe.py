@@ -120,6 +120,8 @@ class Playback(Model):
         speed: simulated seconds per second of animation; 0.5 is slow motion.
         reverse: from the last warp to the first.
         ping_pong: there and back again.
+        dissolve: seconds of the animation in which its end dissolves into its beginning, so that a loop of it has no
+            jump and never turns back. What dissolves is shown at the end only, and the animation shorter by as much.
         hold_first, hold_last: seconds that the first and last frame stand still.
         start, end: the part of the simulation that is shown, in simulated seconds.
     """
@@ -127,6 +129,7 @@ class Playback(Model):
     speed: Annotated[float, Field(gt=0, le=1000)] = 1.0
     reverse: bool = False
     ping_pong: bool = False
+    dissolve: Seconds = 0.0
     hold_first: Seconds = 0.0
     hold_last: Seconds = 0.0
     start: Seconds = 0.0
@@ -136,6 +139,9 @@ class Playback(Model):
     def _forwards(self) -> Self:
         if self.end is not None and self.end < self.start:
             raise ValueError(f"'end' ({self.end:g}) is before 'start' ({self.start:g})")
+        for name in ("ping_pong", "hold_first", "hold_last"):
+            if self.dissolve and getattr(self, name):
+                raise ValueError(f"'dissolve' and {name!r} do not go together; leave one out")
         return self
 
 

@@ -26,6 +26,7 @@ SOURCE = "source"
 PictureName = FileName
 Point = tuple[Place, Place]
 """x and y as fractions of the picture's width and height, from its top left corner."""
+FrameNumber = Annotated[int, Field(ge=0, le=1_000_000)]
 Box = tuple[Place, Place, Place, Place]
 """Left, top, right and bottom, as fractions of the picture's width and height."""
 
@@ -33,8 +34,10 @@ Box = tuple[Place, Place, Place, Place]
 class NamedPictures(Protocol):
     """The picture that is warped and the others that a recipe names; `app.media.auxiliary.Pictures` reads them."""
 
-    def load(self, name: str) -> Picture:
-        """The picture called `name`; the one that is warped is called `SOURCE`. Raises UserError."""
+    def load(self, name: str, frame: int = 0) -> Picture:
+        """The picture called `name`; the one that is warped is called `SOURCE`, and may be a frame of a clip, of which
+        0 is the first. Raises UserError.
+        """
         ...
 
     def notice(self, text: str) -> None:
@@ -48,14 +51,15 @@ class SmallPictures:
     def __init__(self, full: NamedPictures) -> None:
         self.full = full
         self.notice = full.notice
-        self._made: dict[str, tuple[Picture, Picture]] = {}
+        self._made: dict[tuple[str, bool], tuple[Picture, Picture]] = {}
 
-    def load(self, name: str) -> Picture:
+    def load(self, name: str, frame: int = 0) -> Picture:
         """The picture called `name`, in the means of squares of pixels where it is large. Raises UserError."""
-        picture = self.full.load(name)
-        if name not in self._made or self._made[name][0] is not picture:
-            self._made[name] = picture, _shrunk(picture, math.ceil(max(picture.width, picture.height) / FINEST))
-        return self._made[name][1]
+        picture = self.full.load(name, frame)
+        key = name, frame > 0  # of a clip's frames but the first only the last that was asked for is kept
+        if key not in self._made or self._made[key][0] is not picture:
+            self._made[key] = picture, _shrunk(picture, math.ceil(max(picture.width, picture.height) / FINEST))
+        return self._made[key][1]
 
 
 def _shrunk(picture: Picture, side: int) -> Picture:
@@ -270,6 +274,7 @@ class Segment(Model):
         color: "#rrggbb"; pixels within `tolerance` of it, as the distance in RGB, each of 0-1.
         mask: a picture file, chosen where it is brighter than middle grey.
         at: only what is connected with this place, as fractions of the picture.
+        frame: of a clip that is warped, the one it is chosen in; 0 is the first. A picture has no other.
         window: nothing outside it is chosen.
     """
 
@@ -279,6 +284,7 @@ class Segment(Model):
     tolerance: Annotated[float, Field(gt=0, le=2)] = 0.15
     mask: PictureName | None = None
     at: tuple[Fraction01, Fraction01] | None = None
+    frame: FrameNumber = 0
     window: Window | None = None
 
     @model_validator(mode="after")
@@ -335,10 +341,10 @@ class Segment(Model):
         if self.mask is not None:
             return intensity(pictures.load(self.mask)) > 0.5
         if self.color is not None:
-            colours, alpha = channels(pictures.load(picture))
+            colours, alpha = channels(pictures.load(picture, self.frame))
             wanted = np.array([int(self.color[k : k + 2], 16) / 255 for k in (1, 3, 5)], np.float32)
             return (np.linalg.norm(colours - wanted, axis=-1) <= self.tolerance) & (alpha > 0.5)
-        grey = intensity(pictures.load(picture))
+        grey = intensity(pictures.load(picture, self.frame))
         low = -1.0 if self.above is None else self.above
         high = 2.0 if self.below is None else self.below
         return (grey > low) & (grey < high)

@@ -110,7 +110,7 @@ class BrushPath(Model):
         """
         yield dabs, False
         width, height = extent
-        for a, b, c, d in _turns(self.symmetry, self.sectors):
+        for a, b, c, d in turns(self.symmetry, self.sectors):
 
             def place(x: float, y: float) -> tuple[float, float]:
                 x, y = (x - 0.5) * width, (y - 0.5) * height
@@ -287,8 +287,8 @@ class Stroke(BrushPath):
         return agreed
 
 
-def _turns(symmetry: Symmetry, sectors: int) -> list[tuple[float, float, float, float]]:
-    """The matrices of all images but the first."""
+def turns(symmetry: Symmetry, sectors: int) -> list[tuple[float, float, float, float]]:
+    """The matrices, row by row, that take a place from the picture's middle to its images, all but itself."""
     if symmetry == "radial":
         angles = (2 * pi * k / sectors for k in range(1, sectors))
         return [(cos(angle), -sin(angle), sin(angle), cos(angle)) for angle in angles]

@@ -61,8 +61,42 @@ def frame_positions(timeline: Timeline, playback: Playback, fps: float) -> list[
         )
     if end == start:
         return [Fraction(start)]
-    count = max(1, round(wanted))
+    count = steps_of(timeline, playback, fps)
     return [start + Fraction((end - start) * frame, count) for frame in range(count + 1)]
+
+
+def steps_of(timeline: Timeline, playback: Playback, fps: float) -> int:
+    """How many steps there are from frame to frame, from the first to the last."""
+    start, end, wanted = _part(timeline, playback, fps)
+    return max(1, round(wanted)) if end > start else 0
+
+
+@dataclass(frozen=True)
+class Dissolve:
+    """A frame that is dissolved: so much of it, from 0 to 1, is what is seen at another position, in ticks."""
+
+    into: Fraction
+    share: float
+
+
+def dissolved(positions: list[Fraction], frames: int) -> tuple[list[Fraction], dict[int, Dissolve]]:
+    """The positions of a loop, and what its last frames dissolve into, by their places among these.
+
+    Args:
+        positions: of an animation's frames, in the order they are shown.
+        frames: until nothing is left of the end. With as many less than the positions, of which the last
+            one shows what the first one of the loop does, the loop begins after what is dissolved into.
+
+    Raises:
+        UserError: if it is more than half of the animation, or no frame shows it.
+    """
+    if frames < 2:
+        raise UserError("what dissolves ('time.dissolve') takes less than two frames; make it longer")
+    length = len(positions) - 1 - frames
+    if length < frames:
+        raise UserError("what dissolves ('time.dissolve') is more than half of the animation; make it shorter")
+    into = {length - frames + number: Dissolve(positions[number], number / frames) for number in range(1, frames)}
+    return positions[frames:-1], into
 
 
 def moment_at(timeline: Timeline, playback: Playback, fps: float, tick: int) -> int:
@@ -71,8 +105,7 @@ def moment_at(timeline: Timeline, playback: Playback, fps: float, tick: int) -> 
     It is the last one that begins at the tick or before it, by `frame_positions`. Past the end of the timeline, time
     goes on as it does for a clip that is longer: frame after frame, at its rate.
     """
-    start, end, wanted = _part(timeline, playback, fps)
-    count = max(1, round(wanted)) if end > start else 0
+    (start, end, _), count = _part(timeline, playback, fps), steps_of(timeline, playback, fps)
     within = min(max(tick, start), end)
     shown = (within - start) * count // (end - start) if count else 0
     later = max(tick - max(end, timeline.ticks), 0)

@@ -65,6 +65,7 @@ def _table() -> list[Action]:
             keys = f"shift+{tool.key}" + (" d" if tool.name == "freeze" else "")
             add("Tools", f"tool_{tool.name}_back", label, keys, lambda c, n=tool.name: c.state.choose_tool(n, True))
     add("Tools", "select_next", "Select by something else", "shift+m", lambda c: c.state.select_next())
+    add("Masks", "select_invert", "Invert the selection", "i", lambda c: c.selecting.invert())
     add("Masks", "select_fill", "Fill the selection", "enter", lambda c: c.selecting.fill(off=False))
     add("Masks", "select_clear", "Take it off the mask", "shift+enter", lambda c: c.selecting.fill(off=True))
     for kind, label, key in (

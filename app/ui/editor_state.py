@@ -80,6 +80,7 @@ class EditorState:
         connected: only what is connected with the place that was clicked on is.
         selection: what is selected, the first part and what is added to it and taken away.
         selected_area: the same as it is shown, (h, w) uint8, 255 in it; None where there is none.
+        selected_part: how much of the picture that is, 0-1.
         selected: what messages call the handle or pin that the inspector is about; "" where there is none.
         lanes: the bars of the timeline.
         is_scaling: the amount of the warp is being dragged.
@@ -110,6 +111,7 @@ class EditorState:
     connected: bool = True
     selection: tuple[Part, ...] = ()
     selected_area: np.ndarray | None = None
+    selected_part: float = 0.0
     selected: str = ""
     lanes: Lanes = field(default_factory=Lanes)
     is_scaling: bool = False

@@ -24,7 +24,7 @@ from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
 from app.model.handles import in_words
 from app.model.recipe import Recipe
-from app.model.timeline import NEARLY
+from app.model.timeline import NEARLY, Timeline, steps_of
 from app.ui.canvas import shown_pixels
 from app.ui.chooser import FileChooser
 from app.ui.clipboard import Giving, check
@@ -165,6 +165,7 @@ class ExportDialog(Dialog):
         format: which of its kinds of file, for each of these.
         variant: which of the variants, for each kind of file.
         returns: an animation goes there and back again.
+        dissolve: seconds in which its end dissolves into its beginning, if it does not return.
         presets: those that there are for it.
         forward: the map tells where the points of the original go.
         offsets: an EXR or TIFF map holds offsets in pixels.
@@ -187,7 +188,7 @@ class ExportDialog(Dialog):
             self.kind = ANIMATION
         if session.project.picture.linear and not _holds_light(PICTURES[self.format[PICTURE]]):
             self.format[PICTURE] = next(number for number, file in enumerate(PICTURES) if file.name == "EXR")
-        self.returns = session.recipe.time.ping_pong
+        self.returns, self.dissolve = session.recipe.time.ping_pong, session.recipe.time.dissolve
         # No clip is played backwards.
         self.presets = [preset for preset in PRESETS if not (preset.returns and session.project.clip)]
         self.forward = self.offsets = False
@@ -259,6 +260,7 @@ class ExportDialog(Dialog):
         self.format[preset.kind] = preset.format
         self.variant[preset.kind][preset.format] = preset.variant
         self.size, self.quality, self.fps, self.returns = self._of(preset)
+        self.dissolve = 0.0
 
     def _of(self, preset: Preset) -> tuple[int, int, float, bool]:
         own = max(self.picture.width, self.picture.height)
@@ -270,7 +272,8 @@ class ExportDialog(Dialog):
         chosen = self.kind, self.format[self.kind], self.variant[self.kind][self.format[self.kind]]
         now = self.size, self.quality, self.fps, self.returns
         for number, preset in enumerate(self.presets):
-            if chosen == (preset.kind, preset.format, preset.variant) and now == self._of(preset):
+            is_plain = not (self.animation and self.dissolve)
+            if is_plain and chosen == (preset.kind, preset.format, preset.variant) and now == self._of(preset):
                 return number
         return -1
 
@@ -291,7 +294,12 @@ class ExportDialog(Dialog):
             update={"size": None if self.size == own else self.size, "fps": self.fps, "quality": self.quality}
         ).model_copy(update={"filter": FILTERS[self.filter][0]})
         part = recipe.time.model_copy(
-            update={"start": self.start, "end": max(self.end, self.start), "ping_pong": self.returns}
+            update={
+                "start": self.start,
+                "end": max(self.end, self.start),
+                "ping_pong": self.returns,
+                "dissolve": 0.0 if self.returns else self._dissolves,
+            }
         )
         recipe = recipe.edited(
             output=output,
@@ -300,7 +308,7 @@ class ExportDialog(Dialog):
         )
         if self.kind == MAP:
             maps = MapOutput(self.output, "offsets" if self.offsets else "st", self.forward)
-            return Job(recipe, self.picture, session.project.folder, Outputs(None, maps=maps))
+            return Job(recipe, self.picture, session.project.folder, Outputs(None, maps=maps), self.clip)
         how = self.how
         outputs = Outputs(self.output, animated=how.animated, bits=how.bits, codec=how.codec, recorded=False)
         if self.animation:
@@ -321,6 +329,22 @@ class ExportDialog(Dialog):
             return WHOLE
         first, last = (floor(at * float(self._rate) + NEARLY) for at in (self.start, max(self.end, self.start)))
         return self.clip.number_at(first), self.clip.number_at(last)
+
+    @property
+    def _longest_dissolve(self) -> float:
+        """Seconds: half of the animation, in whole frames; 0 if these are less than two."""
+        recipe = self.session.document.recipe
+        if recipe.time.hold_first or recipe.time.hold_last:
+            return 0.0
+        shown = recipe.time.model_copy(update={"start": self.start, "end": max(self.end, self.start)})
+        frames = steps_of(Timeline.of(recipe), shown, self.fps) // 2
+        return frames / self.fps if frames > 1 else 0.0
+
+    @property
+    def _dissolves(self) -> float:
+        """Seconds: as asked for, but no less than two frames, and no more than there is."""
+        asked = 0.0 if self.dissolve < 1 / self.fps else max(self.dissolve, 2 / self.fps)
+        return min(asked, self._longest_dissolve)
 
     @property
     def _seconds(self) -> float:
@@ -374,6 +398,13 @@ class ExportDialog(Dialog):
             if clip is None:
                 self.returns = ui.check("Ping-pong", self.returns)
                 ui.tooltip("Ping-pong", more="There and back again: a loop without a jump.")
+                if not self.returns and (most := self._longest_dissolve):
+                    more = "So long its end dissolves into its beginning: a loop without a jump that never turns back."
+                    slid = ui.slider(
+                        "dissolve", "Dissolve the end into the beginning", self._dissolves, 0, most, SECONDS,
+                        0.0, title="Dissolve", more=more,
+                    )  # fmt: skip
+                    self.dissolve = slid.value if slid.changed else self.dissolve
             else:
                 kept = [word for word, has in (("sound", clip.sound), ("time code", clip.timecode)) if has]
                 pace = f"{float(self._rate):.5g} frames a second" if clip.durations is None else "own pace"

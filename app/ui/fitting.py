@@ -72,7 +72,9 @@ class Fits:
         session.seek(session.end)
         self._session, self._of, self._stopping = session, session.recipe, False
         project = session.project
-        self.process = FitProcess(Fit(recipe, project.picture, project.folder, pairs, self.evaluations))
+        self.process = FitProcess(
+            Fit(recipe, project.picture, project.folder, pairs, self.evaluations, clip=project.clip)
+        )
 
     def finish(self) -> None:
         """Let it end with the best so far."""

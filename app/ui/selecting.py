@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.model.areas import Area, Part
+from app.model.areas import Area, Part, inverted
 from app.model.mask_edits import FillMask
 from app.model.sampling import SOURCE, Point, Segment, Window, channels, intensity, pixel_at, to_grid
 from app.ui.editor_state import SELECT_BY, EditorState
@@ -40,7 +40,9 @@ class Selecting:
     path: list[Point] = field(default_factory=list)
     _combine: str = field(default="replace", init=False)
     _before: tuple[Part, ...] = field(default=(), init=False)  # what the last part was added to or taken from
-    _picked: Point | None = field(default=None, init=False)  # the place in the original that was clicked on last
+    _is_inverted: bool = field(default=False, init=False)  # since the last part was
+    # The place in the original that was clicked on last, and the clip's frame.
+    _picked: tuple[Point, int] | None = field(default=None, init=False)
     _search: _Search | None = field(default=None, init=False)
     _shown: tuple[Session | None, int] = field(default=(None, 0), init=False)  # what it was worked out for
 
@@ -70,10 +72,12 @@ class Selecting:
             return
         state, by = self.state, self.state.select_by
         self._before, self._picked = (() if self._combine == "replace" else state.selection), None
+        self._is_inverted = False
         if by in ("colour", "brightness"):
             replay = self.workspace.session.replay
             moved = replay.warp.at(np.multiply([path[0]], replay.grid.extent))[0] / replay.grid.extent
-            self._picked = _within(path[0][0] + float(moved[0]), path[0][1] + float(moved[1]))
+            place = _within(path[0][0] + float(moved[0]), path[0][1] + float(moved[1]))
+            self._picked = place, self.workspace.frames_after_first
             self._pick()
         elif by == "lasso":
             self._add(Area(outline=tuple(path)) if len(path) > 2 else None)
@@ -95,9 +99,9 @@ class Selecting:
     def _pick(self) -> None:
         if self._picked is None or self.state.select_by not in ("colour", "brightness"):
             return
-        state, place, pictures = self.state, self._picked, self.workspace.session.replay.small_pictures
-        like: dict[str, Any] = {"at": place if state.connected else None}
-        picture = pictures.load(SOURCE)
+        state, (place, frame) = self.state, self._picked
+        like: dict[str, Any] = {"at": place if state.connected else None, "frame": frame}
+        picture = self.workspace.session.replay.small_pictures.load(SOURCE, frame)
         row, column = pixel_at(place, picture.pixels)
         here = picture.with_pixels(picture.pixels[row : row + 1, column : column + 1])
         if state.select_by == "colour":
@@ -116,7 +120,7 @@ class Selecting:
         if area is not None:
             combine = self._combine if parts and self._combine != "replace" else "add"
             parts = *parts, Part.model_validate({"combine": combine, **dict(area)})
-        self._show(parts)
+        self._show(inverted(parts) if parts and self._is_inverted else parts)
 
     def _show(self, parts: tuple[Part, ...]) -> None:
         session, area = self.workspace.session, None
@@ -129,6 +133,7 @@ class Selecting:
                 raise UserError(f"Nothing can be selected so: {error}.") from None
             area = np.rint(255 * share).astype(np.uint8)
         self.state.selection, self.state.selected_area = parts, area
+        self.state.selected_part = 0.0 if area is None else float(area.mean()) / 255
         self._shown = self._now()
 
     def _colours(self) -> np.ndarray:
@@ -138,6 +143,21 @@ class Selecting:
         grid = Grid.for_picture(picture.width, picture.height, min(SHOWN, max(picture.width, picture.height)))
         colours = np.stack([to_grid(channel, grid) for channel in np.moveaxis(channels(picture)[0], 2, 0)], axis=-1)
         return np.rint(255 * replay.as_seen(colours, grid)).astype(np.uint8)
+
+    def invert(self) -> None:
+        """Select what is not selected, and nothing else.
+
+        Raises:
+            UserError: if nothing is selected.
+        """
+        if self.state.tool_name == "select":
+            self._need_some()
+            self._is_inverted = not self._is_inverted
+            self._show(inverted(self.state.selection))
+
+    def _need_some(self) -> None:
+        if not self.state.selection:
+            raise UserError("Nothing is selected yet.")
 
     # -- what becomes of it -----------------------------------------------------------------------------------------
 
@@ -150,8 +170,7 @@ class Selecting:
         state = self.state
         if state.tool_name != "select":
             return
-        if not state.selection:
-            raise UserError("Nothing is selected yet.")
+        self._need_some()
         words = {"frozen": ("Freeze", "Thaw"), "thickness": ("Thicken", "Clear")}[state.mask]
         amount = 0.0 if off else 1.0 if state.mask == "frozen" else state.mask_decades
         self.workspace.session.edit_masks(f"{words[off]} the selection", self._fill(state.selection, amount))
@@ -188,10 +207,7 @@ class Selecting:
             return ""
         if self.is_busy:
             return "Looking for the subject ..."
-        by = self.state.select_by
-        of_clip = self.workspace.session.project.clip is not None and by in ("colour", "brightness")
-        first = " Of a clip, that is looked for in its first frame." if of_clip else ""
-        return "" if self.state.selection else SELECT_BY[by] + first
+        return "" if self.state.selection else SELECT_BY[self.state.select_by]
 
     def look(self) -> None:
         """See whether a subject has been found, and whether what is selected is still where it was."""

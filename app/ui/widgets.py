@@ -376,6 +376,8 @@ class Ui:
             # The number that was offered, as after Escape, is the value from before, with all its digits.
             before = self._untyped.get(name, value)
             new = before if unit.value(number) == unit.value(unit.number(before)) else unit.value(number)
+        if changed:  # a number of few digits may be less than the least, and no value at all: 0 of .2 pixels
+            new = min(max(new, low), high)
         done = imgui.is_item_deactivated_after_edit()
         hovered, held, again = imgui.is_item_hovered(), imgui.is_item_active(), False
         if hovered and default is not None and imgui.is_mouse_double_clicked(0) and not typing:

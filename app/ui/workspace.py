@@ -192,6 +192,12 @@ class Workspace:
         return self._works[self._index].frame
 
     @property
+    def frames_after_first(self) -> int:
+        """How many frames after its first one of the clip the canvas shows; 0 of a picture."""
+        clip = self.session.project.clip
+        return self.shown_frame - clip.start if clip else 0
+
+    @property
     def shown_picture(self) -> Picture | None:
         """That frame, as the canvas shows it, if it is not the first."""
         pixels = self._works[self._index].pixels

@@ -207,6 +207,7 @@ class _Applying:
             unheld(
                 self.output,
                 self.source.picture,
+                animated=True,
                 with_layers=is_own,
                 with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
             )

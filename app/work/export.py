@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -21,7 +21,8 @@ import numpy as np
 from app.errors import UserError
 from app.media.animation import Frame, FrameWriter, NumberedWriter, animation_writer, frame_order, reordered
 from app.media.auxiliary import Pictures
-from app.media.clip import Clip, coded
+from app.media.clip import frame_of
+from app.media.depth import mixed
 from app.media.displacement import Displacement
 from app.media.encoders import passes, unheld_of_clip
 from app.media.files import is_sequence, replacing
@@ -32,7 +33,7 @@ from app.media.record import Record, digest_of
 from app.model.handles import ARRIVED
 from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.model.timeline import Sentinel, Timeline, frame_positions
+from app.model.timeline import Dissolve, Sentinel, Timeline, dissolved, frame_positions
 from app.progress import Progress
 from app.work.along import along, widened
 from app.work.checkpoints import DEFAULT_BUDGET
@@ -93,7 +94,7 @@ class _Export:
         self.recipe = job.recipe
         self.progress = progress
         self.device = device
-        self.pictures = Pictures(job.picture, job.folder)
+        self.pictures = Pictures(job.picture, job.folder, job.frame[0] if job.frame else job.clip)
         job.picture.pixels.flags.writeable = False  # so that it stays on the GPU from frame to frame
         playback = job.recipe.time
         # A moving source has no frame that is shown twice: what goes back does so in the simulation.
@@ -109,6 +110,7 @@ class _Export:
         self.like = replace(like, premultiplied=False) if job.recipe.mode == "density" else like
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.numbers: list[dict[str, Any]] = []
+        self.dissolves: dict[int, Dissolve] = {}
         self._position: Fraction | None = None
         device.timings.enabled = self.replay.fluid.measuring = self.outputs.stats is not None
 
@@ -126,7 +128,8 @@ class _Export:
         end = self.replay.tick if watched else recipe.ticks
         self.progress.total = runs * end + stills
         if job.has_frames:
-            count = self._write_frames(shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate)), end)
+            shown, self.dissolves = shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate))
+            count = self._write_frames(shown, end)
         else:
             self._go_to(Fraction(end))
             if outputs.file is not None:
@@ -245,7 +248,7 @@ class _Export:
         if not written or not outputs.recorded:
             return {}
         clip, recipe = self.job.clip, self.recipe.model_dump_json(exclude={"name", "picture"})
-        common = digest_of(code(), recipe, self.job.picture, *self.pictures.values())
+        common = digest_of(code(), recipe, self.job.picture, *self.pictures.values(self.recipe))
 
         def made_of(how: tuple[Any, ...], number: int) -> str:
             return digest_of(common, how, number, clip.digest(number) if clip else "")
@@ -257,17 +260,29 @@ class _Export:
         picture = self.job.picture
         if not self.is_spooled or self.outputs.file is None:
             return self._frames(((number, position, picture) for number, position in wanted), take_map)
-        numbers: dict[Fraction, int] = {}
+        # What is dissolved is looked up at two positions, the one after the other.
+        looked: list[tuple[int, Fraction]] = []
         for number, position in wanted:
+            into = self.dissolves.get(number)
+            looked += [(number, position), *([(number, into.into)] if into else [])]
+        numbers: dict[Fraction, int] = {}
+        for number, position in looked:
             numbers.setdefault(position, number)
         distinct = sorted(numbers)
         places = {position: place for place, position in enumerate(distinct)}
-        order = [places[position] for _, position in wanted]
+        order = [places[position] for _, position in looked]
         numbered = self._frames(((numbers[at], at, picture) for at in distinct), take_map)
         made = (frame for _, frame in numbered if isinstance(frame, np.ndarray))
         goes_back = any(later < earlier for earlier, later in pairwise(order))
         frames = reordered(made, order, self.outputs.file.parent) if goes_back else repeated(made, order)
-        return zip((number for number, _ in wanted), frames, strict=True)
+        return ((number, self._dissolved(number, frames)) for number, _ in wanted)
+
+    def _dissolved(self, number: int, frames: Iterator[np.ndarray]) -> np.ndarray:
+        """The next of the frames, dissolved into the one after it if this number is to be."""
+        frame, into = next(frames), self.dissolves.get(number)
+        if into is None:
+            return frame
+        return mixed(frame, next(frames), into.share, premultiplied=self.like.premultiplied)
 
     def _writer(self, first: int, records: dict[Path, Record]) -> AbstractContextManager[FrameWriter]:
         job, file = self.job, self.outputs.file
@@ -357,7 +372,8 @@ class _Export:
 
     @property
     def _along(self) -> dict[str, bool]:
-        return {"with_layers": self._has_layers, "with_margins": self._has_margins}
+        told = {"with_layers": self._has_layers, "with_margins": self._has_margins}
+        return told | {"animated": self.job.has_frames}
 
     def _still(self, picture: Picture, parts: Callable[[int], Callable[[int], None]]) -> Picture:
         """A picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""
@@ -449,15 +465,6 @@ class _Export:
         }
 
 
-def frame_of(clip: Clip, number: int) -> Picture:
-    """One frame of a clip. Raises `UserError`."""
-    with closing(clip.pictures_from(number)) as pictures:
-        found = next(pictures, None)
-    if found is None:
-        raise UserError(f"Cannot read {clip.path}: it has no frame {number}; choose an earlier moment.")
-    return replace(found[1], chunks={**found[1].chunks, **coded(clip.colours)})
-
-
 def noting(records: dict[Path, Record], path: Path) -> Callable[[int], None]:
     """What hears of each frame that is written of a sequence: its record, if it has one."""
     return records[path].add if path in records else lambda number: None
@@ -511,19 +518,21 @@ def repeated(frames: Iterator[np.ndarray], order: list[int]) -> Iterator[np.ndar
             yield frame
 
 
-def shown_positions(timeline: Timeline, recipe: Recipe, fps: float) -> list[Fraction]:
-    """The position in ticks of every frame of an animation in the order they are shown."""
+def shown_positions(timeline: Timeline, recipe: Recipe, fps: float) -> tuple[list[Fraction], dict[int, Dissolve]]:
+    """The position in ticks of every frame of an animation in the order they are shown, and which are dissolved."""
     playback = recipe.time
     positions = frame_positions(timeline, playback, fps)
     if playback.reverse:
         positions.reverse()
+    if playback.dissolve:
+        return dissolved(positions, round(playback.dissolve * fps))
     order = frame_order(
         len(positions),
         ping_pong=playback.ping_pong,
         hold_first=round(playback.hold_first * fps),
         hold_last=round(playback.hold_last * fps),
     )
-    return [positions[index] for index in order]
+    return [positions[index] for index in order], {}
 
 
 def displacement(

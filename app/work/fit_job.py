@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import UserError
+from app.media.clip import Clip
 from app.media.files import check_kept, name_from, replacing, writable
 from app.media.landmarks import Pairs, check_ending, read_pairs, write_pairs
 from app.media.opening import Opened, check_picture
@@ -32,6 +33,7 @@ class Fit:
     pairs: Pairs | None = None
     evaluations: int = EVALUATIONS
     local: float | None = None
+    clip: Clip | None = None
 
     @property
     def label(self) -> str:
@@ -41,7 +43,7 @@ class Fit:
     def perform(self, device: Device, progress: Progress) -> Fitted:
         """Do it. Raises `UserError`, and `Cancelled` if nothing has been found yet."""
         check_picture(self.picture)
-        how = self.evaluations, self.local
+        how = self.evaluations, self.local, self.clip
         return fitted(device, self.recipe, self.picture, self.folder, self.pairs, progress, *how)
 
 
@@ -85,10 +87,11 @@ class FitJob:
         """Do it. Raises `UserError`, and `Cancelled` if there is nothing to write yet."""
         progress.enter("reading")
         found = opened(self.recipe, self.max_pixels)
-        picture = found.source(self.image, self.max_pixels).picture
+        source = found.source(self.image, self.max_pixels)
+        picture = source.picture
         size = picture.width, picture.height
         pairs, notices = self._pairs(size)
-        fit = Fit(self._placed(found), picture, found.folder, pairs, self.evaluations, self.local)
+        fit = Fit(self._placed(found), picture, found.folder, pairs, self.evaluations, self.local, source.clip)
         done = fit.perform(device, progress)
         with replacing(self.output) as temporary:
             temporary.write_text(done.trial.recipe.text(), encoding="utf-8")

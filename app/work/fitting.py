@@ -16,6 +16,7 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media.auxiliary import Pictures
+from app.media.clip import Clip
 from app.media.landmarks import Pairs
 from app.model.handles import (
     ARRIVED,
@@ -136,6 +137,7 @@ def fitted(
     progress: Progress,
     evaluations: int = EVALUATIONS,
     local: float | None = None,
+    clip: Clip | None = None,
 ) -> Fitted:
     """The recipe with a handle for each pair, its values searched for the least work that reaches them without a fold.
 
@@ -152,16 +154,18 @@ def fitted(
         pairs: None are those of the recipe's own handles, which are replaced, and keep their numbers.
         evaluations: replays on the coarse grid.
         local: of all handles; None is 1 where there are curves, 0 of points, and the recipe's own keep theirs.
+        clip: the one that the picture is the first frame of.
 
     Raises:
         UserError: if no pair lies in the picture, or there are too many.
         Cancelled: if it is stopped before anything has been found.
     """
-    aim = _aimed(device, recipe, picture, folder, pairs, progress)
+    pictures = Pictures(picture, folder, clip)
+    aim = _aimed(device, recipe, pictures, pairs, progress)
     if local is not None:
         leads = (replace(lead, handle=lead.handle.model_copy(update={"local": local})) for lead in aim.leads)
         aim = replace(aim, leads=tuple(leads))
-    search = _Search(device, aim, picture, folder, progress)
+    search = _Search(device, aim, pictures, progress)
     fine, count = max(evaluations // A_FINE_ONE, 1), len(search.numbers)
     alike, each = _directions(count), np.eye(3 * count + 1)
     parts = [(alike, 0.25), (each[:, :count], 0.15), (each[:, 2 * count : -1], 0.15)][: 3 if count <= ALONE else 1]
@@ -317,10 +321,9 @@ class _Aim:
     own: tuple[int, ...] = ()
 
 
-def _aimed(
-    device: Device, recipe: Recipe, picture: Picture, folder: Path, pairs: Pairs | None, progress: Progress
-) -> _Aim:
+def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | None, progress: Progress) -> _Aim:
     """What is fitted to given pairs, or, None, to those of the recipe's own handles."""
+    picture = pictures.source
     extent = picture.width / max(picture.width, picture.height), picture.height / max(picture.width, picture.height)
     if pairs is not None:
         base = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each)))
@@ -341,7 +344,7 @@ def _aimed(
         recipe = recipe.edited(handle=(*recipe.handle, *late), pin=pins)
     leads, names, places, begins, own, kept = [], [], [], [], [], list(recipe.handle)
     shapes = _shapes(recipe.handle, extent)
-    at_once, starts = _starts(device, recipe, picture, folder, shapes, progress)
+    at_once, starts = _starts(device, recipe, pictures, shapes, progress)
     for number, (handle, shape) in enumerate(zip(recipe.handle, shapes, strict=True)):
         if handle.muted or _lets_go(handle, recipe):
             continue
@@ -400,7 +403,7 @@ def _until(handle: RecipeHandle, recipe: Recipe) -> float:
 
 
 def _starts(
-    device: Device, recipe: Recipe, picture: Picture, folder: Path, shapes: list[Shape], progress: Progress
+    device: Device, recipe: Recipe, pictures: Pictures, shapes: list[Shape], progress: Progress
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Where the points of a recipe's handles are at first, and when they begin: (k, 2) each, in longer sides."""
     places = [shape.led for shape in shapes]
@@ -408,7 +411,7 @@ def _starts(
     ticks = [handle.first_tick(recipe.fluid.dt) for handle in recipe.handle if handle.takes_hold]
     if not ticks or (max(ticks) <= recipe.begins and recipe.map is None):
         return first, starts
-    replay = Replay(device, recipe, Pictures(picture, folder), budget=0)
+    replay = Replay(device, recipe, pictures, budget=0)
     progress.enter("looking where the handles were set")
     try:
         now = replay.handles.shapes
@@ -457,19 +460,20 @@ class _Stage:
 class _Search:
     """Points of the unit cube made into recipes, played and ranked."""
 
-    def __init__(self, device: Device, aim: _Aim, picture: Picture, folder: Path, progress: Progress) -> None:
+    def __init__(self, device: Device, aim: _Aim, pictures: Pictures, progress: Progress) -> None:
         self.device, self.aim, self.progress = device, aim, progress
         pairs, base = aim.pairs.places, aim.recipe
         self.pairs, self.noun = pairs, RecipeHandle.kind if aim.own else NAME
+        picture = pictures.source
         self.longer = max(picture.width, picture.height)
         self.extent = np.array([picture.width, picture.height]) / self.longer
         self.notices: list[str] = []
         self.numbers = self._usable(base)
-        self.fine = _Stage(base, Pictures(picture, folder), A_FINE_ONE)
+        self.fine = _Stage(base, pictures, A_FINE_ONE)
         self.hopeful = self._reachable()
         apart = -(-self.longer // COARSE_PICTURE)
         small = replace(picture, pixels=np.ascontiguousarray(picture.pixels[::apart, ::apart]))
-        coarse = _Stage(_coarse(base), Pictures(small, folder))
+        coarse = _Stage(_coarse(base), Pictures(small, pictures.folder, pictures.clip))
         if apart == 1 and coarse.recipe == base:
             self.fine = coarse
         self.coarse = coarse

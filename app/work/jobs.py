@@ -211,6 +211,11 @@ class Job:
             raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
         if self.clip is not None and self.has_frames:
             self.clip.check(outputs.part)
+        if self.has_frames and self.recipe.time.dissolve:
+            if self.clip is not None:
+                raise UserError(f"'time.dissolve' is for a picture, and {self.clip.path} is a clip; leave it out")
+            if maps is not None and maps.is_sequence:
+                raise UserError(f"no map shows what dissolves; leave out {maps.path}, or 'time.dissolve'")
         outputs.check()
         if outputs.file is not None:
             check_result(result_size(self.recipe, self.picture), self.picture, "--size, or 'output.size',")

@@ -83,7 +83,7 @@ class Session:
         self.device = device
         self.project = project
         self.document = Document(project.picture, project.recipe, project.path)
-        self.pictures = Pictures(project.picture, project.folder)
+        self.pictures = Pictures(project.picture, project.folder, project.clip)
         self.replay = Replay(device, project.recipe, self.pictures, BUDGET)
         self.playing = False
         self.loops = False

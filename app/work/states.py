@@ -134,7 +134,7 @@ def _digest(replay: Replay) -> str:
     told = hashlib.sha256(code().encode())
     told.update(replay.device.limits.renderer.encode() + replay.device.limits.version.encode())
     told.update(_simulated(replay.recipe).encode())
-    for part in replay.pictures.values():
+    for part in replay.pictures.values(replay.recipe):
         told.update(f"{part.shape} {part.dtype}".encode())
         told.update(np.ascontiguousarray(part).data.cast("B"))
     return told.hexdigest()[:32]

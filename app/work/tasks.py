@@ -16,7 +16,7 @@ from app.media.files import check_kept, is_sequence, make_folder, takes_place, u
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
 from app.media.opening import Opened, open_recipe
-from app.media.project import picture_names
+from app.media.project import frame_numbers, picture_names
 from app.media.source import CLIP_ENDINGS
 from app.model.recipe import Recipe
 from app.progress import Progress
@@ -154,7 +154,8 @@ class Task(Piece):
         own = found.recipe if self.picture is None else found.recipe.edited(picture=None)
         read = [Path(found.label), *(found.folder / name for name in picture_names(own))]
         self.check_names(read if file is None else [*read, file])
-        source = found.source(self.picture, self.max_pixels, self.outputs.has_frames)
+        animated = self.outputs.has_frames or bool(frame_numbers(own))
+        source = found.source(self.picture, self.max_pixels, animated)
         return Job(self.edits.applied(found.recipe), source.picture, found.folder, self.outputs, source.clip)
 
 

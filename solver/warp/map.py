@@ -19,7 +19,7 @@ from solver.gl.images import for_images
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.grid import Grid
-from solver.limits import check_size, check_step, check_type, numbers, places, real_array
+from solver.limits import check_finite, check_size, check_step, check_type, numbers, places, real_array
 from solver.state import State
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
@@ -151,9 +151,10 @@ class WarpMap:
             time: where it begins, for the function.
 
         Raises:
-            ValueError: on an array of another shape, a value that is not finite, or a step that is none.
+            ValueError: on an array of another shape, a value that is not finite, or a step or a time that is none.
         """
         dt = check_step(dt)
+        check_finite("a time", time)
         if callable(velocity):
             self._accumulated.is_walled = False  # it may cross the edges
             self._submap.trace.set(traced(velocity, self.grid, dt, time))

@@ -27,7 +27,7 @@ from app.media.depth import to_bits
 from app.media.encoders import check_animation, crf_of, is_animation, unheld_of_clip
 from app.media.pictures import read_picture
 from app.media.sequence import PictureSequence
-from app.media.video import read_clip
+from app.media.video import read_clip, sound_tracks
 from app.model.picture import Picture
 
 # What is left open is told when it is collected, where nothing can be raised any more.
@@ -706,6 +706,19 @@ def test_every_sound_track_is_carried_over(tmp_path: Path, ending: str, codecs: 
         assert np.argmax(np.abs(np.fft.rfft(heard))) * 8000 / len(heard) == pytest.approx(tone, abs=4)
 
 
+def test_a_sound_track_keeps_its_name_and_role(tmp_path: Path):
+    named = ["-metadata:s:a:0", "title=The mix", "-disposition:a:0", "comment"]
+    clip = generate(tmp_path / "in.mp4", "testsrc=s=64x48:r=10:d=0.3", "-f", "lavfi", "-i", "sine=d=0.3", *named)
+    assert read_clip(clip).roles == ("comment",)
+    for again in ("a.mkv", "a.mp4"):  # of a Matroska's title ffmpeg makes the name by itself
+        save(tmp_path / again, 3, 10, sound=clip, frames=3)
+        clip = tmp_path / again
+        (track,) = sound_tracks(clip)
+        assert track.roles == ("comment",)
+    assert track.name == "The mix"
+    assert probe(tmp_path / "a.mkv")[1]["tags"]["title"] == "The mix"
+
+
 def test_what_else_a_clip_holds_is_told(tmp_path: Path):
     told = tmp_path / "told.txt"
     told.write_text(";FFMETADATA1\ntitle=A day\nartist=Me\n[CHAPTER]\nTIMEBASE=1/1\nSTART=0\nEND=1\ntitle=Morning\n")
@@ -745,6 +758,10 @@ def test_sound_and_times_that_a_format_has_no_room_for_are_told(tmp_path: Path):
     assert unheld_of_clip("a.mov", None, clip) == ""
     assert unheld_of_clip("a.mkv", None, replace(clip, sounds=()), (63, 48)) == ""
     assert unheld_of_clip("a.mov", None, clip, (64, 48)) == ""
+    marked = replace(clip, sounds=("aac",), roles=("dub", "forced"))
+    assert unheld_of_clip("a.mp4", None, marked) == unheld_of_clip("a.mkv", None, marked) == ""
+    assert unheld_of_clip("a.mov", None, marked) == "a.mov: what its sound is marked as (dub, forced) is not kept"
+    assert "becomes opus; what its sound is marked as (dub) is not kept" in unheld_of_clip("a.webm", None, marked)
     assert unheld_of_clip("a.mov", None, clip, (63, 48)) == (
         "a.mov: its last pixels are repeated, as ProRes has no odd sides"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.media.depth import as_half, over, to_bits
+from app.media.depth import as_half, mixed, over, to_bits
 
 
 def test_of_floats_each_depth_is_the_nearest_and_alpha_is_not_curved() -> None:
@@ -38,3 +38,15 @@ def test_laid_over_a_colour_alpha_mixes_the_values() -> None:
 def test_half_floats_stay_finite_where_they_were() -> None:
     found = as_half(np.array([1e9, -1e9, 0.1, np.inf, -np.inf, np.nan], np.float32))
     np.testing.assert_array_equal(found, np.array([65504, -65504, 0.1, np.inf, -np.inf, np.nan], np.float16))
+
+
+def test_a_picture_dissolves_in_light_and_by_its_alpha() -> None:
+    dark, bright = (np.full((3, 2, 3), value, np.uint16) for value in (0, 65535))
+    assert (mixed(dark, bright, 0.25) == 35199).all()  # the code of a quarter of the light
+    assert (mixed(bright, dark, 0.75) == 35199).all()
+    clear, red = np.array([[[0.0, 9.0, 0.0, 0.0]]], np.float32), np.array([[[1.0, 0.0, 0.0, 0.5]]], np.float32)
+    np.testing.assert_allclose(mixed(clear, red, 0.2), [[[1.0, 0.0, 0.0, 0.1]]], atol=1e-6)
+    np.testing.assert_allclose(mixed(red, clear, 0.2), [[[1.0, 0.0, 0.0, 0.4]]], atol=1e-6)
+    np.testing.assert_allclose(mixed(red, red[:, ::-1], 0.7), red, atol=1e-6)
+    np.testing.assert_allclose(mixed(red, clear, 0.5, premultiplied=True), [[[0.5, 4.5, 0.0, 0.25]]], atol=1e-6)
+    assert not mixed(clear, clear, 0.5)[..., 3].any()

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image, ImageCms
 
 from app.media.encoders import ANIMATIONS
-from app.media.formats import FORMATS, TABLE, Format
+from app.media.formats import FORMATS, TABLE, Format, unheld
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Layer, Picture
 
@@ -126,3 +126,19 @@ def test_readme_tells_what_the_table_does():
 def test_readme_names_every_kind_of_animation():
     told = ", ".join(rows("other")).upper()
     assert all(ending.removeprefix(".").upper() in told for ending in ANIMATIONS)
+
+
+def test_a_colour_profile_that_a_file_cannot_hold_is_told() -> None:
+    """But for sRGB's, as which what has none is read."""
+    usual = full(8).icc
+    assert usual is not None
+    wide = Picture(
+        np.zeros((4, 4, 3), np.uint8), icc=usual.replace("sRGB".encode("utf-16-be"), "Wide".encode("utf-16-be"))
+    )
+    said = "cannot hold the picture's colour profile (Wide built-in), and is read as sRGB"
+    for name, animated in (("a.exr", False), ("a.mp4", True), ("a.webp", True), ("a.gif", True)):
+        assert unheld(name, wide, animated=animated) == f"{name} {said}"
+        assert unheld(name, replace(wide, icc=usual), animated=animated) == ""
+        assert unheld(name, replace(wide, icc=b"damaged"), animated=animated) == ""
+    for name, animated in (("a.png", False), ("a.webp", False), ("a.%04d.png", True)):
+        assert unheld(name, wide, animated=animated) == ""

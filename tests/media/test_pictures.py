@@ -871,3 +871,16 @@ def test_a_tiff_that_lacks_strips_is_told_and_not_filled(tmp_path: Path):
     path.write_bytes(data)
     with pytest.raises(UserError, match=r"a\.tif: the TIFF file is truncated .*it has 2 of its 1000 strips or tiles"):
         read_picture(path)
+
+
+@pytest.mark.parametrize("ending", [".jpg", ".png", ".webp"])
+def test_damaged_exif_costs_no_picture_and_is_told(tmp_path: Path, ending: str) -> None:
+    exif = Image.Exif()
+    exif[0x010F], exif[0x0110] = "A camera", "Of the first kind"
+    whole = exif.tobytes()
+    for damaged in (whole[:-9], whole.replace(b"\0\x08\0\x02", b"\0\x08\0\x09")):  # cut off; of nine tags and not two
+        path = tmp_path / f"a{ending}"
+        Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(path, exif=damaged)
+        assert read_picture(path).note == f"a{ending}: its EXIF is damaged and not kept whole"
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(path, exif=whole)
+    assert not read_picture(path).note

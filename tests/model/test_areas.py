@@ -10,7 +10,7 @@ import pytest
 from scipy import ndimage
 
 from app.errors import UserError
-from app.model.areas import Area, Part
+from app.model.areas import Area, Part, inverted
 from app.model.mask_edits import FillMask, PictureMask, edited, with_edit
 from app.model.recipe import Recipe
 from app.model.sampling import FINEST, Segment, SmallPictures, Window, connected, strips
@@ -78,7 +78,7 @@ def test_by_colour_everywhere_or_only_where_it_is_connected() -> None:
 
 
 def reference(part: Area, x: np.ndarray, y: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """The pixels (bool) whose middles lie in an area, by OpenCV, and the equations of shapes."""
+    """The pixels (bool) whose middles lie in an area that is not inverted, by OpenCV, and the equations of shapes."""
     if part.window is not None:
         left, top, right, bottom = part.window.box
         if part.window.shape == "rectangle":
@@ -95,6 +95,10 @@ def reference(part: Area, x: np.ndarray, y: np.ndarray, pixels: np.ndarray) -> n
 
 
 def anything(dice: random.Random) -> Area:
+    return _anything(dice).model_copy(update={"invert": dice.random() < 0.3})
+
+
+def _anything(dice: random.Random) -> Area:
     match dice.randrange(4):
         case 0 | 1 as kind:
             left, top = dice.uniform(0, 0.7), dice.uniform(0, 0.7)
@@ -120,7 +124,8 @@ def test_random_parts_added_and_taken_away_are_sets(seed: int) -> None:
     edit = FillMask(kind="fill", tick=0, of="frozen", amount=1.0, then=tuple(parts[1:]), **first)
     before = np.zeros((SIZE[1], SIZE[0]), np.uint8)
     grid = GRID
-    after = edited(before, edit, grid, SmallPictures(OnePicture(pixels)))
+    pictures = SmallPictures(OnePicture(pixels))
+    after = edited(before, edit, grid, pictures)
     x, y = grid.centres()
     x, y = x / grid.extent[0], y / grid.extent[1]
     wanted, edges = np.zeros(x.shape, bool), np.zeros(x.shape, bool)
@@ -131,11 +136,15 @@ def test_random_parts_added_and_taken_away_are_sets(seed: int) -> None:
         if part.outline is not None:
             line = np.rint(np.array(part.outline) * SIZE - 0.5).astype(np.int32)
             edges |= cv2.polylines(np.zeros(x.shape, np.uint8), [line], True, 1, 3) > 0
+        here = here != part.invert
         if number and part.combine != "add":
             wanted = wanted & (~here if part.combine == "subtract" else here)
         else:
             wanted = wanted | here
     assert np.array_equal((after > 127)[~edges], wanted[~edges])
+    first, *then = inverted(parts)
+    outside = edit.model_copy(update={"invert": first.invert, "then": tuple(then)})
+    assert np.allclose(outside.coverage(grid, pictures), 1 - edit.coverage(grid, pictures), rtol=0, atol=1e-15)
     assert edges.mean() < 0.5
     assert not before.any()
 

@@ -40,7 +40,7 @@ class Pictures:
     def __init__(self) -> None:
         self.remarks: list[str] = []
 
-    def load(self, name: str) -> Picture:
+    def load(self, name: str, frame: int = 0) -> Picture:
         dice = np.random.default_rng(sum(name.encode()))
         y, x = np.mgrid[0:36, 0:48] / 48
         waves = [np.sin((9 + 3 * k) * x + k) * np.cos((7 + 2 * k) * y - k) for k in range(dice.integers(1, 5))]

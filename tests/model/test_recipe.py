@@ -150,6 +150,8 @@ def test_save_and_load(tmp_path: Path):
         ("duration = ", "not valid TOML"),
         ("duration = 1e6", "make dt larger"),
         ("[time]\nstart = 2\nend = 1", "'end' (1) is before 'start' (2)"),
+        ("[time]\ndissolve = 1\nping_pong = true", "'dissolve' and 'ping_pong' do not go together; leave one out"),
+        ("[time]\ndissolve = 1\nhold_last = 0.5", "'dissolve' and 'hold_last' do not go together; leave one out"),
         ("[[stop.watch]]\npoint = [0.1, 0.1]", "stop.watch[1]: give either 'distance' or 'place'"),
         ("[[stroke]]\ntool = 'push'\nsamples = []", "line 3: stroke[1]: 'samples' must be a list of at least 1"),
         ("[[stroke]]\ntool = 'pish'\nsamples = [[0, 0, 0, 1]]", "'tool' must be one of 'push'"),

@@ -12,7 +12,16 @@ import pytest
 
 from app.errors import UserError
 from app.model.recipe import Playback, Recipe, Stop, Watch
-from app.model.timeline import Observation, Sentinel, Timeline, frame_positions, frame_rate, moment_at
+from app.model.timeline import (
+    Dissolve,
+    Observation,
+    Sentinel,
+    Timeline,
+    dissolved,
+    frame_positions,
+    frame_rate,
+    moment_at,
+)
 
 TEN = Timeline(10, 0.1)
 
@@ -202,3 +211,27 @@ def test_the_frame_at_a_tick_is_the_last_that_has_begun(playback: dict[str, floa
         assert moment_at(timeline, how, fps, timeline.ticks + later) == last
     backwards = how.model_copy(update={"reverse": True})
     assert moment_at(timeline, backwards, fps, first) == len(positions) - 1
+
+
+@pytest.mark.parametrize(("count", "frames"), [(11, 2), (11, 3), (11, 5), (21, 10), (300, 77)])
+def test_a_loop_goes_on_from_its_last_frame_to_its_first(count: int, frames: int):
+    """The end falls and the beginning rises by one step a frame, also around the seam."""
+    positions = [Fraction(step) for step in range(count)]
+    shown, into = dissolved(positions, frames)
+    assert len(shown) == count - 1 - frames
+    end = {number: 1 - into[number].share if number in into else 1 for number in range(len(shown))}
+    assert [end[number] for number in sorted(into)] == pytest.approx([1 - n / frames for n in range(1, frames)])
+    assert shown == positions[frames:-1]
+    for number, fade in into.items():  # one more step and it is the loop's first frame, and nothing but that
+        assert fade.into == pytest.approx(fade.share * frames)
+        assert len(shown) - number == frames - fade.into
+    assert into.get(len(shown) - 1, Dissolve(positions[0], 0)).into + 1 == shown[0]
+
+
+def test_a_loop_dissolves_half_of_itself_at_most():
+    positions = [Fraction(step) for step in range(11)]
+    assert len(dissolved(positions, 5)[0]) == 5
+    with pytest.raises(UserError, match=r"'time.dissolve'\) takes less than two frames; make it longer"):
+        dissolved(positions, 1)
+    with pytest.raises(UserError, match=r"'time.dissolve'\) is more than half of the animation"):
+        dissolved(positions, 6)

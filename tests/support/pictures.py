@@ -13,7 +13,7 @@ class OnePicture:
     def __init__(self, pixels: np.ndarray) -> None:
         self.picture = Picture(pixels)
 
-    def load(self, name: str) -> Picture:
+    def load(self, name: str, frame: int = 0) -> Picture:
         return self.picture
 
     def notice(self, text: str) -> None:

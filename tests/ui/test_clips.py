@@ -31,6 +31,7 @@ from app.work.journal import Origin, project_of
 from app.work.tasks import Edits, Task
 from solver.gl.device import Device
 from support.editing import Robot, export_dialog, pattern
+from support.widgets import Widgets
 
 FRAMES, RATE = 20, Fraction(25)
 
@@ -116,6 +117,8 @@ def test_what_is_exported_is_what_the_command_line_makes(viewer: Robot, device: 
     """Of the project and of the saved recipe: the clip in its rate; a still is the moment's frame with its warp."""
     editor, session = viewer.editor, viewer.editor.session
     go_to(viewer, 4)
+    frozen = freeze_colour(viewer, frame(4), 40, 31)
+    viewer.key("p")
     viewer.drag((0.3, 0.5), (0.6, 0.5), steps=3)
     viewer.rest()
     go_to(viewer, 6)
@@ -145,6 +148,34 @@ def test_what_is_exported_is_what_the_command_line_makes(viewer: Robot, device: 
     one, other = (read_picture(tmp_path / name).pixels for name in ("f.06.png", "still.png"))
     np.testing.assert_array_equal(one, other[..., :3])
     assert (one != frame(6)).any()
+    rendered("work.fluidwarp", "first.png")
+    np.testing.assert_array_equal(read_picture(tmp_path / "first.png").pixels[frozen][:, :3], frame(0)[frozen])
+
+
+def freeze_colour(viewer: Robot, pixels: np.ndarray, x: int, y: int) -> np.ndarray:
+    """Freeze what is all over the canvas of the colour of a pixel of what it shows; where that is, (h, w) bool."""
+    state, session = viewer.editor.state, viewer.editor.session
+    viewer.key("m")
+    state.select_by, state.connected, state.tolerance = "colour", False, 0.05
+    viewer.click(*viewer.at((x + 0.5) / 96, (y + 0.5) / 64))
+    viewer.key("enter")
+    near = np.linalg.norm((pixels.astype(float) - pixels[y, x]) / 255, axis=2) <= 0.05
+    texels = session.replay.masks.frozen.get()
+    found = texels[
+        texels.shape[0] // 64 // 2 :: texels.shape[0] // 64, texels.shape[1] // 96 // 2 :: texels.shape[1] // 96
+    ]
+    np.testing.assert_array_equal(found > 127, near)
+    return near
+
+
+def test_thickness_by_brightness_is_that_of_the_frame_that_is_seen(viewer: Robot, widgets: Widgets):
+    go_to(viewer, 12)
+    viewer.key("m")
+    widgets.click("Thickness")
+    widgets.type("By brightness", "100")
+    texels = viewer.editor.session.replay.masks.thickness.get().reshape(64, 2, 96, 2).mean(axis=(1, 3))
+    grey = frame(12) @ [0.2126, 0.7152, 0.0722]
+    assert np.corrcoef(texels.ravel(), grey.ravel())[0, 1] > 0.97
 
 
 def test_it_comes_back_with_its_project_and_is_missed_with_a_sentence(viewer: Robot, clip: Path, tmp_path: Path):

@@ -254,6 +254,13 @@ def test_a_stroke_is_painted_with_symmetry_and_undone_as_one(
         widgets.type("Sectors", "5")
     before = session.recipe
     robot.key(tool)
+    seen = []
+    for place in ((5, 5), robot.at(0.2, 0.3)):
+        robot.move(*place)
+        robot.frame(count=2)
+        seen.append(robot.canvas())
+    across = 6 * seen[0].shape[1] // 10
+    assert not np.array_equal(seen[0][:, across:], seen[1][:, across:])  # a ring there too
     robot.drag((0.2, 0.3), (0.28, 0.36), steps=6)
     robot.rest()
     stroke = (*session.recipe.stroke, *session.recipe.mask)[-1]
@@ -401,8 +408,12 @@ def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: Export
         assert dialog.job().target.name.endswith(ending)
     widgets.click("H.265")
     assert dialog.job().outputs.codec == "h265"
+    for text, seconds in (("0.01", 0.0), ("0.05", 2 / 30), ("0.1", 0.1)):  # two frames at least
+        widgets.type("Dissolve the end into the beginning", text)
+        assert dialog.job().recipe.time.dissolve == pytest.approx(seconds)
+    assert dialog.preset == -1
     widgets.click("Ping-pong")
-    assert dialog.job().recipe.time.ping_pong
+    assert (dialog.job().recipe.time.ping_pong, dialog.job().recipe.time.dissolve) == (True, 0.0)
     widgets.type("Frames a second", "24")
     widgets.type("From", "0.1")
     widgets.type("To", "0.2")
@@ -517,7 +528,7 @@ def test_every_slider_goes_as_far_as_it_did_and_back_to_its_default(
         _, name, label, _, low, high, unit, default, _, logarithmic, *_ = bound.arguments.values()
         ends = f"{unit.text(low)} to {unit.text(high)}{' by ratios' if logarithmic else ''}"
         line = f"{name}, {label}: {ends}{'' if default is None else f', {unit.text(default)}'}"
-        if line not in found and name not in ("from", "to"):  # they go as far as the recording
+        if line not in found and name not in ("from", "to", "dissolve"):  # they go as far as the recording
             found.append(line)
         return slider(*given, **named)
 

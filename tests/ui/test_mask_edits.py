@@ -111,6 +111,25 @@ def test_a_button_edits_the_mask_of_the_tool(robot: Robot, widgets: Widgets, kin
     assert robot.editor.session.document.history.entries[-1].name == f"{kind.capitalize()} the thickness"
 
 
+def test_what_a_slider_writes_as_no_pixel_still_moves_an_edge(robot: Robot, widgets: Widgets) -> None:
+    """On a small picture its least is less than half a pixel."""
+    robot.key("f")
+    robot.drag((0.5, 0.5), (0.55, 0.5), steps=3)
+    state = robot.editor.state
+    state.sections = {name: name == "masks" for name in state.sections}
+    widgets.look()
+    slider = widgets.at["By"]
+    x, y = slider.middle
+    robot.move(x, y)
+    robot.press()
+    robot.move(slider.x - 40, y)
+    robot.release()
+    robot.rest()
+    assert state.mask_reach == 0.001
+    widgets.click("Grow")
+    assert robot.editor.session.recipe.mask[-1] == SpreadMask(kind="grow", tick=0, of="frozen", radius=0.001)
+
+
 def test_keys_edit_masks_too_and_clear_both(robot: Robot) -> None:
     robot.key("f")
     robot.drag((0.5, 0.5), (0.55, 0.5), steps=3)

@@ -111,12 +111,65 @@ def test_shift_adds_alt_takes_away_both_intersect_and_neither_begins_anew(robot:
     assert edit.amount == 0
 
 
+def test_an_inverted_selection_is_the_rest_and_can_be_added_to(robot: Robot, widgets: Widgets) -> None:
+    """By its button and its key, with parts of all kinds, in the window and in the recipe that it writes."""
+    session = robot.editor.session
+    select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
+    select(robot, "rectangle", (0.4, 0.4), (0.8, 0.8), mods=Mods(shift=True))
+    select(robot, "rectangle", (0.2, 0.2), (0.3, 0.3), mods=Mods(alt=True))
+    select(robot, "rectangle", (0.0, 0.0), (0.7, 0.6), mods=Mods(shift=True, alt=True))
+    widgets.click("Invert the selection")
+    robot.key("enter")
+    both = (box(0.1, 0.1, 0.5, 0.5) | box(0.4, 0.4, 0.8, 0.8)) & ~box(0.2, 0.2, 0.3, 0.3) & box(0.0, 0.0, 0.7, 0.6)
+    assert is_like(frozen(robot), ~both, 0.99)
+    select(robot, "rectangle", (0.2, 0.4), (0.6, 0.6), mods=Mods(shift=True))
+    robot.key("enter")
+    assert is_like(frozen(robot), ~both | box(0.2, 0.4, 0.6, 0.6), 0.99)
+    again = Replay(session.device, Recipe.parse(session.recipe.text()), session.pictures)
+    assert np.array_equal(again.masks.frozen.get(), session.replay.masks.frozen.get())
+    again.release()
+    select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
+    robot.key("i")
+    assert robot.editor.state.selected_part == pytest.approx(0.84, abs=0.001)  # is told: the edge may be out of sight
+    robot.key("i")
+    assert not any(part.invert for part in robot.editor.state.selection)
+    robot.key("escape")
+    robot.key("i")
+    assert robot.editor.messages.shown[-1].text == "Nothing is selected yet."
+
+
+def test_what_is_picked_stays_inverted_while_its_tolerance_is_set(robot: Robot, widgets: Widgets) -> None:
+    state = robot.editor.state
+    select(robot, "colour", (0.33, 0.5))
+    robot.key("i")
+    assert state.selected_area is not None
+    before = int((state.selected_area > 127).sum())
+    widgets.type("Tolerance", "2")
+    (part,) = state.selection
+    assert part.invert
+    assert int((state.selected_area > 127).sum()) > before
+    select(robot, "colour", (0.33, 0.5))
+    assert not state.selection[0].invert
+
+
 def test_a_lasso_is_what_was_drawn_around(robot: Robot) -> None:
     turns = np.linspace(0, 2 * np.pi, 40)[:-1]
     select(robot, "lasso", *((0.5 + 0.2 * np.cos(turn), 0.5 + 0.3 * np.sin(turn)) for turn in turns))
     robot.key("enter")
     x, y = (X + 0.5) / WIDTH, (Y + 0.5) / HEIGHT
     assert is_like(frozen(robot), ((x - 0.5) / 0.2) ** 2 + ((y - 0.5) / 0.3) ** 2 < 1)
+
+
+def test_a_lasso_may_end_where_it_began(robot: Robot) -> None:
+    robot.editor.state.select_by = "lasso"
+    robot.move(*robot.at(0.2, 0.2))
+    robot.press()
+    for place in ((0.6, 0.2), (0.6, 0.63), (0.2, 0.2)):
+        robot.move(*robot.at(*place))
+        robot.frame()
+    robot.release()
+    assert robot.editor.state.selected_area is not None
+    assert 0.05 < (robot.editor.state.selected_area > 127).mean() < 0.12
 
 
 @pytest.mark.parametrize("by", ["colour", "brightness"])
@@ -223,16 +276,17 @@ def test_a_click_drops_it_and_so_does_another_picture(robot: Robot, tmp_path: Pa
         assert state.selected_area is None
 
 
-def test_with_another_tool_in_hand_nothing_is_filled(robot: Robot) -> None:
+def test_with_another_tool_in_hand_nothing_is_filled_or_inverted(robot: Robot) -> None:
     select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
     robot.key("p")
+    robot.key("i")
     robot.key("enter")
     robot.key("shift+enter")
     robot.key("delete")
     assert robot.editor.session.recipe.mask == ()
     robot.key("m")
     robot.key("enter")
-    assert frozen(robot).any()
+    assert is_like(frozen(robot), box(0.1, 0.1, 0.5, 0.5))
 
 
 def test_its_key_goes_through_what_can_be_selected_by(robot: Robot) -> None:

@@ -20,6 +20,7 @@ from app.errors import Cancelled, UserError
 from app.gallery.measures import sharpness, spline_warp
 from app.media import ffmpeg
 from app.media.auxiliary import Pictures
+from app.media.depth import to_bits
 from app.media.displacement import Displacement, cropped, to_st
 from app.media.files import takes_place
 from app.media.maps import read_map, write_map
@@ -254,7 +255,24 @@ def test_the_rates_of_ntsc_are_exact(device: Device, picture: Path, tmp_path: Pa
 def test_the_order_in_which_warps_are_shown(time: str, order: list[float]):
     """Ten frames a second, a tick each."""
     recipe = Recipe.parse(f"duration = 0.4\n[fluid]\ndt = 0.1\n[time]\n{time}\n")
-    assert shown_positions(Timeline.of(recipe), recipe, 10) == order
+    assert shown_positions(Timeline.of(recipe), recipe, 10) == (order, {})
+
+
+def test_a_loop_is_dissolved_of_the_frames_that_there_are(device: Device, picture: Path, tmp_path: Path):
+    """Also where a part of it is made alone."""
+    head = "duration = 0.8\n[fluid]\ngrid = 16\ndt = 0.1\n[[force]]\nkind = 'point'\npoint = [0.5, 0.5]\n"
+    head += "direction = [3, 1]\n[output]\nfps = 10\nsize = 24\n[time]\n"
+    render(device, head, picture, tmp_path / "plain.%d.png")
+    render(device, head + "dissolve = 0.3", picture, tmp_path / "loop.%d.png")
+    render(device, head + "dissolve = 0.3", picture, tmp_path / "part.%d.png", part=(3, 4))
+    plain = [read_picture(tmp_path / f"plain.{number}.png").pixels for number in range(9)]
+    loop = [read_picture(tmp_path / f"loop.{number}.png").pixels for number in range(5)]
+    assert not (tmp_path / "loop.5.png").exists()
+    assert all(map(np.array_equal, loop[:3], plain[3:6]))
+    for number, (end, beginning, share) in {3: (6, 1, 1 / 3), 4: (7, 2, 2 / 3)}.items():
+        light = (1 - share) * to_bits(plain[end], 32) + share * to_bits(plain[beginning], 32)
+        assert np.abs(to_bits(light, 8, dither=False).astype(int) - loop[number]).max() <= 1
+        assert np.array_equal(read_picture(tmp_path / f"part.{number}.png").pixels, loop[number])
 
 
 def test_a_video_has_the_quality_of_its_recipe(device: Device, picture: Path, tmp_path: Path):
@@ -442,6 +460,11 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
         render(device, WHIRL, picture, tmp_path / "out.png", part=(1, 2))
     with pytest.raises(UserError, match=r"clip\.mkv is a clip"):
         render(device, 'mode = "density"\n' + WHIRL, clip, tmp_path / "out.mp4")
+    loop = WHIRL + "[time]\ndissolve = 0.1\n"
+    with pytest.raises(UserError, match=r"'time.dissolve' is for a picture, and .*clip\.mkv is a clip"):
+        render(device, loop, clip, tmp_path / "out.mp4")
+    with pytest.raises(UserError, match=r"no map shows what dissolves; leave out .*m\.%02d\.exr, or 'time.dissolve'"):
+        render(device, loop, picture, tmp_path / "out.mp4", maps=sequence)
     write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
     with pytest.raises(UserError, match="do not make a still"):
         apply(device, tmp_path / "m.npy", clip, tmp_path / "out.png")

@@ -170,6 +170,29 @@ def test_what_is_whole_is_not_made_again(folder: Path, fluidwarp: Run):
     assert part.stderr == "fluidwarp: 2 of 2 frames were whole and are kept\n"
 
 
+def test_a_mask_of_the_colours_of_a_frame_is_that_frame_s(folder: Path, fluidwarp: Run):
+    """Of a still too, and of what was made before that frame was another; one that there is not is told."""
+    mask = '[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1\nsegment = {color = "#ffffff", frame = 2}\n'
+    (folder / "a.toml").write_text(RECIPE.replace("duration = 0.3", "duration = 0.1") + mask)
+    first = ["render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr", "--frames", "1002-1002", "--resume"]
+    still = ["render", "a.toml", "plate.%04d.exr", "-o", "still.exr"]
+    said = "mask[1]: the segmentation is empty; nothing in the picture is chosen by it"
+    assert said in fluidwarp(folder, *first).stderr
+    for white, words in ((slice(0, 24), first), (slice(24, 48), first), (slice(24, 48), still)):
+        values = plate(3)
+        values[:, white] = 1
+        OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": values}).write(str(folder / "plate.1003.exr"))
+        ran = fluidwarp(folder, *words)
+        assert (ran.returncode, "kept" in ran.stderr) == (0, False)
+        name, number = ("still.exr", 1) if words is still else ("w.1002.exr", 2)
+        is_kept = channels(folder / name)["R"] == plate(number)[..., 0]
+        assert is_kept[:, white].all()
+        assert not is_kept.all()
+    (folder / "plate.1003.exr").unlink()
+    (folder / "plate.1004.exr").unlink()
+    assert "has no frame 1003" in fluidwarp(folder, *still).stderr
+
+
 def test_a_damaged_record_costs_no_more_than_the_work(folder: Path, fluidwarp: Run):
     words = ["render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr"]
     assert fluidwarp(folder, *words).returncode == 0

@@ -15,7 +15,7 @@ from solver.grid import Grid
 
 
 class NoPictures:
-    def load(self, name: str) -> Picture:
+    def load(self, name: str, frame: int = 0) -> Picture:
         raise AssertionError(name)
 
     def notice(self, text: str) -> None:

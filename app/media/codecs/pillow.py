@@ -51,14 +51,21 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
 
     losses: what is known to be lost of the file; what else is goes to their end.
     """
+    from PIL import Image
+
     icc = image.info.get("icc_profile")
     if pixels is None and image.mode == "CMYK":
         losses.append(INK)
         pixels, icc = cmyk_to_rgb(np.asarray(image), icc)
     elif pixels is None:
         pixels = np.asarray(image if image.mode == (mode := _plain_mode(image)) else image.convert(mode))
-    exif = image.getexif()
-    orientation = exif.get(ORIENTATION, 1)
+    with warnings.catch_warnings(record=True) as complaints:
+        warnings.simplefilter("always")
+        Image.Exif().load(image.info.get("exif", b""))  # read once more: of a JPEG that is done when it is opened
+        exif = image.getexif()
+        orientation, encoded = exif.get(ORIENTATION, 1), upright_exif(exif)
+    if complaints or (exif and encoded is None):
+        losses.append("its EXIF is damaged and not kept whole")
     texts = {key: str(text) for key, text in getattr(image, "text", {}).items() if key != "XML:com.adobe.xmp"}
     if isinstance(comment := image.info.get("comment"), bytes):
         texts["Comment"] = comment.decode("utf-8", "replace")
@@ -70,7 +77,7 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
     return Picture(
         upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
         icc=icc,
-        exif=upright_exif(exif),
+        exif=encoded,
         xmp=upright_xmp(xmp.encode() if isinstance(xmp, str) else xmp),
         dpi=upright_dpi(image.info.get("dpi"), orientation),
         texts={key: text.replace("\0", "") for key, text in texts.items() if key},

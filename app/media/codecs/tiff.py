@@ -106,6 +106,7 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
             encoded = upright_exif(exif)
         except Exception:  # damaged metadata must not cost the picture
             encoded = None
+            losses.append("its EXIF is damaged and not kept whole")
     orientation = int(tags.get(ORIENTATION, 1))
     unit = {2: 1.0, 3: 2.54}.get(int(tags.get(296, 2)))
     resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]

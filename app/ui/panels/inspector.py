@@ -66,7 +66,7 @@ def draw(
         imgui.begin_child("sections")
         for name, label, section, opened in (
             *_about_handles(ui, workspace, state, do),
-            *_about_selection(ui, session, state, selecting, do),
+            *_about_selection(ui, workspace, state, selecting, do),
             *_about_bars(ui, session, state),
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("symmetry", "Symmetry", lambda: _symmetry(ui, state), False),
@@ -95,12 +95,12 @@ def _about_handles(
 
 
 def _about_selection(
-    ui: Ui, session: Session, state: EditorState, selecting: Selecting, do: Do
+    ui: Ui, workspace: Workspace, state: EditorState, selecting: Selecting, do: Do
 ) -> list[tuple[str, str, Callable[[], None], bool]]:
     """The section about what is selected, with its tool in hand."""
     if state.tool_name != "select":
         return []
-    return [("selection", "Selection", lambda: _selection(ui, session, state, selecting, do), True)]
+    return [("selection", "Selection", lambda: _selection(ui, workspace, state, selecting, do), True)]
 
 
 def _about_bars(ui: Ui, session: Session, state: EditorState) -> list[tuple[str, str, Callable[[], None], bool]]:
@@ -110,7 +110,7 @@ def _about_bars(ui: Ui, session: Session, state: EditorState) -> list[tuple[str,
     return [("bar", "Selected in the timeline", lambda: selected_bar.draw(ui, session, state), True)]
 
 
-def _selection(ui: Ui, session: Session, state: EditorState, selecting: Selecting, do: Do) -> None:
+def _selection(ui: Ui, workspace: Workspace, state: EditorState, selecting: Selecting, do: Do) -> None:
     ways = list(SELECT_BY)
     for first in (0, 3):
         row, now = ways[first : first + 3], ways.index(state.select_by)
@@ -128,6 +128,14 @@ def _selection(ui: Ui, session: Session, state: EditorState, selecting: Selectin
     ui.wrapped(
         f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, both intersect, Esc gives up.", ui.palette.dim, 13
     )
+    part = (
+        f"{100 * state.selected_part:.1f}% of the picture is selected." if state.selection else "Nothing is selected."
+    )
+    ui.dim(part)
+    with ui.enabled(bool(state.selection)):
+        if ui.button("Invert the selection", width=-1, height=30):
+            do("select_invert")
+        ui.tooltip("Select the rest instead", ACTIONS["select_invert"].key)
     _which_mask(ui, state)
     words = ("Freeze", "Thaw") if state.mask == "frozen" else ("Fill", "Clear")
     width = (imgui.get_content_region_avail().x / ui.scale - 8) / 2
@@ -139,7 +147,7 @@ def _selection(ui: Ui, session: Session, state: EditorState, selecting: Selectin
                 do(name)
             ui.tooltip(f"{label} what is selected", ACTIONS[name].key)
     if state.mask == "thickness":
-        _brightness(ui, session, state)
+        _brightness(ui, workspace, state)
 
 
 def _which_mask(ui: Ui, state: EditorState) -> None:
@@ -338,7 +346,7 @@ def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     if state.tool_name != "select":
         _which_mask(ui, state)
         if state.mask == "thickness":
-            _brightness(ui, workspace.session, state)
+            _brightness(ui, workspace, state)
     for row in (("invert", "fill", "clear"), ("feather", "grow", "shrink"), ("load", "save")):
         if "grow" in row:
             slid = ui.slider(
@@ -367,8 +375,9 @@ def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         do("copy_recipe")
 
 
-def _brightness(ui: Ui, session: Session, state: EditorState) -> None:
+def _brightness(ui: Ui, workspace: Workspace, state: EditorState) -> None:
     """Thickness from the picture's own brightness, as long as nothing but strokes has come over it."""
+    session = workspace.session
     last = next((edit for edit in reversed(session.recipe.mask) if not isinstance(edit, MaskStroke)), None)
     own = last if last is not None and last.of == "thickness" and is_brightness(last) else None
     contrast, dark_is_thick = (own.white, own.invert) if own else (0.0, state.dark_is_thick)
@@ -382,7 +391,8 @@ def _brightness(ui: Ui, session: Session, state: EditorState) -> None:
     if slid.again:
         session.retract()
     if slid.changed or turned:
-        edit = PictureMask(kind="picture", tick=0, of="thickness", white=round(log10(slid.value), 3), invert=way)
+        white, frame = round(log10(slid.value), 3), workspace.frames_after_first
+        edit = PictureMask(kind="picture", tick=0, of="thickness", white=white, frame=frame, invert=way)
         session.edit_masks("Thickness by brightness", edit, commit=turned)
         state.show_mask()
     if slid.done:

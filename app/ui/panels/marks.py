@@ -12,6 +12,7 @@ from imgui_bundle.imgui import ImVec2
 
 from app.model.handles import in_words
 from app.model.sampling import Point
+from app.model.strokes import turns
 from app.ui.editor_state import EditorState, Overlay
 from app.ui.pointer import PointerController
 from app.ui.theme import Colour, packed, rgb
@@ -63,9 +64,10 @@ def _dashes(ui: Ui, corners: list[Point], lines: imgui.ImDrawList) -> None:
         length = hypot(x1 - x0, y1 - y0)
         at = -gone
         while at < length:
-            start, end = max(at, 0.0) / length, min(at + dash, length) / length
-            if end > start:
-                first, last = (ImVec2(x0 + (x1 - x0) * part, y0 + (y1 - y0) * part) for part in (start, end))
+            start, end = max(at, 0.0), min(at + dash, length)
+            if end > start:  # so that a side of no length, as of a lasso that ends where it began, has none
+                parts = start / length, end / length
+                first, last = (ImVec2(x0 + (x1 - x0) * part, y0 + (y1 - y0) * part) for part in parts)
                 lines.add_line(first, last, packed(WHITE), ui.px(1.6))
             at += 2 * dash
         gone = (gone + length) % (2 * dash)
@@ -89,7 +91,8 @@ def _axes(ui: Ui, view: Viewport, state: EditorState, lines: imgui.ImDrawList) -
 def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList) -> None:
     """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard.
 
-    What is frozen is so as far as the brush reaches, however hard it is.
+    What is frozen is so as far as the brush reaches, however hard it is. Where the symmetry lets it act too, the second
+    is faint.
     """
     brush, (x, y) = state.brush, pointer.ring_at
     reach = brush.radius * view.longer
@@ -103,6 +106,14 @@ def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController
         lines.add_line(middle, pen, packed(soft), ui.px(2.6))
         lines.add_line(middle, pen, packed(WHITE, 0.95), ui.px(1.0))
         lines.add_circle_filled(pen, ui.px(2.6), packed(WHITE), 12)
+    if state.tool_name != "handle":  # which has none
+        rect = view.rect
+        centre = rect.x + rect.width / 2, rect.y + rect.height / 2
+        dx, dy = x - centre[0], y - centre[1]
+        for a, b, c, d in turns(state.symmetry, state.sectors):
+            image = ImVec2(centre[0] + a * dx + b * dy, centre[1] + c * dx + d * dy)
+            lines.add_circle(image, half, packed(soft, 0.5), count, ui.px(2.0))
+            lines.add_circle(image, half, packed(WHITE, 0.55), count, ui.px(1.0))
     lines.add_circle(middle, reach, packed(soft, 0.5), count, ui.px(2.0))
     lines.add_circle(middle, reach, packed(WHITE, 0.55), count, ui.px(1.0))
     lines.add_circle(middle, half, packed(soft), count, ui.px(2.6))
