@@ -47,7 +47,9 @@ cli = typer.Typer(
     name="fluidwarp",
     cls=CommandOrFile,
     subcommand_metavar="[FILE | COMMAND [ARGS]...]",
-    help="Warp pictures by pushing them about as a fluid of varying viscosity.",
+    help="Warp pictures by simulating a fluid.\n\n"
+    "`fluidwarp` alone opens the editor; `fluidwarp FILE` opens a picture, clip, recipe or project in it. "
+    "`fluidwarp COMMAND --help` explains a command.",
     no_args_is_help=False,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -93,7 +95,7 @@ def _tell(*lines: str) -> None:
 
 
 Output = Annotated[
-    Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; its ending chooses the format.")
+    Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; its extension sets the format.")
 ]
 
 
@@ -116,10 +118,10 @@ def start(
 def edit(
     file: Annotated[
         Path | None,
-        typer.Argument(help="A picture, a clip (f.%04d.png: numbered files), a recipe or a project.", readable=False),
+        typer.Argument(help="Picture, clip, numbered files (f.%04d.png), recipe or project to open.", readable=False),
     ] = None,
 ) -> None:
-    """Open the editor and push the picture about with the mouse."""
+    """Open the editor."""
     try:
         from app.ui.window import run
     except ImportError as error:
@@ -129,42 +131,43 @@ def edit(
 
 # Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
 
-MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse larger pictures, clips and maps.")]
-Bits = Annotated[int | None, typer.Option(help="Bits a channel: 8, 16 (half in EXR) or 32; else the picture's own.")]
+MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse pictures, clips and maps of more pixels.")]
+Bits = Annotated[int | None, typer.Option(help="Bits per channel: 8, 16 (half in EXR) or 32. Default: the picture's.")]
 Size = Annotated[int | None, typer.Option(help="Longer side of the result, in pixels.")]
-Quality = Annotated[int | None, typer.Option(help="1-100, of JPEG, WebP, AVIF and video.")]
+Quality = Annotated[int | None, typer.Option(help="Quality of JPEG, WebP, AVIF and video, 1 to 100.")]
 Filter = Annotated[
     str | None,
     typer.Option(
-        "--filter", help="Between pixels: catmull-rom (sharp), limited (the same, never rings), bilinear or nearest."
+        "--filter", help="Interpolation: catmull-rom (sharp), limited (sharp without ringing), bilinear or nearest."
     ),
 ]
 Frames = Annotated[
     str | None,
-    typer.Option(metavar="A-B", help="Only these frames of an animation, from 0 or by the numbers of its files."),
+    typer.Option(metavar="A-B", help="Only these frames of an animation, from 0; of numbered files, by their numbers."),
 ]
-Resume = Annotated[bool, typer.Option("--resume", help="Keep the files of a sequence that would come out the same.")]
-Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes to share several pictures.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Skip files of a sequence that are already up to date.")]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of processes, for several pictures.")]
 Cluster = Annotated[
     str | None,
-    typer.Option(metavar="ADDRESS", help="Send several pictures to a Dask scheduler, such as tcp://host:8786."),
+    typer.Option(metavar="ADDRESS", help="Dask scheduler to hand several pictures to, such as tcp://host:8786."),
 ]
-Strip = Annotated[bool, typer.Option("--strip", help="Leave out the picture's metadata; its colour profile stays.")]
+Strip = Annotated[bool, typer.Option("--strip", help="Leave out metadata, but not the colour profile.")]
 Codec = Annotated[
     str | None,
     typer.Option(help="Another codec: h265 in .mp4, av1 in .webm, prores-422-hq in .mov; piz, dwaa ... in .exr."),
 ]
 Gpu = Annotated[
     int | None,
-    typer.Option("--gpu", min=0, help="The graphics device to work on, by its number in `fluidwarp doctor`."),
+    typer.Option("--gpu", min=0, help="Graphics device to use, by its number in `fluidwarp doctor`."),
 ]
-MapKind = Annotated[str | None, typer.Option("--kind", help="What MAP holds, if it does not say: st or offsets.")]
+MapKind = Annotated[str | None, typer.Option("--kind", help="Kind of MAP, if the file does not say: st or offsets.")]
 StGrid = Annotated[
-    str | None, typer.Option("--grid", help="Where MAP's 0 and 1 lie, if it does not say: centres, corners or pixels.")
+    str | None,
+    typer.Option("--grid", help="Where MAP's 0 and 1 are, if the file does not say: centres, corners or pixels."),
 ]
 MapOverscan = Annotated[
     int | None,
-    typer.Option("--overscan", min=0, help="Pixels of MAP beyond each side of the picture, if it does not say."),
+    typer.Option("--overscan", min=0, help="Pixels that MAP adds on each side, if the file does not say."),
 ]
 
 
@@ -173,54 +176,57 @@ def render(
     recipe: Annotated[
         str,
         typer.Argument(
-            metavar="RECIPE", help="A recipe (.toml) or project, or the name of a recipe that comes with fluidwarp."
+            metavar="RECIPE", help="Recipe (.toml), project, or the name of a recipe that comes with fluidwarp."
         ),
     ],
     pictures: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="PICTURE", help="Pictures, clips or f.%04d.exr, instead of the recipe's own.", readable=False
+            metavar="PICTURE",
+            help="Pictures, clips or numbered files (f.%04d.exr) to warp instead of the recipe's.",
+            readable=False,
         ),
     ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", metavar="OUT", help="File to write; its ending chooses the format. Default: out.png"
+            "--output", "-o", metavar="OUT", help="File to write; its extension sets the format. Default: out.png"
         ),
     ] = None,
-    image: Annotated[
-        Path | None, typer.Option("--image", "-i", help="The picture or clip to warp.", readable=False)
-    ] = None,
-    stats: Annotated[Path | None, typer.Option(help="Write numbers about every frame, as JSON.")] = None,
+    image: Annotated[Path | None, typer.Option("--image", "-i", help="The same as PICTURE.", readable=False)] = None,
+    stats: Annotated[Path | None, typer.Option(help="Write energy, speed, det J and folds of each frame.")] = None,
     map_: Annotated[
         Path | None,
-        typer.Option("--map", help="Write the last frame's warp map (.exr .tif .flo .npy); m.%04d.exr: every frame's."),
+        typer.Option(
+            "--map", help="Write the last frame's warp map (.exr .tif .flo .npy), or every frame's (m.%04d.exr)."
+        ),
     ] = None,
     forward: Annotated[
-        bool, typer.Option("--forward", help="The map tells where points of the original go, not where they come from.")
+        bool,
+        typer.Option("--forward", help="Map says where points of the original go, not where they come from."),
     ] = False,
     offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in the map, instead of an ST map.")] = False,
-    overscan: Annotated[int, typer.Option(min=0, help="Pixels of the map beyond each side of the picture.")] = 0,
+    overscan: Annotated[int, typer.Option(min=0, help="Pixels to add to the map on each side of the picture.")] = 0,
     map_size: Annotated[int | None, typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,
     size: Size = None,
     filter_: Filter = None,
-    grid: Annotated[int | None, typer.Option(help="Cells along the longer side.")] = None,
-    solver: Annotated[str | None, typer.Option(help="mac, or paper for the paper's own scheme.")] = None,
+    grid: Annotated[int | None, typer.Option(help="Cells of the simulation along the longer side.")] = None,
+    solver: Annotated[str | None, typer.Option(help="Simulate by mac, or by paper: the scheme of the paper.")] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds to simulate.")] = None,
-    amount: Annotated[float | None, typer.Option(help="How much of the warp: 0 to 1.5; 1 is all of it.")] = None,
+    amount: Annotated[float | None, typer.Option(help="Part of the warp to apply, 0 to 1.5; 1 is all of it.")] = None,
     fps: Annotated[
         float | None, typer.Option(help="Frames per second of a picture's animation; a clip keeps its own.")
     ] = None,
     quality: Quality = None,
     start: Annotated[float | None, typer.Option("--from", help="First second of an animation.")] = None,
-    end: Annotated[float | None, typer.Option("--to", help="Last second.")] = None,
+    end: Annotated[float | None, typer.Option("--to", help="Last second of an animation.")] = None,
     frames: Frames = None,
     resume: Resume = False,
     states: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Keep states of the simulation there, for later parts to start from."),
+        typer.Option(metavar="DIR", help="Folder to save states of the simulation in; later parts start from them."),
     ] = None,
-    animated: Annotated[bool, typer.Option("--animated", help="Make OUT.webp an animation, not a still.")] = False,
+    animated: Annotated[bool, typer.Option("--animated", help="Write OUT.webp as an animation, not a still.")] = False,
     codec: Codec = None,
     bits: Bits = None,
     strip: Strip = False,
@@ -229,10 +235,12 @@ def render(
     cluster: Cluster = None,
     gpu: Gpu = None,
 ) -> None:
-    """Warp a picture by a recipe: OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its
-    frames. A clip is warped frame by frame, and keeps its sound.
+    """Warp pictures, clips or numbered files by a recipe.
 
-    Several pictures go into the folder OUT under their own names, or to OUT with {name} in it for the name of each.
+    OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its frames.
+    A clip is warped frame by frame, and keeps its sound.
+
+    Several pictures are written to the folder OUT under their own names, or to a name such as OUT/{name}-w.png.
     """
     from app.work.jobs import MapOutput, Outputs
     from app.work.tasks import Edits, Task, opened
@@ -337,45 +345,53 @@ def _about(label: str, said: str) -> str:
 @cli.command()
 def fit(
     recipe: Annotated[
-        str, typer.Argument(metavar="RECIPE", help="A recipe (.toml), or the name of one that comes with fluidwarp.")
+        str,
+        typer.Argument(
+            metavar="RECIPE", help="Recipe (.toml), project, or the name of a recipe that comes with fluidwarp."
+        ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="The recipe to write.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="Recipe to write.")],
     pairs: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Where points are and where they should be: a CSV of x0,y0,x1,y1 in pixels, with a column curve for "
-            "polylines, a .tps of two specimens, or two .pts or .tps, by --pairs twice. Without it and --masks: the "
-            "recipe's own handles.",
+            help="Where points are and where they should be: a CSV file of x0,y0,x1,y1 in pixels (with a column curve "
+            "for polylines), a .tps file of two specimens, or two .pts or .tps files, each after its own --pairs. "
+            "Without --pairs and --masks: the recipe's own handles.",
             readable=False,
         ),
     ] = None,
     masks: Annotated[
         tuple[Path, Path] | None,
-        typer.Option(metavar="FROM TO", help="Two masks: the outline of what is white in FROM goes to that in TO."),
+        typer.Option(metavar="FROM TO", help="Two pictures: the white area of FROM gets the outline of that of TO."),
     ] = None,
     arrived: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write where the points arrive: .csv, .pts or .tps.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write where the points arrive: .csv, .pts or .tps."),
     ] = None,
     image: Annotated[
-        Path | None, typer.Option("--image", "-i", help="The picture, instead of the recipe's own.", readable=False)
+        Path | None, typer.Option("--image", "-i", help="Picture to use instead of the recipe's.", readable=False)
     ] = None,
     evaluations: Annotated[
-        int, typer.Option(min=1, max=100_000, help="Replays on a coarse grid that may be made.")
+        int, typer.Option(min=1, max=100_000, help="At most so many trial runs on a coarse grid.")
     ] = 32,
     local: Annotated[
         float | None,
-        typer.Option(min=0, max=1, help="From 0, a fluid's push, to 1, what is under a point alone: 1 of curves."),
+        typer.Option(
+            min=0,
+            max=1,
+            help="0: handles push as a fluid; 1: they move only what is under them, the default for curves.",
+        ),
     ] = None,
     time_limit: Annotated[
-        float | None, typer.Option(min=0, help="Seconds after which the best so far is taken.")
+        float | None, typer.Option(min=0, help="Seconds after which to stop and write the best result so far.")
     ] = None,
     max_pixels: MaxPixels = 400_000_000,
     gpu: Gpu = None,
 ) -> None:
-    """Find handles that bring points to where they should be with the least work and without a fold.
+    """Find handles that bring points to given places, with the least work and without a fold.
 
-    Ctrl+C takes the best so far. FITTED.toml is an ordinary recipe: fluidwarp render FITTED.toml
+    Ctrl+C stops and writes the best result so far. FITTED.toml is a recipe: `fluidwarp render FITTED.toml` plays it.
     """
     from time import monotonic
 
@@ -410,18 +426,22 @@ def apply(
     map_: Annotated[
         Path,
         typer.Argument(
-            metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: one for each frame.", readable=False
+            metavar="MAP", help="Warp map (.exr .tif .flo .npy), or one for each frame (m.%04d.exr).", readable=False
         ),
     ],
     pictures: Annotated[
         list[Path],
-        typer.Argument(metavar="PICTURE", help="The pictures, clips or f.%04d.exr to warp by it.", readable=False),
+        typer.Argument(
+            metavar="PICTURE", help="Pictures, clips or numbered files (f.%04d.exr) to warp.", readable=False
+        ),
     ],
     output: Output,
     kind: MapKind = None,
     grid: StGrid = None,
     overscan: MapOverscan = None,
-    edges: Annotated[str, typer.Option(help="transparent, black, clamp, mirror or wrap.")] = "transparent",
+    edges: Annotated[
+        str, typer.Option(help="Beyond the edges: transparent, black, clamp, mirror or wrap.")
+    ] = "transparent",
     size: Size = None,
     filter_: Filter = None,
     fps: Annotated[float | None, typer.Option(help="Frames per second of a picture's animation.")] = None,
@@ -436,7 +456,10 @@ def apply(
     cluster: Cluster = None,
     gpu: Gpu = None,
 ) -> None:
-    """Warp pictures or clips by a map from fluidwarp or another program; several as `render` does."""
+    """Warp pictures, clips or numbered files by a warp map, made by fluidwarp or another program.
+
+    Several pictures are written to the folder OUT under their own names, or to a name such as OUT/{name}-w.png.
+    """
     from app.model.recipe import Recipe
     from app.work.applying import Application
     from app.work.jobs import Outputs
@@ -473,13 +496,14 @@ def convert(
     map_: Annotated[
         Path,
         typer.Argument(
-            metavar="MAP", help="A warp map: .exr, .tif, .flo or .npy; m.%04d.exr: a sequence.", readable=False
+            metavar="MAP", help="Warp map (.exr .tif .flo .npy), or a sequence (m.%04d.exr).", readable=False
         ),
     ],
     output: Output,
     offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in OUT, instead of an ST map.")] = False,
     invert: Annotated[
-        bool, typer.Option("--invert", help="Invert it: where points go, from where they come from.")
+        bool,
+        typer.Option("--invert", help="Invert the map: where points go, instead of where they come from."),
     ] = False,
     kind: MapKind = None,
     grid: StGrid = None,
@@ -500,16 +524,16 @@ def convert(
 
 @cli.command()
 def gallery(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="The folder to write to.")] = Path(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write to.")] = Path(
         "gallery"
     ),
     strokes: Annotated[
         bool,
-        typer.Option("--strokes", help="Make three retouching jobs and three posters, done by brush strokes, instead."),
+        typer.Option("--strokes", help="Render the retouching jobs and posters instead, painted with brush strokes."),
     ] = False,
     gpu: Gpu = None,
 ) -> None:
-    """Make the paper's figures again: results, animations and contact sheets."""
+    """Render the figures of the paper and of the guide: results, animations and contact sheets."""
     from app.gallery import figures, retouching
     from app.progress import on_terminal
     from solver.gl.device import Device
@@ -523,7 +547,7 @@ def gallery(
 
 @cli.command()
 def doctor() -> None:
-    """Check OpenGL, the window and the encoder, and say what to install."""
+    """Check OpenGL, the window and the video encoder, and say what to install."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table

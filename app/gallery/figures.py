@@ -116,15 +116,15 @@ def portrait(studio: Studio, name: str, what: str) -> Measured:
         f"Figure {name[-1]}: {what}",
         [
             ("a  source", thick.source),
-            ("b  viscosity: dark flows", shades(thick.viscosity, thick.source)),
+            ("b  viscosity: the dark part flows", shades(thick.viscosity, thick.source)),
             (
-                "c  forces: the gradient of this",
+                "c  force: the gradient of this picture",
                 arrows(rgb(pictures.load(lift.picture).pixels), thick.field, 40, pale=0.0),
             ),
             ("d  result", thick.result),
-            ("e  source, near", _near(thick.source, lift)),
-            ("f  result, near", _near(thick.result, lift)),
-            ("g  frozen outside, near", _near(frozen.result, lift)),
+            ("e  source, close up", _near(thick.source, lift)),
+            ("f  result, close up", _near(thick.result, lift)),
+            ("g  with all outside the window frozen", _near(frozen.result, lift)),
         ],
     )
     # The window is what the recipe with the freeze leaves free: where the dark window is darker than middle grey.
@@ -172,7 +172,7 @@ def beside_spline(studio: Studio, name: str) -> Measured:
     ours, splines = ((*stretch_and_det(each), beyond(each)) for each in (mine, theirs))
     studio.sheet(
         name,
-        f"{played.recipe.name}, and by a thin-plate spline",
+        f"{played.recipe.name}, and the same by a thin-plate spline",
         [
             ("a  source; handles and pins", led(played.source, played.recipe)),
             ("b  handles", marked(played.result, ours[1])),

@@ -1,4 +1,4 @@
-"""Draws the auxiliary pictures of Figures 4, 5 and 6: `python -m assets.gallery.draw_masks [FOLDER]`."""
+"""Draws the auxiliary pictures of Figures 4, 5 and 6, and the guide's field: `python -m assets.gallery.draw_masks [FOLDER]`."""
 
 from __future__ import annotations
 
@@ -36,6 +36,14 @@ def rise(size: tuple[int, int], centre: tuple[float, float], way: tuple[float, f
     return _grey(np.clip(0.5 + along / length, 0, 1))
 
 
+def bands(size: tuple[int, int], periods: float) -> Image.Image:
+    """A force field in red (x) and green (y): level bands that push to the right and to the left in turn."""
+    _, y = _fractions(size)
+    red = np.round(128 + 127 * np.sin(2 * np.pi * periods * y)).astype(np.uint8)
+    still = np.full_like(red, 128)
+    return Image.fromarray(np.stack([red, still, still], axis=-1))
+
+
 def _fractions(size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     return np.meshgrid((np.arange(size[0]) + 0.5) / size[0], (np.arange(size[1]) + 0.5) / size[1])
 
@@ -59,6 +67,7 @@ def main() -> None:
         "mouth-force": rise(portrait, mouth, (0.5, -1), 0.4),
         "brow-viscosity": dark_window(portrait, brow, (0.192, 0.117)),
         "brow-force": rise(portrait, brow, (0.3, -1), 0.25),
+        "bands": bands((451, 300), 3),
     }
     for name, picture in pictures.items():
         picture.save(folder / f"{name}.png", optimize=True)
