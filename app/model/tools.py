@@ -336,7 +336,7 @@ def _held(press: Press, tick: int, **what: Any) -> RecipeHandle:
 TOOLS = (
     Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
          settings=("radius", "hardness", "strength", "local")),
-    Tool("curve", "Curve", "c", "Draw a path: the picture is blown along it", _curve, ("Forwards", "Backwards")),
+    Tool("curve", "Curve", "c", "Draw a path: the picture flows along it", _curve, ("Forwards", "Backwards")),
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
     Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),
     Tool(
@@ -346,7 +346,7 @@ TOOLS = (
         settings=("radius", "stiffness", "local"),
     ),
     Tool(
-        "thicken", "Thicken", "v", "Paint where the fluid is thick and hardly bends",
+        "thicken", "Thicken", "v", "Paint where the picture should resist",
         painting("thicken", "thin"), ("Thicken", "Thin"), masks=True,
     ),
     Tool(

@@ -56,7 +56,7 @@ def _table() -> list[Action]:
     add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
     add("Edit", "remove", "Delete handle or bars", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "fit_handles", "Fit the handles", "shift+g", lambda c: c.fits.start())
-    add("Edit", "cancel", "Give up the stroke or selection", "escape", lambda c: c.cancel())
+    add("Edit", "cancel", "Cancel the stroke or selection", "escape", lambda c: c.cancel())
 
     for tool in TOOLS:
         add("Tools", f"tool_{tool.name}", tool.label, tool.key, lambda c, n=tool.name: c.state.choose_tool(n, False))
@@ -64,10 +64,10 @@ def _table() -> list[Action]:
             label = tool.directions[1] if tool.name in ("bloat", "thicken", "freeze") else f"{tool.label}, reversed"
             keys = f"shift+{tool.key}" + (" d" if tool.name == "freeze" else "")
             add("Tools", f"tool_{tool.name}_back", label, keys, lambda c, n=tool.name: c.state.choose_tool(n, True))
-    add("Tools", "select_next", "Select by something else", "shift+m", lambda c: c.state.select_next())
+    add("Tools", "select_next", "Select by another method", "shift+m", lambda c: c.state.select_next())
     add("Masks", "select_invert", "Invert the selection", "i", lambda c: c.selecting.invert())
     add("Masks", "select_fill", "Fill the selection", "enter", lambda c: c.selecting.fill(off=False))
-    add("Masks", "select_clear", "Take it off the mask", "shift+enter", lambda c: c.selecting.fill(off=True))
+    add("Masks", "select_clear", "Take the selection off the mask", "shift+enter", lambda c: c.selecting.fill(off=True))
     for kind, label, key in (
         ("invert", "Invert the mask", "ctrl+shift+i"),
         ("fill", "Fill the mask", "ctrl+shift+f"),
@@ -98,7 +98,7 @@ def _table() -> list[Action]:
         add("View", f"overlay_{name}", overlay.label, overlay.key, lambda c, n=name: c.state.toggle_overlay(n))
 
     add("Time", "play", "Play or pause", "space", lambda c: c.workspace.session.play())
-    add("Time", "step", "One step on", ".", lambda c: c.workspace.session.step(), repeats=True)
+    add("Time", "step", "One step forward", ".", lambda c: c.workspace.session.step(), repeats=True)
     add("Time", "back", "One step back", ",", lambda c: c.step_back(), repeats=True)
     add("Time", "repeat", "Play once, in a loop, or as ping-pong", "", lambda c: c.repeat())
     add("Time", "start", "To the start", "home", lambda c: c.workspace.session.seek(0))

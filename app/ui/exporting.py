@@ -125,7 +125,7 @@ ANIMATIONS = (
     ),
 )  # fmt: skip
 MAPS = (
-    FileKind("EXR", "ST map or offsets, for Nuke and its like.", _as_it_is(".exr")),
+    FileKind("EXR", "ST map or offsets, for Nuke and similar programs.", _as_it_is(".exr")),
     FileKind("TIFF", "The same values.", _as_it_is(".tif")),
     FileKind("FLO", "Offsets in pixels, as optical flow has them.", _as_it_is(".flo")),
     FileKind("NPY", "Offsets in longer sides of the picture, for NumPy.", _as_it_is(".npy")),
@@ -399,7 +399,7 @@ class ExportDialog(Dialog):
                 self.returns = ui.check("Ping-pong", self.returns)
                 ui.tooltip("Ping-pong", more="There and back again: a loop without a jump.")
                 if not self.returns and (most := self._longest_dissolve):
-                    more = "So long its end dissolves into its beginning: a loop without a jump that never turns back."
+                    more = "How long the end dissolves into the beginning: a loop without a jump that never turns back."
                     slid = ui.slider(
                         "dissolve", "Dissolve the end into the beginning", self._dissolves, 0, most, SECONDS,
                         0.0, title="Dissolve", more=more,

@@ -130,7 +130,7 @@ class Selecting:
             try:
                 share = self._fill(parts, 0.0).coverage(grid, session.replay.small_pictures, session.replay.as_seen)
             except ValueError as error:
-                raise UserError(f"Nothing can be selected so: {error}.") from None
+                raise UserError(f"The selection failed: {error}.") from None
             area = np.rint(255 * share).astype(np.uint8)
         self.state.selection, self.state.selected_area = parts, area
         self.state.selected_part = 0.0 if area is None else float(area.mean()) / 255

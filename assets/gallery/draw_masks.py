@@ -1,4 +1,4 @@
-"""Draws the auxiliary pictures of Figures 4, 5 and 6, and the guide's field: `python -m assets.gallery.draw_masks [FOLDER]`."""
+"""Draws auxiliary pictures of Figures 4 to 6 and of the guide: `python -m assets.gallery.draw_masks [FOLDER]`."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ SETTINGS = (
     Setting("hardness", "Hardness", "Hardness", "A soft brush bends the picture gently.", "{", "}"),
     Setting("strength", "Strength", "Strength", "Full strength moves the picture with the pointer.", ";", "'"),
     Setting("stiffness", "Stiffness", "Stiffness",
-            "At 100 % a handle is led exactly. With less it gives way to the fluid and to the others."),
+            "At 100 % a handle follows exactly. With less it gives way to the fluid and to other handles."),
     Setting("local", "Local", "Local",
             "At 0 % the picture flows back beside the brush, as a fluid does. At 100 % only what is under it moves."),
 )  # fmt: skip
@@ -146,8 +146,8 @@ def _more(ui: Ui, layout: Layout, state: EditorState, likes: Preferences, parts:
             slid = ui.slider(
                 "stabiliser", "Stabiliser", state.stabiliser, 0.0, LONGEST_STRING, POINTS, 0.0, width=BRUSHES_WIDTH,
                 title="Stabiliser",
-                more="The brush follows on a string so long, so that a hand that shakes draws smoothly. "
-                "It catches up where the pointer is let go.",
+                more="How far behind the pointer the brush follows, so that a shaky hand draws smoothly. "
+                "It catches up when you let go.",
             )  # fmt: skip
             state.stabiliser = slid.value
         brushes.draw(ui, state, likes, BRUSHES_WIDTH)

@@ -41,10 +41,10 @@ SYMMETRIES: dict[Symmetry, str] = {
 WALLS = ("free-slip", "no-slip")
 ROW = 32  # points, of the history
 ABOUT_MASKS = {
-    "invert": "What is thickest becomes what is thinnest, what is frozen thaws and the rest freezes.",
+    "invert": "Swaps thickest and thinnest, or frozen and free.",
     "fill": "All of the picture.",
-    "clear": "Takes all paint off.",
-    "feather": "Softens edges; of what is frozen, corners.",
+    "clear": "Removes all paint.",
+    "feather": "Softens edges, or rounds the corners of frozen areas.",
     "load": "A picture: white is frozen, or thickest.",
     "save": "A picture of 16 bits.",
 }
@@ -120,13 +120,13 @@ def _selection(ui: Ui, workspace: Workspace, state: EditorState, selecting: Sele
     if state.select_by in ("colour", "brightness"):
         slid = ui.slider(
             "tolerance", "Tolerance", state.tolerance, 0.01, 1.0, PERCENT, 0.2,
-            title="Tolerance", more="How unlike what you click on it may be.",
+            title="Tolerance", more="How different from the clicked pixel it may be.",
         )  # fmt: skip
         connected = ui.check("Only what is connected", state.connected)
         if slid.changed or connected != state.connected:
             selecting.set_tolerance(slid.value, connected)
     ui.wrapped(
-        f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, both intersect, Esc gives up.", ui.palette.dim, 13
+        f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, both intersect, Esc cancels.", ui.palette.dim, 13
     )
     part = (
         f"{100 * state.selected_part:.1f}% of the picture is selected." if state.selection else "Nothing is selected."
@@ -157,7 +157,7 @@ def _which_mask(ui: Ui, state: EditorState) -> None:
     if state.mask == "thickness":
         slid = ui.slider(
             "mask amount", "Fill with", 10**state.mask_decades, 10**THINNEST, 10**THICKEST, TIMES, 100.0,
-            logarithmic=True, title="What Fill fills with", more="So many times as thick as the fluid.",
+            logarithmic=True, title="What Fill fills with", more="How many times as thick as the fluid.",
         )  # fmt: skip
         state.mask_decades = round(log10(slid.value), 3)
 
@@ -184,7 +184,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         _set_held(session, label, f"Reach of a {led.kind}", slid, radius=slid.value)
         slid = ui.slider(
             "held stiffness", "Stiffness", led.stiffness, 0.01, 1.0, PERCENT, 1.0,
-            title="Stiffness", more="With less it gives way to the fluid and to the others.",
+            title="Stiffness", more="With less it gives way to the fluid and to other handles.",
         )  # fmt: skip
         _set_held(session, label, f"Stiffness of a {led.kind}", slid, stiffness=slid.value)
         if isinstance(led, RecipeHandle):
@@ -197,7 +197,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
                 _turn(ui, session, label, led)
         if ui.button("Remove", width=-1, height=30):
             do("remove")
-        ui.tooltip("Remove it, as if it had never been", "delete", "Or click it with Alt.")
+        ui.tooltip("Remove it and its effect", "delete", "Or click it with Alt.")
     away, unmet = sum(held.is_away for held in session.held), session.unmet
     rest = f", {len(unmet)} did not arrive" if unmet else f", {away} not there yet" if away else ""
     if recipe.leads:
@@ -207,8 +207,8 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     with ui.enabled(any(handle.is_led and not handle.muted for handle in recipe.handle)):
         if ui.button("Fit##handles", width=-1, height=30):
             do("fit_handles")
-        more = "Searches how far and how fast each reaches; may take a minute."
-        ui.tooltip("Let all go at once, with the least work", ACTIONS["fit_handles"].key, more)
+        more = "Finds the reach and the speed of each; may take a minute."
+        ui.tooltip("Move all of them together, with the least work", ACTIONS["fit_handles"].key, more)
 
 
 def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
@@ -351,7 +351,7 @@ def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         if "grow" in row:
             slid = ui.slider(
                 "mask reach", "By", state.mask_reach, 0.001, 0.25, Unit(" px", max(workspace.canvas.size)), 0.02,
-                logarithmic=True, title="How far", more="By so much Feather, Grow and Shrink move its edges.",
+                logarithmic=True, title="How far", more="How far Feather, Grow and Shrink move its edges.",
             )  # fmt: skip
             state.mask_reach = slid.value
         width = (imgui.get_content_region_avail().x / ui.scale - 8 * (len(row) - 1)) / len(row)
@@ -384,7 +384,7 @@ def _brightness(ui: Ui, workspace: Workspace, state: EditorState) -> None:
     slid = ui.slider(
         "brightness", "By brightness", 10**contrast, 1.0, 10**THICKEST, TIMES, 1.0, logarithmic=True,
         title="Thickness from the picture's own brightness",
-        more="So many times as thick is the brightest as the darkest, or the other way round.",
+        more="How many times as thick the brightest is as the darkest, or the other way round.",
     )  # fmt: skip
     way = bool(ui.segmented("thick", ("Bright is thick", "Dark is thick"), int(dark_is_thick), -1))
     state.dark_is_thick, turned = way, own is not None and way != dark_is_thick

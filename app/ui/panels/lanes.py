@@ -168,7 +168,7 @@ def _ruler(ui: Ui, session: Session, scale: Scale) -> None:
         if tick != session.moment:
             session.seek(tick)
     elif imgui.is_item_hovered():
-        ui.tooltip("The recording", more="Drag to go through it. The wheel with Ctrl shows less of it, or more.")
+        ui.tooltip("The recording", more="Drag to move through it. Ctrl and the wheel zoom.")
     draw, palette = imgui.get_window_draw_list(), ui.palette
     step = next((step for step in STEPS if step * scale.a_tick / dt >= ui.px(56)), STEPS[-1])
     imgui.push_font(ui.fonts.regular, 11.5)

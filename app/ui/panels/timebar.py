@@ -52,7 +52,7 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         if ui.icon_button("play", "pause" if moving else "play", title, "space", "Tap Space.", enabled=some):
             do("play")
         imgui.same_line(0, ui.px(2))
-        if ui.icon_button("step", "step", "One step on", ".", enabled=some):
+        if ui.icon_button("step", "step", "One step forward", ".", enabled=some):
             do("step")
         imgui.same_line(0, ui.px(2))
         returns = session.recipe.time.ping_pong
