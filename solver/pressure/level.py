@@ -57,7 +57,9 @@ class GridLevel:
             textures = {"left": packed(left), "up": packed(up), "far": far, "inverse": packed(inverse)}
             for name, texels in textures.items():
                 texels = texels[: self.size[1], : self.size[0]]
-                self._textures[name] = device.upload(texels, f"{label} {name}", "f2")
+                # One over the links of a cell far longer than wide may be more than 16 bits hold.
+                dtype = "f2" if texels.max(initial=0.0) <= np.finfo(np.float16).max else "f4"
+                self._textures[name] = device.upload(texels, f"{label} {name}", dtype)
             self.inputs |= self._textures
 
     def draw(self, shader: str, target: Target, defines: dict[str, Any] | None = None, **inputs: Any) -> None:
