@@ -82,8 +82,8 @@ class Projection:
         self._prepare()
 
     def _prepare(self) -> None:
-        self._cycle.release()
-        self._cycle = Cycle(self.device, self.size, self._aspect, self._solid)
+        before, self._cycle = self._cycle, Cycle(self.device, self.size, self._aspect, self._solid)
+        before.release()
 
     def project(
         self,
