@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.limits import LARGEST_VISCOSITY
 from solver.packing import DoublePackedFaces, PackedFaces, Packing
 from solver.params import Walls
 from solver.viscosity.conjugate_gradients import ConjugateGradients
@@ -15,7 +16,7 @@ from solver.viscosity.deflation import Deflation
 from solver.viscosity.multigrid import Multigrid
 from solver.viscosity.plan import Plan, is_sharp, plan_for
 
-# Largest dt mu / h^2 that is reckoned with. With more, a float64 loses the mass of a stiff part beside its strains, and
+# Largest dt mu / h^2 that is counted. With more, a float64 loses the mass of a stiff part beside its strains, and
 # a float32 does not tell the flows apart.
 MOST = 1e12
 
@@ -57,9 +58,8 @@ class Viscosity:
         self._wall_speed = walls.driving_speed
         hx, hy = self.spacing
         kappa = dt / (hx * hy)
-        is_solid, amount = solid.get() == 255, viscosity.get()
-        if kappa * float(amount.max()) > MOST:
-            amount = np.minimum(amount, np.float32(MOST / kappa))
+        is_solid = solid.get() == 255
+        amount = np.clip(viscosity.get(), 0.0, min(MOST / max(kappa, 1e-30), LARGEST_VISCOSITY))
         fluid = amount[~is_solid] if is_solid.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         is_one, cells = least == largest and not is_solid.any(), self.size[0] * self.size[1]
