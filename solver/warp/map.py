@@ -151,16 +151,19 @@ class WarpMap:
             time: where it begins, for the function.
 
         Raises:
-            ValueError: on an array of another shape, a value that is not finite, or a step or a time that is none.
+            ValueError: on an array of another shape, a value that is not finite or beyond all measure, or a step or a
+                time that is none.
         """
         dt = check_step(dt)
         check_finite("a time", time)
         if callable(velocity):
-            self._accumulated.is_walled = False  # it may cross the edges
             self._submap.trace.set(traced(velocity, self.grid, dt, time))
+            self._accumulated.is_walled = False  # it may cross the edges
             self.advance_traced(self._submap.trace)
         else:
-            field = self.device.upload(on_faces("a velocity", velocity, self.grid), "prescribed velocity")
+            faces = on_faces("a velocity", velocity, self.grid)
+            check_size("a velocity", faces)
+            field = self.device.upload(faces, "prescribed velocity")
             self.advance(field, dt)
             field.release()
 

@@ -276,6 +276,8 @@ def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
         lambda warp: warp.read((40.5, 24)),
         lambda warp: warp.statistics("all"),
         lambda warp: warp.statistics([[1], [1, 2]]),
+        lambda warp: warp.advance_prescribed(np.full((12, 20, 2), 1e30), 0.1),
+        lambda warp: warp.advance_prescribed(lambda x, y, t: (x + 1e308, y), 0.1),
     ],
     ids=[
         "transposed",
@@ -296,6 +298,8 @@ def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
         "half a pixel",
         "size of a word",
         "size of unequal rows",
+        "velocity beyond all measure",
+        "function beyond all measure",
     ],
 )
 def test_a_map_refuses_what_does_not_fit(device: Device, act: Callable[[WarpMap], object]) -> None:
