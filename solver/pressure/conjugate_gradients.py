@@ -87,7 +87,7 @@ class ConjugateGradients:
                 targets = *targets, direction
             cycle.finest.draw("apply_operator", targets, first, z=z, residual=residual.read, **before)
             rz, curvature, rq, qq = self.add_up(self.products).tolist()
-            if curvature == 0.0:
+            if not (rz and curvature):  # as small as float32 does not hold
                 break
             alpha = rz / curvature
             squares = max(squares - 2.0 * alpha * rq + alpha**2 * qq, 0.0)
