@@ -8,8 +8,8 @@ from properties import hostile as properties
 from solver.gl.device import Device
 
 
-# 2, 28 and 40 had solid cells so long that one over their links is more than half a float holds; 7099 was so slow that r.z
-# was 0 in float32.
+# 2, 28 and 40 had solid cells so long that one over their links is more than half a float holds; in 7099 r.z was 0 in
+# float32, so slow was the fluid.
 @pytest.mark.parametrize("seed", [*range(4), 28, 40, 7099])
 def test_what_is_accepted_gives_finite_numbers_and_no_energy(device: Device, seed: int) -> None:
     properties.check_the_ends_of_what_is_accepted(device, seed)
