@@ -238,9 +238,10 @@ def energy(fluid: Fluid) -> float:
     """|w|^2 + 2 |g|^2, each face times its open part: the sum of (S6)."""
     closed = fluid.closed.astype(float) / 255
     open_part = np.stack([1 - np.maximum(closed, np.roll(closed, 1, axis)) for axis in (1, 0)], axis=-1)
-    w, g = (
-        float((open_part * field.read.get().astype(float) ** 2).sum()) for field in (fluid.velocity, fluid._carried)
-    )
+    state = fluid.save()
+    arrays = state.arrays()
+    state.release()
+    w, g = (float((open_part * arrays[name].astype(float) ** 2).sum()) for name in ("velocity", "carried"))
     return w + 2 * g
 
 
