@@ -43,7 +43,7 @@ def find_parts(stiff: np.ndarray, stiffness: np.ndarray, open_u: np.ndarray, ope
     inside = _opened(stiff)
     core = _numbered(inside, stiffness, side)
     cores = int(core.max(initial=0))
-    # What is few, the parts' faces, is worked on in lists: a mask of bytes costs little, an array of numbers much.
+    # Faces of parts are few, so they are processed as lists: masks of bytes are cheap, whole arrays of numbers are not.
     # The first column of u and the first row of v are walls, so that a cell lies behind each open face.
     touch_u = open_u & (inside | framed(inside, (0, 0), (1, 0))[:, :-1])
     touch_v = open_v & (inside | framed(inside, (1, 0), (0, 0))[:-1])
