@@ -47,7 +47,7 @@ class Advection:
         """w1, from w0 on MAC faces and, if they are given, `carried`, and `force` and its `impulse`."""
         targets, (nx, ny) = (self._blocks.u, self._blocks.v), self.size
         width, height = self._blocks.u.size
-        # Texels whose faces are all inside: none beyond a wall or on it.
+        # Texels with all faces inside: none beyond a wall or on one.
         left, right, above, below = 3, nx + 1, 2, ny // 2 + 1
         inside = (left, above, right - left, below - above)
         around = [(0, 0, width, above), (0, below, width, height - below)]

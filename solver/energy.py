@@ -13,9 +13,10 @@ from solver.packing import PackedFaces
 
 
 class EnergyBound:
-    """Scales w3 down where it has more energy than w1: advection moves energy, and viscosity takes it.
+    """Scales w3 down where it has more energy than w1.
 
-    A semi-Lagrangian step reads some places more often than others, and so may make energy; see (S6).
+    Exact advection keeps energy and viscosity takes it, but a semi-Lagrangian step reads some places more often than
+    others, and so may create some; see (S6).
 
     Args:
         device: the device.
@@ -34,18 +35,18 @@ class EnergyBound:
     def apply(
         self, w3: PackedFaces, before: Field, wall_speed: float = 0.0, weights: dict[str, Any] | None = None
     ) -> PackedFaces:
-        """w3, or as much of it as has the energy `before` (|w1|^2 of each texel) and of all fluid at `wall_speed`.
+        """w3, scaled to no more than the energy `before` (|w1|^2 of each texel) and that of all fluid at `wall_speed`.
 
-        `weights`: the open parts of faces, by which squares count; see `Projection.weights`.
+        `weights`: the open parts of faces, which weight the squares; see `Projection.weights`.
 
         Raises:
-            ValueError: if either is not finite, or beyond all measure.
+            ValueError: if either is not finite, or too large.
         """
         energy = self.device.pass_("step/energy.frag", **({"PARTIAL": 1} if weights else {}))
         energy(self._squares, **w3.inputs(), departed=before, side=SIDE, **(weights or {}))
         after, departed = self._sum(self._squares).tolist()
         if not (departed <= 2 * self._cells * LARGEST_SPEED**2 and math.isfinite(after)):
-            raise ValueError("the forces and brushes of this step are beyond all measure")
+            raise ValueError("the forces and brushes of this step are too large")
         most = math.sqrt(departed) + wall_speed * math.sqrt(self._cells)
         if math.sqrt(after) <= most:
             return w3

@@ -86,7 +86,7 @@ def impulses(forces: Forces, grid: Grid, time: float, dt: float) -> Impulses:
     """What forces add from `time` on in `dt`.
 
     Raises:
-        ValueError: for a force of another shape, or one that is not finite or beyond all measure.
+        ValueError: for a force of another shape, or one that is not finite or too large.
         TypeError: for what is no force.
     """
     fields, total = list[tuple[Field, float]](), None

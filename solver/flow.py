@@ -1,4 +1,4 @@
-"""A flow that goes from one grid of a picture to another."""
+"""A flow that is moved from one grid of a picture to another."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Flow:
     def resampled(self, device: Device, here: Grid, there: Grid, walls: Walls) -> Flow:
         """The flow, now on the faces of grid `here`, on those of `there`, in textures that the caller releases.
 
-        Where both are the same cells, moved by whole ones, it is the same to the bit, and else a mean over each face,
-        so that as much flows through it, without the pressure. Outside `here` all is at rest.
+        If the cells are of the same size and moved by whole cells, it is the same to the bit. Otherwise it is the mean
+        over each face, so that as much flows through it, without `carried`. Outside `here` all is at rest.
 
         Raises:
-            ValueError: if it is a grid of another picture.
+            ValueError: if `there` is a grid of another picture.
         """
         check_type("where a flow goes", there, Grid)
         if there.picture != here.picture:

@@ -1,7 +1,7 @@
 """The fluid: Stable Fluids with spatially varying viscosity, in the paper's order.
 
-Its class is longer than most: `step`, its stages, and each of them once more for who calls it alone, read best one
-below the other. What they do is in `advection`, `viscosity`, `energy` and `pressure`.
+The class is long because `step`, its stages, and each stage as a call of its own read best together. Their work is done
+in `advection`, `viscosity`, `energy` and `pressure`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Fluid(Scheme):
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
         super().__init__(device, grid, params)
         self.velocity = device.double_field(grid.size, 2, "velocity")
-        # g: half of what pressure did in the last step, which the next one takes off where the fluid departs.
+        # g of (S2): half of the last step's velocity change by pressure; the next step subtracts it at the departure.
         self._carried = device.double_field(grid.size, 2, "half the pressure gradient")
         self._trace = Trace(device, grid.size)
         self._flux = device.field(grid.size, 2, "velocity times the open part of the faces")
@@ -53,7 +53,7 @@ class Fluid(Scheme):
         packed = self._viscosity_solver.v_star.u.size
         self._advection = Advection(device, grid.size, packed)
         self._energy_bound = EnergyBound(device, grid.nx * grid.ny, packed)
-        # What the solvers hold of the masks; None if they have to look.
+        # Which masks the solvers have taken up; None if they have to be read again.
         self._coefficients_of: object = None
         self._solids_of: np.ndarray | None = None
         self._solid: np.ndarray | None = None
@@ -86,8 +86,8 @@ class Fluid(Scheme):
     def _add_force(self, given: Impulses) -> Blocks:
         """w1 = w0 - g + dt f, f the sum of the forces and of what brushes have drawn: equation (S2).
 
-        g is half of what pressure did in the last step; the projection takes off the rest where the fluid arrives. So
-        pressure acts along the path by the trapezoidal rule, which is of second order in time.
+        g, half of the pressure's work, acts here, where the fluid departs, the other half in the projection, where it
+        arrives. So pressure acts along the path by the trapezoidal rule, which is of second order in time.
         """
         force = self._together(given)
         with self.device.stage("add force"):
@@ -98,8 +98,8 @@ class Fluid(Scheme):
     def _advect(self, w1: Blocks, dt: float) -> Advected:
         """w2(x) = w1(x_d), each component from where it departs; and drag.
 
-        Carried by w0 where the paper has w1: that is free of divergence and does not cross solids, and the warp map has
-        just been carried by it, so that the trace is there already.
+        Carried by w0 where the paper has w1: w0 is free of divergence and does not cross solids, and the warp map has
+        just been carried by it, so the trace is drawn already.
         """
         trace = self.trace(dt)
         self._take_up_masks(dt)
@@ -120,12 +120,10 @@ class Fluid(Scheme):
         return w3
 
     def _bound_energy(self, w3: PackedFaces, before: Field) -> PackedFaces:
-        """w3, made smaller if it has more energy than w1: equation (S5).
-
-        Walls that move may besides bring all of the fluid to their own speed.
+        """w3, scaled down if it has more energy than w1: equation (S5). Moving walls may add energy.
 
         Raises:
-            ValueError: if what departed is not finite, or beyond all measure.
+            ValueError: if w1 is not finite, or too large.
         """
         with self.device.stage("diffuse"):
             wall_speed = max(map(abs, self.params.walls.driving_speed))
@@ -156,7 +154,7 @@ class Fluid(Scheme):
     # -- its stages, each alone -------------------------------------------------------------------------------------
 
     def add_force(self, forces: Forces, dt: float) -> None:
-        """Add forces, and what brushes have drawn, to the velocity; see `step`."""
+        """Add forces, and what brushes have drawn, to the velocity; see `Scheme.step`."""
         given = impulses(forces, self.grid, self.time, check_step(dt))
         with self._whole_or_not_at_all():
             if force := self._together(given):
@@ -185,9 +183,9 @@ class Fluid(Scheme):
         self._project(carries=False)
 
     def trace(self, dt: float) -> Field:
-        """How far the velocity carries in `dt` seconds what arrives at the cells' centres: x_departed - x, cells.
+        """Where the fluid that arrives at the cells' centres in `dt` seconds comes from: x_departed - x, cells.
 
-        Valid until the velocity changes. The next step follows it.
+        Valid until the velocity changes. The next step uses it too.
         """
         dt = check_step(dt)
         if tracing := self._begin_own_trace(dt):
@@ -196,14 +194,14 @@ class Fluid(Scheme):
         return self._trace.field
 
     def begin_trace(self, dt: float) -> Tracing | None:
-        """What it takes to draw the trace of what carries the picture, for whoever draws it beside something else now.
+        """What it takes to draw the trace of `carrier`, for a pass that draws it together with something else.
 
-        None if that is `trace`, and there already.
+        None if it is the same as `trace`, and that is drawn already.
         """
         if self.local.is_empty:
             return self._begin_own_trace(dt)
         tracing = self._trace.begin(self.carrier(), dt, self.grid, self.params.walls, in_parts=True)
-        self._trace.forget()  # it is not the fluid's own
+        self._trace.forget()  # not the fluid's own: the next step cannot use it
         return tracing
 
     def _begin_own_trace(self, dt: float) -> Tracing | None:
@@ -215,7 +213,7 @@ class Fluid(Scheme):
         """Set u on left faces and v on upper faces from (ny, nx, 2) or a function (x, y, t); walls' faces become zero.
 
         Raises:
-            ValueError: on another shape, or a value that is not finite or beyond all measure.
+            ValueError: on another shape, or a value that is not finite or too large.
         """
         faces = on_faces("a velocity", velocity, self.grid, self.time)
         check_size("a velocity", faces)
@@ -230,7 +228,7 @@ class Fluid(Scheme):
         self._forget_last_step()
 
     def masks_changed(self) -> None:
-        """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
+        """Tell that something was drawn into `viscosity` or `solid`; the next step takes it up."""
         self._coefficients_of = None
         self._solid = None
         self._velocity_changed()  # what carries the fluid stands still in solid cells
@@ -238,10 +236,10 @@ class Fluid(Scheme):
     # -- on another grid of the picture ------------------------------------------------------------------------------
 
     def lay_on(self, grid: Grid) -> None:
-        """Go on at rest with as many cells elsewhere in the picture; viscosity and solid cells are to be set anew.
+        """Go on at rest on another grid with as many cells; viscosity and solid cells have to be set again.
 
         Raises:
-            ValueError: if there are not as many.
+            ValueError: if the numbers of cells differ.
         """
         check_type("where a fluid is laid", grid, Grid)
         if grid.size != self.grid.size:
@@ -255,7 +253,7 @@ class Fluid(Scheme):
     def flow_on(self, grid: Grid) -> Flow:
         """The flow on the faces of another grid of the same picture, which the caller releases; see `go_on_with`.
 
-        Of the same cells, moved by whole ones, it is the same to the bit; see `Flow.resampled`.
+        On cells of the same size, moved by whole cells, it is the same to the bit; see `Flow.resampled`.
         """
         flow = Flow(self.time, self.velocity.read, self._carried.read)
         return flow.resampled(self.device, self.grid, grid, self.params.walls)
@@ -321,7 +319,7 @@ class Fluid(Scheme):
     def _together(self, given: Impulses) -> dict[str, Any]:
         """All that acts in a step as one `force` and its `impulse`, empty if nothing does.
 
-        More than one are added up where brushes draw.
+        Several forces are added up in `impulse`, where brushes draw too.
         """
         fields, faces = given
         upload = None if faces is None else self.device.upload(faces, "force")
@@ -338,7 +336,7 @@ class Fluid(Scheme):
 
     @contextmanager
     def _whole_or_not_at_all(self) -> Iterator[None]:
-        """Where something fails inside, the velocity stays as it was, and what was put in for the step is forgotten."""
+        """If something fails inside, the velocity stays as it was, and the input for the step is forgotten."""
         try:
             yield
         except BaseException:
@@ -346,7 +344,7 @@ class Fluid(Scheme):
             raise
 
     def _replace(self, *draws: Callable[[Field], object]) -> None:
-        """Let `draws`, one after the other, make another velocity, if it is not beyond all measure."""
+        """Let `draws`, one after the other, draw a new velocity, and take it if it is not too large."""
         for draw in draws:
             draw(self.velocity.write)
         check_size("the velocity", self.velocity.write.get())
@@ -354,7 +352,7 @@ class Fluid(Scheme):
         self._velocity_changed()
 
     def _unpack(self, faces: PackedFaces) -> None:
-        """Let packed faces be the velocity."""
+        """Make packed faces the velocity."""
         self._viscosity_solver.unpack(faces, self.velocity.read)
         self._velocity_changed()
 
@@ -375,7 +373,7 @@ class Fluid(Scheme):
         self._pressure_solver.forget()
 
     def _take_up_masks(self, dt: float) -> None:
-        """Hand viscosity and solid cells to the viscous solver, if they or the step are other ones."""
+        """Hand viscosity and solid cells to the viscous solver, if they, the step or the walls have changed."""
         key = (dt, self.params.walls)
         if key != self._coefficients_of:
             with self.device.stage("diffuse"):
@@ -383,14 +381,14 @@ class Fluid(Scheme):
             self._coefficients_of = key
 
     def _take_up_solids(self) -> None:
-        """Hand the solid cells to the projection, if they are other ones: most strokes of paint only thicken."""
+        """Hand the solid cells to the projection, if they have changed: most strokes of paint only thicken."""
         solid = self._look_at_solids()
         if solid is not self._solids_of and (self._solids_of is None or not np.array_equal(solid, self._solids_of)):
             self._pressure_solver.set_solids(solid / np.float32(255) if solid.any() else None)
         self._solids_of = solid
 
     def _look_at_solids(self) -> np.ndarray:
-        """The solid cells, read back where they may be other ones."""
+        """The solid cells, read back if they may have changed."""
         if self._solid is None:
             self._solid = self.solid.get()
             self._has_edges = bool(((self._solid > 0) & (self._solid < 255)).any())

@@ -1,4 +1,4 @@
-"""The limits of what may be put in, and the checks against them: numbers and arrays, nothing of GL."""
+"""The limits of input, and the checks against them: numbers and arrays, nothing of GL."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-# Longer sides per second, and as much for whatever else is put in: the solvers multiply sums of squares over the grid,
+# Longer sides per second, and the limit of all other input too: the solvers multiply sums of squares over the grid,
 # which then stay below float32's 3e38.
 LARGEST_SPEED = 1e6
 # Seconds, and lengths^2 / s, at which dt mu / h^2 stays far below what float32 holds.
@@ -81,7 +81,7 @@ def viscosities(values: object, shape: tuple[int, ...] = ()) -> np.ndarray:
     """Viscosities as float32 of a shape, from one number for all or an array of that shape; without a shape, of any.
 
     Raises:
-        ValueError: on another shape, or if one is negative, not finite or beyond all measure.
+        ValueError: on another shape, or if one is negative, not finite or too large.
     """
     array = real_array("a viscosity", values)
     if array.ndim and shape:
@@ -108,7 +108,7 @@ def places(points: object) -> np.ndarray:
     """Places (n, 2), or more axes of them, as (n, 2) float64.
 
     Raises:
-        ValueError: on another shape, or a value that is not finite or beyond all measure.
+        ValueError: on another shape, or a value that is not finite or too large.
     """
     array = real_array("a list of places", points)
     if array.shape[-1:] != (2,):

@@ -79,15 +79,15 @@ def framed(values: np.ndarray, rows: tuple[int, int], columns: tuple[int, int]) 
     return framed
 
 
-# Products of 2 x 2 blocks that are worth a transform: about a multigrid cycle; and on the finest level, where it takes
-# the place of two or three of them and of their sums, eight times as many (128 x 128 cells). While someone paints, the
-# viscous step and the projection so take .44 and .49 of the processor time at 96 x 76 cells, .67 and .75 at 128 x 101;
-# at 192 x 151 they would take 1.35 and .99.
+# A transform is used up to so many products of 2 x 2 blocks, the cost of about one multigrid cycle; on the finest
+# level, where it replaces two or three cycles and their sums, up to eight times as many (128 x 128 cells). While
+# someone paints, the viscous step and the projection so take .44 and .49 of the processor time at 96 x 76 cells, .67
+# and .75 at 128 x 101; at 192 x 151 they would take 1.35 and .99.
 LARGEST_TRANSFORM = 65536
 LARGEST_TRANSFORM_OF_FINEST = 8 * LARGEST_TRANSFORM
 
 
 def is_worth_a_transform(blocks: tuple[int, int], is_finest: bool) -> bool:
-    """True if a level of so many blocks of 2 x 2 cells is small enough to be solved by products with dense matrices."""
+    """True if a level of (width, height) blocks of 2 x 2 cells is small enough for products with dense matrices."""
     largest = LARGEST_TRANSFORM_OF_FINEST if is_finest else LARGEST_TRANSFORM
     return blocks[0] * blocks[1] * (blocks[0] + blocks[1]) <= largest

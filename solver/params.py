@@ -30,7 +30,7 @@ class Walls:
             not the picture's edge.
 
     Raises:
-        ValueError: for another slip, or speeds that are not four finite ones, none beyond all measure.
+        ValueError: for another slip, or speeds that are not four finite ones, none too large.
     """
 
     slip: Literal["free", "none"] = "free"

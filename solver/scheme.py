@@ -19,10 +19,10 @@ from solver.state import State
 
 @dataclass(frozen=True)
 class Residuals:
-    """What the two solves of the last step left; see `Scheme.measuring`.
+    """What the two solves of the last step left over; see `Scheme.measuring`.
 
     Attributes:
-        divergence_before, divergence_after: root mean square over the cells, 1 / s, less what brushes ask for.
+        divergence_before, divergence_after: root mean square over the cells, 1 / s, of the divergence less the source.
         viscous_residual: of the implicit viscous step, relative; None where the scheme does not tell.
     """
 
@@ -32,20 +32,20 @@ class Residuals:
 
     @property
     def divergence_left(self) -> float:
-        """The part of the divergence that the projection has left."""
+        """The fraction of the divergence that the projection has left."""
         return self.divergence_after / self.divergence_before if self.divergence_before else 0.0
 
 
 @dataclass(frozen=True)
 class FlowStatistics:
-    """How fast the fluid moves: what stop conditions and statistics look at."""
+    """How fast the fluid moves, for stop conditions and statistics."""
 
     kinetic_energy: float
     largest_speed: float
 
 
 class Additions:
-    """A field that is added to between two steps, and used up by the next."""
+    """A field that sums up what is added between two steps, and is used up by the next."""
 
     def __init__(self, device: Device, size: tuple[int, int], components: int, label: str) -> None:
         self.field = device.field(size, components, label)
@@ -83,8 +83,8 @@ class Scheme(ABC):
             drawing into them.
         impulse: what brushes have drawn on MAC faces for the next step, lengths / s.
         source: the divergence that the next projection shall leave, at cells, 1 / s: bloat, or pinch.
-        local: a motion on MAC faces, lengths / s, that carries the picture until the next step and not the fluid.
-        measuring: let every step leave its `residuals`; it changes no result, and is slow.
+        local: a motion on MAC faces, lengths / s, that carries the picture, but not the fluid, until the next step.
+        measuring: every step computes its `residuals`, which is slow and changes no result.
     """
 
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
@@ -114,12 +114,12 @@ class Scheme(ABC):
             dt: seconds, of any size.
             forces: one or several: arrays (ny, nx, 2) on MAC faces, lengths / s^2; functions (x, y, t) that give both
                 components; or fields, each with its time law integrated over the step.
-            steer: draws into the velocity on MAC faces it is handed, by addition, between diffusion and projection:
-                there brushes that lead the picture by hand make up for what viscosity took.
+            steer: is called with the velocity on MAC faces between diffusion and projection, and adds to it: there
+                brushes make up for what viscosity took.
 
         Raises:
-            ValueError: for a step or a force that is not finite, negative, of another shape, or beyond all measure.
-            TypeError: for what is no number, no force or cannot steer.
+            ValueError: for a step or a force that is not finite, negative, of another shape, or too large.
+            TypeError: for a step that is no number, a force that is none, or `steer` that cannot be called.
         """
 
     # -- what is put in ---------------------------------------------------------------------------------------------
@@ -136,13 +136,13 @@ class Scheme(ABC):
         """Set the viscosity of the cells, lengths^2 / s, from (ny, nx) or one number.
 
         Raises:
-            ValueError: on another shape, or if a value is negative, not finite or beyond all measure.
+            ValueError: on another shape, or if a value is negative, not finite or too large.
         """
         self.viscosity.set(viscosities(viscosity, (self.grid.ny, self.grid.nx)))
         self.masks_changed()
 
     def set_solid(self, solid: np.ndarray) -> None:
-        """Make the cells solid where the (ny, nx) array is true or non-zero, and no others: their faces do not move.
+        """Make exactly those cells solid where the (ny, nx) array is true or non-zero: nothing flows through them.
 
         Raises:
             ValueError: on another shape or a NaN.
@@ -155,7 +155,7 @@ class Scheme(ABC):
         """Say that something was drawn into `viscosity` or `solid`; the next step takes it up."""
 
     def add_source(self, source: Field, amount: float = 1.0) -> None:
-        """Let the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
+        """Make the next projection leave a divergence of `amount` times `source` (cells, 1 / s): bloat, or pinch."""
         check_type("a source", source, Field)
         if source.size != self.grid.size or source.components != 1:
             raise ValueError(f"a source is {source}, {self.grid.nx} x {self.grid.ny} x 1 is wanted")
@@ -164,7 +164,7 @@ class Scheme(ABC):
         self.source.add(lambda field: add(field, add=True, source=source, amount=amount))
 
     def add_local(self, motion: Field, amount: float = 1.0) -> None:
-        """Let `amount` times `motion` (MAC faces, lengths / s) carry the picture until the next step; see `local`."""
+        """Make `amount` times `motion` (MAC faces, lengths / s) carry the picture until the next step; see `local`."""
         check_field("a motion", motion, self.grid)
         check_finite("an amount of a motion", amount)
         add = self.device.pass_("step/add_impulse.frag")
@@ -177,7 +177,7 @@ class Scheme(ABC):
         """The fluid's velocity on MAC faces."""
 
     def carrier(self) -> Field:
-        """What carries the picture, a velocity on MAC faces: the fluid's, and `local` but on the faces of solids."""
+        """The velocity on MAC faces that carries the picture: the fluid's, plus `local` where faces are open."""
         faces = self.faces()
         if self.local.is_empty:
             return faces
@@ -205,9 +205,9 @@ class Scheme(ABC):
 
     @abstractmethod
     def pressure(self) -> np.ndarray:
-        """The last projection's q, (ny, nx) float32, lengths^2 / s: what of pressure times dt acts there.
+        """The last projection's q, (ny, nx) float32, lengths^2 / s.
 
-        All of it in the paper's scheme and in a first step of `Fluid`, half of it in the later ones: see (S2).
+        It is dt times the pressure in the paper's scheme and in a first step of `Fluid`, half of that later: see (S2).
         """
 
     @property
@@ -233,7 +233,7 @@ class Scheme(ABC):
     def stream_function(self) -> np.ndarray:
         """psi at the cells' corners with u = dpsi/dy and v = -dpsi/dx, (ny + 1, nx + 1) float32, lengths^2 / s.
 
-        Zero at the walls. It is all of the flow unless a brush's source has acted in the last step.
+        Zero at the walls. It describes the whole flow unless a brush's source has acted in the last step.
         """
         return np.pad(np.cumsum(self.u * np.float32(self.grid.spacing[1]), axis=0), ((1, 0), (0, 0)))
 
@@ -244,7 +244,7 @@ class Scheme(ABC):
         return FlowStatistics(float(0.5 * (faces**2).sum() * hx * hy), float(speed.max()))
 
     def _divergence_norm(self, wanted: np.ndarray | None) -> float:
-        """Root mean square of the divergence less what is wanted, 1 / s; 0 if nobody is `measuring`."""
+        """Root mean square of the divergence less what is wanted, 1 / s; 0 if not `measuring`."""
         if wanted is None:
             return 0.0
         return float(np.sqrt(np.mean((self.divergence().astype(np.float64) - wanted) ** 2)))
@@ -256,7 +256,7 @@ class Scheme(ABC):
         return State.of(self.device, self._live(), time=self.time)
 
     def restore(self, state: State) -> None:
-        """Go back to a moment, exactly; what was put in for the next step is forgotten.
+        """Go back to a saved moment, exactly; input for the next step is forgotten.
 
         Raises:
             ValueError: if the state is of another grid or of another scheme.

@@ -15,12 +15,12 @@ from solver.gl.tiled import SavedTiles, TiledField
 
 @dataclass(frozen=True)
 class State:
-    """A copy of everything that later steps depend on, on the GPU; whoever has it releases it.
+    """A copy of everything that later steps depend on, on the GPU; its owner releases it.
 
     Attributes:
         fields: the textures by name.
-        values: what is no texture, by name.
-        tiles: what is saved of tiled fields, by name.
+        values: everything else, by name.
+        tiles: the saved tiles of tiled fields, by name.
     """
 
     fields: dict[str, Field]
@@ -44,7 +44,7 @@ class State:
         """Copy the saved textures back into the live ones of the same names.
 
         Raises:
-            ValueError: if they are those of something else.
+            ValueError: if they are of another grid or scheme.
         """
         saved = {name: (item.size, item.components, item.dtype) for name, item in self.fields.items()}
         saved |= {name: item.kind for name, item in self.tiles.items()}
@@ -61,7 +61,7 @@ class State:
                 live.copy_from(self.fields[name])
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Everything in it by name, off the GPU; of tiled fields what is not zero."""
+        """Everything in it by name, read back from the GPU; of tiled fields what is not zero."""
         tiles = {f"{name}/{part}": a for name, item in self.tiles.items() for part, a in item.arrays().items()}
         return {name: saved.get() for name, saved in self.fields.items()} | tiles | self.values
 
@@ -69,7 +69,7 @@ class State:
         """A state like this one that holds what `arrays()` gave.
 
         Raises:
-            ValueError: if those were of something else.
+            ValueError: if an array is missing or of another size.
         """
         rest, fields, tiles = dict(arrays), dict[str, Field](), dict[str, SavedTiles]()
         made = State(fields, rest, tiles)

@@ -20,7 +20,7 @@ MOST_PARTS = 16  # a bound on the cost only
 
 @dataclass(frozen=True)
 class Tracing:
-    """What drawing the trace takes: where to, and the defines and inputs of `trace.frag`."""
+    """What it takes to draw the trace: the target, and the defines and inputs of `trace.frag`."""
 
     target: Field
     defines: dict[str, Any]
@@ -28,7 +28,7 @@ class Tracing:
 
 
 class Trace:
-    """x_d - x at cell centres, in cells (S3): drawn once for a velocity and a step, by whoever needs it first.
+    """x_d - x at cell centres, in cells (S3): drawn once for a velocity and a step, by the first that needs it.
 
     Attributes:
         field: the texture.
@@ -43,13 +43,13 @@ class Trace:
         self._dt: float | None = None  # the step that it is of
 
     def is_of(self, dt: float) -> bool:
-        """True if it is there for this step, and the velocity has not changed since."""
+        """True if it is drawn for this step, and the velocity has not changed since."""
         return self._dt == dt
 
     def begin(self, velocity: Field, dt: float, grid: Grid, walls: Walls, in_parts: bool = False) -> Tracing:
-        """What drawing it for a velocity on MAC faces takes; from here on it is that of `dt`, until `forget`.
+        """What it takes to draw the trace of a velocity on MAC faces for `dt`; it counts as drawn until `forget`.
 
-        `in_parts`: in as many as its gradient needs, which waits for the GPU; ValueError if that is beyond all measure.
+        `in_parts`: in as many parts as the gradient needs, which waits for the GPU; ValueError if that is too large.
         """
         hx, hy = grid.spacing
         defines, inputs = walls.defines, {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **walls.inputs}
@@ -58,7 +58,7 @@ class Trace:
             find(self._steepness, displacement=velocity, spacing=grid.spacing, side=SIDE)
             strain = dt * math.sqrt(self._find_steepest(self._steepness)[0])
             if not math.isfinite(strain):
-                raise ValueError("what carries the picture is beyond all measure")
+                raise ValueError("the motion that carries the picture is too fast")
             defines = defines | {"PARTS": 1}
             inputs["parts"] = float(min(max(math.ceil(strain / STRAIN), 1), MOST_PARTS))
         self._dt = dt

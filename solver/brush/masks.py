@@ -71,7 +71,7 @@ class Masks:
         """Set the viscosity that is painted over, lengths^2 / s: of all cells, (ny, nx), or a function of the grid.
 
         Raises:
-            ValueError: if a value is negative, not finite or beyond all measure.
+            ValueError: if a value is negative, not finite or too large.
         """
         self._base = viscosity if callable(viscosity) else viscosities(viscosity)
         self._applied_to = None

@@ -44,7 +44,7 @@ class Tip:
         others: its images, by symmetry. Where they overlap, what moves the fluid is shared out among them.
 
     Raises:
-        ValueError: if a number is not finite, or beyond all measure, or the radius is not positive, or with more than
+        ValueError: if a number is not finite, or too large, or the radius is not positive, or with more than
             16 paths.
         TypeError: if one of the others is no `Path`, or what must be a number is none.
     """

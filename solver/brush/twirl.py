@@ -14,7 +14,7 @@ class Twirl:
     """Turn the fluid under the tip at `rate` rad/s, positive clockwise.
 
     Raises:
-        ValueError: if the rate is not finite, or beyond all measure.
+        ValueError: if the rate is not finite, or too large.
     """
 
     tip: Tip

@@ -42,7 +42,10 @@ class Reduction:
             self._shrink(level, field=field, side=SIDE)
             field = level
         values = field.get().reshape(-1, field.components)
-        return values.max(axis=0).astype(np.float64) if self._kind == "max" else values.sum(axis=0, dtype=np.float64)
+        if self._kind == "max":
+            return values.max(axis=0).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # the caller checks whether the sum is finite
+            return values.sum(axis=0, dtype=np.float64)
 
     def release(self) -> None:
         """Free the textures."""

@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from solver.gl.field import DoubleField, Field
     from solver.pressure.cycle import Cycle
 
-# A bound, for no endless run: of some thousand random masks none has needed more than 11.
+# Only so that it ends: of some thousand random masks of square cells none has needed more than 11.
 MOST_ITERATIONS = 40
 
-# Times the smallest residual, in squares, that the next may be. Among many enclosed regions what is rounded off to
-# float32 does not sum to zero in each; no pressure accounts for it, and once it is all that is left the residual grows
-# without end (Kaasschieter, J. Comput. Appl. Math. 24, 1988). In a solve that goes well its norm may grow tenfold.
+# How many times the smallest |r|^2 so far the next may be. Rounding errors of float32 do not sum to zero in each of
+# many enclosed regions. No pressure accounts for them, and once they are all that is left the residual grows without
+# end (Kaasschieter, J. Comput. Appl. Math. 24, 1988). In a solve that goes well |r| may grow tenfold.
 GROWTH = 100.0
 
 
@@ -36,7 +36,7 @@ class ConjugateGradients:
             device.double_field(blocks, 4, f"pressure {name}") for name in ("change", "search direction")
         )
         self._applied = device.field(blocks, 4, "pressure applied")
-        # What is summed over the grid, block by block, and read back at once.
+        # Terms of the dot products, summed over the grid and read back together.
         self.products = device.field(blocks, 4, "pressure products")
         self.add_up = Reduction(device, blocks, 4, "sum")
 
@@ -59,8 +59,8 @@ class ConjugateGradients:
         Args:
             cycle: the preconditioner.
             residual: r at blocks.
-            squares: the sum of its squares.
-            wanted: the sum of squares at which it ends.
+            squares: |r|^2.
+            wanted: |r|^2 at which it ends.
             sweeps: of the smoother before and after each correction.
             iterations: at most; by default `MOST_ITERATIONS`.
 
@@ -87,7 +87,7 @@ class ConjugateGradients:
                 targets = *targets, direction
             cycle.finest.draw("apply_operator", targets, first, z=z, residual=residual.read, **before)
             rz, curvature, rq, qq = self.add_up(self.products).tolist()
-            if curvature == 0.0:
+            if not (rz and curvature):  # too small for float32
                 break
             alpha = rz / curvature
             squares = max(squares - 2.0 * alpha * rq + alpha**2 * qq, 0.0)

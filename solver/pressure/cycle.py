@@ -15,17 +15,18 @@ if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.gl.field import Field
 
-# A graph of no more unknowns than this is solved by a dense matrix: with it preparing walls at 192 x 144 takes 11 ms of
-# processor time, with 256 it took 76.
+# A graph of at most so many unknowns is solved by a dense matrix. Preparing walls at 192 x 144 so takes 11 ms of
+# processor time; with 256 unknowns it took 76.
 DIRECT = 128
 
 
 class Cycle:
     """Levels from the finest to one that is solved directly.
 
-    An unknown of a level stands for a block of 2 x 2 cells of the finer one, or among solids for each connected piece
-    of it, so that no wall is leaked through. Interpolation is constant, restriction its transpose, and the smoothing
-    after the correction is that before it backwards: so the cycle is symmetric, as conjugate gradients ask.
+    An unknown of a level stands for a block of 2 x 2 cells of the finer one, or among solids for one connected piece of
+    a block, so that no pressure leaks through a wall. Interpolation is constant, restriction its transpose, and the
+    smoothing after the correction is that before it in reverse order: so the cycle is symmetric, which conjugate
+    gradients need.
 
     Args:
         device: the device.
@@ -36,8 +37,8 @@ class Cycle:
 
     def __init__(self, device: Device, size: tuple[int, int], aspect: float, solid: np.ndarray | None) -> None:
         self.levels: list[GridLevel | GraphLevel] = []
-        # The part of a warm start's residual that a cycle of one sweep leaves, rounded up from one flow each: .095 in a
-        # box, .14 or more round two discs.
+        # The fraction of a warm start's residual that a cycle of one sweep leaves, rounded up from one flow each: .095
+        # in a box, .14 or more around two discs.
         self.light_leaves = 0.1 if solid is None else 0.2
         self._direct = (
             self._coarsen_box(device, size, aspect) if solid is None else self._coarsen_around(device, solid, aspect)
@@ -50,7 +51,7 @@ class Cycle:
         return level
 
     def solve(self, residual: Field, sweeps: int) -> Field:
-        """One cycle from zero: the pressure, at blocks, that roughly accounts for the `residual`."""
+        """One cycle from zero: about A^-1 r, at blocks, for the `residual` r."""
         self._visit(0, residual, sweeps, from_zero=True)
         return self.levels[0].pressure.read
 
@@ -69,8 +70,8 @@ class Cycle:
             level.smooth(residual, from_zero=from_zero and sweep == 0)
         level.restrict(residual, coarse)
         self._visit(number + 1, coarse.residual, sweeps, from_zero=True)
-        # Among thin walls one visit leaves too much to smooth. A second one of the last level would find nothing, and
-        # of the first coarse one it would cost as much as another cycle.
+        # Among thin walls one visit leaves too much to smooth. A second visit of the last level would change nothing,
+        # and of the first coarse one it would cost as much as another cycle.
         if isinstance(coarse, GraphLevel) and 0 < number < len(self.levels) - 2:
             self._visit(number + 1, coarse.residual, sweeps, from_zero=False)
         level.prolong(coarse)
@@ -90,7 +91,7 @@ class Cycle:
     def _coarsen_around(self, device: Device, solid: np.ndarray, aspect: float) -> DirectSolve:
         left, up = links_of(solid)
         self.levels.append(GridLevel(device, solid.shape[::-1], aspect, 0, (left, up)))
-        # As long as no block falls apart the coarser level is a grid as well, which costs less than a graph.
+        # As long as every block is one piece the coarser level is a grid as well, which costs less than a graph.
         while left.size > 4 * DIRECT and has_one_piece_a_block(left, up):
             left, up = coarsen_links(left, up)
             self.levels.append(GridLevel(device, left.shape[::-1], aspect, len(self.levels), (left, up)))

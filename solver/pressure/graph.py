@@ -1,4 +1,4 @@
-"""The coarse unknowns among solids, in NumPy: what is connected within blocks of 2 x 2, and the links between."""
+"""The coarse unknowns among solids, in NumPy: connected pieces of blocks of 2 x 2 cells, and the links between them."""
 
 from __future__ import annotations
 

@@ -57,7 +57,9 @@ class GridLevel:
             textures = {"left": packed(left), "up": packed(up), "far": far, "inverse": packed(inverse)}
             for name, texels in textures.items():
                 texels = texels[: self.size[1], : self.size[0]]
-                self._textures[name] = device.upload(texels, f"{label} {name}", "f2")
+                # One over the links of a cell far longer than wide may be more than 16 bits hold.
+                dtype = "f2" if texels.max(initial=0.0) <= np.finfo(np.float16).max else "f4"
+                self._textures[name] = device.upload(texels, f"{label} {name}", dtype)
             self.inputs |= self._textures
 
     def draw(self, shader: str, target: Target, defines: dict[str, Any] | None = None, **inputs: Any) -> None:
@@ -76,7 +78,7 @@ class GridLevel:
             self.pressure.swap()
 
     def restrict(self, residual: Field, coarse: GridLevel | GraphLevel) -> None:
-        """What is left of the residual becomes the coarser level's."""
+        """r - A p becomes the residual of the coarser level."""
         defines, inputs = ({"GRAPH": 1}, {"cells": coarse.children}) if isinstance(coarse, GraphLevel) else ({}, {})
         self.draw("restrict", coarse.residual, defines, pressure=self.pressure.read, residual=residual, **inputs)
 
@@ -146,7 +148,7 @@ class GraphLevel:
         self.pressure.swap()
 
     def restrict(self, residual: Field, coarse: GridLevel | GraphLevel) -> None:
-        """What is left of the residual becomes the coarser level's."""
+        """r - A p becomes the residual of the coarser level."""
         assert isinstance(coarse, GraphLevel)
         self.device.pass_("pressure/restrict_graph.frag")(
             coarse.residual, pressure=self.pressure.read, residual=residual, rows=self._rows, links=self._links,
@@ -182,7 +184,7 @@ class DirectSolve:
         self._inverse = device.upload(inverse.reshape(len(inverse), -1, 4), "pressure inverse")
 
     def solve(self, residual: Field, pressure: Field) -> None:
-        """The `pressure` that accounts for all of `residual`."""
+        """Solve A `pressure` = `residual`."""
         direct_solve = self.device.pass_("pressure/direct_solve.frag")
         direct_solve(pressure, residual=residual, inverse=self._inverse, count=self._count)
 

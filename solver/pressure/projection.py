@@ -18,21 +18,21 @@ if TYPE_CHECKING:
     from solver.gl.device import Device
     from solver.packing import PackedFaces
 
-# The part of the divergence that a projection may leave: the target set for it, not derived.
+# The fraction of the divergence that a projection may leave: a target, not derived.
 WANTED_LEFT = 1e-3
 
-# Of the squares of the velocities and sources that a right-hand side is made of, the part that its own may be by their
-# rounding to float32, half its epsilon each: a cell sums up five of them, and a velocity counts in two cells. What is
-# rounded off does not sum to zero in each region, so no pressure accounts for it, and conjugate gradients that go on
-# below it diverge (Kaasschieter, J. Comput. Appl. Math. 24, 1988).
+# How large |r|^2 may be by rounding alone, as a fraction of the squares of the velocities and sources that r is made
+# of. Each is rounded to half an epsilon of float32, a cell sums up five of them, and a velocity counts in two cells.
+# Rounding errors do not sum to zero in each region, so no pressure accounts for them, and conjugate gradients that go
+# on below them diverge (Kaasschieter, J. Comput. Appl. Math. 24, 1988).
 ROUNDING = 2.5 * float(np.finfo(np.float32).eps) ** 2
 
 
 class Projection:
     """The projection u <- u - grad q with lap q = div u - s (P1 to P3), and no flow through edges and solid cells.
 
-    What is kept on the GPU is p, q over the side of a cell along x, in lengths / s. Conjugate gradients solve for what
-    the pressure differs from the one expected, the last two's trend: of a flow that changes little one iteration is
+    The GPU holds p, which is q over the side of a cell along x, in lengths / s. Conjugate gradients solve for the
+    difference to the expected pressure, extrapolated from the last two: in a flow that changes little one iteration is
     enough, and float32 sets no floor to the divergence.
 
     Args:
@@ -82,8 +82,8 @@ class Projection:
         self._prepare()
 
     def _prepare(self) -> None:
-        self._cycle.release()
-        self._cycle = Cycle(self.device, self.size, self._aspect, self._solid)
+        before, self._cycle = self._cycle, Cycle(self.device, self.size, self._aspect, self._solid)
+        before.release()
 
     def project(
         self,
@@ -101,9 +101,9 @@ class Projection:
             cycles: multigrid cycles, by default as many as leave a thousandth of the divergence.
             source: wanted divergence of a cell's open part, 1 / s; its mean over each connected region of the fluid is
                 taken off: nothing leaves one.
-            warm: start from the pressure that the last two let expect, unless that leaves more than half.
+            warm: start from the expected pressure, unless that leaves more than half of the divergence.
             carried: gradients at MAC faces, lengths / s, replaced by their mean with that of this pressure.
-            packed: the velocity to be made so, as the viscous solver packs it, instead of what `velocity` holds.
+            packed: the velocity to project, as the viscous solver packs it, instead of what `velocity` holds.
 
         Returns:
             The number of cycles.
@@ -139,7 +139,7 @@ class Projection:
         return self._last.read, self._expected.read
 
     def forget(self) -> None:
-        """Expect no pressure: the velocity is a new one."""
+        """Start from zero pressure next time: the velocity is a new one."""
         for field in self.state():
             field.clear()
 
@@ -147,7 +147,7 @@ class Projection:
     def pressure(self) -> np.ndarray:
         """The last q, (ny, nx) float32, lengths^2 / s: it includes the time step.
 
-        After a warm start what that step changed is a little smoother than what was subtracted; see `gradient.frag`.
+        After a warm start the change in that step is a little smoother than what was subtracted; see `gradient.frag`.
         """
         return unpacked(self._last.read.get())[: self.size[1], : self.size[0]] * np.float32(self.spacing[0])
 
@@ -170,8 +170,10 @@ class Projection:
         return self._source
 
     def _take_divergence(self, given: dict[str, Any], **less: Field) -> tuple[float, float, float]:
-        """The right-hand side less what is wanted and `expected`; the squares' sums without and with the latter, and
-        those of all that it is made of."""
+        """Draw the residual: the divergence less the source and A `expected`.
+
+        Returns the sums of squares: of the residual without `expected`, with it, and of all terms it is made of.
+        """
         defines = {name.upper(): 1 for name in less} | _packing(given)
         targets = self._residual.read, self._solver.products
         self._cycle.finest.draw("divergence", targets, defines, **given, **less)
@@ -181,7 +183,7 @@ class Projection:
     def _subtract_gradient(
         self, velocity: DoubleField, given: dict[str, Any], carried: DoubleField | None, trend: float
     ) -> None:
-        """Take the pressure's gradient from the velocity, and work out the pressure to expect next."""
+        """Subtract the pressure's gradient from the velocity, and extrapolate the pressure to expect next."""
         finest = self._cycle.finest
         finest.draw(
             "gradient", (self._across, self._down, self._last.write, self._expected.write),

@@ -40,7 +40,7 @@ class FastDiagonalization:
         self._half, self._modes = (device.field(size, 4, f"pressure {name}") for name in ("halfway", "modes"))
 
     def solve(self, residual: Field, pressure: Field) -> None:
-        """The `pressure` that accounts for all of `residual`, both at blocks."""
+        """Solve A `pressure` = `residual`, both at blocks."""
         across = self.device.pass_("pressure/transform.frag")
         down = self.device.pass_("pressure/transform.frag", DOWN=1)
         scaled = self.device.pass_("pressure/transform.frag", DOWN=1, SCALED=1)

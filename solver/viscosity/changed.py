@@ -1,4 +1,4 @@
-"""Where a mask has changed since it was last taken up, and how far that reaches on the coarser levels."""
+"""Where a mask has changed since it was last taken up, and which cells of coarser levels that changes."""
 
 from __future__ import annotations
 

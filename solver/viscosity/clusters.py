@@ -13,7 +13,7 @@ SMALL = 8
 
 
 class Block(NamedTuple):
-    """Unknowns that are eliminated together; `parent` is the block that is left to couple with them, -1 for none."""
+    """Unknowns that are eliminated together; `parent` is the later block that they are coupled with, -1 for none."""
 
     unknowns: np.ndarray
     parent: int
@@ -24,9 +24,9 @@ class Block(NamedTuple):
 class ClusterMatrix:
     """The sum of a matrix and its transpose, given by its entries, inverted once in float64 and then applied.
 
-    A small cluster is inverted as it is. The unknowns of the others are ordered by strips of the plane of which each
-    meets its neighbours only, and eliminated from one strip to the next: block Gaussian elimination. What no strip up
-    to the present one connects are blocks of their own, so that the arms of a coil stay apart.
+    A small cluster is inverted as it is. The unknowns of the others are ordered by strips of the plane, each coupled to
+    its neighbours only, and eliminated from one strip to the next: block Gaussian elimination. Unknowns of a strip that
+    no strip up to it connects are separate blocks, so that the arms of a coil stay apart.
 
     Args:
         cluster: number of the cluster of each unknown; entries between two clusters are left out.

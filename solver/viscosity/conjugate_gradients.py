@@ -11,8 +11,9 @@ from solver.gl.reduction import Reduction
 from solver.packing import DoublePackedFaces, PackedFaces
 from solver.viscosity.operator import Level
 
-# v* + d, d what the last step made of its own v*, is a guess good enough if the best one has less than this part of the
-# tolerated error less: the residual is at hand, and in a flow that goes on as it did it takes an eighth of a step less.
+# v* + d, d = v - v* of the last step, is taken as first guess if the best guess is better by no more than this fraction
+# of the tolerated error: its residual is known already, which saves an eighth of a step in a flow that goes on as it
+# did.
 NEAR = 0.5
 
 
@@ -54,12 +55,11 @@ class ConjugateGradients:
     ) -> PackedFaces:
         """The solution, from about the best first guess in the plane of `v_star` and the last step's `change`.
 
-        `change` becomes what this step has made of `v_star`. Ends when less than the part `tolerance`^2 is left, see
-        README.md, or after so many iterations at most. The energy left is the rest of the geometric series of what
-        iterations bring, and taken for no less than what the last has brought. `precondition(r)` returns about A^-1 r;
-        if it is known to leave no more than the part `cycle_leaves` of the energy of any error, the first may be the
-        last without A z and its products: what the guess v* + d lacks is r . A^-1 r, no more than r . r, as A is no
-        less than 1.
+        `change` becomes v - v* of this step. Ends when less than the fraction `tolerance`^2 is left, see README.md, or
+        after `most` iterations. The energy left is estimated as the rest of the geometric series of the iterations'
+        gains, but no less than the last gain. `precondition(r)` returns about A^-1 r. If it is known to leave at most
+        the fraction `cycle_leaves` of the energy of any error, the first iteration may be the last without A z and its
+        products: the error of the guess v* + d has the energy r . A^-1 r <= r . r, as A >= 1.
         """
         iterate: dict[str, Any] = {"parts": (1.0, 1.0), **v_star.inputs(), **change.read.inputs("change_")}
         self._guess(iterate, rhs)
@@ -91,14 +91,14 @@ class ConjugateGradients:
             left = max(gained, _series(gained, gained_before))
             size = found if cycle_leaves < inf else sqrt(max(found * xx, 0.0))
             if not alpha or self.iterations == most or left <= tolerance**2 * size:
-                # What has been spoiled may be no number.
+                # With alpha 0, z may hold NaN.
                 return self._finish(change, iterate, z if alpha else self._r.read, alpha)
             gained_before = gained
             self._update(iterate, z, alpha)
             iterate = {**v_star.inputs(), **self._x.read.inputs("x_"), **self._p.read.inputs("p_"), "beta": 0.0}
 
     def _guess(self, guess: dict[str, Any], rhs: PackedFaces) -> None:
-        """The residual of a v* + c d, (a, c) its `parts`, and the products that tell the best ones."""
+        """The residual of a v* + c d, (a, c) its `parts`, and the products that give the best ones."""
         x, y, width, height = self.level.region
         draw = self.device.pass_("viscosity/guess_residual.frag", **self.level.defines)
         targets = *self._r.read.fields, self._guess_products, self._more_products
@@ -123,7 +123,7 @@ class ConjugateGradients:
             pair.swap()
 
     def _finish(self, change: DoublePackedFaces, iterate: dict[str, Any], z: PackedFaces, alpha: float) -> PackedFaces:
-        """x + alpha p, and what that has made of v* as the `change`."""
+        """x + alpha p, and its difference to v* as the `change`."""
         finish = self.device.pass_("viscosity/finish.frag", **_first(iterate))
         targets = (*self._x.write.fields, *change.write.fields)
         finish(targets, region=self.level.region, alpha=alpha, **iterate, **z.inputs("z_"))
@@ -139,8 +139,8 @@ class ConjugateGradients:
 
 
 def least_energy(bv: float, bd: float, vav: float, vad: float, dad: float) -> tuple[float, float]:
-    """(a, c) of the x = a v* + c d of least energy, of products of v*, d and b; zeros where rounding has spoiled it."""
-    # Along v*; then along what of d is conjugate to v*, unless rounding has spoiled it or nothing is left.
+    """(a, c) of the x = a v* + c d of least energy, from products of v*, d and b; zeros if they are not finite."""
+    # Along v*; then along the part of d that is conjugate to v*, unless that is lost in rounding.
     a = bv / vav if vav > 0.0 else 0.0
     conjugate = vad / vav if vav > 0.0 else 0.0
     left = dad - conjugate * vad
@@ -150,17 +150,17 @@ def least_energy(bv: float, bd: float, vav: float, vad: float, dad: float) -> tu
 
 
 def _series(last: float, before: float) -> float:
-    """The rest of the geometric series that two terms belong to."""
+    """The rest of the geometric series with these two terms."""
     return last**2 / (before - last) if before > last else inf
 
 
 def _first(iterate: dict[str, Any]) -> dict[str, Any]:
-    """The variant of a pass on an iterate of which there is only the guess, and no search direction."""
+    """The variant of a pass for the first iteration: the iterate is the guess, and there is no search direction."""
     return {"FIRST": 1} if "parts" in iterate else {}
 
 
 def cg_coefficients(rz: float, z_az: float, z_ap: float, p_ap: float) -> tuple[float, float, float]:
-    """(alpha, beta, p . A p) of the next direction p = z + beta p_before; alpha 0 where rounding has spoiled it."""
+    """(alpha, beta, p . A p) of the next direction p = z + beta p_before; alpha is 0 if rounding leaves none."""
     beta = -z_ap / p_ap if p_ap > 0.0 else 0.0
     curvature = z_az + beta * z_ap
     if not (isfinite(curvature) and isfinite(rz)) or curvature <= 1e-6 * z_az:

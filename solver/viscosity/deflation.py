@@ -1,10 +1,10 @@
-"""Deflation: what moves at little energy in very viscous fluid, solved for directly as a coarse space.
+"""Deflation: the motions of very viscous parts that cost little energy, as a coarse space that is solved directly.
 
 With harmonic means at the nodes a stiff cell forces no more than u to be constant along its row and v along its column,
-and a node is stiff only where all its four cells are. So the motions without strain are spanned by *runs* (u along
-stiff cells of a row, v along those of a column) and, where it is at least five cells broad, by the rigid motions of
-*cores*. Both end at the tiles' edges, so that long things bend. Coarse correction (V5): f += Z E^-1 Z' r, E = Z' A Z,
-of which only couplings within a cluster are kept, that is of parts which something stiff connects.
+and a node is stiff only if all its four cells are. So the motions without strain are spanned by *runs* (u along stiff
+cells of a row, v along those of a column) and, where parts are at least five cells broad, by the rigid motions of
+*cores*. Both end at the tiles' edges, so that long parts bend. Coarse correction (V5): f += Z E^-1 Z' r, E = Z' A Z, of
+which only couplings within a cluster are kept: of parts that stiff strains connect.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class CoarseSpace:
     """The parts' motions as unknowns: three of a core (across, down, turn), one of a run.
 
     Args:
-        parts: whose.
-        level: K around them, of the same cells.
+        parts: the cores and runs.
+        level: K in the same cells.
         threshold: kappa above which strains connect parts.
         first: (column, row) of the first of these cells.
     """
@@ -147,13 +147,13 @@ class CoarseSpace:
         return self._matrix.solve(loads)
 
     def coupled(self, unknowns: np.ndarray) -> np.ndarray:
-        """The loads (n,) that unknowns (n,) put on other clusters: what E leaves out of Z' A Z."""
+        """The loads (n,) that unknowns (n,) put on other clusters: the part of Z' A Z that E leaves out."""
         rows, columns, values = self._between
         ends, loads = (rows, columns), (values * unknowns[columns], values * unknowns[rows])
         return np.bincount(np.concatenate(ends), np.concatenate(loads), len(unknowns))
 
     def means(self, loads: np.ndarray) -> np.ndarray:
-        """(Z' Z)^-1 times the loads on the unknowns, (n,): how the parts move in the mean."""
+        """(Z' Z)^-1 times the loads on the unknowns, (n,): the mean motion of the parts."""
         return loads / np.maximum(self._masses, 1e-12)
 
     def motions(self, unknowns: np.ndarray) -> np.ndarray:
@@ -190,12 +190,12 @@ class Deflation:
         self._space: CoarseSpace | None = None
 
     def set_stiff(self, stiff: np.ndarray | None, threshold: float = 0.0) -> None:
-        """Take up which cells are stiff, (ny, nx), None if none are: those with kappa above a `threshold`."""
+        """Take up the stiff cells, (ny, nx), those with kappa above a `threshold`; None if there are none."""
         self._stiff, self._threshold, self._space = stiff, threshold, None
 
     @property
     def space(self) -> CoarseSpace | None:
-        """The coarse space, None if there are no parts; made when it is first asked for: fluid at rest needs none."""
+        """The coarse space, None if there are no parts; made at the first use, as fluid at rest needs none."""
         if self._stiff is not None:
             box, self._stiff, stiff = changed(np.zeros_like(self._stiff), self._stiff), None, self._stiff
             if box:
@@ -233,7 +233,7 @@ class Deflation:
     ) -> np.ndarray:
         """Draw Z E^-1 Z' times the residual (V5), or add it; returns the unknowns, (n,). Waits for the GPU.
 
-        `means`: where the parts of other clusters are expected; at rest by default.
+        `means`: the expected motion of the parts of other clusters; at rest by default.
         """
         space, loads = self._made(), self._gather(residual)
         unknowns = space.solve(loads if means is None else loads - space.coupled(means))

@@ -18,23 +18,23 @@ from solver.viscosity.operator import Coefficients, Level, inverse_matrix
 from solver.viscosity.plan import Plan, sweeps_alone
 from solver.viscosity.transform import SineCosineTransform
 
-# Largest eigenvalue of D^-1 A that the smoother reckons with: on the finest level 2.8 was the largest found over random
-# masks at any contrast; the Galerkin levels have 3 to 4, and rarely 5 where one sweep then does nothing.
+# Largest eigenvalue of D^-1 A that the smoother assumes: on the finest level 2.8 was the largest found over random
+# masks at any contrast; the Galerkin levels have 3 to 4, and rarely 5, where one sweep does not damp it.
 LARGEST_EIGENVALUE = 2.8, 4.0
-# The smoothed part of the spectrum, up from the largest eigenvalue over this; by the number of sweeps.
+# The smoother damps eigenvalues from the largest over this up; by the number of sweeps.
 SMOOTHED = {1: 3.8, 2: 5.0}
 
-# Of one viscosity, a level that so many sweeps solve but for a tenth, an order less than what the cycle leaves, is
-# smoothed alone: with two sweeps, transfers and coarser levels it costs as much.
+# With one viscosity, if so many sweeps leave at most a tenth of the error on a coarse level, an order less than the
+# cycle does, no coarser level is used: two sweeps, transfers and coarser levels cost as much.
 MOST_ALONE = 4
 ALONE_LEAVES = 0.1
 
-# kappa that no cell has: the coarse levels count it all.
+# A kappa that no cell reaches: the coarse levels cut nothing off.
 UNBOUNDED = 1e30
 
 
 def chebyshev_weights(least: float, largest: float, count: int) -> list[float]:
-    """Weights of damped Jacobi sweeps that together damp eigenvalues of D^-1 A between the two most."""
+    """Weights of damped Jacobi sweeps that together damp eigenvalues of D^-1 A between the two best."""
     middle, half = 0.5 * (largest + least), 0.5 * (largest - least)
     return [1.0 / (middle + half * math.cos(math.pi * (2 * q + 1) / (2 * count))) for q in range(count)]
 
@@ -43,8 +43,8 @@ class TakenUp(NamedTuple):
     """What the coefficients in the textures were made from.
 
     Attributes:
-        basis: (time step, where the fluid sticks, how many levels, largest kappa that the coarse ones count): with
-            others nothing can be kept.
+        basis: (time step, where the fluid sticks, how many levels, kappa at which the coarse ones cut off): if these
+            change, nothing can be kept.
         viscosity, solid: of the cells.
     """
 
@@ -56,8 +56,8 @@ class TakenUp(NamedTuple):
 class Multigrid:
     """The levels, and cycles on them.
 
-    One viscosity without solids needs no coefficients in textures: they follow from the place. Any other has Galerkin
-    coarse operators.
+    One viscosity without solids needs no coefficients in textures: they follow from the place. Otherwise the coarse
+    operators are Galerkin products.
 
     Args:
         device: where it lives.
@@ -94,7 +94,7 @@ class Multigrid:
             level.shear = math.sqrt(hx / hy), math.sqrt(hy / hx)
 
     def set_uniform(self, viscosity: float, dt: float, no_slip: NoSlip, plan: Plan) -> None:
-        """Take up one viscosity, lengths^2 / s, in a box without solids, and what of the `plan` is said of cycles."""
+        """Take up one viscosity, lengths^2 / s, in a box without solids, and the `plan` for cycles."""
         self._taken_up, self._sweeps = None, plan.sweeps
         self._largest = viscosity * self._scale(dt)
         for level in self.levels:
@@ -119,11 +119,10 @@ class Multigrid:
         no_slip: NoSlip,
         plan: Plan,
     ) -> None:
-        """Take up the `viscosity` of the cells, lengths^2 / s, and the `solid` ones, also as arrays (ny, nx), and what
-        of the `plan` is said of cycles.
+        """Take up the `viscosity` of the cells, lengths^2 / s, the `solid` cells, and the `plan` for cycles.
 
-        What is made again is what has changed: a dab of a brush changes few cells. Where the field holds more than the
-        largest `amount`, it counts as that.
+        `amount` and `is_solid` are the same as arrays (ny, nx). Only what has changed is drawn again: a dab of a brush
+        changes few cells. Where the field holds more than the largest `amount`, it counts as that.
         """
         self.has_transform, self._alone = False, None
         self._sweeps, self._is_full = plan.sweeps, plan.full
@@ -169,7 +168,7 @@ class Multigrid:
     # -- cycles -----------------------------------------------------------------------------------------------------
 
     def precondition(self, rhs: PackedFaces, start: bool, rigid: Deflation | None = None) -> PackedFaces:
-        """About A^-1 rhs, by one cycle from rest, or from what the finest level's iterate holds if it is to `start`.
+        """About A^-1 rhs, by one cycle from zero, or with `start` from what the finest level's iterate holds.
 
         With `rigid` parts: see `_coarse_correction`.
         """
@@ -182,9 +181,9 @@ class Multigrid:
     def cycle(
         self, level: Level, rhs: PackedFaces, begun: int, rigid: Deflation | None = None, is_full: bool = False
     ) -> None:
-        """One V-cycle for A faces = rhs, from the level's iterate, on which so many sweeps have `begun`; or an F-cycle.
+        """One V-cycle for A faces = rhs, from the level's iterate, of which `begun` sweeps are made; or an F-cycle.
 
-        That solves for the coarse correction by an F-cycle and then a V-cycle.
+        An F-cycle solves for the coarse correction by an F-cycle and then a V-cycle.
         """
         if level is self.direct_level:
             self.direct_solve(rhs)
@@ -195,7 +194,7 @@ class Multigrid:
         self.smooth(level, rhs, weights[::-1])
 
     def sawtooth(self, level: Level, rhs: PackedFaces) -> None:
-        """A cycle from rest that smooths only after the coarse correction, for one viscosity.
+        """A cycle from zero that smooths only after the coarse correction, for one viscosity.
 
         It leaves a fifth more than one that also smooths before (.63 of the error in the median of random grids and
         viscosities, where that leaves .53), and costs half.
@@ -242,7 +241,7 @@ class Multigrid:
     # -- its parts --------------------------------------------------------------------------------------------------
 
     def smooth_alone(self, rhs: PackedFaces, start: PackedFaces, sweeps: int) -> None:
-        """So many sweeps on the finest level, after which no coarser one takes over."""
+        """Sweeps on the finest level without coarser ones."""
         self.smooth(self.finest, rhs, self._weights_alone(self.finest, sweeps), start)
 
     def _weights_alone(self, level: Level, sweeps: int) -> list[float]:
@@ -283,7 +282,7 @@ class Multigrid:
         residual(target.fields, region=level.region, **faces.inputs(), **rhs.inputs("rhs_"), **level.operator)
 
     def direct_solve(self, rhs: PackedFaces) -> None:
-        """The solution on the level where it is at hand."""
+        """Solve on `direct_level`."""
         level = self.direct_level
         if self.has_transform:
             stiffness, (s_y, s_x) = math.sqrt(level.operator["stiffness"]), level.operator["shear"]
@@ -301,7 +300,7 @@ class Multigrid:
             stress(level.stress, region=(x, y, width + 1, height + 1), **faces.inputs(), **level.stencil)
 
     def _begin(self, level: Level, rhs: PackedFaces) -> int:
-        """The first sweep from rest, where there is one; how many were made."""
+        """Make the first sweep from zero, unless the level is solved directly; returns the number of sweeps made."""
         if level is self.direct_level:
             return 0
         start = self.device.pass_("viscosity/start.frag", **level.defines)
@@ -311,7 +310,7 @@ class Multigrid:
         return 1
 
     def _restrict(self, residual: PackedFaces, coarser: Level, start: bool) -> int:
-        """The residual as rhs of the coarser level, to `start` with a first sweep on it if it has any; how many."""
+        """Draw the residual as rhs of the coarser level, with `start` the first sweep too; returns the sweeps made."""
         start = start and coarser is not self.direct_level
         restrict = self.device.pass_("viscosity/restrict.frag", **({"START": 1} if start else {}), **coarser.defines)
         inputs = {"weight": self._weights(coarser)[0], **coarser.operator} if start else coarser.bounds

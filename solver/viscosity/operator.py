@@ -20,8 +20,8 @@ from solver.packing import DoublePackedFaces, PackedFaces, packed, unpacked
 from solver.params import NoSlip
 from solver.viscosity.changed import Box
 
-# Texels (of 2 x 2 cells) of the coarsest level, whose inverse matrix is at hand: 64 unknowns. BLAS inverts 128 in
-# threads, which wait longer than they work.
+# Texels (of 2 x 2 cells) of the coarsest level, which has a dense inverse: 64 unknowns. BLAS inverts 128 in threads,
+# which wait longer than they work.
 COARSEST = 8
 # Couplings of a strain with the next ones, (rows, columns) further; those backwards follow by symmetry.
 ROW_STENCIL = (0, 0), (1, 0), (2, 0)
@@ -36,7 +36,7 @@ Stencil = dict[tuple[int, int], np.ndarray]
 
 @dataclass(frozen=True)
 class Coefficients:
-    """One level's K, cell by cell; `rows x columns` are even, cells beyond the grid hold no fluid.
+    """K of one level; `rows x columns` are even, cells beyond the grid hold no fluid.
 
     Attributes:
         xx: couplings of e_xx by `ROW_STENCIL`, each (rows, columns); on the finest level the first only.

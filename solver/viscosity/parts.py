@@ -41,17 +41,17 @@ def find_parts(stiff: np.ndarray, stiffness: np.ndarray, open_u: np.ndarray, ope
     Where these are a part of the grid, no cell on its edge is stiff but at a wall.
     """
     inside = _opened(stiff)
-    core = _numbered(inside, stiffness, side)
+    core, hinges = _numbered(inside, stiffness, side)
     cores = int(core.max(initial=0))
-    # What is few, the parts' faces, is worked on in lists: a mask of bytes costs little, an array of numbers much.
+    # Faces of parts are few, so they are processed as lists: masks of bytes are cheap, whole arrays of numbers are not.
     # The first column of u and the first row of v are walls, so that a cell lies behind each open face.
     touch_u = open_u & (inside | framed(inside, (0, 0), (1, 0))[:, :-1])
     touch_v = open_v & (inside | framed(inside, (1, 0), (0, 0))[:-1])
     of_u, of_v = np.zeros(stiff.shape, np.int32), np.zeros(stiff.shape, np.int32)
-    amount = np.where(inside, stiffness, 0.0).ravel()
+    amount = np.where(inside & ~hinges, stiffness, 0.0).ravel()
     for of_face, touch, back in ((of_u, touch_u, 1), (of_v, touch_v, stiff.shape[1])):
         at = np.flatnonzero(touch)
-        # Of two cores the stiffer one's; of two as stiff, as at the edges of tiles, the last one's.
+        # The stiffer core's; of a hinge and a core the core's; of two as stiff, as at tiles' edges, the last one's.
         here, there = ((amount[cells], core.ravel()[cells]) for cells in (at, at - back))
         is_here = (here[0] > there[0]) | ((here[0] == there[0]) & (here[1] > there[1]))
         of_face.ravel()[at] = np.where(is_here, here[1], there[1])
@@ -79,27 +79,35 @@ def _opened(stiff: np.ndarray) -> np.ndarray:
     return whole
 
 
-def _numbered(inside: np.ndarray, stiffness: np.ndarray, side: int) -> np.ndarray:
-    """The pieces of a mask within tiles, numbered from 1 on, 0 outside.
+def _numbered(inside: np.ndarray, stiffness: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pieces of a mask within tiles, numbered from 1 on, 0 outside; and which of its cells are hinges.
 
     Two cells side by side belong together if neither is much softer, and a node that both touch has all four cells
-    inside; else they are a hinge.
+    inside: only nodes resist a turn. A cell that only two opposite ones of its nodes could join to anything is a hinge:
+    what they join turns about it. It belongs to what lies above.
     """
     count = int(np.count_nonzero(inside))
     number: np.ndarray = np.zeros(inside.shape, int)
     number[inside] = np.arange(count)
     around = framed(inside, (1, 1), (1, 1))
     whole = around[1:, 1:] & around[:-1, 1:] & around[1:, :-1] & around[:-1, :-1]
+    above, below = (whole[:-1, :-1], whole[:-1, 1:]), (whole[1:, :-1], whole[1:, 1:])
+    hinges = (above[0] != above[1]) & (above[0] == below[1]) & (above[1] == below[0])
+    # By the nodes above and below the face between two cells of a row; left and right of that between two of a column.
+    joined = (
+        whole[:-1, 1:-1] | (whole[1:, 1:-1] & ~hinges[:, :-1] & ~hinges[:, 1:]),
+        (whole[1:-1, :-1] | whole[1:-1, 1:]) & ~hinges[:-1],
+    )
     links = []
-    for turned, nodes, amount in ((number, whole, stiffness), (number.T, whole.T, stiffness.T)):
-        together = (nodes[:-1, 1:-1] | nodes[1:, 1:-1]) & (np.arange(1, turned.shape[1]) % side != 0)
+    for turned, nodes, amount in ((number, joined[0], stiffness), (number.T, joined[1].T, stiffness.T)):
+        together = nodes & (np.arange(1, turned.shape[1]) % side != 0)
         ends = amount[:, :-1][together], amount[:, 1:][together]
         alike = np.maximum(*ends) <= EDGE * np.minimum(*ends)
         links.append((turned[:, :-1][together][alike], turned[:, 1:][together][alike]))
     one, other = (np.concatenate(ends) for ends in zip(*links, strict=True))
     root = connected_components(np.arange(count), one, other)
     number[inside] = np.cumsum(root == np.arange(count))[root]
-    return number
+    return number, hinges
 
 
 def _runs(free: np.ndarray, stiffness: np.ndarray, faces: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:

@@ -15,13 +15,13 @@ from solver.viscosity.deflation import Deflation
 from solver.viscosity.multigrid import Multigrid
 from solver.viscosity.plan import Plan, is_sharp, plan_for
 
-# Largest dt mu / h^2 that is reckoned with. With more, a float64 loses the mass of a stiff part beside its strains, and
-# a float32 does not tell the flows apart.
+# Larger dt mu / h^2 count as this. With more, a float64 loses the mass of a stiff part next to its stiffness, and in
+# float32 the flows are the same.
 MOST = 1e12
 
 
 class Viscosity:
-    """Solves the viscous step in conservative stress form, by what the `plan` says for the viscosity at hand.
+    """Solves the viscous step in conservative stress form, by the method that `plan` chooses for the viscosity.
 
     Args:
         device: where it lives.
@@ -43,12 +43,12 @@ class Viscosity:
         self.conjugate_gradients = ConjugateGradients(device, finest)
         self.deflation = Deflation(device, finest)
         ringed = finest.rhs.u.size
-        # What the last step made of v*, v - v*: a flow changes little from step to step, and so does this.
+        # v - v* of the last step: a flow changes little from step to step, and so does this.
         self._change = DoublePackedFaces(device, ringed, "viscous change")
         self._dragged = PackedFaces(device, ringed, "viscous right-hand side between moving walls")
 
     def set_spacing(self, spacing: tuple[float, float]) -> None:
-        """Let the cells have other sides; the coefficients are to be set anew."""
+        """Change the sides of the cells; the coefficients have to be set again."""
         self.spacing = spacing
         self.multigrid.set_spacing(spacing)
 
@@ -57,9 +57,8 @@ class Viscosity:
         self._wall_speed = walls.driving_speed
         hx, hy = self.spacing
         kappa = dt / (hx * hy)
-        is_solid, amount = solid.get() == 255, viscosity.get()
-        if kappa * float(amount.max()) > MOST:
-            amount = np.minimum(amount, np.float32(MOST / kappa))
+        is_solid = solid.get() == 255
+        amount = np.clip(viscosity.get(), 0.0, MOST / max(kappa, 1e-25))
         fluid = amount[~is_solid] if is_solid.any() else amount
         least, largest = (float(fluid.min()), float(fluid.max())) if fluid.size else (0.0, 0.0)
         is_one, cells = least == largest and not is_solid.any(), self.size[0] * self.size[1]
@@ -76,7 +75,7 @@ class Viscosity:
 
     @property
     def v_star(self) -> PackedFaces:
-        """v*, packed, which is to be drawn here before `solve`: see `packing`."""
+        """v*, packed; to be drawn here before `solve`, see `packing`."""
         return self.multigrid.finest.rhs
 
     @property
@@ -123,7 +122,7 @@ class Viscosity:
         pack(target.fields, region=packing.region, velocity=velocity, **packing.open)
 
     def _right_hand_side(self) -> PackedFaces:
-        """v*, and what walls that move drag along."""
+        """v*, plus the drag of moving walls."""
         if not any(self._wall_speed):
             return self.v_star
         finest, rhs = self.multigrid.finest, self._dragged
@@ -137,12 +136,12 @@ class Viscosity:
         return self._change.read.fields
 
     def forget(self) -> None:
-        """Expect no change: the velocity is a new one."""
+        """Start from v* next time: the velocity is a new one."""
         for field in self.state():
             field.clear()
 
     def residual_norm(self, solution: PackedFaces) -> float:
-        """|v* - A v| / |v*| of what `solve` gave, or of any other packed faces; waits for the GPU."""
+        """|b - A v| / |b| of what `solve` gave, or of any other packed faces; waits for the GPU."""
         finest, rhs = self.multigrid.finest, self._right_hand_side()
         left = finest.faces.write
         self.multigrid.residual(finest, solution, rhs, left)

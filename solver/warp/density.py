@@ -24,7 +24,7 @@ class Density:
         source: what is added, per second, shaped as `values`.
 
     Raises:
-        ValueError: for values of another shape, not finite or beyond all measure, or such a kappa, or a negative one.
+        ValueError: for values of another shape, not finite or too large, or such a kappa, or a negative one.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Density:
         """Start again from values shaped as the first.
 
         Raises:
-            ValueError: on another shape, or a value that is not finite or beyond all measure.
+            ValueError: on another shape, or a value that is not finite or too large.
         """
         self._values.read.set(self._padded("a density", values))
 

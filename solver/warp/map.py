@@ -151,16 +151,19 @@ class WarpMap:
             time: where it begins, for the function.
 
         Raises:
-            ValueError: on an array of another shape, a value that is not finite, or a step or a time that is none.
+            ValueError: on an array of another shape, a value that is not finite or too large, or a step or a
+                time that is none.
         """
         dt = check_step(dt)
         check_finite("a time", time)
         if callable(velocity):
-            self._accumulated.is_walled = False  # it may cross the edges
             self._submap.trace.set(traced(velocity, self.grid, dt, time))
+            self._accumulated.is_walled = False  # it may cross the edges
             self.advance_traced(self._submap.trace)
         else:
-            field = self.device.upload(on_faces("a velocity", velocity, self.grid), "prescribed velocity")
+            faces = on_faces("a velocity", velocity, self.grid)
+            check_size("a velocity", faces)
+            field = self.device.upload(faces, "prescribed velocity")
             self.advance(field, dt)
             field.release()
 
@@ -220,7 +223,7 @@ class WarpMap:
             amount: 0-1, the part of the displacement that is taken away at the centre.
 
         Raises:
-            ValueError: if a number is not finite or beyond all measure.
+            ValueError: if a number is not finite or too large.
         """
         numbers("a brush's centre", center, 2)
         numbers("a brush", (radius, hardness, amount), 3)
@@ -272,7 +275,7 @@ class WarpMap:
 
         Raises:
             ValueError: on another shape, also one that is upright for a picture that is not, or a value that is not
-                finite or beyond all measure.
+                finite or too large.
         """
         displacement = real_array("a map", displacement)
         if displacement.ndim != 3 or displacement.shape[2] != 2 or min(displacement.shape[:2]) < 6:

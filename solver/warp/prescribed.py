@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
 from solver.faces import Function, components
 from solver.grid import Grid
+from solver.limits import check_size
 from solver.warp.submap import window_of
 
 
@@ -18,10 +18,18 @@ def traced(velocity: Function, grid: Grid, dt: float, time: float) -> np.ndarray
     A fourth-order Runge-Kutta step; what would come from beyond the grid's edge comes from the edge.
 
     Raises:
-        ValueError: if the velocity has not two components, each finite and shaped as the places.
+        ValueError: if the velocity has not two components, each shaped as the places, or is not finite or beyond all
+            measure.
     """
+
+    def velocity_at(x: np.ndarray, y: np.ndarray, time: float) -> tuple[np.ndarray, ...]:
+        found = components("a velocity", velocity, x, y, time)
+        for component in found:
+            check_size("a velocity", component)
+        return found
+
     x, y = grid.centres()
-    back_x, back_y = _runge_kutta(partial(components, "a velocity", velocity), x, y, time + dt, -dt)
+    back_x, back_y = _runge_kutta(velocity_at, x, y, time + dt, -dt)
     left, top, width, height = window_of(grid)
     back = np.stack([np.clip(back_x, left, left + width) - x, np.clip(back_y, top, top + height) - y], axis=-1)
     return back / grid.spacing

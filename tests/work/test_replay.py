@@ -357,7 +357,7 @@ def test_strokes_that_are_too_much_together_are_refused_in_a_sentence(
     monkeypatch.setattr(energy, "LARGEST_SPEED", 1e-3)
     stroke = Stroke(tool="push", strength=100.0, samples=((0, 0.2, 0.5, 1.0), (1, 0.6, 0.5, 1.0)))
     replay = Replay(device, Recipe.parse("[fluid]\ngrid = 16").edited(stroke=(stroke, stroke)), pictures())
-    said = r"^At 0\S* s the forces and brushes of this step are beyond all measure; make their strength less"
+    said = r"^At 0\S* s the forces and brushes of this step are too large; make their strength less"
     with pytest.raises(UserError, match=said):
         replay.seek(3)
     replay.release()
