@@ -101,6 +101,23 @@ def intensity(picture: Picture) -> np.ndarray:
     return colours @ np.array([0.2126, 0.7152, 0.0722], np.float32) * alpha
 
 
+def alike(picture: Picture, colour: np.ndarray, tolerance: float) -> np.ndarray:
+    """Which pixels (h, w) are within `tolerance` of a colour (3,), as the distance in RGB, and not mostly transparent.
+
+    Of whole numbers the squares are looked up: there are fewer values than pixels.
+    """
+    if picture.linear:
+        colours, alpha = channels(picture)
+        return (np.linalg.norm(colours - colour, axis=-1) <= tolerance) & (alpha > 0.5)
+    pixels = picture.straight().pixels
+    most, last = np.iinfo(pixels.dtype).max, pixels.shape[2] - 1
+    values = np.arange(most + 1, dtype=np.float32) / most
+    colours = last if picture.has_alpha else last + 1  # 1 of a grey picture
+    squares = sum(((values - own) ** 2)[pixels[..., k % colours]] for k, own in enumerate(colour))
+    near = np.sqrt(squares) <= tolerance
+    return near & (values > 0.5)[pixels[..., last]] if picture.has_alpha else near
+
+
 def to_grid(values: np.ndarray, grid: Grid) -> np.ndarray:
     """Values of pixels (h, w) as averages over the cells (ny, nx), float32; the picture is fitted to the whole grid."""
     return _resized(_resized(values, grid.nx, 1), grid.ny, 0).astype(np.float32)
@@ -341,9 +358,8 @@ class Segment(Model):
         if self.mask is not None:
             return intensity(pictures.load(self.mask)) > 0.5
         if self.color is not None:
-            colours, alpha = channels(pictures.load(picture, self.frame))
             wanted = np.array([int(self.color[k : k + 2], 16) / 255 for k in (1, 3, 5)], np.float32)
-            return (np.linalg.norm(colours - wanted, axis=-1) <= self.tolerance) & (alpha > 0.5)
+            return alike(pictures.load(picture, self.frame), wanted, self.tolerance)
         grey = intensity(pictures.load(picture, self.frame))
         low = -1.0 if self.above is None else self.above
         high = 2.0 if self.below is None else self.below

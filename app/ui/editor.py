@@ -107,6 +107,7 @@ class Editor:
         self._styled: tuple[object, ...] = ()
         self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken
         self._later: list[Event] = []  # what the next frame hears first
+        self._clicked = False  # off the canvas, and imgui has not taken it up
         self._known = TOLD  # frames for which it has been known whether text is being typed
         self.open(project)
 
@@ -228,18 +229,30 @@ class Editor:
         return min(self.messages.next_in or 60.0, 60.0)
 
     def _heard(self, events: Sequence[Event]) -> list[Event]:
-        """What this frame hears: a key waits, with what comes after it, until imgui can tell whether it is text.
+        """What this frame hears: keys and presses on the canvas wait, with what comes after them, for imgui.
 
-        On a slow machine a click into a field, what is typed there, and the key of an action come all at once.
+        A key waits until imgui can tell whether it is text, and both until what was clicked on before has acted: on a
+        slow machine a click into a field, what is typed there, and the key of an action come all at once, and so do the
+        click on a tool and the stroke that is drawn with it.
         """
         heard, self._later = [*self._later, *events], []
+        self._clicked &= self.backend.is_behind
+        at = self.pointer.x, self.pointer.y
         for number, event in enumerate(heard):
             match event:
-                case Text() | Key(down=True) if self._known < TOLD or self._once_typed:
+                case Move(x, y):
+                    at = x, y
+                case Text() | Key(down=True) if self._known < TOLD or self._once_typed or self._clicked:
                     heard, self._later = heard[:number], heard[number:]
                     break
+                case Button(down=True) if self._clicked and self.pointer.reaches_canvas(*at):
+                    heard, self._later = heard[:number], heard[number:]
+                    break
+                case Button(down=down):
+                    self._clicked |= not self.pointer.reaches_canvas(*at)
+                    self._known = 0 if down else self._known
                 # imgui hears no repeats; those of a key that is held would pile up behind one another.
-                case Button(down=True) | Key("enter" | "escape" | "tab", True, repeat=False):
+                case Key("enter" | "escape" | "tab", True, repeat=False):
                     self._known = 0
                 case Key(down=True, mods=Mods(ctrl=True)) if self.backend.is_typing:
                     self._known = 0  # an action may leave the field

@@ -67,8 +67,12 @@ class PointerController:
 
     @property
     def _could_begin(self) -> bool:
-        is_free = not self.dialogs.shown and not self.ui.is_covered(self.x, self.y)
-        return is_free and self.workspace.view.canvas.contains(self.x, self.y)
+        return self.reaches_canvas(self.x, self.y)
+
+    def reaches_canvas(self, x: float, y: float) -> bool:
+        """Nothing lies over the canvas at a point of the window."""
+        is_free = not self.dialogs.shown and not self.ui.is_covered(x, y)
+        return is_free and self.workspace.view.canvas.contains(x, y)
 
     @property
     def _is_second_click(self) -> bool:

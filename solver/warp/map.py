@@ -209,7 +209,9 @@ class WarpMap:
         if frozen is None:
             self._frozen.release()
         else:
-            self._frozen.hold(frozen, changed or (0, 0, *frozen.size), self.draw_held)
+            # The identity is what fields begin with: nothing is drawn into them, and saves of them take no memory.
+            draw = (lambda *_: None) if self.is_untouched else self.draw_held
+            self._frozen.hold(frozen, changed or (0, 0, *frozen.size), draw)
         self._changed()
 
     def restore_under(

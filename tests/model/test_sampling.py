@@ -15,6 +15,7 @@ from app.model.sampling import (
     Segment,
     SmallPictures,
     Window,
+    alike,
     blurred,
     channels,
     distance_to_path,
@@ -74,6 +75,23 @@ def test_a_color_s_tolerance_is_the_distance_in_rgb(tmp_path: Path) -> None:
         segment = Segment(color="#646464", tolerance=tolerance / 255)
         found = segment.weight("p.png", Grid(32, 16), Pictures(Picture(picture), tmp_path))
         assert found[8, 4::8].tolist() == columns
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("bands", [1, 2, 3, 4])
+@pytest.mark.parametrize("is_premultiplied", [False, True])
+def test_what_is_alike_is_the_same_in_every_kind_of_picture(kind: type, bands: int, is_premultiplied: bool) -> None:
+    rng = np.random.default_rng(bands)
+    values = rng.random((40, 50, bands), np.float32)
+    if is_premultiplied and bands in (2, 4):
+        values[..., :-1] *= values[..., -1:]
+    most = 1 if kind is np.float32 else np.iinfo(kind).max
+    picture = Picture((values * most).astype(kind), premultiplied=is_premultiplied and bands in (2, 4))
+    wanted = np.array([0.2, 0.5, 0.9], np.float32)
+    colours, alpha = channels(picture)
+    for tolerance in (0.2, 0.5, 0.9):
+        near = np.sqrt(((colours.astype(float) - wanted) ** 2).sum(axis=-1)) <= tolerance
+        np.testing.assert_array_equal(alike(picture, wanted, tolerance), near & (alpha > 0.5))
 
 
 def test_light_is_seen_through_the_curve_of_srgb_and_alpha_is_not() -> None:

@@ -243,6 +243,23 @@ def test_clicks_and_keys_that_come_all_at_once_are_heard_one_after_the_other(rob
     assert robot.editor.state.tool_name == "twirl"
 
 
+@pytest.mark.parametrize("together", [True, False], ids=["click", "release"])
+def test_a_stroke_that_comes_together_with_the_click_on_its_tool_is_drawn_with_it(robot: Robot, together: bool) -> None:
+    """Also if only the release of that click comes with the stroke, as a button acts when it is let go of."""
+    tool, start, end = (24.0, 76.0), robot.at(0.4, 0.5), robot.at(0.6, 0.5)  # the uppermost of the strip
+    robot.key("m")
+    robot.move(*tool)
+    press = Button(LEFT, True)
+    if not together:
+        robot.press()
+        robot.frame(count=5)
+    stroke = Move(*start), press, Move(*end), Button(LEFT, False)
+    robot.frame(*((press,) if together else ()), Button(LEFT, False), *stroke, dt=0.5)
+    robot.frame(count=10)
+    assert robot.editor.state.tool_name == "push"
+    assert [made.tool for made in robot.editor.session.recipe.stroke] == ["push"]
+
+
 @pytest.mark.parametrize("key", ["tab", "escape", "enter"])
 def test_nothing_waits_for_the_repeats_of_a_key_that_was_held(robot: Robot, key: str) -> None:
     robot.frame(Key(key, True))
