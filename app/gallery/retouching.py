@@ -23,6 +23,7 @@ PHOTOGRAPH = 6000, 4000  # pixels
 PORTRAIT = 1200  # pixels along a side of the portrait in its middle; a face in it is some 900 high
 POSTER = 2000  # pixels along the longer side
 SHOWN = 520  # rows of a poster on its sheet
+FROZEN = np.array([70, 150, 255], np.uint8)  # the colour laid over what is frozen
 
 Box = tuple[int, int, int, int]
 
@@ -65,11 +66,15 @@ def retouch(studio: Studio, name: str, smaller: int = 1) -> Measured:
     for stroke in recipe.stroke:
         if stroke.tool == "freeze":
             frozen |= beneath(stroke, before.shape[1::-1])
+    panels = [("before", before)]
     if frozen.any():
         numbers["pixels frozen"] = f"{frozen.sum()}"
         numbers["frozen pixels changed"] = f"{changed[frozen].sum()}"
-    panels = [("before", before[top:bottom, left:right]), ("after", after[top:bottom, left:right])]
-    studio.sheet(name, title, panels, bottom - top)
+        tinted = before.copy()
+        tinted[frozen] = tinted[frozen] // 2 + FROZEN // 2
+        panels.append(("frozen: the blue rim", tinted))
+    panels.append(("after", after))
+    studio.sheet(name, title, [(caption, whole[top:bottom, left:right]) for caption, whole in panels], bottom - top)
     return numbers
 
 

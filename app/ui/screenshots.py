@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import resources
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from app.media.pictures import write_picture
 from app.model.picture import Picture
+from app.model.presets import PUTTY
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move
 from app.ui.files import load_any
@@ -117,10 +119,22 @@ def overlays(offscreen: OffscreenEditor) -> np.ndarray:
 
 
 def compare(offscreen: OffscreenEditor) -> np.ndarray:
-    """Before and after in the light theme."""
-    paint(offscreen)
+    """Before and after in the light theme: a portrait, retouched with Putty on the right of the line."""
+    state = offscreen.editor.state
+    offscreen.editor.session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    state.make_local(PUTTY.local)
+    state.brush = replace(state.brush, radius=0.08)
+    offscreen.stroke(line((0.555, 0.69), (0.576, 0.666)), 10)
+    for *start, far in (0.72, 0.655, 0.022), (0.70, 0.73, 0.024), (0.665, 0.80, 0.02), (0.61, 0.86, 0.012):
+        way = 0.42 - start[0], 0.55 - start[1]
+        part = far / np.hypot(*way)
+        offscreen.stroke(line((start[0], start[1]), (start[0] + part * way[0], start[1] + part * way[1])), 6)
+    state.choose_tool("bloat", False)
+    state.brush = replace(state.brush, radius=0.09, strength=0.6)
+    offscreen.stroke(lambda part: (0.55 + 1e-4 * part, 0.418), 14)
     offscreen.editor.preferences.theme = "light"
     offscreen.key("y")
+    state.split = 0.425
     offscreen.frame(Move(640, 20))
     return offscreen.picture()
 
@@ -137,6 +151,8 @@ def export(offscreen: OffscreenEditor) -> np.ndarray:
 
 
 SCENES = {"editor": editor, "overlays": overlays, "compare": compare, "export": export}
+OPENED = {"compare": Path(str(resources.files("assets"))) / "gallery" / "astronaut.jpg"}
+"""What a scene opens, if not the sample picture."""
 
 
 def film(offscreen: OffscreenEditor, path: Path) -> None:
@@ -167,7 +183,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with Device.headless() as device:
         for name, scene in SCENES.items():
-            offscreen = OffscreenEditor(device)
+            offscreen = OffscreenEditor(device, file=OPENED.get(name))
             write_picture(folder / f"{name}.webp", Picture(scene(offscreen)))
             offscreen.close()
         offscreen = OffscreenEditor(device)
