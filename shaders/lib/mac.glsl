@@ -30,17 +30,17 @@ vec2 mac_centre(sampler2D velocity, vec2 p) {
     return 0.5 * (texture(velocity, uv).rg + beyond * vec2(lessThan(p + 1.0, size)));
 }
 
-// How far from position p (in cells) the fluid there was one step ago, x_d - x: second-order (midpoint) backtrace, kept in
-// the grid; in two halves where the velocity changes by much along the way, or quick pushes, of a brush's radius a step, fold
-// what they pass. Ways are summed up and not places, which 32 cells from the corner are rounded by 2e-6 cells in every step:
-// where the flow draws out a corner of the picture ten-thousandfold, the map has that to the same amount.
-// `here` is the velocity at p; `cells_a_speed` is dt / spacing. 8 reads, and 24 more in two halves: one look at the velocity
-// each time round, since a rasteriser that draws several fragments at once runs both sides of an `if`, but leaves a loop
-// when all of them have.
-const float BENT = 0.5; // cells a step that it changes by: from there on more and more, from twice as much on wholly
+// Where the fluid at position p (in cells) was one step ago, as x_d - x: second-order (midpoint) backtrace, kept in the grid.
+// It is made in two halves where the velocity changes much along the way: else quick pushes, of a brush's radius a step,
+// fold what they pass. Distances are summed up, not places: a place 32 cells from the corner is rounded by 2e-6 cells in
+// every step, and where the flow stretches a corner of the picture ten-thousandfold, that error grows as much.
+// `here` is the velocity at p; `cells_a_speed` is dt / spacing. 8 reads, and 24 more in two halves. The velocity is read at
+// one place of a loop: a rasteriser that draws several fragments at once runs both sides of an `if`, but leaves a loop when
+// all fragments have.
+const float BENT = 0.5; // change of the velocity, cells a step, from which on halves are blended in; twice as much: only halves
 
-// With PARTS in as many parts, u_parts, as the steepest gradient asks for, all over the grid: between places in one part and
-// in two there is a step, which a local push, steeper than any flow, folds. 16 reads for each.
+// With PARTS the trace is made in u_parts equal parts everywhere, as many as the steepest gradient needs: a blend between one
+// and two would be a step in the trace, which a local push, steeper than any flow, folds. 16 reads for each.
 #ifdef PARTS
 uniform float u_parts;
 

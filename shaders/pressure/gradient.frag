@@ -1,7 +1,7 @@
 // The gradient of the pressure, the pressure to keep, and the one to expect next, by its trend.
-// The pressure comes as a sum that is taken only after the differences, which keeps the digits of the smaller part.
-// Velocities are rounded anew in each step, noise from cell to cell that a trend of two steps would more than double. So
-// where there is a trend, what has changed is smoothed a little before it is kept, and more before it makes the trend.
+// The pressure is given as two parts, which are added only after taking differences: that keeps the digits of the smaller.
+// The rounding of the velocities is noise from cell to cell in every step, which a trend of two steps would more than
+// double. So where there is a trend, the change is smoothed a little before it is kept, and more before it makes the trend.
 // in:  u_expected, u_change   the two parts of the pressure;  u_before   the one kept before;  u_trend   1, or 0 for none
 //      links of lib/block.glsl
 // out: across, down   p - p_left and p - p_up at the blocks' four cells, lengths / s
@@ -15,8 +15,8 @@ uniform sampler2D u_change;
 uniform sampler2D u_before;
 uniform float u_trend;
 
-// Parts of A p that are added to the change: 1/8 would take away all of a checkerboard. What is kept loses half of it; what
-// makes the trend nearly all, but not all, as one that is in the expected pressure already would then never fade.
+// Fractions of A p that are added to the change: 1/8 would remove a checkerboard. The kept pressure loses half of it, the
+// trend nearly all; not all, as a checkerboard that is in the expected pressure already would then never fade.
 const float KEPT = 0.0625, TREND = 0.12;
 
 in vec2 v_uv;

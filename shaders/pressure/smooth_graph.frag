@@ -1,5 +1,5 @@
-// A sweep of damped Jacobi on a graph:  p += 0.8 (A p - r) / (sum of links); damped so that neither the smoothest nor,
-// as its eigenvalues go to 2, the roughest error of a level grows: 0.8 leaves 0.6 at most of all from 1/2 on.
+// A sweep of damped Jacobi on a graph:  p += 0.8 (A p - r) / (sum of links). The eigenvalues of that matrix lie between 0
+// and 2, so no error grows, and 0.8 leaves at most 0.6 of those with eigenvalues from 1/2 on.
 // in:  u_pressure   p, none with FROM_ZERO (p = 0);  u_residual   r;  u_rows, u_links of pressure/graph.glsl
 // out: p
 // reads: 12

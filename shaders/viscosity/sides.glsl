@@ -30,8 +30,8 @@ vec4 glides(vec4 place, float far, vec2 no_slip) {
 #endif
 }
 
-// Where the fluid sticks to the two sides across which a level is coarsened, or not: `alone` is 2 for a single column or
-// row, which is carried over as it is, whatever its walls do. (Of one viscosity the walls' drag is that of the coarse cells.)
+// `no_slip` of the two sides across which a level is coarsened; 0 for a single column or row (`alone` is 2), which is carried
+// over as it is, whatever its walls are. (With one viscosity K at the walls is that of the coarse cells.)
 vec2 sides_across(vec2 no_slip, float alone) {
 #ifdef UNIFORM
     return no_slip;

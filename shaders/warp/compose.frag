@@ -1,11 +1,10 @@
 // Compose: D(x), the displacement of the whole map: see lib/warp.glsl; x: see lib/place.glsl.
-// Define REMAP if the fragments are the texels of A, which then are met to the bit where nothing has moved.
-// Define CUBIC to look into A by the cubic: where it has four texels a cell, or whoever looks between the texels of the
-// result will again.
-// Define LINEAR to look into A between its four next texels, for a look that has none closer together than A.
-// Define GATHER for what the submaps alone add up to.
-// Define KEEP (with REMAP) to draw nothing but what is newly held: where u_now, whose first texel is u_corner, is 1/2 or
-// more, and u_before, over the picture, is not.
+// Define REMAP if the fragments are the texels of A: then A stays the same to the bit where nothing has moved.
+// Define CUBIC to read A by the cubic: where it has four texels a cell, or if the result will be interpolated again.
+// Define LINEAR to read A bilinearly, for a target whose texels are no closer together than those of A.
+// Define GATHER for the composition of the submaps alone.
+// Define KEEP (with REMAP) to draw only what is newly held: where u_now, whose first texel is u_corner, is 1/2 or more, and
+// u_before, over the picture, is not.
 // Define FROM for W(x + P(x)) - x: u_from (P), texel for texel, longer sides.
 // reads: 48, and 24 with CUBIC, 16 with LINEAR, 12 with GATHER; 12 more for each of LEVELS above 1, 4 for each of WEIGHED
 #include "lib/warp.glsl"

@@ -51,10 +51,10 @@ class Brush:
         fluid.impulse.add(lambda faces: self._draw(fluid, motion, faces, gain))
 
     def make_up(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None = None) -> None:
-        """Add to a velocity on MAC faces what it lacks of a motion: the last touch before the projection.
+        """Add to a velocity on MAC faces what it lacks of a motion, after viscosity and before the projection.
 
-        Viscosity does not spread that any more. So it spares what is thicker than the fluid at the tip, and does less
-        the more of the brush lies on what is thicker or solid. For `steer` of `Scheme.step`.
+        Viscosity does not spread this any more. So it is less where the fluid is thicker than at the tip, and less the
+        more of the brush lies on thicker fluid or solids. For `steer` of `Scheme.step`.
         """
         _check(fluid, motion, warp)
         check_field("a velocity", velocity, fluid.grid)
@@ -66,7 +66,7 @@ class Brush:
         self._draw(fluid, motion, velocity, 1.0, attenuation)
 
     def carry(self, fluid: Scheme, push: Push, warp: WarpMap | None = None) -> None:
-        """Let the local part of a push carry the picture until the next step; less what is thicker or near solids."""
+        """Make the local part of a push carry the picture for a step, less in thicker fluid and near solids."""
         check_type("what is carried", push, Push)
         _check(fluid, push, warp)
         if not push.local:
@@ -88,7 +88,7 @@ class Brush:
         self.lead(fluid, Twirl(tip, rate))
 
     def expand(self, fluid: Scheme, tip: Tip, rate: float) -> None:
-        """Let the area under the tip grow (or, negative, shrink) at `rate` 1/s in the next projection.
+        """Make the area under the tip grow (or, negative, shrink) at `rate` 1/s in the next projection.
 
         The room comes from all of the fluid or, if the tip is near, from that around it.
         """

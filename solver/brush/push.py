@@ -14,7 +14,7 @@ from solver.grid import Grid
 from solver.limits import check_finite, check_step, check_type
 from solver.warp.map import WarpMap
 
-# A push slips so that what it draws out does not become thinner than the map can tell: there the map would fold.
+# A push slips so that what it draws out does not become thinner than the map can resolve, where the map would fold.
 #
 # 1. By the brush's own path: it holds fast for FIRM radii, and in the end gives LOOSEST of its speed; one over a square
 #    in between. Else a long stroke would draw out what lay at its start into a thread.

@@ -57,9 +57,9 @@ class ConjugateGradients:
 
         `change` becomes v - v* of this step. Ends when less than the fraction `tolerance`^2 is left, see README.md, or
         after `most` iterations. The energy left is estimated as the rest of the geometric series of the iterations'
-        gains, but no less than the last gain. `precondition(r)` returns about A^-1 r. If it is known to leave at most
-        the fraction `cycle_leaves` of the energy of any error, the first iteration may be the last without A z and its
-        products: the error of the guess v* + d has the energy r . A^-1 r <= r . r, as A >= 1.
+        gains, but no less than the last gain, nor than r . z. `precondition(r)` returns about A^-1 r. If it is known to
+        leave at most the fraction `cycle_leaves` of the energy of any error, the first iteration may be the last
+        without A z and its products: the error of the guess v* + d has the energy r . A^-1 r <= r . r, as A >= 1.
         """
         iterate: dict[str, Any] = {"parts": (1.0, 1.0), **v_star.inputs(), **change.read.inputs("change_")}
         self._guess(iterate, rhs)
@@ -88,7 +88,7 @@ class ConjugateGradients:
             alpha, iterate["beta"], curvature = cg_coefficients(rz, z_az, z_ap, curvature)
             gained = alpha**2 * curvature
             found += gained
-            left = max(gained, _series(gained, gained_before))
+            left = max(gained, rz, _series(gained, gained_before))
             size = found if cycle_leaves < inf else sqrt(max(found * xx, 0.0))
             if not alpha or self.iterations == most or left <= tolerance**2 * size:
                 # With alpha 0, z may hold NaN.

@@ -1,4 +1,4 @@
-"""The accumulated map: what has moved up to the last remap, as fine as the picture."""
+"""The accumulated map: all motion up to the last remap, as fine as the picture."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from solver.grid import Grid
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
-NOWHERE = 1e-4  # texels that what has moved less has not moved
+NOWHERE = 1e-4  # texels: a smaller displacement counts as none
 
 Limits = tuple[float, float, float, float]
 
@@ -25,9 +25,9 @@ Limits = tuple[float, float, float, float]
 def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, int]:
     """Texels of the accumulated map of a picture, (width, height).
 
-    The picture's own pixels, or one for a whole number of them where that would be more than `MOST_TEXELS` or `largest`
-    along a side; whole numbers to a pixel where a cell of the grid would have fewer than `LEAST_TEXELS`, as far as that
-    is not too many.
+    One a pixel; or one for a whole number of pixels, if there would be more than `MOST_TEXELS` or than `largest` along
+    a side; or a whole number of texels a pixel, if a cell of the grid would have fewer than `LEAST_TEXELS`, within
+    these limits.
     """
     width, height = picture
     shrunk = max(math.ceil(math.sqrt(width * height / MOST_TEXELS)), math.ceil(max(width, height) / largest))
@@ -43,7 +43,7 @@ def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, i
 
 
 class AccumulatedMap:
-    """A displacement of the whole picture, RG32F, longer sides, made anew tile by tile where something has moved.
+    """A displacement of the whole picture, RG32F, longer sides, redrawn tile by tile where something has moved.
 
     Args:
         device: the device.
@@ -51,7 +51,7 @@ class AccumulatedMap:
         extent: (width, height) of the picture, longer sides.
 
     Attributes:
-        now: the displacement. What is drawn anew is drawn into another field, which takes its place once it is whole.
+        now: the displacement. Tiles are redrawn into another field, which replaces it once all are done.
         limits: of the places looked up: left, top, right, bottom.
     """
 
@@ -74,9 +74,9 @@ class AccumulatedMap:
         return min(texels) > LEAST_TEXELS - 1e-6
 
     def begin(self, *moved: tuple[np.ndarray, Grid]) -> int:
-        """Plan to draw all tiles anew in which one of several submaps moves anything; how many there are.
+        """Plan to redraw all tiles in which one of several submaps moves anything; returns how many there are.
 
-        Each has a texel, or a whole number both ways, for every cell of its grid: (ny, nx, 2).
+        Each submap has one texel, or n x n, for every cell of its grid: (ny, nx, 2).
         """
         self.forget()
         least, wanted = NOWHERE * self.extent[0] / self.size[0], set[Region]()
@@ -105,7 +105,7 @@ class AccumulatedMap:
         return {"accumulated": self.now, "picture": self.extent, "limits": self.limits, "walled": float(self.is_walled)}
 
     def draw(self, part: float, draw: Callable[[Field, list[Region]], None]) -> None:
-        """Come to a `part` of what is planned, 0-1: `draw` draws regions anew, out of `now`, into another field."""
+        """Do a `part`, 0-1, of what is planned: `draw` redraws regions, from `now`, into another field."""
         before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
         if anew := self._moved[before:until]:
             draw(self._next, anew)
@@ -118,12 +118,12 @@ class AccumulatedMap:
             self._moved, self._copied, self._done = [], [], 0
 
     def forget(self) -> None:
-        """Leave what is planned undone."""
+        """Drop what is planned."""
         self._stale.update(self._moved[: self._done])
         self._moved, self._copied, self._done = [], [], 0
 
     def change(self, region: Region, draw: Callable[[Field, list[Region]], None]) -> None:
-        """Draw a region anew at once; nothing may be planned."""
+        """Redraw a region at once; nothing may be planned."""
         draw(self._next, [region])
         self.now.copy_from(self._next, region)
         self._stale.update(tile for tile in self._tiles if _meet(tile, region))

@@ -13,15 +13,15 @@ from solver.grid import Grid
 from solver.warp.state import FACTOR
 from solver.warp.submap import Level, defines_of, inputs_of
 
-# Of min(1, det J) at 100 %, what det J may fall to where a factor is scaled: 1/2 is a quarter turn. What is on its
-# way may turn on by 41 degrees before a remap, and then det J still falls to no less than 0.1 of it.
+# How far det J may fall where a factor is scaled, as a fraction of min(1, det J) at 100 %: 1/2 is a quarter turn. The
+# present submap may turn by another 41 degrees before its remap, and then det J still falls to no less than 0.1.
 CLOSED, SPLIT = 0.5, 0.05
-MOST = 12  # that are closed: every checkpoint has a copy of them; what comes after goes into one
-TEXELS = 2  # of a factor along a cell: with one, of twelve random recipes that do not fold two do between 60 and 90 %
+MOST = 12  # closed factors, as every checkpoint has a copy of them; all that follows goes into one
+TEXELS = 2  # of a factor along a cell: with one, two of twelve random recipes without folds fold between 60 and 90 %
 
 
 class Factors:
-    """What a map's submaps have added up to, cut where more of a turn could not be scaled any more.
+    """The product of a map's submaps, cut into factors before one turns too far to be scaled.
 
     W = F_1 F_2 ... F_n S, with S the submap that moves, each F a displacement of the whole picture.
 
@@ -45,10 +45,10 @@ class Factors:
         return not self._closed
 
     def take(self, submap: Level, held: Field | None) -> None:
-        """Take in what a submap has moved, which begins anew with nothing; `held`: as the map has it."""
+        """Take in what a submap has moved, before it is emptied; `held`: the map's."""
         self._merge(self._open.write, submap, held)
         left = self._left(self._open.write) if len(self._closed) < MOST else 1.0
-        # One step has turned it too far, and is a factor by itself; what has turned nothing before is none.
+        # If one remap turns the open factor too far, it begins a new one, unless nothing was turned before.
         if left < SPLIT and self._left(self._open.read) < 1:
             self._close(self._open.read)
             self._open.read.clear()

@@ -1,4 +1,4 @@
-"""What of a picture is frozen, and what the map is there."""
+"""Where the map is frozen, and its displacement there."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from solver.gl.field import Field
 from solver.gl.passes import Region, differing, hull, split
 from solver.gl.tiled import SavedTiles, TiledField
 
-# Texels: a place in a frozen pixel may lie nearest to the next texel, and what is looked up there is interpolated from
-# two more to each side.
+# Texels: a place in a frozen pixel may be nearest to the next texel, and interpolation there reads two more to each
+# side.
 INNER, REACH = 1, 3
-FADED = 31  # texels along an axis in which the distance is told
-BLOCK = 64  # texels along a block that is drawn or not
+FADED = 31  # texels along an axis up to which distances are kept
+BLOCK = 64  # texels along the blocks that are drawn
 
 Draw = Callable[[Field, list[Region], Field, tuple[int, int], Field], None]
-"""Draws the map into regions of a field, where it is held now, told from a corner on, and was not held before."""
+"""Draws the map into regions of a field, where it is held now (a field from a corner on) and was not held before."""
 
 
 class Frozen:
@@ -45,7 +45,7 @@ class Frozen:
         self.box: Region | None = None
 
     def hold(self, mask: Field, changed: Region, draw: Draw) -> None:
-        """Hold what a mask over the whole picture, of any size, has frozen in a region; let go of the rest of it."""
+        """Hold what a mask over the whole picture, of any size, freezes in a region; release the rest of the region."""
         held, kept = self._fields()
         (x, right), (y, bottom) = (
             (floor(changed[k] * n / of), ceil((changed[k] + changed[k + 2]) * n / of))
@@ -98,7 +98,7 @@ class Frozen:
     def parts(
         self, regions: list[Region], origin: tuple[float, float], step: tuple[float, float]
     ) -> list[tuple[bool, list[Region]]]:
-        """Regions of a target by whether what is held, or fades before it, lies there.
+        """Split regions of a target into parts near held places, within `FADED` texels, and others.
 
         Args:
             regions: of the target's texels.
@@ -106,7 +106,7 @@ class Frozen:
         """
         if self.held is None or self.box is None:
             return [(False, regions)]
-        # Of a place the texels around it are read: up to one away from it.
+        # For each place the texels around it are read, up to one away.
         (x, right), (y, bottom) = (
             (floor((self.box[k] - 1) / (step[k] * n) - origin[k]) - 1,
              ceil((self.box[k] + self.box[k + 2] + 1) / (step[k] * n) - origin[k]) + 1)
@@ -121,7 +121,7 @@ class Frozen:
         return {"held": self.held, "kept": self.kept} if self.held and self.kept else {}
 
     def save(self) -> dict[str, SavedTiles]:
-        """What is held, by name; nothing if nothing was frozen. Whoever has it releases it."""
+        """What is held, by name, which the caller releases; nothing if nothing was frozen."""
         return {"held": self.held.save(), "kept": self.kept.save()} if self.held and self.kept else {}
 
     def restore(self, tiles: dict[str, SavedTiles]) -> None:
@@ -138,19 +138,19 @@ class Frozen:
                     self._reach(tile.field.get(), *region[:2])
 
     def release(self) -> None:
-        """Let go of everything."""
+        """Hold nothing any more."""
         for field in (self.held, self.kept):
             if field is not None:
                 field.release()
         self.held = self.kept = self.box = None
 
     def _reach(self, held: np.ndarray, x: int, y: int) -> None:
-        """Let the box be about what of `held` is not 0 too, the first texel of which is (x, y)."""
+        """Extend the box to all texels of `held` that are not 0; its first texel is (x, y)."""
         if box := differing(np.zeros_like(held), held):
             self.box = hull((x + box[0], y + box[1], *box[2:]), self.box)
 
     def _fields(self) -> tuple[TiledField, TiledField]:
-        """Both, made when they are wanted first."""
+        """Both, made at the first use."""
         if self.held is None or self.kept is None:
             self.held = TiledField(self.device, self.size, 1, "held", "f1")
             self.kept = TiledField(self.device, self.size, 2, "kept")

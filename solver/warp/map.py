@@ -1,6 +1,7 @@
 """The warp map: where every point of the result is looked up in the original.
 
-One long class: all that moves the map or reads it takes its levels together; what each does is in modules beside it.
+The class is long because everything that moves or reads the map needs all its levels; the work is in the other modules
+of this folder.
 """
 
 from __future__ import annotations
@@ -37,26 +38,25 @@ MOST_PLACES = 2**19  # at which its distortion is looked at
 class WarpMap:
     """The map x -> x + D(x) from the result to the original, carried along by a fluid without blurring.
 
-    Two levels (the characteristic mapping method): a submap of what has moved lately, on the simulation's grid, which
-    may be a window of the picture, and the accumulated map A of the whole picture, which takes the submap S in (a
-    remap) before that is bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0
-    outside the window; longer sides, RG32F at the centres of cells and texels. Only tiles of A that have moved are made
-    anew, a few in each step; until all are there, the submap that they take in, *pending*, stands between S and A, and
-    what is to be remapped meanwhile is *gathered* in a level between the two, of several texels a cell. Every place
-    x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set` had looked. Looking at the map
-    changes nothing of it.
+    Two levels (the characteristic mapping method): the submap S holds what has moved lately, on the simulation's grid,
+    which may be a window of the picture; the accumulated map A of the whole picture takes S in (a remap) before S is
+    bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0 outside the window; longer
+    sides, RG32F at the centres of cells and texels. Only tiles of A that have moved are redrawn, a few in each step.
+    Until all are done, the submap being taken in, *pending*, stands between S and A; what has to be remapped meanwhile
+    is *gathered* in a level between S and the pending one, of several texels a cell. Every place x + S(x) lies in the
+    picture, and every x + D(x) there or where a map that was `set` had looked. Reading the map changes nothing in it.
 
     Args:
         device: the device.
         grid: the simulation's grid.
-        size: (width, height) of the accumulated map in texels, as of `map_size`; by default `LEAST_TEXELS` a cell.
-        remap_every: most steps between two remaps.
+        size: (width, height) of the accumulated map in texels, see `map_size`; by default `LEAST_TEXELS` a cell.
+        remap_every: the most steps between two remaps.
 
     Attributes:
         grid: of the submap.
         extent: (width, height) of the picture, the longer of them 1.
-        version: counts the changes, for those who keep what they made of the map.
-        factors: what it is made of but for the submap, for `ScaledMap`.
+        version: counts the changes, for callers that cache what they made of the map.
+        factors: what it is made of, without the submap, for `ScaledMap`.
     """
 
     def __init__(self, device: Device, grid: Grid, size: tuple[int, int] | None = None, remap_every: int = 64) -> None:
@@ -94,7 +94,7 @@ class WarpMap:
 
     @property
     def held(self) -> Field | None:
-        """Where it is held, texel by texel, from 1/2 on; None if nothing is."""
+        """Where it is held: texels of 1/2 and more; None if it is held nowhere."""
         return self._frozen.held
 
     @property
@@ -125,17 +125,17 @@ class WarpMap:
         self.advance_traced(trace)
 
     def advance_traced(self, trace: Field) -> None:
-        """Carry the map one step, given for every cell centre how far back the fluid came from, in cells."""
+        """Carry the map one step by a trace: x_departed - x at every cell centre, in cells."""
         check_field("a trace", trace, self.grid)
         self._submap.advance(trace, self._accumulated.is_walled)
         self._advanced()
 
     def _advanced(self) -> None:
-        """A step was made: remap as far as it is time to."""
+        """A step was made: go on with a remap, or begin one if it is time."""
         self._steps += 1
         self._changed()
         self._remapping.advance(self.grid)
-        # The look waits for the GPU, so not at every step; at fixed steps, so that a replay remaps at the same ones.
+        # Reading the steepness waits for the GPU, so not at every step; at fixed ones, so that a replay remaps alike.
         looks = self._steps % CHECK_EVERY == 0
         if self._steps >= self.remap_every or (looks and (not self._is_settled or self._submap.is_steep)):
             self._begin_remap()
@@ -168,12 +168,12 @@ class WarpMap:
             field.release()
 
     def remap(self) -> None:
-        """Let the accumulated map take in all that has moved, at once; the whole map stays what it was."""
+        """Take all that has moved into the accumulated map at once; the whole map stays the same."""
         self._begin_remap()
         self._remapping.finish()
 
     def move_to(self, grid: Grid) -> None:
-        """Go on with a submap on another grid of the same picture; the map stays what it was.
+        """Go on with a submap on another grid of the same picture; the map stays the same.
 
         Raises:
             ValueError: if it is a grid of another picture.
@@ -192,13 +192,12 @@ class WarpMap:
     def hold(self, frozen: Field | None, changed: Region | None = None) -> None:
         """From now on, change nothing where a mask over the whole picture, of any size, is 1.
 
-        Nor within three texels of the accumulated map around it: what is looked up on a frozen pixel is interpolated
-        from there. What the map is there is kept to the bit, however it came about; what moves from now on does so
-        less and less over the last cell before it, so that what is around goes on from it without a step.
+        Nor within three texels of the accumulated map around it, from which a frozen pixel is interpolated. The map
+        there is kept to the bit. Over the last cell before it the motion falls to zero, so that the map has no step.
 
         Args:
             frozen: the mask; None holds nothing.
-            changed: (x, y, width, height) in the mask's texels, outside of which it is as it was given before.
+            changed: (x, y, width, height) in the mask's texels; outside of it the mask is the same as last time.
         """
         if frozen is not None:
             check_type("what is frozen", frozen, Field)
@@ -217,7 +216,7 @@ class WarpMap:
     def restore_under(
         self, center: tuple[float, float], radius: float, hardness: float = 0.0, amount: float = 1.0
     ) -> None:
-        """Let the map go back to the identity under a round brush, but where it is frozen.
+        """Bring the map back to the identity under a round brush, except where it is frozen.
 
         Args:
             center, radius: longer sides.
@@ -230,7 +229,7 @@ class WarpMap:
         numbers("a brush's centre", center, 2)
         numbers("a brush", (radius, hardness, amount), 3)
         if not self._is_settled:
-            self._begin_remap()  # or what is around the held places would not go on from them
+            self._begin_remap()  # or there would be a step around the held places
         self._remapping.finish()
         restore = self.device.pass_("warp/restore.frag", **self._held_defines())
         inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
@@ -306,7 +305,7 @@ class WarpMap:
         self._frozen.draw_anew(self.draw_held)
 
     def save(self) -> MapState:
-        """A copy of this moment, on the GPU, which the caller releases; it shares with others what is the same."""
+        """A copy of this moment, on the GPU, which the caller releases; states share tiles that are the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._accumulated.limits}
         values["walled"] = self._accumulated.is_walled
@@ -378,11 +377,11 @@ class WarpMap:
         return self._composed[key]
 
     def size_for(self, picture: tuple[int, int], result: tuple[int, int]) -> tuple[int, int]:
-        """Texels to compose for a result of a picture, both in pixels: not finer than either needs.
+        """Texels to compose for a result of a picture, both in pixels: not finer than needed.
 
-        The accumulated map's, or one for a whole number of them: as many as the result has pixels, or else the picture,
-        or two a cell. Where something is frozen it is the accumulated map's: what is looked up between coarser texels
-        would reach beyond what is held.
+        The accumulated map's, or one for a whole number of them: along each side no fewer than the result's pixels, or
+        than the larger of the picture's pixels and two a cell. If something is frozen it is the accumulated map's, as
+        interpolation between coarser texels would reach beyond what is held.
         """
         if self._frozen.held is not None:
             return self.size
@@ -417,10 +416,10 @@ class WarpMap:
         """Where points (n, 2) of the original are, by Newton's method from guesses (n, 2), in longer sides.
 
         Args:
-            farthest: that one of its rounds may go, (n,).
+            farthest: the longest step of one round, (n,).
 
         Returns:
-            The best places that were found, float64 (n, 2); and how far they are looked up from the points, (n,).
+            The best places found, float64 (n, 2); and how far from the points these are looked up, (n,).
         """
         more = np.column_stack([guesses - points, farthest])
         shader, defines = "warp/seek.frag", self._defines()
@@ -433,7 +432,7 @@ class WarpMap:
         return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())[:, 1]
 
     def strain(self, points: np.ndarray) -> np.ndarray:
-        """What it does to what lies close to points (n, 2), in longer sides: float32 (n, 4); see `warp/strain.frag`."""
+        """Displacement and strain close to points (n, 2), in longer sides: float32 (n, 4); see `warp/strain.frag`."""
         shader, defines = "warp/strain.frag", self._held_defines()
         return draw_at(self.device, places(points), self.extent, shader, defines, components=4, **self._parts())
 
@@ -455,9 +454,9 @@ class WarpMap:
         """Draw the displacement at (fragment + origin) step, 0-1 of the picture.
 
         Args:
-            exact: not to be looked at between its texels.
-            moved: another displacement of `target`'s size, after which this one is drawn.
-            coarsely: the accumulated map need not be looked up more exactly than `target` will be, linearly.
+            exact: the target will not be interpolated.
+            moved: another displacement of `target`'s size that is applied first.
+            coarsely: linear interpolation of the accumulated map is enough, as for `target`.
             regions: of `target`, where it is drawn; by default everywhere.
         """
         # Its own texels must not be farther apart than those of the target.
@@ -493,10 +492,10 @@ class WarpMap:
         compose(target, region=region, **self._parts(), origins=for_images(origins), step=step)
 
     def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
-        """How the whole map distorts, looked at on a lattice of `size`; waits for the GPU.
+        """How the whole map distorts, measured on a lattice of `size`; waits for the GPU.
 
-        By default that has a place for each texel of the accumulated map, or for a whole number of them where they
-        would be more than `MOST_PLACES`.
+        By default it has a place for each texel of the accumulated map, or for a whole number of texels if there would
+        be more than `MOST_PLACES`.
         """
         if size is None:
             width, height = self.size
@@ -507,7 +506,7 @@ class WarpMap:
     # -- its parts --------------------------------------------------------------------------------------------------
 
     def _begin_remap(self) -> None:
-        """Let what has moved stand by to be taken in, and begin with a submap of nothing."""
+        """Hand what has moved to the remapping, and begin with an empty submap."""
         if self._steps:
             self.factors.take(self.submap, self.held)
             self._remapping.give(self._submap, self._is_weighed)

@@ -1,4 +1,4 @@
-"""What the accumulated map is still to take in, and how it does so a few tiles at a time."""
+"""What the accumulated map still has to take in, a few tiles at a time."""
 
 from __future__ import annotations
 
@@ -16,15 +16,20 @@ from solver.warp.frozen import Frozen
 from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
 
 REMAP_STEPS = 8  # steps over which a remap is spread, at least
-MOST_TILES = 8  # that are made anew in a step, unless something has to be out of the way: the work of one of the fluid
-MOST_GATHERED = 8, 2**19  # texels of what is gathered, along a cell and in all, but for `LEAST_TEXELS` along a cell
+MOST_TILES = (
+    8  # redrawn in a step, as much work as a step of the fluid, unless a level of another grid has to be finished
+)
+MOST_GATHERED = (
+    8,
+    2**19,
+)  # texels of the gathered level, along a cell and in all, but at least `LEAST_TEXELS` along a cell
 
 
 class Remapping:
-    """Submaps on their way into the accumulated map.
+    """Submaps that are being taken into the accumulated map.
 
-    The one that is *pending* is taken in tile by tile, and stands above the accumulated map until all tiles are there.
-    What is given meanwhile is *gathered* in a level above that one, of several texels a cell, and is pending next.
+    The *pending* one is taken in tile by tile, and stands above the accumulated map until all tiles are done. What is
+    given meanwhile is *gathered* in a level above it, of several texels a cell, which is pending next.
 
     Args:
         device: the device.
@@ -38,29 +43,29 @@ class Remapping:
         self._frozen = frozen
         self._gathered: Level | None = None  # only while another is pending
         self._pending: Level | None = None
-        self._tiles = 0  # that are made anew for it
-        self._begun = self._done = 0  # how far they are, of `_whole`, and where that was begun
+        self._tiles = 0  # to be redrawn for it
+        self._begun = self._done = 0  # progress, of `_whole`, at the start and now
 
     @property
     def levels(self) -> list[Level]:
-        """What stands between the submap and the accumulated map, the uppermost first."""
+        """The levels between the submap and the accumulated map, the uppermost first."""
         return [level for level in (self._gathered, self._pending) if level is not None]
 
     @property
     def is_idle(self) -> bool:
-        """True if nothing is on its way."""
+        """True if nothing is being taken in."""
         return self._pending is None
 
     def advance(self, grid: Grid) -> None:
-        """Come a step further, with the submap on a grid."""
+        """Go on by one step; `grid` is the submap's."""
         if self._pending is not None:
-            # What was gathered on another grid has to be out of the way when the submap on this one is bent.
+            # A level gathered on another grid has to be finished before the submap on this one needs a remap.
             waits = self._gathered is not None and self._gathered.grid != grid
             self._done += self._whole // REMAP_STEPS if waits else REMAP_STEPS
             self._take_in(min(self._done / self._whole, 1.0))
 
     def give(self, submap: Submap, is_weighed: bool) -> None:
-        """Take over what a submap holds, weighed or not, which begins anew with nothing."""
+        """Take over what a submap holds, weighted or not, and empty it."""
         if self._gathered is not None and self._gathered.grid != submap.grid:
             self.finish()
         elif self._tiles * (1 - self._done / self._whole) <= MOST_TILES:
@@ -71,7 +76,7 @@ class Remapping:
             submap.replace()
 
     def settle(self) -> None:
-        """Let what is on its way go on with the weights that it has now, whatever is held from now on."""
+        """Fix the weights of the pending level as they are now, before the mask changes."""
         if self._pending is not None and self.is_weighed:
             coarse, fine = self._pending, self._resampled([self._pending])
             coarse.field.release()
@@ -80,7 +85,7 @@ class Remapping:
                 self._go_on()
 
     def finish(self) -> None:
-        """Let the accumulated map take in all of it at once."""
+        """Take everything into the accumulated map at once."""
         if self._gathered is None:
             self._take_in(1.0)
         else:
@@ -89,7 +94,7 @@ class Remapping:
             self.drop()
 
     def drop(self) -> None:
-        """Let nothing be on its way any more."""
+        """Drop all levels."""
         for level in self.levels:
             level.field.release()
         self._gathered = self._pending = None
@@ -109,7 +114,7 @@ class Remapping:
 
     @property
     def is_weighed(self) -> bool:
-        """True if the pending level is."""
+        """True if the pending level is weighted."""
         return self._pending is not None and self._pending.is_weighed
 
     def restore(self, saved: dict[str, Level], progress: int) -> None:
@@ -126,14 +131,14 @@ class Remapping:
     # -- its parts --------------------------------------------------------------------------------------------------
 
     def _stand_by(self, moved: Level, progress: int = 0) -> bool:
-        """Let a level be taken in from the next step on, or go on with it; False if there is nothing to take in."""
+        """Make a level pending, from a `progress` on; False if there is nothing to take in."""
         self._tiles = self._accumulated.begin((moved.field.get(), moved.grid))
         self._begun = self._done = max(0, min(progress, self._whole - 1))
         self._pending = moved if self._tiles else None
         return self._tiles > 0
 
     def _gather(self, submap: Submap, is_weighed: bool) -> None:
-        """Let a submap go into what is to be taken in after what is pending."""
+        """Add a submap to the gathered level."""
         before, level = self._gathered, Level(submap.read, submap.grid, is_weighed)
         self._gathered = self._resampled([level, *([] if before is None else [before])])
         submap.read.clear()
@@ -141,7 +146,7 @@ class Remapping:
             before.field.release()
 
     def _resampled(self, levels: list[Level]) -> Level:
-        """What levels of a grid add up to, of several texels a cell."""
+        """The composition of levels of one grid, with several texels a cell."""
         grid, (most, in_all) = levels[0].grid, MOST_GATHERED
         times = max(LEAST_TEXELS, min(math.isqrt(in_all // (grid.nx * grid.ny)), most))
         field = self.device.field((times * grid.nx, times * grid.ny), 2, "gathered submap")
@@ -160,7 +165,7 @@ class Remapping:
         return Level(field, grid)
 
     def _take_in(self, part: float) -> None:
-        """Come to a `part`, 0-1, of what the pending level wants."""
+        """Do a `part`, 0-1, of taking in the pending level."""
         if self._pending is None:
             return
         begun = self._begun / self._whole
@@ -170,18 +175,18 @@ class Remapping:
             self._go_on()
 
     def _go_on(self) -> None:
-        """With what was gathered, now that nothing is pending any more."""
+        """Make the gathered level, if there is one, the pending one."""
         gathered, self._gathered, self._pending = self._gathered, None, None
         if gathered is not None and not self._stand_by(gathered):
             gathered.field.release()
 
     def _draw_anew(self, levels: list[Level], part: float) -> None:
-        """Come to a `part` of the accumulated map's tiles that are planned for levels."""
+        """Redraw a `part` of the accumulated map's tiles that are planned for these levels."""
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
         inputs = self._accumulated.inputs() | inputs_of(levels, self._frozen.inputs())
 
         def draw(target: Field, regions: list[Region]) -> None:
-            # Also where it is held: places beside that may look into it, and once thawed it goes on from there.
+            # Also where it is held: places next to that may look into it, and it goes on from there once released.
             for is_near, parts in self._frozen.parts(regions, (0.0, 0.0), target.texel):
                 defines = defines_of(levels if is_near else away_from_held(levels))
                 compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **defines)

@@ -18,8 +18,8 @@ from solver.viscosity.parts import BROAD, find_parts
 
 
 # Of the others a spiral and snakes once took 12 to 14 iterations, and a contrast of 1e8 or a solid left 9 to 90 %;
-# at a contrast of 100 solids left 2 to 9 % (5136, 5505).
-@pytest.mark.parametrize("seed", [*range(6), 1025, 1107, 448279178, 700096, 700135, 5136, 5505])
+# at a contrast of 100 solids left 2 to 9 % (5136, 5505); where the cycle overshot 6 % were left (5142).
+@pytest.mark.parametrize("seed", [*range(6), 1025, 1107, 448279178, 700096, 700135, 5136, 5142, 5505])
 def test_viscous_step_is_near_the_direct_solution(device: Device, seed: int) -> None:
     viscosity.check_viscous_step(device, seed)
 
