@@ -273,9 +273,9 @@ def in_words(said: str) -> str:
 
 
 def heading(said: str) -> str:
-    """The same with a capital."""
+    """The same with a capital, unless it begins with the name of a file."""
     words = in_words(said)
-    return f"{words[:1].upper()}{words[1:]}"
+    return words if "." in words.split(" ", 1)[0] else f"{words[:1].upper()}{words[1:]}"
 
 
 def _short(seconds: float) -> float:

@@ -22,7 +22,7 @@ from app.media.clip import WHOLE, FrameRange, rate_of
 from app.media.formats import FORMATS
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
-from app.model.handles import in_words
+from app.model.handles import heading
 from app.model.recipe import Recipe
 from app.model.timeline import NEARLY, Timeline, steps_of
 from app.ui.canvas import shown_pixels
@@ -615,7 +615,7 @@ class Exports:
                 self._giving = Giving(process.job.target)
             else:
                 for notice in process.notices:
-                    self.messages.say(in_words(notice))
+                    self.messages.say(heading(notice))
                 self.messages.done(f"Exported {process.job.target.name} to {process.job.target.parent}")
             return
         state = f": {process.state}" if process.state else ""

@@ -23,6 +23,7 @@ from app.work.replay import Replay
 from solver.gl.device import Device
 from support.commands import Run
 from support.desk import Desk, needs_a_screen
+from support.drawn import Drawn
 from support.editing import Robot, pattern, small_project
 from support.widgets import Widgets
 
@@ -170,6 +171,22 @@ def test_a_lasso_may_end_where_it_began(robot: Robot) -> None:
     robot.release()
     assert robot.editor.state.selected_area is not None
     assert 0.05 < (robot.editor.state.selected_area > 127).mean() < 0.12
+
+
+def test_how_much_is_selected_is_told(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = Drawn(monkeypatch)
+
+    def told() -> set[str]:
+        drawn.lines.clear()
+        robot.frame()
+        return {line.split("|")[-1].strip() for line in drawn.lines if "selected." in line}
+
+    robot.key("m")
+    assert told() == {"Nothing is selected."}
+    select(robot, "rectangle", (0.0, 0.0), (0.5, 0.5))
+    assert told() == {"25.0% of the picture is selected."}
+    select(robot, "rectangle", (0.5, 0.5), (0.52, 0.52))
+    assert told() == {"Less than 0.1% of the picture is selected."}
 
 
 @pytest.mark.parametrize("by", ["colour", "brightness"])

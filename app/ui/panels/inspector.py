@@ -128,10 +128,8 @@ def _selection(ui: Ui, workspace: Workspace, state: EditorState, selecting: Sele
     ui.wrapped(
         f"{SELECT_BY[state.select_by]} Shift adds, Alt takes away, both intersect, Esc cancels.", ui.palette.dim, 13
     )
-    part = (
-        f"{100 * state.selected_part:.1f}% of the picture is selected." if state.selection else "Nothing is selected."
-    )
-    ui.dim(part)
+    part = "Less than 0.1%" if 0 < state.selected_part < 0.001 else f"{state.selected_part:.1%}"
+    ui.dim(f"{part} of the picture is selected." if state.selection else "Nothing is selected.")
     with ui.enabled(bool(state.selection)):
         if ui.button("Invert the selection", width=-1, height=30):
             do("select_invert")
