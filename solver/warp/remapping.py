@@ -152,7 +152,7 @@ class Remapping:
         fractions = np.divide(step, grid.picture).tolist()
         compose(
             field,
-            **self._accumulated.inputs(),
+            **self._accumulated.own(),
             **inputs_of(levels, self._frozen.inputs()),
             origin=origin,
             step=fractions,
@@ -178,7 +178,7 @@ class Remapping:
     def _draw_anew(self, levels: list[Level], part: float) -> None:
         """Come to a `part` of the accumulated map's tiles that are planned for levels."""
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
-        inputs = self._accumulated.inputs() | inputs_of(levels, self._frozen.inputs())
+        inputs = self._accumulated.own() | inputs_of(levels, self._frozen.inputs())
 
         def draw(target: Field, regions: list[Region]) -> None:
             # Also where it is held: places beside that may look into it, and once thawed it goes on from there.

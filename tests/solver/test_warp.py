@@ -64,7 +64,7 @@ def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) 
     before = warp.read()
     warp.remap()
     assert not warp.submap.field.get().any()
-    assert difference(warp.read((2 * size[0], 2 * size[1])), warp.composed().get()) < 1e-5
+    assert difference(warp.read((2 * size[0], 2 * size[1])), warp.composed(exact=True).get()) < 1e-5
     assert difference(warp.read(), before) < 0.1
 
 
@@ -219,7 +219,8 @@ def test_a_remap_touches_only_what_has_moved(device: Device) -> None:
     for _ in range(24):
         warp.advance_prescribed(flow, 0.1)
     second = warp.save()
-    shared = {*first.tiles["accumulated map"].textures} & {*second.tiles["accumulated map"].textures}
+    tiles = (texture for saved in second.tiles.values() for texture in saved.textures)  # what was steep has been closed
+    shared = {*first.tiles["accumulated map"].textures}.intersection(tiles)
     assert len(shared) == 16 - 4, "the window lies in four of the tiles"
     warp.remap()
     after = warp.read((1024, 1024))
