@@ -154,8 +154,8 @@ class AccumulatedMap:
         if len(self.closed) < self._most_closed:
             spacing = [side / n for side, n in zip(self.extent, self.size, strict=True)]
             blocks = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in tiles]
-            find = self.device.pass_("warp/steepness.frag")
-            find(self._steepness, region=blocks, displacement=self._next, spacing=spacing, side=SIDE, tile=TILE)
+            find = self.device.pass_("warp/steepness.frag", TILE=TILE)
+            find(self._steepness, region=blocks, displacement=self._next, spacing=spacing, side=SIDE)
 
     def _begin_anew(self) -> None:
         """With nothing, in the field that is at hand."""

@@ -59,7 +59,7 @@ class Submap(DoubleField):
     def is_steep(self) -> bool:
         """True if it is bent too far for its interpolation; waits for the GPU."""
         find = self.device.pass_("warp/steepness.frag")
-        find(self._steepness, displacement=self.read, spacing=self.grid.spacing, side=SIDE, tile=max(self.grid.size))
+        find(self._steepness, displacement=self.read, spacing=self.grid.spacing, side=SIDE)
         return self._find_steepest(self._steepness)[0] > STEEPEST**2
 
     def release(self) -> None:
