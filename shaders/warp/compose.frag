@@ -50,5 +50,6 @@ void main() {
     out_displacement = moved;
     return;
 #endif
-    out_displacement = from + displacement_from(x, moved, place + moved / texel);
+    place += moved / texel;
+    out_displacement = from + displacement_from(x, moved, place);
 }
