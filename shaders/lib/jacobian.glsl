@@ -1,5 +1,5 @@
 // The Jacobian of the warp map by the chain rule: the product of those of its parts, each by the derivatives of the cubic
-// both ways. 32 reads, and 16 more for each of LEVELS above 1, 4 for each of WEIGHED.
+// both ways. 32 reads, and 16 more for each of LEVELS above 1 and of CLOSED, 4 for each of WEIGHED.
 #include "lib/warp.glsl"
 
 // What the map does at x.
@@ -20,6 +20,16 @@ mat2 bend_of(int level, sampler2D submap, vec4 window, vec2 x, inout vec2 moved)
     vec2 more = cubic_displacement(submap, at.xy * size, u_walled, slope);
     moved = within_picture(x, moved + w * more * at.z);
     return mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading));
+}
+
+// What A, or one of those before it, does after that.
+void follow(sampler2D accumulated, vec2 x, inout Bend bend) {
+    vec2 density = vec2(textureSize(accumulated, 0)) / u_picture;
+    mat2 slope;
+    bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density, u_walled, slope);
+    mat2 next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
+    bend.determinant *= determinant(next);
+    bend.jacobian = next * bend.jacobian;
 }
 
 Bend bend_at(vec2 x) {
@@ -48,9 +58,32 @@ Bend bend_at(vec2 x) {
     bend.determinant *= determinant(next);
     bend.jacobian = next * bend.jacobian;
 #endif
-    bend.moved += cubic_displacement(u_accumulated, (x + bend.moved) * density, u_walled, slope);
-    next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
-    bend.determinant *= determinant(next);
-    bend.jacobian = next * bend.jacobian;
+    follow(u_accumulated, x, bend);
+#define FOLLOW(closed) bend.moved = within_picture(x, bend.moved); follow(closed, x, bend);
+#if CLOSED > 7
+    FOLLOW(u_closed_7)
+#endif
+#if CLOSED > 6
+    FOLLOW(u_closed_6)
+#endif
+#if CLOSED > 5
+    FOLLOW(u_closed_5)
+#endif
+#if CLOSED > 4
+    FOLLOW(u_closed_4)
+#endif
+#if CLOSED > 3
+    FOLLOW(u_closed_3)
+#endif
+#if CLOSED > 2
+    FOLLOW(u_closed_2)
+#endif
+#if CLOSED > 1
+    FOLLOW(u_closed_1)
+#endif
+#if CLOSED > 0
+    FOLLOW(u_closed_0)
+#endif
+#undef FOLLOW
     return bend;
 }

@@ -1,9 +1,10 @@
 // The warp map as its parts: submaps on windows of the picture, the identity outside them, then the accumulated map.
 //   D(x) = S(x) + A(x + S(x));   with LEVELS defined as 2 or 3, with the submaps that are still to be taken into A,
-//   D(x) = S + S2 + S3 + A, each where those before it have led. x + S(x) is kept in the picture, and x + D(x) within
+//   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 8, with so many maps more that
+//   A goes on from, the last one closed first. What leads into another part is kept in the picture, and x + D(x) within
 //   u_limits, which the texels of all are: between them a polynomial reaches beyond, and what is composed again and again
 //   would grow without end.
-// u_submap, u_second, u_third, u_accumulated: displacements, longer sides; u_window, u_second_window, u_third_window: left,
+// u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_7: displacements, longer sides; u_window, u_second_window, u_third_window: left,
 // top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
 // bottom, longer sides; u_walled: 1 if neither what has moved nor A crosses the picture's edges, else 0.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
@@ -25,6 +26,33 @@ uniform vec4 u_second_window;
 #if LEVELS > 2
 uniform sampler2D u_third;
 uniform vec4 u_third_window;
+#endif
+#ifndef CLOSED
+#define CLOSED 0
+#endif
+#if CLOSED > 0
+uniform sampler2D u_closed_0;
+#endif
+#if CLOSED > 1
+uniform sampler2D u_closed_1;
+#endif
+#if CLOSED > 2
+uniform sampler2D u_closed_2;
+#endif
+#if CLOSED > 3
+uniform sampler2D u_closed_3;
+#endif
+#if CLOSED > 4
+uniform sampler2D u_closed_4;
+#endif
+#if CLOSED > 5
+uniform sampler2D u_closed_5;
+#endif
+#if CLOSED > 6
+uniform sampler2D u_closed_6;
+#endif
+#if CLOSED > 7
+uniform sampler2D u_closed_7;
 #endif
 #if defined(HELD) || defined(WEIGHED)
 uniform sampler2D u_held;
@@ -102,17 +130,64 @@ bool is_held(vec2 place) {
 vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), 0.0); }
 #endif
 
-// D(x); by the cubic in A where CUBIC is defined.
+// A, or one of those before it, at a place in its texels: by the cubic where CUBIC is defined, LINEAR between four texels.
+vec2 accumulated_displacement(sampler2D accumulated, vec2 place) {
+#if defined(LINEAR)
+    return linear_displacement(accumulated, place);
+#elif defined(CUBIC)
+    return cubic_displacement(accumulated, place, u_walled);
+#else
+    return quintic_displacement(accumulated, place, u_walled);
+#endif
+}
+
+// Goes on from where x has been `moved` and `more` to, `place` being where without `more`, in A's texels: what leads nowhere
+// stays on its texel to the bit.
+void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
+    vec2 led = within_picture(x, moved + more) - moved;
+    moved += led;
+    place += led * vec2(textureSize(closed, 0)) / u_picture;
+    more = accumulated_displacement(closed, place);
+}
+
+// D(x) of x that the submaps have `moved`, to `place` in A's texels.
+vec2 displacement_from(vec2 x, vec2 moved, vec2 place) {
+    vec2 more = accumulated_displacement(u_accumulated, place);
+#define FOLLOW(closed) follow(closed, x, moved, more, place);
+#if CLOSED > 7
+    FOLLOW(u_closed_7)
+#endif
+#if CLOSED > 6
+    FOLLOW(u_closed_6)
+#endif
+#if CLOSED > 5
+    FOLLOW(u_closed_5)
+#endif
+#if CLOSED > 4
+    FOLLOW(u_closed_4)
+#endif
+#if CLOSED > 3
+    FOLLOW(u_closed_3)
+#endif
+#if CLOSED > 2
+    FOLLOW(u_closed_2)
+#endif
+#if CLOSED > 1
+    FOLLOW(u_closed_1)
+#endif
+#if CLOSED > 0
+    FOLLOW(u_closed_0)
+#endif
+#undef FOLLOW
+    return within(u_limits, x, moved + more);
+}
+
+// D(x).
 vec2 displacement_at(vec2 x) {
     vec2 density = vec2(textureSize(u_accumulated, 0)) / u_picture;
 #ifdef HELD
     if (is_held(x * density)) return within(u_limits, x, held_displacement(x * density));
 #endif
     vec2 moved = displacement_of_submaps(x);
-#ifdef CUBIC
-    moved += cubic_displacement(u_accumulated, (x + moved) * density, u_walled);
-#else
-    moved += quintic_displacement(u_accumulated, (x + moved) * density, u_walled);
-#endif
-    return within(u_limits, x, moved);
+    return displacement_from(x, moved, (x + moved) * density);
 }

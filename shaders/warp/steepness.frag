@@ -1,6 +1,6 @@
 // Steepness: the largest |grad D|^2 at the corners, each shared by four cells, of a block, by differences of their means.
 // u_displacement (D): cell centres, longer sides; u_spacing: distances of the centres, longer sides; u_side: corners along
-// a block.
+// a block. Define TILE to look at no corner between two tiles of so many cells a side.
 // reads: 144
 uniform sampler2D u_displacement;
 uniform vec2 u_spacing;
@@ -10,6 +10,9 @@ layout(location = 0) out float out_steepness;
 void main() {
     vec2 size = vec2(textureSize(u_displacement, 0)), texel = 1.0 / size;
     vec2 first = u_side * floor(gl_FragCoord.xy) + 0.5, end = min(first + u_side, size - 1.0);
+#ifdef TILE
+    end = min(end, float(TILE) * (floor(first / float(TILE)) + 1.0) - 1.0);
+#endif
     out_steepness = 0.0;
     for (float y = first.y; y < end.y; ++y) {
         vec2 upper_left = texture(u_displacement, vec2(first.x, y) * texel).rg;

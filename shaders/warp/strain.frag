@@ -3,7 +3,7 @@
 // the right and below is (half the product of its diagonals), negative where it is folded: as exact as a middle difference. A
 // triangle of three of them, one-sided, tells of folds that are not there as soon as the map is bent within ten texels.
 // x: see lib/place.glsl; or as near to it as none of them leaves the picture.
-// reads: 104, and 52 more for each of LEVELS above 1, 16 for each of WEIGHED
+// reads: 104, and 52 more for each of LEVELS above 1 and of CLOSED, 16 for each of WEIGHED
 #define CUBIC
 #include "lib/warp.glsl"
 #include "lib/place.glsl"

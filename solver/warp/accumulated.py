@@ -11,13 +11,17 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.gl.tiled import SavedTiles, TiledField
+from solver.gl.reduction import SIDE, Reduction, blocks_of
+from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
+from solver.warp.state import ACCUMULATED, CLOSED
 
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
+STEEPEST = 6.0  # largest |grad A| of a map that goes on: stretched more it folds between its texels
+MOST_CLOSED = 8, 2**24  # maps, and texels of them in all
 
 Limits = tuple[float, float, float, float]
 
@@ -45,6 +49,9 @@ def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, i
 class AccumulatedMap:
     """A displacement of the whole picture, RG32F, longer sides, redrawn tile by tile where something has moved.
 
+    Where it has become too steep for its texels it is closed, and begins anew with nothing, above the closed ones, the
+    last of which comes first. Once there are as many as there may be, it goes on however steep it is.
+
     Args:
         device: the device.
         size: (width, height) in texels.
@@ -52,12 +59,18 @@ class AccumulatedMap:
 
     Attributes:
         now: the displacement. Tiles are redrawn into another field, which replaces it once all are done.
+        closed: what comes after it, the first one closed first.
         limits: of the places looked up: left, top, right, bottom.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
+        self.device = device
         self.size = size
         self.extent = extent
+        self.closed: list[TiledField] = []
+        self._most_closed = min(MOST_CLOSED[0], MOST_CLOSED[1] // (size[0] * size[1]))
+        self._steepness = device.field(blocks_of(size), 1, "accumulated map, steepness")
+        self._find_steepest = Reduction(device, blocks_of(size), 1, "max")
         self.now = TiledField(device, size, 2, "accumulated map")
         self._next = TiledField(device, size, 2, "accumulated map, anew")
         self._tiles = self.now.kind.regions
@@ -89,6 +102,7 @@ class AccumulatedMap:
                 if counts[bottom, right] - counts[top, right] - counts[bottom, left] + counts[top, left]:
                     wanted.add(tile)
         self._moved = [tile for tile in self._tiles if tile in wanted]
+        self._steepness.clear()
         self._copied = sorted(self._stale.difference(wanted))
         return len(self._moved)
 
@@ -100,15 +114,30 @@ class AccumulatedMap:
         first, last = math.floor((start - origin) / step) - REACH, math.ceil((end - origin) / step) + REACH
         return min(max(first, 0), count), min(max(last, 0), count)
 
+    @property
+    def defines(self) -> dict[str, object]:
+        """Of `lib/warp.glsl`, with what is closed."""
+        return {"CLOSED": len(self.closed)} if self.closed else {}
+
     def inputs(self) -> dict[str, Any]:
-        """It as `lib/warp.glsl` has it."""
-        return {"accumulated": self.now, "picture": self.extent, "limits": self.limits, "walled": float(self.is_walled)}
+        """It as `lib/warp.glsl` has it, with what is closed."""
+        return (
+            self.own()
+            | {f"closed_{number}": field for number, field in enumerate(self.closed)}
+            | {"limits": self.limits}
+        )
+
+    def own(self) -> dict[str, Any]:
+        """The same without: above what is closed it stays in the picture."""
+        limits = self._picture if self.closed else self.limits
+        return {"accumulated": self.now, "picture": self.extent, "limits": limits, "walled": float(self.is_walled)}
 
     def draw(self, part: float, draw: Callable[[Field, list[Region]], None]) -> None:
         """Do a `part`, 0-1, of what is planned: `draw` redraws regions, from `now`, into another field."""
         before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
         if anew := self._moved[before:until]:
             draw(self._next, anew)
+            self._look(anew)
         count = len(self._moved)
         self._next.take(self.now, self._copied[max(before - count, 0) : max(until - count, 0)])
         self._done = max(before, until)
@@ -116,6 +145,23 @@ class AccumulatedMap:
             self.now, self._next = self._next, self.now
             self._stale = set(self._moved)
             self._moved, self._copied, self._done = [], [], 0
+            if len(self.closed) < self._most_closed and self._find_steepest(self._steepness)[0] > STEEPEST**2:
+                self.closed.append(self.now)
+                self._begin_anew()
+
+    def _look(self, tiles: list[Region]) -> None:
+        """See how steep tiles have been drawn, if that matters."""
+        if len(self.closed) < self._most_closed:
+            spacing = [side / n for side, n in zip(self.extent, self.size, strict=True)]
+            blocks = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in tiles]
+            find = self.device.pass_("warp/steepness.frag", TILE=TILE)
+            find(self._steepness, region=blocks, displacement=self._next, spacing=spacing, side=SIDE)
+
+    def _begin_anew(self) -> None:
+        """With nothing, in the field that is at hand."""
+        self.now, self._next = self._next, TiledField(self.device, self.size, 2, "accumulated map, anew")
+        self.now.clear()
+        self._stale.clear()
 
     def forget(self) -> None:
         """Drop what is planned."""
@@ -131,19 +177,38 @@ class AccumulatedMap:
     def set(self, draw: Callable[[Field], None], limits: Limits) -> None:
         """Draw all of it, which looks up places within these limits; what was planned is forgotten."""
         self.forget()
+        self._open()
         draw(self.now)
         self._stale = set(self._tiles)
         self.limits, self.is_walled = limits, False
 
-    def restore(self, saved: SavedTiles, limits: Limits, is_walled: bool) -> None:
-        """Go back to what `now.save()` gave and the limits of then; what was planned is forgotten."""
+    def merge(self, draw: Callable[[Field], None]) -> None:
+        """Be one map with what is closed: `draw` draws them together; nothing may be planned."""
+        draw(self._next)
+        self.now, self._next = self._next, self.now
+        self._stale = set(self._tiles)
+        self._open()
+
+    def saved(self) -> dict[str, TiledField]:
+        """The fields by name."""
+        return {ACCUMULATED: self.now} | {f"{CLOSED}{number}": field for number, field in enumerate(self.closed)}
+
+    def restore(self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool) -> None:
+        """Go back to what `saved` gave, as it was then, with the limits of then; what was planned is forgotten."""
         self.forget()
-        self._stale.update(self.now.restore(saved))
+        self._stale.update(self.now.restore(saved[ACCUMULATED]))
+        count = sum(name.startswith(CLOSED) for name in saved)
+        self._open(count)
+        while len(self.closed) < count:
+            self.closed.append(TiledField(self.device, self.size, 2, "closed map"))
+        for number, field in enumerate(self.closed):
+            field.restore(saved[f"{CLOSED}{number}"])
         self.limits, self.is_walled = limits, is_walled
 
     def clear(self) -> None:
         """The identity; what was planned is forgotten."""
         self.forget()
+        self._open()
         for field in (self.now, self._next):
             field.clear()
         self._stale.clear()
@@ -151,8 +216,14 @@ class AccumulatedMap:
 
     def release(self) -> None:
         """Free the textures."""
-        self.now.release()
-        self._next.release()
+        self._open()
+        for thing in (self.now, self._next, self._steepness, self._find_steepest):
+            thing.release()
+
+    def _open(self, left: int = 0) -> None:
+        """Let what is closed go, but for so many."""
+        while len(self.closed) > left:
+            self.closed.pop().release()
 
 
 def _meet(a: Region, b: Region) -> bool:

@@ -28,7 +28,7 @@ from solver.warp.factors import Factors
 from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
-from solver.warp.state import FACTOR, SUBMAPS, MapState, grid_in, values_of
+from solver.warp.state import ACCUMULATED, FACTOR, SUBMAPS, MapState, grid_in, values_of
 from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
@@ -231,6 +231,9 @@ class WarpMap:
         if not self._is_settled:
             self._begin_remap()  # or there would be a step around the held places
         self._remapping.finish()
+        if self._accumulated.closed:
+            self.remap()
+            self._accumulated.merge(lambda target: self._compose(target, (0.0, 0.0), target.texel, REMAP=1))
         restore = self.device.pass_("warp/restore.frag", **self._held_defines())
         inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
         still = None
@@ -306,7 +309,7 @@ class WarpMap:
 
     def save(self) -> MapState:
         """A copy of this moment, on the GPU, which the caller releases; states share tiles that are the same."""
-        fields: dict[str, Field] = {"submap": self._submap.read, "accumulated map": self._accumulated.now}
+        fields: dict[str, Field] = {"submap": self._submap.read, **self._accumulated.saved()}
         values: dict[str, Any] = {"steps": self._steps, "limits": self._accumulated.limits}
         values["walled"] = self._accumulated.is_walled
         values |= {"grid": values_of(self.grid), "settled": self._is_settled}
@@ -327,12 +330,12 @@ class WarpMap:
         """
         check_type("what to go back to", state, State)
         grid = grid_in(state.values, "grid")
-        tiles = state.tiles.get("accumulated map")
+        tiles = state.tiles.get(ACCUMULATED)
         if grid.picture != self.extent or tiles is None or tiles.kind != self._accumulated.now.kind:
             raise ValueError("the state is of another picture")
         left, top, right, bottom = state.values["limits"].tolist()
         is_walled = bool(state.values.get("walled", True))
-        self._accumulated.restore(tiles, (left, top, right, bottom), is_walled)
+        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled)
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)
@@ -365,7 +368,8 @@ class WarpMap:
         accumulated map for it.
         """
         size = self.size if size is None else size
-        if size == self.size and self._steps == 0 and self._remapping.is_idle and self._frozen.held is None:
+        is_alone = self._steps == 0 and self._remapping.is_idle and not self._accumulated.closed
+        if size == self.size and is_alone and self._frozen.held is None:
             return self._accumulated.now
         key = size, exact
         if key not in self._composed:
@@ -474,7 +478,8 @@ class WarpMap:
     ) -> None:
         """Draw the map where it is held now and was not before; see `Frozen`."""
         fine = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **fine, **defines_of(self._levels))
+        defines = fine | defines_of(self._levels) | self._accumulated.defines
+        compose = self.device.pass_("warp/compose.frag", REMAP=1, KEEP=1, **defines)
         compose(target, region=regions, now=now, before=before, corner=corner, **self._parts())
 
     def probe(self, target: Field, places: list[tuple[float, float]], step: tuple[float, float]) -> None:
@@ -554,10 +559,13 @@ class WarpMap:
     def _defines(self, is_near: bool = True) -> dict[str, object]:
         """How the whole map is put together, where something is held near or not: see `Frozen.parts`."""
         fine: dict[str, object] = {"CUBIC": 1} if self._accumulated.is_fine(self.grid) else {}
-        return fine | (self._held_defines() if is_near else defines_of(away_from_held(self._levels)))
+        if is_near:
+            return fine | self._held_defines()
+        return fine | defines_of(away_from_held(self._levels)) | self._accumulated.defines
 
     def _held_defines(self) -> dict[str, object]:
-        return defines_of(self._levels) | ({} if self._frozen.held is None else {"HELD": 1})
+        held = {} if self._frozen.held is None else {"HELD": 1}
+        return defines_of(self._levels) | self._accumulated.defines | held
 
     def _parts(self) -> dict[str, Any]:
         """What `lib/warp.glsl` puts together."""

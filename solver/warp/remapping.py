@@ -157,7 +157,7 @@ class Remapping:
         fractions = np.divide(step, grid.picture).tolist()
         compose(
             field,
-            **self._accumulated.inputs(),
+            **self._accumulated.own(),
             **inputs_of(levels, self._frozen.inputs()),
             origin=origin,
             step=fractions,
@@ -183,7 +183,7 @@ class Remapping:
     def _draw_anew(self, levels: list[Level], part: float) -> None:
         """Redraw a `part` of the accumulated map's tiles that are planned for these levels."""
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
-        inputs = self._accumulated.inputs() | inputs_of(levels, self._frozen.inputs())
+        inputs = self._accumulated.own() | inputs_of(levels, self._frozen.inputs())
 
         def draw(target: Field, regions: list[Region]) -> None:
             # Also where it is held: places next to that may look into it, and it goes on from there once released.

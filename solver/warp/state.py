@@ -12,7 +12,8 @@ from solver.grid import Grid
 from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
-FACTOR = "factor "  # and its number
+FACTOR, CLOSED = "factor ", "closed map "  # and their numbers
+ACCUMULATED = "accumulated map"
 
 
 class MapState(State):
@@ -42,8 +43,10 @@ class MapState(State):
                 if given is None or (given.shape, given.dtype) != ((*size[::-1], 2), np.float32):
                     raise ValueError(f"its {name} is missing or of another size")
                 made.fields[name] = device.upload(given, f"{name}, given")
-            accumulated = self.tiles["accumulated map"]
-            tiles = {"accumulated map": accumulated}
+            accumulated = self.tiles[ACCUMULATED]
+            tiles = {ACCUMULATED: accumulated}
+            for number in range(sum(name.startswith(CLOSED) and name.endswith("/places") for name in arrays)):
+                tiles[f"{CLOSED}{number}"] = SavedTiles.nothing(accumulated.kind)
             for name, kind in held_kinds(accumulated.kind.size).items():
                 if f"{name}/places" in rest:
                     tiles[name] = SavedTiles.nothing(kind)
