@@ -17,6 +17,7 @@ from app.media.leftovers import sweep, temporary_name
 from app.progress import if_abandoned
 
 MENDS = {
+    errno.ENOENT: "its folder is gone; make it again or choose another",
     errno.ENOSPC: "the disk is full; free some space or choose another folder",
     errno.EDQUOT: "your disk quota is used up; free some space or choose another folder",
     errno.EACCES: "no permission; choose another folder or change its permissions",
@@ -218,6 +219,10 @@ def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Itera
                 sync(target.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
+    except UserError:  # of ffmpeg, in words of its own and with a name that nobody knows
+        if target.parent.is_dir():
+            raise
+        raise cannot_write(path, FileNotFoundError(errno.ENOENT, "")) from None
 
 
 def _keep(path: Path, backup: Path) -> None:

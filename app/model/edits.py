@@ -8,7 +8,7 @@ from typing import Any
 from app.errors import UserError
 from app.model.handles import MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin, labelled
 from app.model.mask_edits import MaskStroke
-from app.model.recipe import MOST_FORCES, Recipe
+from app.model.recipe import Recipe
 from app.model.schema import written
 from app.model.strokes import Change, Stroke
 from app.model.toml import MOST_NUMBERS, MOST_WORDS
@@ -97,8 +97,8 @@ def check_size(recipe: Recipe, before: Recipe | None = None) -> None:
         raise UserError(
             "This work is as large as one may be. Undo something, or export the warp as a map and begin anew with that."
         )
-    if before is not None and len(recipe.force) > max(MOST_FORCES, len(before.force)):
-        raise UserError(f"There would be {len(recipe.force)} forces; at most {MOST_FORCES} work.")
+    if before is not None and (said := recipe.excess) and not before.excess:
+        raise UserError(f"That is not made, or {said}.")
 
 
 def with_change(recipe: Recipe, tick: int, settings: dict[str, Any], lasts: bool) -> Recipe:

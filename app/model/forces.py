@@ -38,7 +38,12 @@ from solver.grid import Grid
 
 Falloff = Literal["smooth", "gaussian"]
 Strength = Annotated[float, Field(ge=-1e6, le=1e6)]
+MOST_FORCES = 512  # each has a picture of itself as large as the grid: of 256 cells, 200 MB in all
 MOST_PIECES = 20_000  # of a curve; around the edge of a picture, of a radius of two thousandths
+MOST_PIECES_IN_ALL = 60_000  # of all curves: each takes 15 microseconds
+MOST_COVERED = (
+    1500  # times that all their pieces may cover the whole picture: on 256 cells each takes half a millisecond
+)
 
 
 class _Force(Timed):
@@ -184,8 +189,7 @@ class CurveForce(_Push):
             raise ValueError(f"a curve needs at least two points, not {len(self.points)}")
         if len(set(self.points)) < 2:
             raise ValueError("all points of the curve are the same; a curve needs a length")
-        pieces = len(self.points) + 8 * sum(math.dist(*ends) for ends in pairwise(self.points)) / self.radius
-        if pieces > MOST_PIECES:
+        if self.pieces > MOST_PIECES:
             raise ValueError(
                 f"'radius' ({self.radius:g}) is too small for so long a curve: it is cut into eight pieces a radius, "
                 f"{MOST_PIECES} at most"
@@ -193,6 +197,16 @@ class CurveForce(_Push):
         if not isinstance(self.direction, str):
             _checked_direction(self.direction)
         return self
+
+    @property
+    def pieces(self) -> float:
+        """How many it is cut into, or a few less."""
+        return len(self.points) + 8 * sum(math.dist(*ends) for ends in pairwise(self.points)) / self.radius
+
+    @property
+    def covered(self) -> float:
+        """How many times its pieces cover the whole picture."""
+        return self.pieces * min(2 * _reach(self.radius, self.falloff), 1.0) ** 2
 
     def _bare(self, grid: Grid) -> np.ndarray:
         at, tangents, lengths = pieces_of(places(self.points, grid), self.spline, self.radius / 8)
@@ -398,6 +412,24 @@ class BuiltForce:
     motion: np.ndarray | None
 
 
+def excess(forces: Sequence[Force]) -> str | None:
+    """What of forces is more than a simulation can begin with in a second or two; None if nothing is."""
+    curves = [force for force in forces if isinstance(force, CurveForce) and not force.muted]
+    if len(forces) > MOST_FORCES:
+        return f"there are {len(forces)} forces; at most {MOST_FORCES} work"
+    if (pieces := sum(curve.pieces for curve in curves)) > MOST_PIECES_IN_ALL:
+        return (
+            f"the curves of the forces are cut into {pieces:.0f} pieces, eight a radius; at most {MOST_PIECES_IN_ALL} "
+            "work"
+        )
+    if (covered := sum(curve.covered for curve in curves)) > MOST_COVERED:
+        return (
+            f"the curves of the forces cover the whole picture {covered:.0f} times, each eight times a radius; at most "
+            f"{MOST_COVERED} times work"
+        )
+    return None
+
+
 def build(forces: Sequence[Force], grid: Grid, pictures: NamedPictures, duration: float) -> list[BuiltForce]:
     """The recipe's forces on a grid, without those that are muted, for a simulation of `duration` seconds.
 
@@ -456,9 +488,14 @@ def _slope(r: np.ndarray, radius: float, falloff: Falloff) -> np.ndarray:
     return -6 * r / radius**2 * np.maximum(1 - (r / radius) ** 2, 0.0) ** 2
 
 
+def _reach(radius: float, falloff: Falloff) -> float:
+    """The distance beyond which nothing is left of a profile."""
+    return radius * (3.5 if falloff == "gaussian" else 1.0)
+
+
 def _neighbourhood(grid: Grid, place: np.ndarray, radius: float, falloff: Falloff) -> tuple[slice, slice]:
     """The cells that a profile at `place` reaches, as rows and columns."""
-    reach = radius * (3.5 if falloff == "gaussian" else 1.0)
+    reach = _reach(radius, falloff)
     low = np.maximum(np.floor((place - reach) / grid.spacing).astype(int), 0)
     high = np.maximum(np.ceil((place + reach) / grid.spacing).astype(int) + 1, 0)
     return slice(low[1], high[1]), slice(low[0], high[0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import zip_longest
-from typing import Annotated, Any, Literal, TypeGuard
+from typing import Annotated, Any, Literal, Self, TypeGuard
 
 import numpy as np
 from pydantic import Field, TypeAdapter, model_validator
@@ -38,6 +38,7 @@ MaskTool = Literal["thicken", "thin", "freeze", "thaw", "smooth"]
 THINNEST, THICKEST = -3.0, 5.0  # decades that can be painted
 UNITS = {"frozen": (0, 255), "thickness": (24576, 8192)}
 """The words that masks are kept in: that of nothing, and how many more it is frozen at, or a decade thicker."""
+LONGEST_HAND = 216_000  # ticks of a hand in one stroke: an hour; what stands still is painted once in each
 Decades = Annotated[float, Field(ge=THINNEST, le=THICKEST)]
 
 
@@ -50,6 +51,12 @@ class MaskStroke(BrushPath):
 
     kind: Literal["stroke"]
     tool: MaskTool
+
+    @model_validator(mode="after")
+    def _ends(self) -> Self:
+        if (ticks := self.last_tick - self.first_tick) > LONGEST_HAND:
+            raise ValueError(f"paints for {ticks} ticks of the hand; at most {LONGEST_HAND}, an hour, work")
+        return self
 
     @property
     def tick(self) -> int:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import Field, ValidationError, model_validator
 
 from app.errors import UserError
-from app.model import toml
+from app.model import forces, strokes, toml
 from app.model.forces import Force
 from app.model.handles import MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin
 from app.model.mask_edits import MaskEdit, remaining
@@ -24,7 +24,6 @@ from app.model.validation import complaint
 VERSION = 5
 MOST_TICKS = 1_000_000
 FINEST_GRID = 4096  # cells along the longer side
-MOST_FORCES = 512  # each has a picture of itself as large as the grid: of 256 cells, 200 MB in all
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
 
 T = TypeVar("T")
@@ -222,8 +221,8 @@ class Recipe(Model):
             raise ValueError("a 'map' warps coordinates, and mode \"density\" has none; remove one of them")
         if self.amount != 1 and self.mode == "density":
             raise ValueError("'amount' scales a warp of coordinates, and mode \"density\" has none; remove one of them")
-        if len(self.force) > MOST_FORCES:
-            raise ValueError(f"there are {len(self.force)} forces; at most {MOST_FORCES} work")
+        if said := self.excess:
+            raise ValueError(said)
         if len(self.handle) + len(self.pin) > MOST_HANDLES:
             raise ValueError(
                 f"there are {len(self.handle) + len(self.pin)} handles and pins; at most {MOST_HANDLES} work"
@@ -290,6 +289,11 @@ class Recipe(Model):
     # -- what it says -----------------------------------------------------------------------------------------------
 
     @property
+    def excess(self) -> str | None:
+        """What of it is more than works, for messages; None if nothing is."""
+        return forces.excess(self.force) or strokes.excess(self.stroke)
+
+    @property
     def ticks(self) -> int:
         """The whole number of steps nearest to the duration, at least 1."""
         return max(1, round(self.duration / self.fluid.dt))
@@ -306,8 +310,8 @@ class Recipe(Model):
         if self.force or self.freeze or self.map is not None or self.mode == "density":
             return 0
         led = (one.first_tick(self.fluid.dt) for one in (*self.handle, *self.pin))
-        strokes = (stroke.first_tick for stroke in self.stroke if not stroke.muted)
-        return min([*led, *strokes, *(one.tick for one in (*self.change, *self.mask))], default=MOST_TICKS)
+        drawn = (stroke.first_tick for stroke in self.stroke if not stroke.muted)
+        return min([*led, *drawn, *(one.tick for one in (*self.change, *self.mask))], default=MOST_TICKS)
 
     @property
     def pushes(self) -> bool:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import cos, hypot, inf, pi, sin
 from typing import Annotated, Literal, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from app.model.schema import Fraction01, Model, Place, Several
@@ -18,6 +19,7 @@ FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1
 SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
 LATEST = 10_000_000  # tick
 MOST_TIMES = 1000  # that a stroke repeats
+MOST_AT_ONCE = 2000  # in one tick, all strokes and their times together: each takes half a millisecond
 Tick = Annotated[int, Field(ge=0, le=LATEST)]
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
@@ -285,6 +287,24 @@ class Stroke(BrushPath):
             nexts = (each.first_tick + times * each.every for each in (self, other) if each.repeat > times)
             agreed = min([agreed, *nexts])
         return agreed
+
+
+def excess(strokes: Sequence[Stroke]) -> str | None:
+    """What of strokes is more than a tick can do in a second or two; None if nothing is."""
+    acting = [stroke for stroke in strokes if not stroke.muted]
+    if sum(stroke.repeat for stroke in acting) <= MOST_AT_ONCE:
+        return None
+    changes = np.zeros(max(stroke.end_tick for stroke in acting) + 2, np.int32)  # in how many act, from tick to tick
+    for stroke in acting:
+        first = stroke.last_tick if stroke.tool == "curve" else stroke.first_tick
+        for tick, change in ((first, 1), (stroke.last_tick + 1, -1)):
+            changes[tick : tick + (stroke.repeat - 1) * stroke.every + 1 : max(stroke.every, 1)] += change
+    acts = np.cumsum(changes, out=changes)
+    if (most := int(acts.max())) <= MOST_AT_ONCE:
+        return None
+    return (
+        f"in tick {int(acts.argmax())} {most} strokes act at once, with their repetitions; at most {MOST_AT_ONCE} work"
+    )
 
 
 def turns(symmetry: Symmetry, sectors: int) -> list[tuple[float, float, float, float]]:

@@ -42,8 +42,7 @@ class Leading:
             way |= {"to": one.to and self._within(one.to)}
             if one.keys:
                 times, *place = np.array(one.keys).T
-                keys = np.stack([times, *(np.clip(place, 0.0, 1.0) * np.array(extent)[:, None])], axis=-1)
-                way |= {"keys": keys.tolist()}
+                way |= {"keys": np.stack([times, *(np.clip(place, 0.0, 1.0) * np.array(extent)[:, None])], axis=-1)}
             way |= {"goals": np.multiply(one.goals, extent) if one.goals else ()}
         return Handle(at, radius=one.radius, start=one.start, end=one.let_go, stiffness=one.stiffness, **way)
 

@@ -87,11 +87,14 @@ class Handle(Course):
         for name in ("keys", "turned"):
             keys = getattr(self, name)
             check_type("a handle's keys", keys, Iterable)
-            object.__setattr__(self, name, tuple(map(tuple, rows_of("the keys of a handle", (*keys,), 3).tolist())))
+            keys = rows_of("the keys of a handle", keys if isinstance(keys, np.ndarray) else (*keys,), 3)
+            if name == "keys" and (np.abs(keys[:, 1:]) > FARTHEST).any():
+                raise ValueError(f"a handle's keys are off the picture by more than {FARTHEST:g} sides")
+            object.__setattr__(self, name, tuple(map(tuple, keys.tolist())))
         for number in (self.radius, self.start, self.duration, self.end, self.stiffness, self.local):
             check_type("a number of a handle", number)
         self._check_line()
-        stations = (self.at, *((self.to,) if self.to else ()), *(key[1:] for key in self.keys))
+        stations = (self.at, *((self.to,) if self.to else ()))
         if not all(abs(side) <= FARTHEST for place in (*stations, *self.points, *self.goals) for side in place):
             raise ValueError(f"a handle from {self.at} to {self.to} is off the picture by more than {FARTHEST:g} sides")
         if not 1e-6 <= self.radius <= 1:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -495,6 +496,26 @@ def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str)
     with pytest.raises(UserError, match=f"^Cannot write {tmp_path / shown}: the disk is full; free some space"):
         save(tmp_path / name, 30)
     assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize("moved", [False, True])
+@pytest.mark.parametrize("name", ["a.%04d.png", "a.mp4", "a.gif", "a.apng"])
+def test_a_folder_that_vanishes_meanwhile(tmp_path: Path, name: str, moved: bool) -> None:
+    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
+    folder.mkdir()
+
+    def frames() -> None:
+        with animation_writer(folder / name) as write:
+            for number in range(4):
+                write(np.full((32, 32, 3), 40 * number, np.uint8))
+                if number == 1:
+                    folder.rename(elsewhere)
+                    if not moved:
+                        shutil.rmtree(elsewhere)
+
+    with pytest.raises(UserError, match=rf"^Cannot write {folder}/a[.a-z0-9]*: .*folder.* make it (first|again)"):
+        frames()
+    assert not folder.exists()
 
 
 def test_outputs_that_cannot_be(tmp_path: Path):

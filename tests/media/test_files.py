@@ -109,6 +109,7 @@ def test_a_result_is_not_written_over_its_source(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("number", "said"),
     [
+        (errno.ENOENT, "its folder is gone; make it again"),
         (errno.ENOSPC, "the disk is full"),
         (errno.EDQUOT, "quota is used up"),
         (errno.EROFS, "read-only"),

@@ -209,6 +209,43 @@ SMALL_AND_HARMFUL = {
         "[[force]]\nkind = 'curve'\nradius = 1e-300\npoints = [[0, 0], [9, 9]]",
         "line 1: force[1]: 'radius' (1e-300) is too small for so long a curve",
     ),
+    "wide curve": (
+        "[[force]]\nkind = 'curve'\nradius = 0.2\npoints = [" + "[0, 0.5], [1, 0.5], " * 240 + "]",
+        "the curves of the forces cover the whole picture 3142 times",
+    ),
+    "wide soft curve": (
+        "[[force]]\nkind = 'curve'\nradius = 0.2\nfalloff = 'gaussian'\npoints = ["
+        + "[0, 0.5], [1, 0.5], " * 240
+        + "]",
+        "the curves of the forces cover the whole picture 19640 times",
+    ),
+    "curves": (
+        ("[[force]]\nkind = 'curve'\nradius = 0.01\npoints = [" + "[0, 0.5], [1, 0.5], " * 12 + "]\n") * 100,
+        "the curves of the forces are cut into 1842400 pieces",
+    ),
+    "strokes at once": (
+        "[[stroke]]\ntool = 'push'\nsamples = [[0, 0.1, 0.2, 1.0], [1, 0.2, 0.2, 1.0]]\n" * 9000,
+        "in tick 0 9000 strokes act at once",
+    ),
+    "strokes again and again": (
+        (
+            "[[stroke]]\ntool = 'push'\nrepeat = 1000\nevery = 1\nsymmetry = 'radial'\nsectors = 16\n"
+            "samples = [[0, 0.1, 0.2, 1.0], [1, 0.2, 0.2, 1.0]]\n"
+        )
+        * 6000,
+        "in tick 1 12000 strokes act at once, with their repetitions",
+    ),
+    "keys of a handle": (
+        "[[handle]]\nat = [0.5, 0.5]\nkeys = ["
+        + "".join(f"[{key}, 0.5, 0.5], " for key in range(200_000))
+        + "]\n",
+        "",
+    ),
+    "a hand that rests": (
+        "[[mask]]\nkind = 'stroke'\ntool = 'thicken'\n"
+        "samples = [[0, 0.5, 0.5, 1.0], [10000000, 0.5, 0.5, 1.0]]",
+        "mask[1]: paints for 10000000 ticks of the hand",
+    ),
     "formula": (
         "[[force]]\nkind = 'point'\npoint = [0, 0]\ndirection = [1, 0]\nformula = '" + "~" * 499 + "1'",
         "not allowed in a formula",

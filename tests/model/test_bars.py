@@ -11,6 +11,7 @@ import pytest
 from pydantic import ValidationError
 
 from app.errors import UserError
+from app.model import strokes
 from app.model.bars import Actor, Bar, Which, bars, lanes, moved, stretched, with_changed
 from app.model.forces import Force, PointForce, VortexForce
 from app.model.handles import RecipeHandle, RecipePin
@@ -50,6 +51,21 @@ def done(several: tuple[Stroke, ...], tick: int) -> list[tuple[str, float, tuple
     return [
         (act.stroke.tool, act.stroke.strength, act.dabs, act.stroke.travelled(act.tick, (1.0, 0.7))) for act in acts
     ]
+
+
+def test_how_many_strokes_act_at_once_is_counted_as_they_act(monkeypatch: pytest.MonkeyPatch) -> None:
+    dice = random.Random(3)
+    for _ in range(60):
+        several = tuple(random_stroke(dice) for _ in range(dice.randrange(1, 9)))
+        if dice.random() < 0.5:
+            several += (stroke((2, 0.1, 0.1, 1.0), (9, 0.4, 0.1, 1.0), tool="curve", repeat=3, every=2),)
+        acts = [sum(1 for one in several for _ in one.acts(tick)) for tick in range(200)]
+        monkeypatch.setattr(strokes, "MOST_AT_ONCE", max(acts))
+        assert strokes.excess(several) is None
+        monkeypatch.setattr(strokes, "MOST_AT_ONCE", max(acts) - 1)
+        if most := max(acts):
+            told = f"in tick {acts.index(most)} {most} strokes act at once, with their repetitions; at most"
+            assert strokes.excess(several) == f"{told} {most - 1} work"
 
 
 # -- a stroke ---------------------------------------------------------------------------------------------------------

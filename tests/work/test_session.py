@@ -98,6 +98,26 @@ def test_whatever_can_be_painted_can_be_opened_again(
     assert len(session.recipe.stroke) == len(kept.stroke) - 1
 
 
+def test_an_edit_that_would_be_refused_when_it_is_opened_again_is_not_made(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paint(session, "push", (0.3, 0.3), (0.6, 0.6), ticks=6)
+    before = session.recipe
+    again = lambda stroke: stroke.repeated(9, 1)  # noqa: E731
+    monkeypatch.setattr("app.model.strokes.MOST_AT_ONCE", 4)
+    with pytest.raises(UserError, match=r"^That is not made, or in tick \d+ \d strokes act at once"):
+        session.edit_bars("Repeat", [("stroke", 0)], again)
+    with pytest.raises(UserError, match=r"^That is not made, or there are 513 forces"):
+        session.edit("Add", force=513 * (VortexForce(kind="vortex", point=(0.5, 0.5)),))
+    assert session.recipe == before
+    monkeypatch.setattr("app.model.strokes.MOST_AT_ONCE", 9)
+    session.edit_bars("Repeat", [("stroke", 0)], again)
+    # One that was made before there was a bound can still be worked on.
+    monkeypatch.setattr("app.model.strokes.MOST_AT_ONCE", 4)
+    session.edit_bars("Mute", [("stroke", 0)], lambda stroke: stroke.model_copy(update={"local": 1.0}))
+    assert session.recipe.stroke[0].local == 1.0
+
+
 def test_a_stroke_that_is_as_long_as_one_may_be_ends_and_says_so(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
