@@ -127,6 +127,12 @@ def beside_edges(places: np.ndarray, extent: tuple[float, float]) -> tuple[np.nd
     return least, np.minimum(near * MOST_STRETCH, extent - far / MOST_STRETCH)
 
 
+def short_of_edges(places: np.ndarray, goals: np.ndarray, extent: tuple[float, float]) -> float:
+    """How far what is farthest of a line at these places (n, 2) stays from its goals (n, 2), led as `beside_edges`."""
+    lack = np.clip(goals, *beside_edges(places, extent)) - goals
+    return float(np.hypot(*lack.T).max(initial=0.0))
+
+
 def check_step(dt: float) -> float:
     """A time step, if it is one.
 

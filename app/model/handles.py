@@ -22,7 +22,7 @@ from solver.limits import (
     MOST_SCALE,
     MOST_STRETCH,
     MOST_TURNED,
-    beside_edges,
+    short_of_edges,
 )
 
 MOST_HANDLES = 64  # with the pins
@@ -353,13 +353,12 @@ class _Way:
         self.reach = max(led.radius, max(_lengths(np.diff(line, axis=0)).sum() for line in rounds) / LONGEST_LINE)
 
     def short_of_edges(self, extent: Point) -> float:
-        """How far what is farthest of its line stays from where it is led within the picture, as `beside_edges`."""
+        """How far what is farthest of its line stays from where it is led within the picture."""
         if not self.led.points:
             return 0.0
         before, after = (_between_corners(line, self.led.closed) for line in (self.before, self.after))
         inside = ((before >= 0) & (before <= extent)).all(axis=1)
-        before, after = before[inside], np.clip(after[inside], 0.0, extent)
-        return float(_lengths(np.clip(after, *beside_edges(before, extent)) - after).max(initial=0.0))
+        return short_of_edges(before[inside], np.clip(after[inside], 0.0, extent), extent)
 
 
 def _between_corners(line: np.ndarray, closed: bool) -> np.ndarray:

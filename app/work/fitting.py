@@ -565,7 +565,7 @@ class _Search:
             stage.found = point, trial
         if self.fine.found is not None:
             best = self.fine.found[1]
-            off = f"{np.nanmean(best.errors) * self.longer:.2f} px off on average" + ", and folds" * (best.folds > 0)
+            off = f"{np.nanmean(best.errors) * self.longer:.2f} px off" + ", and folds" * (best.folds > 0)
             self.progress.enter(f"best so far {off}, work {best.work:.3f}")
         self.progress.advance(stage.cost)
         return trial

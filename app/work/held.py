@@ -20,6 +20,7 @@ HALTED = {  # why a handle or a pin halts, by `Handles.halts`
     "at odds": "what others hold is in its way",
     "soft": "it gives way to the fluid, and wants more stiffness",
     "edge": "what is at the picture's edge stays there",
+    "outside": "it is outside the picture",
 }
 FIT = "Fit"  # what the history calls an edit by a fit
 ANEW = "; Fit leads all anew, which may bring it nearer"

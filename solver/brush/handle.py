@@ -257,6 +257,12 @@ class Shape:
         """True if all but the first of its points are a ring."""
         return len(self.led) > 1 and not self.handle.points
 
+    @property
+    def is_in_picture(self) -> bool:
+        """True if some of it lies in the picture; of what is all outside nothing is led."""
+        held = self.led if self.handle.points else np.array([self.handle.at])
+        return bool(((held >= 0) & (held <= self.extent)).all(axis=1).any())
+
     def middle(self, places: np.ndarray) -> np.ndarray:
         """Where `at` of the handle is while its points are at these places, (2,)."""
         if not self.handle.points:
@@ -279,11 +285,6 @@ class Shape:
         handle = self.handle
         time = max(time, handle.ready, handle.upright)
         return self._about(handle.wanted(self.middle(starts), time, dt, math.inf), starts, time, dt)
-
-    def is_held_by_edges(self, starts: np.ndarray) -> bool:
-        """True if it is a line that goes only a part of its way in the end, as what is at an edge stays there."""
-        due = self.due(starts, math.inf, 1.0)
-        return bool(self.handle.points) and not np.allclose(np.clip(due, *beside_edges(starts, self.extent)), due)
 
     def away(self, places: np.ndarray, ends: np.ndarray) -> float:
         """How far what is farthest of it is from these places; of a ring, by how far it is turned and scaled."""

@@ -20,7 +20,7 @@ from solver.brush.pushes import Pushes
 from solver.brush.tip import SMALLEST, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
-from solver.limits import LEAST_STIFFNESS, check_step, check_type
+from solver.limits import LEAST_STIFFNESS, check_step, check_type, short_of_edges
 from solver.scheme import Scheme
 from solver.state import State
 from solver.warp.inverse import ForwardMap
@@ -175,7 +175,8 @@ class Handles:
         """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
         if not check_step(dt) > 0:
             raise ValueError("to lead a handle takes some time")
-        begun = np.array([handle.start <= time + dt / 2 for handle in self.handles], bool)
+        shapes = self._shapes
+        begun = np.array([each.is_in_picture and each.handle.start <= time + dt / 2 for each in shapes], bool)
         in_force = begun & np.array([time + dt / 2 < handle.end for handle in self.handles], bool)
         self._places = self._located()
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
@@ -292,9 +293,9 @@ class Handles:
 
     @property
     def halts(self) -> list[str | None]:
-        """Why each comes no nearer to where it is led: "edge", if that is farther than a line goes beside the picture's
-        edge; "strain", if the map around it slows it down so far that it would let go by that alone; where it has let
-        go "soft", if nothing else is held, or else "at odds"; else None.
+        """Why each comes no nearer to where it is led: "outside", if nothing of it lies in the picture; "edge", if that
+        is farther than a line goes beside the picture's edge; "strain", if the map around it slows it down so far that
+        it would let go by that alone; where it has let go "soft", if nothing else is held, or else "at odds"; else None.
         """
         found = list[str | None]()
         let_go = "at odds" if len(self.handles) > 1 else "soft"
@@ -302,8 +303,8 @@ class Handles:
         for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._lacks, strict=True):
             starts = self._starts[rows]
             if np.isnan(starts).any():
-                found.append(None)
-            elif shape.is_held_by_edges(starts):
+                found.append(None if shape.is_in_picture else "outside")
+            elif shape.handle.points and short_of_edges(starts, shape.due(starts, math.inf, 1.0), shape.extent) > FOUND:
                 found.append("edge")
             else:
                 is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time

@@ -196,6 +196,22 @@ def test_what_comes_no_nearer_lets_go(device: Device):
     assert set(handles.halts) <= {"strain", "at odds"}
 
 
+@pytest.mark.parametrize(
+    "rest", [{}, {"rotate": 90.0}, {"points": ((-0.5, -0.5), (-0.4, 1.1))}], ids=["point", "ring", "line"]
+)
+def test_what_lies_outside_the_picture_is_not_led(rest: dict[str, Any], device: Device):
+    """Found by inverting the map beyond its edges, such a handle folded 6,340 places."""
+    grid = Grid(16, 16)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid, (64, 64))
+    fluid.set_viscosity(0.03)
+    handles = Handles(fluid, warp, [Handle((-0.02, 0.5), (0.5, 0.5), RADIUS, duration=0.1, **rest)])
+    for _ in range(10):
+        handles.advance(DT)
+    assert not warp.read().any()
+    assert handles.halts == ["outside"]
+    assert handles.away[0] > 0.4
+
+
 def test_why_a_line_stays_short_beside_the_edge_is_told(device: Device):
     line = {"points": [[0.05, 0.3], [0.05, 0.7]], "to": [0.22, 0.5], "duration": 0.1}
     replay = replay_of(device, handle=[line], fluid={"grid": 16}, duration=0.1)
