@@ -293,9 +293,11 @@ class Handles:
 
     @property
     def halts(self) -> list[str | None]:
-        """Why each comes no nearer to where it is led: "outside", if nothing of it lies in the picture; "edge", if that
-        is farther than a line goes beside the picture's edge; "strain", if the map around it slows it down so far that
-        it would let go by that alone; where it has let go "soft", if nothing else is held, or else "at odds"; else None.
+        """Why each comes no nearer to where it is led, or None.
+
+        "outside": nothing of it lies in the picture; "edge": that is farther than a line goes beside the picture's edge;
+        "strain": the map around it slows it down so far that it would let go by that alone; where it has let go, "soft"
+        if nothing else is held, and "at odds" otherwise.
         """
         found = list[str | None]()
         let_go = "at odds" if len(self.handles) > 1 else "soft"
