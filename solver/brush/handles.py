@@ -295,7 +295,7 @@ class Handles:
     def halts(self) -> list[str | None]:
         """Why each comes no nearer to where it is led, or None.
 
-        "outside": nothing of it lies in the picture; "edge": that is farther than a line goes beside the picture's edge;
+        "outside": nothing of it lies in the picture; "edge": farther than a line goes beside the picture's edge;
         "strain": the map around it slows it down so far that it would let go by that alone; where it has let go, "soft"
         if nothing else is held, and "at odds" otherwise.
         """
