@@ -10,6 +10,8 @@ import pytest
 from app.model.recipe import Recipe
 from app.work.checkpoints import Checkpoint, Checkpoints, Moment
 from solver.gl.device import Device
+from solver.gl.field import Field
+from solver.gl.passes import Region
 from solver.gl.tiled import TiledField
 from solver.state import State
 
@@ -89,6 +91,43 @@ def test_what_no_save_holds_any_more_is_copied_anew(device: Device, tiled: Tiled
     tiled.restore(again)
     assert (tiled.get() == noise(1)).all()
     again.release()
+
+
+def test_tiles_that_were_made_ready_are_what_a_save_holds(
+    device: Device, tiled: TiledField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It copies none of them again, but what has been drawn into since; and what it does not take is let go."""
+    copied, kept = list[Field](), TiledField._copy_of
+
+    def copy_of(field: TiledField, region: Region) -> Field:
+        copied.append(kept(field, region))
+        return copied[-1]
+
+    monkeypatch.setattr(TiledField, "_copy_of", copy_of)
+    tiled.set(noise(1))
+    tiled.make_ready(tiled.kind.regions)
+    tiled.make_ready(tiled.kind.regions)
+    assert len(copied) == 12, "each once"
+    draw(device, tiled, 2, (30, 10, 4, 5))  # across two tiles
+    now = tiled.get()
+    first = tiled.save()
+    assert len(copied) == 14
+    assert nbytes(first) == WHOLE
+    tiled.clear()
+    tiled.restore(first)
+    assert (tiled.get() == now).all()
+    first.release()
+    again = tiled.save()
+    assert len(copied) == 26, "nothing is held for a save any more"
+    tiled.set(noise(3))
+    tiled.make_ready(tiled.kind.regions[:3])
+    for change in (lambda: tiled.restore(again), tiled.clear, lambda: tiled.set(noise(4)), tiled.release):
+        change()
+        if change != tiled.release:
+            tiled.set(noise(5))
+            tiled.make_ready(tiled.kind.regions[3:])
+    again.release()
+    assert all(field._is_released for field in copied)
 
 
 @pytest.mark.parametrize("dtype", ["f1", "f2", "f4"])
