@@ -40,11 +40,11 @@ class WarpMap:
     Two levels (the characteristic mapping method): a submap of what has moved lately, on the simulation's grid, which
     may be a window of the picture, and the accumulated map A of the whole picture, which takes the submap S in (a
     remap) before that is bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0
-    outside the window; where A is too steep for its texels it is closed, and another goes on before it; longer sides, RG32F at the centres of cells and texels. Only tiles of A that have moved are made
-    anew, a few in each step; until all are there, the submap that they take in, *pending*, stands between S and A, and
-    what is to be remapped meanwhile is *gathered* in a level between the two, of several texels a cell. Every place
-    x + S(x) lies in the picture, and every x + D(x) there or where a map that was `set` had looked. Looking at the map
-    changes nothing of it.
+    outside the window; where A is too steep for its texels it is closed, and another goes on before it. Longer sides,
+    RG32F at the centres of cells and texels. Only tiles of A that have moved are made anew, a few in each step; until
+    all are there, the submap that they take in, *pending*, stands between S and A, and what is to be remapped meanwhile
+    is *gathered* in a level between the two, of several texels a cell. Every place x + S(x) lies in the picture, and
+    every x + D(x) there or where a map that was `set` had looked. Looking at the map changes nothing of it.
 
     Args:
         device: the device.
