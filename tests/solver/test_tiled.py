@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -10,10 +10,9 @@ import pytest
 from app.model.recipe import Recipe
 from app.work.checkpoints import Checkpoint, Checkpoints, Moment
 from solver.gl.device import Device
-from solver.gl.field import Field
-from solver.gl.passes import Region
-from solver.gl.tiled import TiledField
+from solver.gl.tiled import SavedTiles, TiledField
 from solver.state import State
+from support.gl_objects import Made
 
 SIZE = 100, 70
 SIDE = 32
@@ -93,41 +92,35 @@ def test_what_no_save_holds_any_more_is_copied_anew(device: Device, tiled: Tiled
     again.release()
 
 
-def test_tiles_that_were_made_ready_are_what_a_save_holds(
-    device: Device, tiled: TiledField, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tiles_that_were_made_ready_are_what_a_save_holds(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """It copies none of them again, but what has been drawn into since; and what it does not take is let go."""
-    copied, kept = list[Field](), TiledField._copy_of
+    made = Made(monkeypatch)
+    tiled = TiledField(device, SIZE, 2, "tiled", tile=SIDE)
 
-    def copy_of(field: TiledField, region: Region) -> Field:
-        copied.append(kept(field, region))
-        return copied[-1]
+    def copies(act: Callable[[], object]) -> int:
+        device.timings.take()
+        with device.stage("copies"):
+            act()
+        return device.timings.passes["copies"]
 
-    monkeypatch.setattr(TiledField, "_copy_of", copy_of)
     tiled.set(noise(1))
-    tiled.make_ready(tiled.kind.regions)
-    tiled.make_ready(tiled.kind.regions)
-    assert len(copied) == 12, "each once"
+    assert copies(lambda: tiled.make_ready(tiled.kind.regions)) == 12
+    assert copies(lambda: tiled.make_ready(tiled.kind.regions)) == 0
     draw(device, tiled, 2, (30, 10, 4, 5))  # across two tiles
-    now = tiled.get()
-    first = tiled.save()
-    assert len(copied) == 14
-    assert nbytes(first) == WHOLE
+    now, saves = tiled.get(), list[SavedTiles]()
+    assert copies(lambda: saves.append(tiled.save())) == 2
+    assert nbytes(saves[0]) == WHOLE
     tiled.clear()
-    tiled.restore(first)
+    tiled.restore(saves[0])
     assert (tiled.get() == now).all()
-    first.release()
-    again = tiled.save()
-    assert len(copied) == 26, "nothing is held for a save any more"
-    tiled.set(noise(3))
-    tiled.make_ready(tiled.kind.regions[:3])
-    for change in (lambda: tiled.restore(again), tiled.clear, lambda: tiled.set(noise(4)), tiled.release):
+    saves.pop().release()
+    assert copies(lambda: saves.append(tiled.save())) == 12, "nothing is held for a save any more"
+    for change in (lambda: tiled.restore(saves[0]), tiled.clear, lambda: tiled.set(noise(4)), tiled.release):
+        tiled.set(noise(3))
+        tiled.make_ready(tiled.kind.regions[3:])
         change()
-        if change != tiled.release:
-            tiled.set(noise(5))
-            tiled.make_ready(tiled.kind.regions[3:])
-    again.release()
-    assert all(field._is_released for field in copied)
+    saves[0].release()
+    assert not made.left
 
 
 @pytest.mark.parametrize("dtype", ["f1", "f2", "f4"])
