@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -156,31 +156,42 @@ class TiledField(Field):
         self.blank = blank
         # What each tile was last saved as or restored from; None where something was drawn since.
         self._same = np.full(self.kind.rows_and_columns, None, object)
+        self._ready = dict[int, _Tile]()  # by place, those that were copied for the next save, and are held until then
         self._pass = device.pass_
         super().__init__(device, size, components, label, dtype)
 
     def drawn(self, region: Region | None = None) -> None:
         if region is None:
             self._same[...] = None
-            return
-        x, y, width, height = region
-        side = self.kind.tile
-        self._same[y // side : -(-(y + height) // side), x // side : -(-(x + width) // side)] = None
+        else:
+            x, y, width, height = region
+            side = self.kind.tile
+            self._same[y // side : -(-(y + height) // side), x // side : -(-(x + width) // side)] = None
+        self._leave_ready(lambda place, tile: self._same.flat[place] is not tile)
 
     def clear(self, *values: float) -> None:
         super().clear(*(values or self._blank_values))
         if not values:
             self._same[...] = _Tile(None)
+            self._leave_ready()
+
+    def make_ready(self, tiles: Iterable[Region]) -> None:
+        """Copy whole tiles now, so that the next save has less to do."""
+        columns = self.kind.rows_and_columns[1]
+        for region in tiles:
+            place = region[1] // self.tile * columns + region[0] // self.tile
+            if self._same.flat[place] is None:
+                self._same.flat[place] = self._ready[place] = _Tile(self._copy_of(region), 1)
 
     def save(self) -> SavedTiles:
         """A copy of this moment, sharing with earlier ones what is the same."""
-        for place, (x, y, width, height) in enumerate(self.kind.regions):
+        for place, region in enumerate(self.kind.regions):
             same: _Tile | None = self._same.flat[place]
             if same is None or (same.field is not None and same.holders == 0):
-                copy = Field(self.device, (width, height), self.components, f"{self.label}, saved tile", self.dtype)
-                self._pass("gl/copy.frag")(copy, field=self, offset=(x, y))
-                self._same.flat[place] = _Tile(copy)
-        return _held(SavedTiles(self.kind, self._same.copy(), self.blank))
+                self._same.flat[place] = _Tile(self._copy_of(region))
+        saved = _held(SavedTiles(self.kind, self._same.copy(), self.blank))
+        self._leave_ready()
+        return saved
 
     def restore(self, saved: SavedTiles) -> list[Region]:
         """Go back to what was saved, exactly; the regions that were another.
@@ -203,7 +214,12 @@ class TiledField(Field):
                 self._copy(tile.field, region, (-region[0], -region[1]))
             self._same.flat[place] = tile
             changed.append(region)
+        self._leave_ready()
         return changed
+
+    def release(self) -> None:
+        super().release()
+        self._leave_ready()
 
     def copy_from(self, other: Field, region: Region | None = None) -> None:
         """Take over the texels of `other`, of the same size and components, or those in (x, y, width, height)."""
@@ -215,6 +231,17 @@ class TiledField(Field):
             self._copy(other, region, (0, 0))
             place = region[1] // self.tile, region[0] // self.tile
             self._same[place] = other._same[place]
+
+    def _copy_of(self, region: Region) -> Field:
+        x, y, *size = region
+        copy = Field(self.device, (size[0], size[1]), self.components, f"{self.label}, saved tile", self.dtype)
+        self._pass("gl/copy.frag")(copy, field=self, offset=(x, y))
+        return copy
+
+    def _leave_ready(self, which: Callable[[int, _Tile], bool] = lambda place, tile: True) -> None:
+        """Let go of what is held for the next save."""
+        for place in [place for place, tile in self._ready.items() if which(place, tile)]:
+            self._ready.pop(place).release()
 
     @property
     def _blank_values(self) -> tuple[float, float, float, float]:

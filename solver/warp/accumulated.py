@@ -78,6 +78,7 @@ class AccumulatedMap:
         self._moved: list[Region] = []  # tiles to be drawn anew
         self._copied: list[Region] = []  # tiles to be copied
         self._done = 0  # of both
+        self._is_saved = False  # now and then: then not all tiles are copied at once, when all have been drawn
         self.limits = self._picture = (0.0, 0.0, *extent)
         self.is_walled = True
 
@@ -138,6 +139,8 @@ class AccumulatedMap:
         if anew := self._moved[before:until]:
             draw(self._next, anew)
             self._look(anew)
+            if self._is_saved:
+                self._next.make_ready(anew)
         count = len(self._moved)
         self._next.take(self.now, self._copied[max(before - count, 0) : max(until - count, 0)])
         self._done = max(before, until)
@@ -191,6 +194,7 @@ class AccumulatedMap:
 
     def saved(self) -> dict[str, TiledField]:
         """The fields by name."""
+        self._is_saved = True
         return {ACCUMULATED: self.now} | {f"{CLOSED}{number}": field for number, field in enumerate(self.closed)}
 
     def restore(self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -10,8 +10,9 @@ import pytest
 from app.model.recipe import Recipe
 from app.work.checkpoints import Checkpoint, Checkpoints, Moment
 from solver.gl.device import Device
-from solver.gl.tiled import TiledField
+from solver.gl.tiled import SavedTiles, TiledField
 from solver.state import State
+from support.gl_objects import Made
 
 SIZE = 100, 70
 SIDE = 32
@@ -89,6 +90,37 @@ def test_what_no_save_holds_any_more_is_copied_anew(device: Device, tiled: Tiled
     tiled.restore(again)
     assert (tiled.get() == noise(1)).all()
     again.release()
+
+
+def test_tiles_that_were_made_ready_are_what_a_save_holds(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It copies none of them again, but what has been drawn into since; and what it does not take is let go."""
+    made = Made(monkeypatch)
+    tiled = TiledField(device, SIZE, 2, "tiled", tile=SIDE)
+
+    def copies(act: Callable[[], object]) -> int:
+        device.timings.take()
+        with device.stage("copies"):
+            act()
+        return device.timings.passes["copies"]
+
+    tiled.set(noise(1))
+    assert copies(lambda: tiled.make_ready(tiled.kind.regions)) == 12
+    assert copies(lambda: tiled.make_ready(tiled.kind.regions)) == 0
+    draw(device, tiled, 2, (30, 10, 4, 5))  # across two tiles
+    now, saves = tiled.get(), list[SavedTiles]()
+    assert copies(lambda: saves.append(tiled.save())) == 2
+    assert nbytes(saves[0]) == WHOLE
+    tiled.clear()
+    tiled.restore(saves[0])
+    assert (tiled.get() == now).all()
+    saves.pop().release()
+    assert copies(lambda: saves.append(tiled.save())) == 12, "nothing is held for a save any more"
+    for change in (lambda: tiled.restore(saves[0]), tiled.clear, lambda: tiled.set(noise(4)), tiled.release):
+        tiled.set(noise(3))
+        tiled.make_ready(tiled.kind.regions[3:])
+        change()
+    saves[0].release()
+    assert not made.left
 
 
 @pytest.mark.parametrize("dtype", ["f1", "f2", "f4"])
