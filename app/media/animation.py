@@ -248,7 +248,9 @@ def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple
         # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
         chosen = ("-c", "copy", "-copypriorss", "0") if track.codec in container.sound else container.encoder
         options += ["-map", f"1:a:{place}"]
-        options += [f"-metadata:s:a:{number}", f"title={track.name}"] if track.name else []
+        named = {"title": track.name, "language": (container.languages or {}).get(track.language)}
+        for name, value in named.items():
+            options += [f"-metadata:s:a:{number}", f"{name}={value}"] if value else []
         for name, value in zip(chosen[::2], chosen[1::2], strict=True):
             options += [f"{name}:a:{number}", value]
     return [*begin, *length, "-i", f"file:{sound}"], options
