@@ -248,10 +248,47 @@ def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple
         # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
         chosen = ("-c", "copy", "-copypriorss", "0") if track.codec in container.sound else container.encoder
         options += ["-map", f"1:a:{place}"]
-        options += [f"-metadata:s:a:{number}", f"title={track.name}"] if track.name else []
+        named = {"title": track.name, "language": (container.languages or {}).get(track.language)}
+        for name, value in named.items():
+            options += [f"-metadata:s:a:{number}", f"{name}={value}"] if value else []
         for name, value in zip(chosen[::2], chosen[1::2], strict=True):
             options += [f"{name}:a:{number}", value]
     return [*begin, *length, "-i", f"file:{sound}"], options
+
+
+class _FewColours:
+    """Looks whether frames have no more colours than a palette holds beside what is transparent: then none changes.
+
+    Attributes:
+        colours: a palette of them, (16, 16, 4) uint8, as ffmpeg reads one; None if they are too many.
+    """
+
+    def __init__(self) -> None:
+        self._seen: np.ndarray | None = np.zeros(2**24, bool)
+        self._alpha = False
+
+    def look(self, frame: np.ndarray) -> None:
+        """At a frame, uint8."""
+        if self._seen is None:
+            return
+        channels = frame.shape[2]
+        self._alpha = channels in (2, 4)
+        red, green, blue = (frame[..., channel if channels > 2 else 0].astype(np.uint32) for channel in range(3))
+        packed = red << 16 | green << 8 | blue
+        self._seen[packed[frame[..., -1] >= 128] if self._alpha else packed] = True
+        if np.count_nonzero(self._seen) > 255:
+            self._seen = None
+
+    @property
+    def colours(self) -> np.ndarray | None:
+        if self._seen is None:
+            return None
+        found = np.flatnonzero(self._seen)
+        palette = np.zeros((256, 4), np.uint8)
+        palette[: len(found), :3] = np.stack([found >> 16, found >> 8 & 255, found & 255], axis=-1)
+        palette[:, 3] = 255
+        palette[255, 3] = 0 if self._alpha else 255  # ffmpeg's filter and encoder take the same only if there is one
+        return palette.reshape(16, 16, 4)
 
 
 @contextmanager
@@ -273,9 +310,17 @@ def _gif_writer(
             first = ["-vf", generate, "-update", "1", f"file:{palette}"]
             return [*first, "-map", "0:v:0", *lossless(stream)]
 
+        few = _FewColours()
         with _Video(spool, label, with_palette, rate, cancel=cancel) as video:
-            yield lambda frame: video.write(to_bits(frame, 8))
+
+            def write(frame: np.ndarray) -> None:
+                few.look(in_bytes := to_bits(frame, 8))
+                video.write(in_bytes)
+
+            yield write
             video.finish()
+        if few.colours is not None:
+            write_picture(palette, Picture(few.colours))
         dithered, shown = "paletteuse=dither=sierra2_4a:diff_mode=rectangle", []
         if durations is not None:
             dithered = f"[0:v]settb={1 / rate},{shown_for(durations)}[shown];[shown][1:v]{dithered}"

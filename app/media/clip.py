@@ -67,6 +67,7 @@ class Clip(ABC):
         start: the number of the first.
         sounds: the codecs of its sound tracks.
         roles: what these are marked as, besides default, such as comment or forced.
+        languages: of these, as far as they are named.
         late: seconds from the file's start, as a rule its sound's, to the first frame; 0 where ffmpeg does not say.
         durations: of the frames, in steps of 1 / fps, where they differ.
         loops: how often it is played, 0 for ever.
@@ -88,6 +89,7 @@ class Clip(ABC):
     start: int = 0
     sounds: tuple[str, ...] = ()
     roles: tuple[str, ...] = ()
+    languages: tuple[str, ...] = ()
     late: float = 0.0
     durations: tuple[int, ...] | None = None
     loops: int = 0

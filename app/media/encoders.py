@@ -125,7 +125,8 @@ class Container:
     """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
-    is turned into the first one, by the options `encoder`, in pairs. `roles` is what sound can be marked as.
+    is turned into the first one, by the options `encoder`, in pairs. `roles` is what sound can be marked as,
+    `languages` what it calls each of those that it knows; None: it knows all, as ISO 639-2 calls them.
     """
 
     name: str
@@ -134,6 +135,7 @@ class Container:
     sound: tuple[str, ...] = ()
     encoder: tuple[str, ...] = ()
     roles: tuple[str, ...] = ()
+    languages: Mapping[str, str] | None = None
     passes: int = 1
 
     def encoding(self, codec: str | None) -> Encoding:
@@ -149,6 +151,19 @@ LARGEST = {
 
 # What ffmpeg's muxers were seen to write down and its readers to find again.
 ROLES = ("dub", "comment", "forced", "hearing impaired", "visual impaired")
+
+# In a MOV languages are numbers, of which ffmpeg knows these names; some have others beside them in ISO 639-2.
+MAC_LANGUAGES = """
+alb amh ara arm asm aym aze baq bel ben bul bur cat ces chi dan dut dzo eng epo est fin fra geo ger grn guj heb hin hun
+ice ind ita jav jpn kan kas kaz khm kin kir kor kur lao lat lav lit mac mal mar may mlg mlt mon nep nor nya ori orm pol
+por pus que ron rus san sin slk slv smi snd som spa sve swa tam tat tel tgk tgl tha tib tir tuk tur uig ukr urd uzb vie
+wel yid
+"""
+MAC_NAMES = {name: name for name in MAC_LANGUAGES.split()} | {
+    "bod": "tib", "cym": "wel", "cze": "ces", "deu": "ger", "eus": "baq", "fre": "fra", "hye": "arm", "isl": "ice",
+    "kat": "geo", "mkd": "mac", "msa": "may", "mya": "bur", "nld": "dut", "rum": "ron", "slo": "slk", "sqi": "alb",
+    "swe": "sve", "zho": "chi",
+}  # fmt: skip
 
 ANIMATIONS = {
     ".mp4": Container(
@@ -178,6 +193,7 @@ ANIMATIONS = {
         "ProRes",
         {"prores-4444": _prores, "prores-422-hq": _prores_422_hq},
         even=True,
+        languages=MAC_NAMES,
         sound=("pcm_s16le", "pcm_s24le", "aac"),
         encoder=("-c", "pcm_s16le"),
     ),
@@ -250,6 +266,9 @@ def unheld_of_clip(
         losses = [f"its sound ({' '.join(other)}) becomes {container.sound[0]}"] if other else []
         if dropped := [role for role in clip.roles if role not in container.roles]:
             losses.append(f"what its sound is marked as ({', '.join(dropped)}) is not kept")
+        known = container.languages
+        if unknown := [language for language in clip.languages if known is not None and language not in known]:
+            losses.append(f"what its sound is spoken in ({', '.join(unknown)}) is not kept")
         if container.even and size is not None and (size[0] % 2 or size[1] % 2):
             losses.append(f"its last pixels are repeated, as {container.name} has no odd sides")
     if container is None or container.passes > 1:

@@ -188,6 +188,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
         sounds=tuple(track.codec for track in sounds),
         roles=tuple(dict.fromkeys(role for track in sounds for role in track.roles)),
+        languages=tuple(dict.fromkeys(track.language for track in sounds if track.language)),
         late=late,
         bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
         pixel_format=pixel_format,
@@ -298,11 +299,13 @@ class SoundTrack:
         codec: "none" where ffmpeg knows none for it.
         name: what an MP4 or MOV calls it; ffmpeg takes it over as a title from other containers only.
         roles: what it is for, such as comment or forced, besides default.
+        language: three letters of ISO 639-2; "" if it does not say.
     """
 
     codec: str
     name: str
     roles: tuple[str, ...]
+    language: str
 
 
 def sound_tracks(path: str | os.PathLike[str]) -> list[SoundTrack]:
@@ -315,11 +318,12 @@ def sound_tracks(path: str | os.PathLike[str]) -> list[SoundTrack]:
 
 def _sounds(told: str) -> list[SoundTrack]:
     tracks = []
-    for _, _, kind, words, lines in TRACK.findall(told):
+    for _, language, kind, words, lines in TRACK.findall(told):
         if kind == "Audio":
             codec, name = re.match(r"\w+", words), re.search(r"^ +name +: (.*?) *$", lines, re.MULTILINE)
             roles = [role for role in re.findall(r" \(([a-z ]+)\)", words) if role != "default"]
-            tracks.append(SoundTrack(codec[0] if codec else "none", name[1] if name else "", tuple(roles)))
+            spoken = "" if language == "und" else language
+            tracks.append(SoundTrack(codec[0] if codec else "none", name[1] if name else "", tuple(roles), spoken))
     return tracks
 
 

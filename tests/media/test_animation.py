@@ -740,6 +740,25 @@ def test_a_sound_track_keeps_its_name_and_role(tmp_path: Path):
     assert probe(tmp_path / "a.mkv")[1]["tags"]["title"] == "The mix"
 
 
+def test_a_sound_track_keeps_its_language_or_that_is_told(tmp_path: Path) -> None:
+    languages = ("deu", "fre", "swe", "nob", "und")
+    tracks = [
+        word
+        for number, language in enumerate(languages)
+        for word in ("-map", "1", f"-metadata:s:a:{number}", f"language={language}")
+    ]
+    clip = generate(
+        tmp_path / "in.mp4", "testsrc=s=64x48:r=10:d=0.3", "-f", "lavfi", "-i", "sine=d=0.3", *tracks, "-map", "0"
+    )
+    assert read_clip(clip).languages == languages[:4]
+    for ending, found in (".mov", ["ger", "fra", "sve"]), (".mkv", [*languages[:4]]), (".mp4", [*languages[:4]]):
+        save(tmp_path / f"a{ending}", 3, 10, sound=clip, frames=3)
+        said = [track["tags"].get("language", "und") for track in probe(tmp_path / f"a{ending}")[1:]]
+        assert [language for language in said if language != "und"] == found
+        told = unheld_of_clip(f"a{ending}", None, replace(read_clip(clip), bits=8))
+        assert ("what its sound is spoken in (nob) is not kept" in told) == (ending == ".mov")
+
+
 def test_what_else_a_clip_holds_is_told(tmp_path: Path):
     told = tmp_path / "told.txt"
     told.write_text(";FFMETADATA1\ntitle=A day\nartist=Me\n[CHAPTER]\nTIMEBASE=1/1\nSTART=0\nEND=1\ntitle=Morning\n")

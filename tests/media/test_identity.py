@@ -13,6 +13,7 @@ import pytest
 import tifffile
 from PIL import Image
 
+from app.media.animation import animation_writer
 from app.media.depth import to_bits
 from app.media.displacement import Displacement
 from app.media.ffmpeg import executable
@@ -312,3 +313,24 @@ def test_tiles_of_premultiplied_colours_are_the_same_to_the_bit(device: Device):
     for top, dtype in ((255, np.uint8), (65535, np.uint16), (1, np.float32)):
         pixels = (np.random.default_rng(0).random((150, 230, 4), np.float32) * top).astype(dtype)
         np.testing.assert_array_equal(tiled.apply(warp, pixels, how=how), whole.apply(warp, pixels, how=how))
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize("count", [2, 255])
+def test_a_gif_of_few_colours_keeps_them(tmp_path: Path, channels: int, count: int) -> None:
+    """Those of all frames together; with more, ffmpeg chooses among 64 levels of each channel."""
+    random = np.random.default_rng(count)
+    colours = random.permutation(256)[:count, None] if channels == 1 else random.integers(0, 256, (count, 3))
+    frames = colours[random.integers(0, count, (4, 24, 32))].astype(np.uint8)
+    if channels == 4:
+        frames = np.concatenate([frames, random.choice([0, 255], (4, 24, 32, 1)).astype(np.uint8)], axis=-1)
+    with animation_writer(tmp_path / "a.gif") as write:
+        for frame in frames:
+            write(frame)
+    with Image.open(tmp_path / "a.gif") as image:
+        for number, frame in enumerate(frames):
+            image.seek(number)
+            found, wanted = np.asarray(image.convert("RGBA")), Image.fromarray(frame.squeeze()).convert("RGBA")
+            visible = np.asarray(wanted)[..., 3:] > 0
+            np.testing.assert_array_equal(found[..., 3:] > 0, visible)
+            np.testing.assert_array_equal(found * visible, np.asarray(wanted) * visible)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import struct
 import subprocess
@@ -884,3 +885,19 @@ def test_damaged_exif_costs_no_picture_and_is_told(tmp_path: Path, ending: str) 
         assert read_picture(path).note == f"a{ending}: its EXIF is damaged and not kept whole"
     Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(path, exif=whole)
     assert not read_picture(path).note
+
+
+@pytest.mark.parametrize("ending", [".jpg", ".png", ".webp"])
+def test_a_thumbnail_in_the_exif_is_told(tmp_path: Path, ending: str) -> None:
+    """It shows the picture as it was, and a warp makes it wrong."""
+    small = io.BytesIO()
+    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(small, "JPEG")
+    first = struct.pack("<HHHIII", 1, 0x0112, 3, 1, 1, 26)  # upright; the next directory
+    second = struct.pack("<HHHIIHHIII", 2, 0x0201, 4, 1, 56, 0x0202, 4, 1, len(small.getvalue()), 0)
+    path = tmp_path / f"a{ending}"
+    exif = b"Exif\0\0II*\0" + struct.pack("<I", 8) + first + second + small.getvalue()
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(path, exif=exif)
+    assert read_picture(path).note == f"a{ending}: its thumbnail is not kept"
+    write_picture(tmp_path / f"b{ending}", read_picture(path))
+    assert small.getvalue() not in (tmp_path / f"b{ending}").read_bytes()
+    assert not read_picture(tmp_path / f"b{ending}").note

@@ -51,7 +51,7 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
 
     losses: what is known to be lost of the file; what else is goes to their end.
     """
-    from PIL import Image
+    from PIL import ExifTags, Image
 
     icc = image.info.get("icc_profile")
     if pixels is None and image.mode == "CMYK":
@@ -66,6 +66,8 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
         orientation, encoded = exif.get(ORIENTATION, 1), upright_exif(exif)
     if complaints or (exif and encoded is None):
         losses.append("its EXIF is damaged and not kept whole")
+    elif exif and exif.get_ifd(ExifTags.IFD.IFD1):
+        losses.append("its thumbnail is not kept")
     texts = {key: str(text) for key, text in getattr(image, "text", {}).items() if key != "XML:com.adobe.xmp"}
     if isinstance(comment := image.info.get("comment"), bytes):
         texts["Comment"] = comment.decode("utf-8", "replace")
