@@ -94,7 +94,9 @@ class Files:
             self.load_mask(path, state.mask)
             state.show_mask()
 
-        self.chooser.ask_which(f"A picture of {MASKS[state.mask]}", self.preferences.open_from, PICTURE_ENDINGS, load)
+        self.chooser.ask_which(
+            f"Load a picture of {MASKS[state.mask]}", self.preferences.open_from, PICTURE_ENDINGS, load
+        )
 
     def ask_save_mask(self, of: MaskName) -> None:
         path = self.preferences.open_from / f"{self.workspace.session.project.name}-{of}.png"

@@ -6,6 +6,7 @@ import gc
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.ui.chooser import Chosen
 from app.ui.events import Drop
+from app.ui.widgets import Ui
 from app.work.export_process import FitProcess
 from app.work.fit_job import pairs_in
 from app.work.worker import Outcome
@@ -228,6 +230,24 @@ def test_a_mask_is_fitted_to_another_as_by_the_command_line(robot: Robot, tmp_pa
     assert process.fit.pairs is not None
     np.testing.assert_array_equal(process.fit.pairs.places, pairs.places)
     assert process.fit.pairs.curves == pairs.curves
+
+
+def test_what_to_do_is_not_told_where_a_fit_is(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    floating, drawn = Ui.floating, list[str]()
+
+    def noting(ui: Ui, name: str, *given: Any, **named: Any) -> Any:
+        drawn.append(name)
+        return floating(ui, name, *given, **named)
+
+    monkeypatch.setattr(Ui, "floating", noting)
+    robot.key("g")
+    robot.editor.session.edit("None", handle=())
+    robot.frame()
+    assert "how" in drawn
+    drawn.clear()
+    monkeypatch.setattr(type(robot.editor.fits), "is_running", True)
+    robot.frame()
+    assert "how" not in drawn
 
 
 def test_a_fit_that_falls_short_is_no_success_and_told_of_until_it_is_undone(robot: Robot) -> None:
