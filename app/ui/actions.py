@@ -56,6 +56,7 @@ def _table() -> list[Action]:
     add("Edit", "clear_masks", "Clear the masks", "ctrl+d", lambda c: c.clear_masks())
     add("Edit", "remove", "Delete handle or bars", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "fit_handles", "Fit the handles", "shift+g", lambda c: c.fits.start())
+    add("Edit", "fit_masks", "Fit a mask to another ...", "", lambda c: c.files.ask_outlines())
     add("Edit", "cancel", "Cancel the stroke or selection", "escape", lambda c: c.cancel())
 
     for tool in TOOLS:

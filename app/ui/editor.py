@@ -360,7 +360,8 @@ class Editor:
     def _draw_panels(self) -> None:
         ui, layout, workspace, state, likes = self.ui, self.layout, self.workspace, self.state, self.preferences
         marks.draw(ui, self.view, self.session, state, self.pointer, self.selecting.outline)
-        hud.draw(ui, workspace, state, self.selecting, likes, self.numbers, self.clock, self.do)
+        busy = self.exports.is_running or self.fits.is_running or self.files.is_loading
+        hud.draw(ui, workspace, state, self.selecting, likes, self.numbers, self.clock, self.do, busy)
         strip.draw(ui, layout, state)
         if layout.inspector is not None:
             inspector.draw(ui, layout.inspector, workspace, state, self.selecting, self.quality, self.clock, self.do)

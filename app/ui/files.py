@@ -49,7 +49,7 @@ class Files:
 
     Attributes:
         show: opens a project that has been read, with its picture as the canvas shows it and what it was restored from.
-        fit: fits pairs in files to the picture that is open.
+        fit: fits pairs in files, or two masks, to the picture that is open.
     """
 
     workspace: Workspace
@@ -58,7 +58,7 @@ class Files:
     messages: Messages
     preferences: Preferences
     show: Callable[[Project, np.ndarray | None, Found | None], None]
-    fit: Callable[[Sequence[Path]], None]
+    fit: Callable[[Sequence[Path], tuple[Path, Path] | None], None]
     _loading: Loading | None = field(default=None, init=False)
 
     # -- opening ----------------------------------------------------------------------------------------------------
@@ -79,12 +79,24 @@ class Files:
     def ask_map(self) -> None:
         self.chooser.ask_which("Start from a warp map", self.preferences.open_from, MAP_ENDINGS, self.start_from_map)
 
+    def ask_outlines(self) -> None:
+        """Ask for two masks, and fit the outline of the one to that of the other."""
+
+        def ask_other(one: Path) -> None:
+            title = "Fit to a mask of where that goes"
+            self.chooser.ask_which(title, one.parent, PICTURE_ENDINGS, lambda other: self.fit((), (one, other)))
+
+        title = "Fit from a mask of what is moved"
+        self.chooser.ask_which(title, self.preferences.open_from, PICTURE_ENDINGS, ask_other)
+
     def ask_mask(self, state: EditorState) -> None:
         def load(path: Path) -> None:
             self.load_mask(path, state.mask)
             state.show_mask()
 
-        self.chooser.ask_which(f"A picture of {MASKS[state.mask]}", self.preferences.open_from, PICTURE_ENDINGS, load)
+        self.chooser.ask_which(
+            f"Load a picture of {MASKS[state.mask]}", self.preferences.open_from, PICTURE_ENDINGS, load
+        )
 
     def ask_save_mask(self, of: MaskName) -> None:
         path = self.preferences.open_from / f"{self.workspace.session.project.name}-{of}.png"
@@ -96,10 +108,7 @@ class Files:
         What may be a picture as well as a map is asked about. Pairs are fitted, of which there may be two files.
         """
         if path.suffix.lower() in ENDINGS:
-            session = self.workspace.session
-            if session is self.workspace.placeholder and not session.has_begun:
-                raise UserError(f"{path.name} has pairs of points: first open the picture that they are of.")
-            self.fit((path, *others))
+            self.fit((path, *others), None)
             return
         match holds(path):
             case "map":

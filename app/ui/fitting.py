@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.landmarks import Pairs, read_pairs
+from app.media.landmarks import Pairs
 from app.model.handles import heading
 from app.model.recipe import Recipe
 from app.ui.exporting import under_way
@@ -16,7 +16,7 @@ from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.export_process import FitProcess
-from app.work.fit_job import Fit
+from app.work.fit_job import Fit, pairs_in
 from app.work.fitting import DURATION, EVALUATIONS
 from app.work.held import FIT
 from app.work.session import Session
@@ -54,17 +54,23 @@ class Fits:
             return
         self._begin(session.recipe)
 
-    def start_with(self, files: Sequence[Path]) -> None:
-        """Begin to fit the pairs in files, as `fluidwarp fit --pairs`, with a handle for each beside what there is.
+    def start_with(self, files: Sequence[Path], masks: tuple[Path, Path] | None = None) -> None:
+        """Begin to fit the pairs in files, or the outline of one mask to that of another, as `fluidwarp fit` does.
+
+        There will be a handle for each pair beside what there is.
 
         Raises:
             UserError: if they cannot be read, are not two sets of points, or something is being fitted.
         """
         if self.is_running:
-            raise UserError("A fit is under way: stop it, or wait for it, and then drop the pairs again.")
+            raise UserError("A fit is under way: stop it, or wait for it, and then give the pairs or masks again.")
         session = self._workspace.session
         picture, recipe = session.project.picture, session.recipe
-        pairs = read_pairs(files, (picture.width, picture.height))
+        if session is self._workspace.placeholder and not session.has_begun:
+            raise UserError("There is nothing to fit yet: first open the picture that the pairs or masks are of.")
+        pairs, notices = pairs_in(files, masks, (picture.width, picture.height))
+        for notice in notices:
+            self._messages.say(f"{notice}.")
         self._begin(recipe if session.has_begun else recipe.edited(duration=DURATION[0]), pairs)
 
     def _begin(self, recipe: Recipe, pairs: Pairs | None = None) -> None:
@@ -98,7 +104,7 @@ class Fits:
         process.poll()
         if not self._is_still_of_use():
             self.give_up()
-            again = "Press Fit" if process.fit.pairs is None else "Drop the pairs again"
+            again = "Press Fit" if process.fit.pairs is None else "Give the pairs or masks again"
             self._messages.say(f"The fit was stopped, because the work was changed meanwhile. {again} to start again.")
         elif process.is_done:
             session = self._session

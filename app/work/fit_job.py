@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,6 +46,23 @@ class Fit:
         check_picture(self.picture)
         how = self.evaluations, self.local, self.clip
         return fitted(device, self.recipe, self.picture, self.folder, self.pairs, progress, *how)
+
+
+def pairs_in(
+    files: Sequence[Path], masks: tuple[Path, Path] | None, size: tuple[int, int]
+) -> tuple[Pairs | None, list[str]]:
+    """All pairs of files, and of the outlines of two masks, for a picture of this size; None if nothing is given.
+
+    Also what should be heard of it. Raises `UserError`, as `read_pairs` and `read_outlines`.
+    """
+    given, notices = [read_pairs(files, size)] if files else [], list[str]()
+    if masks:
+        outline, notices = read_outlines(*masks, size)
+        given.append(Pairs(outline / size, ("outline",) * len(outline)))
+    if not given:
+        return None, notices
+    places = np.concatenate([pairs.places for pairs in given])
+    return Pairs(places, sum((pairs.curves for pairs in given), ())), notices
 
 
 @dataclass(frozen=True)
@@ -90,7 +108,7 @@ class FitJob:
         source = found.source(self.image, self.max_pixels)
         picture = source.picture
         size = picture.width, picture.height
-        pairs, notices = self._pairs(size)
+        pairs, notices = pairs_in(self.pairs, self.masks, size)
         fit = Fit(self._placed(found), picture, found.folder, pairs, self.evaluations, self.local, source.clip)
         done = fit.perform(device, progress)
         with replacing(self.output) as temporary:
@@ -98,19 +116,6 @@ class FitJob:
         if self.arrived is not None:
             write_pairs(self.arrived, done.pairs, size)
         return replace(done, notices=(*notices, *done.notices))
-
-    def _pairs(self, size: tuple[int, int]) -> tuple[Pairs | None, list[str]]:
-        """All that is in files, None if nothing is; and what should be heard of it."""
-        given, notices = [], list[str]()
-        if self.pairs:
-            given.append(read_pairs(self.pairs, size))
-        if self.masks:
-            outline, notices = read_outlines(*self.masks, size)
-            given.append(Pairs(outline / size, ("outline",) * len(outline)))
-        if not given:
-            return None, notices
-        places = np.concatenate([pairs.places for pairs in given])
-        return Pairs(places, sum((pairs.curves for pairs in given), ())), notices
 
     def _placed(self, found: Opened) -> Recipe:
         """The recipe with its picture named from where it is written."""

@@ -19,6 +19,7 @@ HALTED = {  # why a handle or a pin halts, by `Handles.halts`
     "frozen": "the picture between it and what is frozen is bent as far as it bears",
     "at odds": "what others hold is in its way",
     "soft": "it gives way to the fluid, and wants more stiffness",
+    "alone": "the fluid brings it no nearer",
     "edge": "what is at the picture's edge stays there",
     "outside": "it is outside the picture",
 }
@@ -122,7 +123,9 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[tu
                 if halt == "strain" and _nearest_of(solid, replay, held) < led.radius:
                     halt = "frozen"
                 # A fit leads what goes somewhere, and leaves pins as they are.
-                helps = halt != "edge" and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
+                helps = (
+                    halt not in ("edge", "outside") and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
+                )
                 why = f": {HALTED[halt]}{ANEW if helps else ''}"
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
             yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led{why}"

@@ -220,8 +220,9 @@ class Shape:
         handle: whose it is.
         led: their places in the original, (n, 2).
         goals: where they shall be, likewise; None if the handle has no goals.
-        around: the first of those that lie around an area; None if they are no closed line and no ring, or if a part of
-            the line is outside and it is neither scaled nor has goals: the edge closes it, and what flows along that.
+        around: the first of those that lie around an area; None if they are no closed line and no ring, if the line or
+            its goals cross themselves, or if a part of it is outside and it is neither scaled nor has goals: the edge
+            closes it, and what flows along that.
         extent: the sides of the picture, which lines do not leave.
     """
 
@@ -250,6 +251,8 @@ class Shape:
             if handle.points and not (inside.all() or handle.goals or handle.turns):
                 around = None
             led, goals = led[inside], goals if goals is None else goals[inside]
+        if handle.closed and any(_crosses_itself(line) for line in (led, goals) if line is not None):
+            around = None  # the areas of its loops cancel, and what is left of that tells of no growth
         return cls(handle, led, goals, around if len(led) >= 3 + (around or 0) else None, extent)
 
     @property
@@ -331,6 +334,19 @@ def area(loop: np.ndarray) -> float:
     """The area within a closed line of places (n, 2), positive clockwise."""
     x, y = (loop - loop.mean(axis=0)).T
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def _crosses_itself(loop: np.ndarray) -> bool:
+    """True if two sides of a closed line of places (n, 2) cross."""
+    ends = np.roll(loop, -1, axis=0)
+
+    def side_of(places: np.ndarray) -> np.ndarray:
+        """On which side of each side (rows) each place lies."""
+        (x, y), (far_x, far_y) = (ends - loop).T[..., None], (places - loop[:, None]).transpose(2, 0, 1)
+        return x * far_y - y * far_x
+
+    parted = side_of(loop) * side_of(ends) < 0
+    return bool((parted & parted.T).any())
 
 
 def _between(

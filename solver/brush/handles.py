@@ -293,14 +293,13 @@ class Handles:
 
     @property
     def halts(self) -> list[str | None]:
-        """Why each comes no nearer to where it is led, or None.
+        """Why each comes no nearer to where it is led; None if it does.
 
-        "outside": nothing of it lies in the picture; "edge": farther than a line goes beside the picture's edge;
-        "strain": the map around it slows it down so far that it would let go by that alone; where it has let go, "soft"
-        if nothing else is held, and "at odds" otherwise.
+        "outside": nothing of it lies in the picture. "edge": its goal is farther than a line goes beside the picture's
+        edge. "strain": the map around it slows it down so far that it would let go by that alone. It has let go: "at
+        odds" where others are held, "soft" where it leads with less than all its stiffness, else "alone".
         """
         found = list[str | None]()
-        let_go = "at odds" if len(self.handles) > 1 else "soft"
         slower = self._slower(np.concatenate([np.zeros((0, 2)), *self.shapes]), np.arange(len(self._places)))
         for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._lacks, strict=True):
             starts = self._starts[rows]
@@ -310,6 +309,7 @@ class Handles:
                 found.append("edge")
             else:
                 is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
+                let_go = "at odds" if len(self.handles) > 1 else "soft" if shape.handle.stiffness < 1 else "alone"
                 found.append("strain" if is_strained else let_go if waited > PATIENCE else None)
         return found
 

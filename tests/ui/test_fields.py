@@ -501,7 +501,7 @@ amount, Amount: 0% to 150%, 100%
 radius, Size: 2 px to 240 px by ratios, 72 px
 stiffness, Stiffness: 1% to 100%, 100%
 local, Local: 0% to 100%, 0%
-held radius, Reach: 1 px to 240 px by ratios, 36 px
+held radius, Size: 2 px to 480 px by ratios, 72 px
 held stiffness, Stiffness: 1% to 100%, 100%
 held local, Local: 0% to 100%, 0%
 held rotate, Rotate: -180° to 180°, 0°

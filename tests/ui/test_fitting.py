@@ -6,17 +6,24 @@ import gc
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from app.errors import UserError
 from app.media import project as projects
 from app.media.landmarks import Pairs, write_pairs
+from app.media.pictures import write_picture
 from app.media.recipes import read_recipe
 from app.model.handles import ARRIVED
+from app.model.picture import Picture
 from app.model.recipe import Recipe
+from app.ui.chooser import Chosen
 from app.ui.events import Drop
+from app.ui.widgets import Ui
 from app.work.export_process import FitProcess
+from app.work.fit_job import pairs_in
 from app.work.worker import Outcome
 from solver.gl.device import Device
 from support.commands import Run
@@ -47,6 +54,14 @@ def robot(dragged: Robot, device: Device) -> Iterator[Robot]:
     yield dragged
     dragged.editor.fits.give_up()
     dragged.editor.messages.shown.clear()
+
+
+@pytest.fixture
+def asked(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> list[Chosen]:
+    """Who is told the files that are asked for."""
+    told = list[Chosen]()
+    monkeypatch.setattr(robot.editor.chooser, "ask_which", lambda *given: told.append(given[-1]))
+    return told
 
 
 def names(robot: Robot) -> list[str]:
@@ -187,8 +202,52 @@ def test_pairs_that_fall_on_the_window_are_fitted_as_by_the_command_line(robot: 
     assert robot.editor.fits.process is process
     robot.editor.do("redo")
     robot.frame()
-    assert "Drop the pairs again" in messages.shown[-1].text
+    assert "Give the pairs or masks again" in messages.shown[-1].text
     assert robot.editor.fits not in gc.get_referrers(session), "what was fitted is not kept for ever"
+
+
+def test_a_mask_is_fitted_to_another_as_by_the_command_line(robot: Robot, tmp_path: Path, asked: list[Chosen]) -> None:
+    session, messages = robot.editor.session, robot.editor.messages
+    picture, black = session.project.picture, np.zeros((48, 64, 1), np.float32)
+    for name, columns in (("from.png", (10, 30)), ("to.png", (14, 38))):
+        mask = black.copy()
+        mask[10:30, slice(*columns)] = 1
+        mask[40:45, 5:8] = 1  # a second part
+        write_picture(tmp_path / name, Picture(mask))
+    write_picture(tmp_path / "black.png", Picture(black))
+    robot.editor.do("fit_masks")
+    asked.pop()(tmp_path / "from.png")
+    with pytest.raises(UserError, match=r"black\.png has no outline"):
+        asked[-1](tmp_path / "black.png")
+    assert not robot.editor.fits.is_running
+    asked.pop()(tmp_path / "to.png")
+    process = robot.editor.fits.process
+    assert process is not None
+    pairs, notices = pairs_in((), (tmp_path / "from.png", tmp_path / "to.png"), (picture.width, picture.height))
+    assert pairs is not None
+    assert len(notices) == 2
+    assert [message.text for message in messages.shown[-2:]] == [f"{notice}." for notice in notices]
+    assert process.fit.pairs is not None
+    np.testing.assert_array_equal(process.fit.pairs.places, pairs.places)
+    assert process.fit.pairs.curves == pairs.curves
+
+
+def test_what_to_do_is_not_told_where_a_fit_is(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    floating, drawn = Ui.floating, list[str]()
+
+    def noting(ui: Ui, name: str, *given: Any, **named: Any) -> Any:
+        drawn.append(name)
+        return floating(ui, name, *given, **named)
+
+    monkeypatch.setattr(Ui, "floating", noting)
+    robot.key("g")
+    robot.editor.session.edit("None", handle=())
+    robot.frame()
+    assert "how" in drawn
+    drawn.clear()
+    monkeypatch.setattr(type(robot.editor.fits), "is_running", True)
+    robot.frame()
+    assert "how" not in drawn
 
 
 def test_a_fit_that_falls_short_is_no_success_and_told_of_until_it_is_undone(robot: Robot) -> None:

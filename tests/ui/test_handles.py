@@ -286,10 +286,10 @@ def test_the_inspector_s_settings_hold_from_the_start(robot: Robot, device: Devi
     drag(robot, (0.4, 0.5), (0.45, 0.5))
     session = robot.editor.session
     for radius in (0.2, 0.25, 0.3):
-        session.edit_held("Reach of a handle", "handle[1]", radius == 0.3, radius=radius)
+        session.edit_held("Size of a handle", "handle[1]", radius == 0.3, radius=radius)
         robot.frame()
     robot.rest()
-    assert names(robot) == ["Open", "Handle", "Reach of a handle"]
+    assert names(robot) == ["Open", "Handle", "Size of a handle"]
     again = Replay(device, session.recipe, session.pictures)
     again.seek(session.tick)
     assert np.array_equal(again.warp.read(), robot.warp())

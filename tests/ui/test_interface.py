@@ -336,6 +336,7 @@ def test_questions_show_the_files_that_answer_them(robot: Robot, monkeypatch: py
     for ask, wanted in (
         (files.ask_open, every), (files.ask_frames, ("png",)), (files.ask_apply, ("mp4", "png")),
         (files.ask_map, ("npy",)), (lambda: files.ask_mask(robot.editor.state), ("png",)),
+        (files.ask_outlines, ("png",)),
     ):  # fmt: skip
         ask()
         assert tuple(ending for ending in every if f".{ending}" in shown[-1]) == wanted

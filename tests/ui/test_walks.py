@@ -28,7 +28,7 @@ SIZE = (1100, 720)
 STEPS = 11
 CLOSE = 2e-3
 ELSEWHERE = ("open", "apply_to", "import_map", "paste", "copy_picture", "copy_recipe", "quit", "fit_handles",
-             "mask_load", "mask_save", "save", "save_as", "export", "statistics")  # fmt: skip
+             "fit_masks", "mask_load", "mask_save", "save", "save_as", "export", "statistics")  # fmt: skip
 """Actions that ask for files, for other processes or for the clipboard; times are told by the last."""
 KEYS = sorted(key for name, action in ACTIONS.items() if name not in ELSEWHERE for key in action.keys)
 NUMBER = re.compile(r"(?<![#\w])-?\d+\.?\d*(?:e-?\d+)?(?!\w)")

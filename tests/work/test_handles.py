@@ -212,6 +212,21 @@ def test_what_lies_outside_the_picture_is_not_led(rest: dict[str, Any], device: 
     assert handles.away[0] > 0.4
 
 
+@pytest.mark.parametrize(
+    "eight", [((0.3, 0.3), (0.7, 0.7), (0.7, 0.3), (0.3, 0.7)), ((0.3, 0.3), (0.7, 0.7), (0.7, 0.4), (0.3, 0.6))]
+)
+def test_a_closed_line_that_crosses_itself_arrives(eight: tuple[tuple[float, float], ...], device: Device):
+    """The areas of its loops cancel: taken for an area that should grow, what is left of them folded 257 places."""
+    grid = Grid(32, 32)
+    fluid, warp = Fluid(device, grid, FluidParams(drag=2.0)), WarpMap(device, grid, (128, 128))
+    fluid.set_viscosity(0.03)
+    handles = Handles(fluid, warp, [Handle((0.5, 0.5), (0.6, 0.5), points=eight, closed=True)])
+    for _ in range(60):
+        handles.advance(DT)
+    assert handles.away[0] < ARRIVED
+    assert warp.statistics().det_min > 0.9
+
+
 def test_why_a_line_stays_short_beside_the_edge_is_told(device: Device):
     line = {"points": [[0.05, 0.3], [0.05, 0.7]], "to": [0.22, 0.5], "duration": 0.1}
     replay = replay_of(device, handle=[line], fluid={"grid": 16}, duration=0.1)

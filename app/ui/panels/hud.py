@@ -34,18 +34,20 @@ def draw(
     numbers: Numbers,
     clock: Clock,
     do: Do,
+    is_covered: bool,
 ) -> None:
-    """Everything that floats over the canvas."""
+    """Everything that floats over the canvas; `is_covered`: what is under way is told where hints stand."""
     session, canvas = workspace.session, workspace.view.canvas
     if canvas.width > ui.px(ZOOM):
         _zoom(ui, workspace, do)
-    if state.tool_name == "handle" and not session.recipe.leads and canvas.width > ui.px(HINT):
-        _how(ui, canvas, "Drag a point to where it should go. Click to pin one where it is.")
-    elif state.tool_name == "freeze" and not _has_frozen(session.recipe) and canvas.width > ui.px(HINT):
-        _how(ui, canvas, "Leave a margin to what you push: fluid sticks to what is frozen.")
-    elif selecting.hint and canvas.width > ui.px(HINT):
-        _how(ui, canvas, selecting.hint)
-    elif preferences.hint and canvas.width > ui.px(HINT):
+    how = selecting.hint
+    if state.tool_name == "handle" and not session.recipe.leads:
+        how = "Drag a point to where it should go. Click to pin one where it is."
+    elif state.tool_name == "freeze" and not _has_frozen(session.recipe):
+        how = "Leave a margin to what you push: fluid sticks to what is frozen."
+    if how and not is_covered and canvas.width > ui.px(HINT):
+        _how(ui, canvas, how)
+    elif preferences.hint and not how and canvas.width > ui.px(HINT):
         _hint(ui, canvas, preferences)
     if state.shows_viscosity and not state.before and canvas.width > ui.px(HINT):
         _legend(ui, canvas, state.overlays["viscosity"].opacity)

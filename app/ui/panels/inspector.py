@@ -162,7 +162,7 @@ def _which_mask(ui: Ui, state: EditorState) -> None:
 
 def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     session = workspace.session
-    pixels = Unit(" px", max(workspace.canvas.size))
+    pixels = Unit(" px", 2 * max(workspace.canvas.size))
     label, recipe = state.selected, session.recipe
     if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
         ui.wrapped(
@@ -176,10 +176,10 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         imgui.same_line()
         ui.dim(_whereabouts(workspace, label, led))
         slid = ui.slider(
-            "held radius", "Reach", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
-            title="How far it reaches", more="It goes at most twice as far.",
+            "held radius", "Size", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
+            title="How far across it reaches", more="It goes at most that far.",
         )  # fmt: skip
-        _set_held(session, label, f"Reach of a {led.kind}", slid, radius=slid.value)
+        _set_held(session, label, f"Size of a {led.kind}", slid, radius=slid.value)
         slid = ui.slider(
             "held stiffness", "Stiffness", led.stiffness, 0.01, 1.0, PERCENT, 1.0,
             title="Stiffness", more="With less it gives way to the fluid and to other handles.",
@@ -207,6 +207,9 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             do("fit_handles")
         more = "Finds the reach and the speed of each; may take a minute."
         ui.tooltip("Move all of them together, with the least work", ACTIONS["fit_handles"].key, more)
+    if ui.button("Fit a mask to another ...", width=-1, height=30):
+        do("fit_masks")
+    ui.tooltip("Leads the outline of the white area of one picture to that of another", more="Makes handles along it.")
 
 
 def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
@@ -221,7 +224,7 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     _set_held(session, label, f"Turn of a {led.kind}", slid, **turned)
     slid = ui.slider("held scale", "Scale", scale, 0.25, 4.0, PERCENT, 1.0, logarithmic=True, title="Scale", more=when)
     turned = {"turned": led.turned_to(tick, dt, rotate, slid.value).turned} if led.turned else {"scale": slid.value}
-    _set_held(session, label, f"Size of a {led.kind}", slid, **turned)
+    _set_held(session, label, f"Scale of a {led.kind}", slid, **turned)
     keyed = led.turned_to(tick, dt, rotate, scale).turned
     is_key = keyed == led.turned
     if ui.button("Remove the key of its turn" if is_key else "Key its turn here", width=-1, height=30):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from math import cos, hypot, pi, sin
@@ -180,6 +181,7 @@ def _number(ui: Ui, label: str, at: ImVec2, is_left: bool, is_lit: bool, lines: 
     """
     ground, ink = (packed(ui.palette.accent), ui.palette.on_accent) if is_lit else (packed(BLACK, 0.5), WHITE)
     words = in_words(label).removeprefix("handle ")
+    words = re.sub(r'^(\d+) "pair \1"$', r"\1", words)  # a fit's own name says no more
     imgui.push_font(ui.fonts.bold, 12.0)
     size, box = imgui.calc_text_size(words), ImVec2(ui.px(3), 0.0)
     at = ImVec2(at.x - (size.x if is_left else 0.0), at.y - size.y / 2)
