@@ -96,6 +96,7 @@ def test_tiles_that_were_made_ready_are_what_a_save_holds(device: Device, monkey
     """It copies none of them again, but what has been drawn into since; and what it does not take is let go."""
     made = Made(monkeypatch)
     tiled = TiledField(device, SIZE, 2, "tiled", tile=SIDE)
+    blank = tiled.save()
 
     def copies(act: Callable[[], object]) -> int:
         device.timings.take()
@@ -115,10 +116,14 @@ def test_tiles_that_were_made_ready_are_what_a_save_holds(device: Device, monkey
     assert (tiled.get() == now).all()
     saves.pop().release()
     assert copies(lambda: saves.append(tiled.save())) == 12, "nothing is held for a save any more"
-    for change in (lambda: tiled.restore(saves[0]), tiled.clear, lambda: tiled.set(noise(4)), tiled.release):
+    restores = [lambda: tiled.restore(blank), lambda: tiled.restore(saves[0])]
+    for change in (*restores, tiled.clear, lambda: tiled.set(noise(4)), tiled.release):
         tiled.set(noise(3))
+        before = len(made.left)
         tiled.make_ready(tiled.kind.regions[3:])
         change()
+        assert len(made.left) <= before
+    blank.release()
     saves[0].release()
     assert not made.left
 
