@@ -14,6 +14,7 @@ from solver.state import State
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED = "factor ", "closed map "  # and their numbers
 ACCUMULATED = "accumulated map"
+MOST_CLOSED = 8, 2**24  # maps, and texels of them in all
 
 
 class MapState(State):
@@ -45,7 +46,10 @@ class MapState(State):
                 made.fields[name] = device.upload(given, f"{name}, given")
             accumulated = self.tiles[ACCUMULATED]
             tiles = {ACCUMULATED: accumulated}
-            for number in range(sum(name.startswith(CLOSED) and name.endswith("/places") for name in arrays)):
+            closed = sum(name.startswith(CLOSED) and name.endswith("/places") for name in arrays)
+            if closed > most_closed(accumulated.kind.size):
+                raise ValueError(f"its map has {closed} closed ones, more than there may be")
+            for number in range(closed):
                 tiles[f"{CLOSED}{number}"] = SavedTiles.nothing(accumulated.kind)
             for name, kind in held_kinds(accumulated.kind.size).items():
                 if f"{name}/places" in rest:
@@ -58,6 +62,11 @@ class MapState(State):
             raise
         made.values.update(rest)
         return made
+
+
+def most_closed(size: tuple[int, int]) -> int:
+    """How many closed maps there may be, for a map of `size` texels."""
+    return min(MOST_CLOSED[0], MOST_CLOSED[1] // (size[0] * size[1]))
 
 
 def held_kinds(size: tuple[int, int]) -> dict[str, Kind]:

@@ -674,9 +674,14 @@ def test_closed_maps_are_saved_and_come_back(device: Device) -> None:
         for _ in range(60):
             again.advance_prescribed(flow, 0.05)
         np.testing.assert_array_equal(again.read(), later)
-    broken = {name: array for name, array in state.arrays().items() if name != "closed map 0/texels"}
+    arrays = state.arrays()
+    broken = {name: array for name, array in arrays.items() if name != "closed map 0/texels"}
     with pytest.raises(ValueError, match="tiles are missing"):
         template.with_arrays(device, broken)
+    parts = {part: arrays[f"closed map 0/{part}"] for part in ("places", "texels")}
+    nine = {f"closed map {number}/{part}": array for number in range(9) for part, array in parts.items()}
+    with pytest.raises(ValueError, match="9 closed ones, more than there may be"):
+        template.with_arrays(device, arrays | nine)
     other.restore(template)
     assert not other.read().any()
     for made in (state, template, resumed, warp, other):
