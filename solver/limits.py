@@ -128,7 +128,7 @@ def beside_edges(places: np.ndarray, extent: tuple[float, float]) -> tuple[np.nd
 
 
 def short_of_edges(places: np.ndarray, goals: np.ndarray, extent: tuple[float, float]) -> float:
-    """How far what is farthest of a line at these places (n, 2) stays from its goals (n, 2), led as `beside_edges`."""
+    """How far, at most, points of a line at `places` (n, 2) stay from their `goals` (n, 2) within `beside_edges`."""
     lack = np.clip(goals, *beside_edges(places, extent)) - goals
     return float(np.hypot(*lack.T).max(initial=0.0))
 

@@ -22,7 +22,7 @@ mat2 bend_of(int level, sampler2D submap, vec4 window, vec2 x, inout vec2 moved)
     return mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading));
 }
 
-// What A, or one of those before it, does after that.
+// What A, or a closed map, does after that.
 void follow(sampler2D accumulated, vec2 x, inout Bend bend) {
     vec2 density = vec2(textureSize(accumulated, 0)) / u_picture;
     mat2 slope;
@@ -33,10 +33,11 @@ void follow(sampler2D accumulated, vec2 x, inout Bend bend) {
 }
 
 Bend bend_at(vec2 x) {
-    mat2 slope, next;
-    vec2 size = vec2(textureSize(u_accumulated, 0)), density = size / u_picture;
+    mat2 next;
     Bend bend;
 #ifdef HELD
+    mat2 slope;
+    vec2 density = vec2(textureSize(u_accumulated, 0)) / u_picture;
     // Not on a texel that is held by itself: its slopes would be those to others, which are not kept.
     if (texture(u_held, x / u_picture).r > 0.9) {
         bend.moved = cubic_displacement(u_kept, on_texel(x * density), 0.0, slope);

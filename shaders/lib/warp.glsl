@@ -1,12 +1,13 @@
 // The warp map as its parts: submaps on windows of the picture, the identity outside them, then the accumulated map.
 //   D(x) = S(x) + A(x + S(x));   with LEVELS defined as 2 or 3, with the submaps that are still to be taken into A,
-//   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 8, with so many maps more that
-//   A goes on from, the last one closed first. What leads into another part is kept in the picture, and x + D(x) within
-//   u_limits, which the texels of all are: between them a polynomial reaches beyond, and what is composed again and again
-//   would grow without end.
-// u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_7: displacements, longer sides; u_window, u_second_window, u_third_window: left,
-// top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits: left, top, right,
-// bottom, longer sides; u_walled: 1 if neither what has moved nor A crosses the picture's edges, else 0.
+//   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 8, with so many closed maps
+//   after A, the last one closed first. A place that is looked up in the next part is kept in the picture, and x + D(x)
+//   within u_limits, as all texels are: between them a polynomial exceeds them, and composed again and again that would grow
+//   without end.
+// u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_7: displacements, longer sides; u_window,
+// u_second_window, u_third_window: left, top, width and height that the submaps cover, u_picture: width and height of the
+// picture, u_limits: left, top, right, bottom, longer sides; u_walled: 1 if neither what has moved nor A or a closed map
+// crosses the picture's edges, else 0.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
 // that are carried less and less before that, 1, 2 and 4 or their sum, and FADED: see weight.
 #include "lib/displacement.glsl"
@@ -130,7 +131,7 @@ bool is_held(vec2 place) {
 vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), 0.0); }
 #endif
 
-// A, or one of those before it, at a place in its texels: by the cubic where CUBIC is defined, LINEAR between four texels.
+// A, or a closed map, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the quintic.
 vec2 accumulated_displacement(sampler2D accumulated, vec2 place) {
 #if defined(LINEAR)
     return linear_displacement(accumulated, place);
@@ -141,8 +142,8 @@ vec2 accumulated_displacement(sampler2D accumulated, vec2 place) {
 #endif
 }
 
-// Goes on from where x has been `moved` and `more` to, `place` being where without `more`, in A's texels: what leads nowhere
-// stays on its texel to the bit.
+// Looks a closed map up where x has been led: x + moved + more, kept in the picture. `place` is x + moved in A's texels; it
+// is moved along and not computed anew, so that it stays on its texel to the bit where nothing has moved.
 void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
     vec2 led = within_picture(x, moved + more) - moved;
     moved += led;

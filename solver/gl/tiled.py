@@ -156,7 +156,7 @@ class TiledField(Field):
         self.blank = blank
         # What each tile was last saved as or restored from; None where something was drawn since.
         self._same = np.full(self.kind.rows_and_columns, None, object)
-        self._ready = dict[int, _Tile]()  # by place, those that were copied for the next save, and are held until then
+        self._ready = dict[int, _Tile]()  # by place, copies that were made for the next save, and are held until then
         self._pass = device.pass_
         super().__init__(device, size, components, label, dtype)
 
@@ -239,7 +239,7 @@ class TiledField(Field):
         return copy
 
     def _leave_ready(self, which: Callable[[int, _Tile], bool] = lambda place, tile: True) -> None:
-        """Let go of what is held for the next save."""
+        """Release the copies that are held for the next save: all, or those for which `which` is true."""
         for place in [place for place, tile in self._ready.items() if which(place, tile)]:
             self._ready.pop(place).release()
 

@@ -20,7 +20,7 @@ LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs n
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
-STEEPEST = 6.0  # largest |grad A| of a map that goes on: stretched more it folds between its texels
+STEEPEST = 6.0  # largest |grad A| of a map that is not closed: one that stretches more folds between its texels
 
 Limits = tuple[float, float, float, float]
 
@@ -48,8 +48,9 @@ def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, i
 class AccumulatedMap:
     """A displacement of the whole picture, RG32F, longer sides, redrawn tile by tile where something has moved.
 
-    Where it has become too steep for its texels it is closed, and begins anew with nothing, above the closed ones, the
-    last of which comes first. Once there are as many as there may be, it goes on however steep it is.
+    Where it has become too steep for its texels it is closed, and a new one of nothing begins; a place is looked up in
+    the new one first, then in the closed ones, the last one closed first. Once there are `most_closed` of them, it goes
+    on however steep it is.
 
     Args:
         device: the device.
@@ -58,7 +59,7 @@ class AccumulatedMap:
 
     Attributes:
         now: the displacement. Tiles are redrawn into another field, which replaces it once all are done.
-        closed: what comes after it, the first one closed first.
+        closed: the closed maps, the first one closed first.
         limits: of the places looked up: left, top, right, bottom.
     """
 
@@ -77,7 +78,7 @@ class AccumulatedMap:
         self._moved: list[Region] = []  # tiles to be drawn anew
         self._copied: list[Region] = []  # tiles to be copied
         self._done = 0  # of both
-        self._is_saved = False  # now and then: then not all tiles are copied at once, when all have been drawn
+        self._is_saved = False  # if so, tiles are copied for the next save as they are drawn, not all of them at once
         self.limits = self._picture = (0.0, 0.0, *extent)
         self.is_walled = True
 
@@ -116,11 +117,11 @@ class AccumulatedMap:
 
     @property
     def defines(self) -> dict[str, object]:
-        """Of `lib/warp.glsl`, with what is closed."""
+        """The defines of `lib/warp.glsl` for it and the closed maps."""
         return {"CLOSED": len(self.closed)} if self.closed else {}
 
     def inputs(self) -> dict[str, Any]:
-        """It as `lib/warp.glsl` has it, with what is closed."""
+        """The inputs of `lib/warp.glsl` for it and the closed maps."""
         return (
             self.own()
             | {f"closed_{number}": field for number, field in enumerate(self.closed)}
@@ -128,7 +129,7 @@ class AccumulatedMap:
         )
 
     def own(self) -> dict[str, Any]:
-        """The same without: above what is closed it stays in the picture."""
+        """The same without the closed maps, as a remap needs it: while there are any, it must stay in the picture."""
         limits = self._picture if self.closed else self.limits
         return {"accumulated": self.now, "picture": self.extent, "limits": limits, "walled": float(self.is_walled)}
 
@@ -152,7 +153,7 @@ class AccumulatedMap:
                 self._begin_anew()
 
     def _look(self, tiles: list[Region]) -> None:
-        """See how steep tiles have been drawn, if that matters."""
+        """Draw how steep tiles of `_next` are, if another map may be closed."""
         if len(self.closed) < self._most_closed:
             spacing = [side / n for side, n in zip(self.extent, self.size, strict=True)]
             blocks = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in tiles]
@@ -160,7 +161,7 @@ class AccumulatedMap:
             find(self._steepness, region=blocks, displacement=self._next, spacing=spacing, side=SIDE)
 
     def _begin_anew(self) -> None:
-        """With nothing, in the field that is at hand."""
+        """Go on with a map of nothing, in the field that would be drawn next."""
         self.now, self._next = self._next, TiledField(self.device, self.size, 2, "accumulated map, anew")
         self.now.clear()
         self._stale.clear()
@@ -177,7 +178,7 @@ class AccumulatedMap:
         self._stale.update(tile for tile in self._tiles if _meet(tile, region))
 
     def set(self, draw: Callable[[Field], None], limits: Limits) -> None:
-        """Draw all of it, which looks up places within these limits; what was planned is forgotten."""
+        """Draw all of it anew, with places within these limits, and no closed maps; what was planned is forgotten."""
         self.forget()
         self._open()
         draw(self.now)
@@ -185,14 +186,14 @@ class AccumulatedMap:
         self.limits, self.is_walled = limits, False
 
     def merge(self, draw: Callable[[Field], None]) -> None:
-        """Be one map with what is closed: `draw` draws them together; nothing may be planned."""
+        """Make one map of it and the closed ones: `draw` draws their composition; nothing may be planned."""
         draw(self._next)
         self.now, self._next = self._next, self.now
         self._stale = set(self._tiles)
         self._open()
 
     def saved(self) -> dict[str, TiledField]:
-        """The fields by name."""
+        """The fields by name, to be saved; from the first call on, tiles are made ready for that as they are drawn."""
         self._is_saved = True
         return {ACCUMULATED: self.now} | {f"{CLOSED}{number}": field for number, field in enumerate(self.closed)}
 
@@ -224,7 +225,7 @@ class AccumulatedMap:
             thing.release()
 
     def _open(self, left: int = 0) -> None:
-        """Let what is closed go, but for so many."""
+        """Drop the closed maps but the first so many."""
         while len(self.closed) > left:
             self.closed.pop().release()
 

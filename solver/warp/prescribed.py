@@ -18,8 +18,7 @@ def traced(velocity: Function, grid: Grid, dt: float, time: float) -> np.ndarray
     A fourth-order Runge-Kutta step; what would come from beyond the grid's edge comes from the edge.
 
     Raises:
-        ValueError: if the velocity has not two components, each shaped as the places, or is not finite or beyond all
-            measure.
+        ValueError: if the velocity has not two components, each shaped as the places, or is not finite or too large.
     """
 
     def velocity_at(x: np.ndarray, y: np.ndarray, time: float) -> tuple[np.ndarray, ...]:

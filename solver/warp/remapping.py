@@ -16,13 +16,10 @@ from solver.warp.frozen import Frozen
 from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
 
 REMAP_STEPS = 8  # steps over which a remap is spread, at least
-MOST_TILES = (
-    8  # redrawn in a step, as much work as a step of the fluid, unless a level of another grid has to be finished
-)
-MOST_GATHERED = (
-    8,
-    2**19,
-)  # texels of the gathered level, along a cell and in all, but at least `LEAST_TEXELS` along a cell
+# Tiles redrawn in a step, as much work as a step of the fluid, unless a level of another grid has to be finished.
+MOST_TILES = 8
+# Texels of the gathered level, along a cell and in all, but at least `LEAST_TEXELS` along a cell.
+MOST_GATHERED = 8, 2**19
 
 
 class Remapping:
