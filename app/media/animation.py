@@ -257,10 +257,9 @@ def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple
 
 
 class _FewColours:
-    """Looks whether frames have no more colours than a palette holds beside what is transparent: then none changes.
+    """The colours of all frames, as long as a GIF's palette holds them: 255, and one more for transparent pixels.
 
-    Attributes:
-        colours: a palette of them, (16, 16, 4) uint8, as ffmpeg reads one; None if they are too many.
+    With this palette no pixel changes; one that ffmpeg chooses is rounded.
     """
 
     def __init__(self) -> None:
@@ -268,7 +267,7 @@ class _FewColours:
         self._alpha = False
 
     def look(self, frame: np.ndarray) -> None:
-        """At a frame, uint8."""
+        """Add the colours of a frame, (h, w, channels) uint8."""
         if self._seen is None:
             return
         channels = frame.shape[2]
@@ -279,15 +278,15 @@ class _FewColours:
         if np.count_nonzero(self._seen) > 255:
             self._seen = None
 
-    @property
-    def colours(self) -> np.ndarray | None:
+    def palette(self) -> np.ndarray | None:
+        """A palette of them, (16, 16, 4) uint8, as ffmpeg reads one; None if they are too many."""
         if self._seen is None:
             return None
         found = np.flatnonzero(self._seen)
         palette = np.zeros((256, 4), np.uint8)
         palette[: len(found), :3] = np.stack([found >> 16, found >> 8 & 255, found & 255], axis=-1)
         palette[:, 3] = 255
-        palette[255, 3] = 0 if self._alpha else 255  # ffmpeg's filter and encoder take the same only if there is one
+        palette[255, 3] = 0 if self._alpha else 255  # of two, ffmpeg's filter and encoder take different ones
         return palette.reshape(16, 16, 4)
 
 
@@ -319,8 +318,8 @@ def _gif_writer(
 
             yield write
             video.finish()
-        if few.colours is not None:
-            write_picture(palette, Picture(few.colours))
+        if (colours := few.palette()) is not None:
+            write_picture(palette, Picture(colours))
         dithered, shown = "paletteuse=dither=sierra2_4a:diff_mode=rectangle", []
         if durations is not None:
             dithered = f"[0:v]settb={1 / rate},{shown_for(durations)}[shown];[shown][1:v]{dithered}"

@@ -98,7 +98,7 @@ def check_size(recipe: Recipe, before: Recipe | None = None) -> None:
             "This work is as large as one may be. Undo something, or export the warp as a map and begin anew with that."
         )
     if before is not None and (said := recipe.excess) and not before.excess:
-        raise UserError(f"That is not made, or {said}.")
+        raise UserError(f"That was not done. With it, {said}.")
 
 
 def with_change(recipe: Recipe, tick: int, settings: dict[str, Any], lasts: bool) -> Recipe:

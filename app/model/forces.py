@@ -41,9 +41,8 @@ Strength = Annotated[float, Field(ge=-1e6, le=1e6)]
 MOST_FORCES = 512  # each has a picture of itself as large as the grid: of 256 cells, 200 MB in all
 MOST_PIECES = 20_000  # of a curve; around the edge of a picture, of a radius of two thousandths
 MOST_PIECES_IN_ALL = 60_000  # of all curves: each takes 15 microseconds
-MOST_COVERED = (
-    1500  # times that all their pieces may cover the whole picture: on 256 cells each takes half a millisecond
-)
+# Times that all their pieces may cover the whole picture: on 256 cells each takes half a millisecond.
+MOST_COVERED = 1500
 
 
 class _Force(Timed):
@@ -205,7 +204,7 @@ class CurveForce(_Push):
 
     @property
     def covered(self) -> float:
-        """How many times its pieces cover the whole picture."""
+        """About how many times its pieces cover the whole picture."""
         return self.pieces * min(2 * _reach(self.radius, self.falloff), 1.0) ** 2
 
     def _bare(self, grid: Grid) -> np.ndarray:
@@ -413,7 +412,7 @@ class BuiltForce:
 
 
 def excess(forces: Sequence[Force]) -> str | None:
-    """What of forces is more than a simulation can begin with in a second or two; None if nothing is."""
+    """A message if a simulation could not build the forces in a second or two; else None."""
     curves = [force for force in forces if isinstance(force, CurveForce) and not force.muted]
     if len(forces) > MOST_FORCES:
         return f"there are {len(forces)} forces; at most {MOST_FORCES} work"
@@ -424,7 +423,7 @@ def excess(forces: Sequence[Force]) -> str | None:
         )
     if (covered := sum(curve.covered for curve in curves)) > MOST_COVERED:
         return (
-            f"the curves of the forces cover the whole picture {covered:.0f} times, each eight times a radius; at most "
+            f"the pieces of the forces' curves, eight a radius, cover the whole picture {covered:.0f} times; at most "
             f"{MOST_COVERED} times work"
         )
     return None

@@ -290,7 +290,7 @@ class Recipe(Model):
 
     @property
     def excess(self) -> str | None:
-        """What of it is more than works, for messages; None if nothing is."""
+        """A message if it has more forces or strokes at once than work; else None."""
         return forces.excess(self.force) or strokes.excess(self.stroke)
 
     @property

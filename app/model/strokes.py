@@ -290,11 +290,12 @@ class Stroke(BrushPath):
 
 
 def excess(strokes: Sequence[Stroke]) -> str | None:
-    """What of strokes is more than a tick can do in a second or two; None if nothing is."""
+    """A message if more strokes act in some tick than it can do in a second or two; else None."""
     acting = [stroke for stroke in strokes if not stroke.muted]
     if sum(stroke.repeat for stroke in acting) <= MOST_AT_ONCE:
         return None
-    changes = np.zeros(max(stroke.end_tick for stroke in acting) + 2, np.int32)  # in how many act, from tick to tick
+    # By how many more act in a tick than in the one before.
+    changes = np.zeros(max(stroke.end_tick for stroke in acting) + 2, np.int32)
     for stroke in acting:
         first = stroke.last_tick if stroke.tool == "curve" else stroke.first_tick
         for tick, change in ((first, 1), (stroke.last_tick + 1, -1)):
@@ -303,7 +304,7 @@ def excess(strokes: Sequence[Stroke]) -> str | None:
     if (most := int(acts.max())) <= MOST_AT_ONCE:
         return None
     return (
-        f"in tick {int(acts.argmax())} {most} strokes act at once, with their repetitions; at most {MOST_AT_ONCE} work"
+        f"{most} strokes act at once in tick {int(acts.argmax())}, with their repetitions; at most {MOST_AT_ONCE} work"
     )
 
 

@@ -211,13 +211,13 @@ SMALL_AND_HARMFUL = {
     ),
     "wide curve": (
         "[[force]]\nkind = 'curve'\nradius = 0.2\npoints = [" + "[0, 0.5], [1, 0.5], " * 240 + "]",
-        "the curves of the forces cover the whole picture 3142 times",
+        "the pieces of the forces' curves, eight a radius, cover the whole picture 3142 times",
     ),
     "wide soft curve": (
         "[[force]]\nkind = 'curve'\nradius = 0.2\nfalloff = 'gaussian'\npoints = ["
         + "[0, 0.5], [1, 0.5], " * 240
         + "]",
-        "the curves of the forces cover the whole picture 19640 times",
+        "the pieces of the forces' curves, eight a radius, cover the whole picture 19640 times",
     ),
     "curves": (
         ("[[force]]\nkind = 'curve'\nradius = 0.01\npoints = [" + "[0, 0.5], [1, 0.5], " * 12 + "]\n") * 100,
@@ -225,7 +225,7 @@ SMALL_AND_HARMFUL = {
     ),
     "strokes at once": (
         "[[stroke]]\ntool = 'push'\nsamples = [[0, 0.1, 0.2, 1.0], [1, 0.2, 0.2, 1.0]]\n" * 9000,
-        "in tick 0 9000 strokes act at once",
+        "9000 strokes act at once in tick 0",
     ),
     "strokes again and again": (
         (
@@ -233,7 +233,7 @@ SMALL_AND_HARMFUL = {
             "samples = [[0, 0.1, 0.2, 1.0], [1, 0.2, 0.2, 1.0]]\n"
         )
         * 6000,
-        "in tick 1 12000 strokes act at once, with their repetitions",
+        "12000 strokes act at once in tick 1, with their repetitions",
     ),
     "keys of a handle": (
         "[[handle]]\nat = [0.5, 0.5]\nkeys = ["

@@ -64,7 +64,7 @@ def test_how_many_strokes_act_at_once_is_counted_as_they_act(monkeypatch: pytest
         assert strokes.excess(several) is None
         monkeypatch.setattr(strokes, "MOST_AT_ONCE", max(acts) - 1)
         if most := max(acts):
-            told = f"in tick {acts.index(most)} {most} strokes act at once, with their repetitions; at most"
+            told = f"{most} strokes act at once in tick {acts.index(most)}, with their repetitions; at most"
             assert strokes.excess(several) == f"{told} {most - 1} work"
 
 

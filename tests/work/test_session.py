@@ -105,9 +105,9 @@ def test_an_edit_that_would_be_refused_when_it_is_opened_again_is_not_made(
     before = session.recipe
     again = lambda stroke: stroke.repeated(9, 1)  # noqa: E731
     monkeypatch.setattr("app.model.strokes.MOST_AT_ONCE", 4)
-    with pytest.raises(UserError, match=r"^That is not made, or in tick \d+ \d strokes act at once"):
+    with pytest.raises(UserError, match=r"^That was not done\. With it, \d strokes act at once in tick \d+"):
         session.edit_bars("Repeat", [("stroke", 0)], again)
-    with pytest.raises(UserError, match=r"^That is not made, or there are 513 forces"):
+    with pytest.raises(UserError, match=r"^That was not done\. With it, there are 513 forces"):
         session.edit("Add", force=513 * (VortexForce(kind="vortex", point=(0.5, 0.5)),))
     assert session.recipe == before
     monkeypatch.setattr("app.model.strokes.MOST_AT_ONCE", 9)
