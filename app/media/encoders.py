@@ -152,17 +152,18 @@ LARGEST = {
 # What ffmpeg's muxers were seen to write down and its readers to find again.
 ROLES = ("dub", "comment", "forced", "hearing impaired", "visual impaired")
 
-# In a MOV languages are numbers, of which ffmpeg knows these names; some have others beside them in ISO 639-2.
+# In a MOV languages are numbers. ffmpeg writes and reads these names of them and, of all others of three letters, none;
+# some have other names in ISO 639-2.
 MAC_LANGUAGES = """
-alb amh ara arm asm aym aze baq bel ben bul bur cat ces chi dan dut dzo eng epo est fin fra geo ger grn guj heb hin hun
-ice ind ita jav jpn kan kas kaz khm kin kir kor kur lao lat lav lit mac mal mar may mlg mlt mon nep nor nya ori orm pol
-por pus que ron rus san sin slk slv smi snd som spa sve swa tam tat tel tgk tgl tha tib tir tuk tur uig ukr urd uzb vie
-wel yid
+alb amh ara arm asm aym aze baq bel ben bul bur cat ces chi dan dut dzo eng epo est fin fra geo ger gre grn guj heb hin
+hun ice ind iri ita jav jpn kan kas kaz khm kin kir kor kur lao lat lav lit mac mal mar may mlg mlt mol mon nep nor nya
+ori orm per pol por pus que ron run rus san sin slk slv smi snd som spa sve swa tam tat tel tgk tgl tha tib tir tuk tur
+uig ukr urd uzb vie wel yid
 """
 MAC_NAMES = {name: name for name in MAC_LANGUAGES.split()} | {
-    "bod": "tib", "cym": "wel", "cze": "ces", "deu": "ger", "eus": "baq", "fre": "fra", "hye": "arm", "isl": "ice",
-    "kat": "geo", "mkd": "mac", "msa": "may", "mya": "bur", "nld": "dut", "rum": "ron", "slo": "slk", "sqi": "alb",
-    "swe": "sve", "zho": "chi",
+    "bod": "tib", "cym": "wel", "cze": "ces", "deu": "ger", "ell": "gre", "eus": "baq", "fas": "per", "fre": "fra",
+    "gle": "iri", "hye": "arm", "isl": "ice", "kat": "geo", "mkd": "mac", "msa": "may", "mya": "bur", "nld": "dut",
+    "rum": "ron", "slo": "slk", "sqi": "alb", "swe": "sve", "zho": "chi",
 }  # fmt: skip
 
 ANIMATIONS = {
