@@ -130,7 +130,7 @@ class Selecting:
             try:
                 share = self._fill(parts, 0.0).coverage(grid, session.replay.small_pictures, session.replay.as_seen)
             except ValueError as error:
-                raise UserError(f"Nothing can be selected so: {error}.") from None
+                raise UserError(f"This cannot be selected: {error}.") from None
             area = np.rint(255 * share).astype(np.uint8)
         self.state.selection, self.state.selected_area = parts, area
         self.state.selected_part = 0.0 if area is None else float(area.mean()) / 255
@@ -248,7 +248,7 @@ class _Search:
 
     def __init__(self, colours: np.ndarray, box: tuple[float, float, float, float]) -> None:
         self._colours, self._box = colours, box
-        self._found: tuple[Point, ...] | UserError = UserError("No subject is found: the search has failed.")
+        self._found: tuple[Point, ...] | UserError = UserError("No subject was found: the search failed.")
         self.thread = threading.Thread(target=self._work, name="looking for a subject", daemon=True)
         self.thread.start()
 

@@ -103,7 +103,7 @@ def test_a_stroke_that_is_as_long_as_one_may_be_ends_and_says_so(
 ) -> None:
     monkeypatch.setattr("app.work.session.LONGEST_GESTURE", 4)
     paint(session, "push", (0.3, 0.3), (0.6, 0.6), ticks=20)
-    assert session.notice == "That is as long as a stroke may be. Press again to go on."
+    assert session.notice == "This stroke has reached its greatest length. Press again to continue."
     (stroke,) = session.recipe.stroke
     assert 4 <= len(stroke.samples) < 10
 
