@@ -621,6 +621,22 @@ def test_the_recording_is_played_once_or_over_and_over_or_there_and_back(
     assert session.document.recipe.time.ping_pong == returns
 
 
+def test_a_stroke_begun_while_the_recording_is_played_takes_the_place_of_what_comes_after(session: Session) -> None:
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    end = session.end
+    session.seek(0)
+    session.settle()
+    session.play()
+    for _ in range(3):
+        session.advance(1)
+    tick = session.tick
+    assert 0 < tick < end
+    paint(session, "push", (0.7, 0.5), (0.6, 0.5))
+    assert session.recipe.stroke[-1].first_tick == tick
+    assert session.notice is not None
+
+
 def test_a_stabilised_stroke_is_recorded_as_it_acts_and_ends_at_the_pen(session: Session) -> None:
     press = Press(BrushSettings(0.12), False, session.extent, session.dt, string=0.15)
     session.press(TOOL["push"], press, 0.3, 0.5)
