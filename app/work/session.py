@@ -43,7 +43,6 @@ from app.model.tools import Made, Press, Tool, Touch
 from app.model.windows import detail_for
 from app.work.gesture import OpenGesture, kept_near
 from app.work.held import FIT, Held, as_seen, held_in, unmet
-from app.work.memo import Memo
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.map import WarpMap
@@ -99,11 +98,11 @@ class Session:
         # The person has sent the playhead back, and what is done next takes the place of what comes after it.
         self._went_back = False
         self._prepared: Replay | None = None  # the simulation on another grid, which is to take this one's place
-        self._held = Memo[list[Held]]()
-        self._marks = Memo[list[Held]]()
-        self._objections = Memo[tuple[str, ...]]()
-        self._unmet = Memo[dict[str, str]]()
-        self._folds = Memo[tuple[int, int]]()
+        self._held: tuple[object, list[Held]] = (None, [])
+        self._marks: tuple[object, list[Held]] = (None, [])
+        self._objections: tuple[object, tuple[str, ...]] = (None, ())
+        self._unmet: tuple[object, dict[str, str]] = (None, {})
+        self._folds: tuple[object, tuple[int, int]] = (None, (0, 0))
         # What gestures and edits start from: the document's recipe, or that cut off at the playhead.
         self._base = project.recipe
         self._live = project.recipe
@@ -358,20 +357,19 @@ class Session:
     def held(self) -> list[Held]:
         """The handles and pins in force at the playhead; looking reads back from the GPU where something has moved."""
         self._take_up()
-        return self._held.get(self._state, lambda: held_in(self.replay))
+        replay = self.replay
+        seen = replay, replay.recipe, replay.tick, replay.warp.version
+        if self._held[0] != seen:
+            self._held = seen, held_in(replay)
+        return self._held[1]
 
     @property
     def marks(self) -> list[Held]:
         """`held`, where the picture is seen at its amount."""
-        held = self.held
-        if self.is_painting or self.replay.recipe.amount == 1:
-            return held
-        return self._marks.get(self._state, lambda: as_seen(held, self.replay))
-
-    @property
-    def _state(self) -> tuple[object, ...]:
-        """What changes with all that can be read from the simulation."""
-        return self.replay, self.replay.recipe, self.replay.tick, self.replay.warp.version
+        held, amount = self.held, 1.0 if self.is_painting else self.replay.recipe.amount
+        if self._marks[0] != (seen := (self._held[0], amount)):
+            self._marks = seen, held if amount == 1 else as_seen(held, self.replay)
+        return self._marks[1]
 
     @property
     def objections(self) -> tuple[str, ...]:
@@ -379,17 +377,23 @@ class Session:
         changed.
         """
         led = self.document.recipe.handle, self.document.recipe.pin
-        return self._objections.get(led, lambda: tuple(islice(objections(*led, self.extent), MOST_OBJECTIONS)))
+        if self._objections[0] != led:
+            self._objections = led, tuple(islice(objections(*led, self.extent), MOST_OBJECTIONS))
+        return self._objections[1]
 
     @property
     def unmet(self) -> dict[str, str]:
         """Which handles have come to rest, at the end, elsewhere than where they are led, and how the command line says
         it, by what messages call them; reads back from the GPU.
         """
-        if self.is_moving or self.tick != self.end or not self.replay.recipe.leads:
+        replay = self.replay
+        if self.is_moving or self.tick != self.end or not replay.recipe.leads:
             return {}
         is_fitted = self.document.history.undo_name == FIT
-        return self._unmet.get((self._state, is_fitted), lambda: dict(unmet(self.replay, ARRIVED, is_fitted)))
+        seen = replay, replay.recipe, replay.tick, replay.warp.version, is_fitted
+        if self._unmet[0] != seen:
+            self._unmet = seen, dict(unmet(replay, ARRIVED, is_fitted))
+        return self._unmet[1]
 
     @property
     def folds(self) -> tuple[int, int]:
@@ -400,13 +404,11 @@ class Session:
         warp = self.replay.warp
         if warp.is_untouched:
             return 0, 0
-
-        def count() -> tuple[int, int]:
+        if self._folds[0] != (seen := (warp, warp.version)):
             width, height = warp.coarse_size
             found = warp.statistics((2 * width, 2 * height))
-            return found.folds, found.places
-
-        return self._folds.get((warp, warp.version), count)
+            self._folds = seen, (found.folds, found.places)
+        return self._folds[1]
 
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:
         """Set something about the handle or pin that messages call so, from its start on, and let it arrive.
