@@ -68,7 +68,7 @@ def writable(path: str | os.PathLike[str]) -> Path:
         if target.is_dir():
             raise UserError(f"Cannot write {path}: it is a folder; give the name of a file in it.")
         if target.exists() and not target.is_file():
-            raise UserError(f"Cannot write {path}: it is no ordinary file; give another name.")
+            raise UserError(f"Cannot write {path}: it is not an ordinary file; give another name.")
         if not target.parent.is_dir():
             raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")
     except OSError as error:  # a name that is too long, a folder that cannot be looked into

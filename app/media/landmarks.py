@@ -204,7 +204,7 @@ def _read_pts(path: Path, lines: Lines) -> np.ndarray:
         elif key != "version":
             raise _bad(path, number, f"expected version, n_points or {{, and not {line[:40]!r}")
     else:
-        raise UserError(f"{path} is no .pts file: it has no {{ before its points")
+        raise UserError(f"{path} is not a .pts file: it has no {{ before its points")
     rows = []
     for number, line in lines:
         if line == "}":

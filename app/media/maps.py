@@ -229,7 +229,7 @@ def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
         stream.seek(len(head))
         width, height = (int(side) for side in np.frombuffer(head[4:12].ljust(8, b"\0"), "<i4"))
         if len(head) < 12 or np.frombuffer(head[:4], "<f4")[0] != FLO_MAGIC or min(width, height) < 1:
-            raise UserError(f"Cannot read {file}: it is no Middlebury .flo file.")
+            raise UserError(f"Cannot read {file}: it is not a Middlebury .flo file.")
         check_size(file, width, height, max_pixels)
         if os.fstat(stream.fileno()).st_size != 12 + width * height * 8:
             raise UserError(
@@ -248,7 +248,7 @@ def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
                 raise ValueError(f"its shape is {shape}")
         except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-            raise UserError(f"Cannot read {file}: it is no NumPy array, or truncated ({reason}).") from error
+            raise UserError(f"Cannot read {file}: it is not a NumPy array, or truncated ({reason}).") from error
         if len(shape) != 3 or shape[2] != 2 or kind.kind != "f":
             raise UserError(
                 f"Cannot read {file}: a map is a float array (height, width, 2), this one is {kind} {shape}."
@@ -279,7 +279,7 @@ def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], 
             values = np.stack([found[x], found[y]], axis=-1)
             break
     else:
-        raise UserError(f"Cannot read {file}: its channels {' '.join(channels)} are no map; it needs R and G.")
+        raise UserError(f"Cannot read {file}: its channels {' '.join(channels)} are not a map; it needs R and G.")
     metadata = {key.removeprefix("fluidwarp/"): value for key, value in header.items() if key.startswith("fluidwarp/")}
     (left, top), (right, bottom) = ((int(x), int(y)) for x, y in header["dataWindow"])
     (first_x, first_y), (last_x, last_y) = ((int(x), int(y)) for x, y in header["displayWindow"])

@@ -118,7 +118,7 @@ def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
     except OSError as error:
         raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
     except Exception:  # of a damaged archive: BadZipFile, zlib.error, NotImplementedError, RuntimeError, IndexError ...
-        raise UserError(f"{path} is no fluidwarp project, or is cut short or damaged; get it again") from None
+        raise UserError(f"{path} is not a fluidwarp project, or is cut short or damaged; get it again") from None
 
 
 def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) -> Project:
@@ -230,7 +230,7 @@ def _referring(project: Project, path: Path) -> Recipe:
             raise UserError(f"Cannot refer to {target}: it is gone; {mend}")
         names[name] = name_from(path.resolve().parent, target)
         if printable(names[name]) != names[name]:
-            raise UserError(f"Cannot refer to {target}: its name is no text; keep the picture in the project instead")
+            raise UserError(f"Cannot refer to {target}: its name is not text; keep the picture in the project instead")
     return Recipe.model_validate(_renamed(plain(project.recipe), names))
 
 

@@ -163,7 +163,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     told = _banner(file)
     video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
     if video is None:
-        raise UserError(f"Cannot read {path}: it is no video, or damaged; give the name of a video.")
+        raise UserError(f"Cannot read {path}: it is not a video, or it is damaged; give the name of a video.")
     kind = re.search(r"Video: [^,]*, ?(?:none, )?(\w+)", video)
     pixel_format = kind.group(1) if kind else ""
     hidden = "Video: vp9" in video and "alpha_mode" in told  # a second stream, which only libvpx decodes

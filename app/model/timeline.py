@@ -91,10 +91,10 @@ def dissolved(positions: list[Fraction], frames: int) -> tuple[list[Fraction], d
         UserError: if it is more than half of the animation, or no frame shows it.
     """
     if frames < 2:
-        raise UserError("what dissolves ('time.dissolve') takes less than two frames; make it longer")
+        raise UserError("the dissolve ('time.dissolve') takes less than two frames; make it longer")
     length = len(positions) - 1 - frames
     if length < frames:
-        raise UserError("what dissolves ('time.dissolve') is more than half of the animation; make it shorter")
+        raise UserError("the dissolve ('time.dissolve') is more than half of the animation; make it shorter")
     into = {length - frames + number: Dissolve(positions[number], number / frames) for number in range(1, frames)}
     return positions[frames:-1], into
 

@@ -98,5 +98,5 @@ def _library() -> Any:
     try:
         import copykitten
     except ImportError:
-        raise UserError("Pictures on the clipboard need copykitten; get it by: pip install copykitten") from None
+        raise UserError("Pictures on the clipboard need copykitten; install it with: pip install copykitten") from None
     return copykitten

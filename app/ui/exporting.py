@@ -623,7 +623,7 @@ class Exports:
         words = f"Copying {process.job.target.stem}" if copied else f"Exporting {process.job.target.name}"
         if under_way(ui, "exporting", canvas, 0.0, words + state, process.part, "Cancel"):
             self.cancel()
-            self.messages.say("Cancelled; nothing half-written is kept.")
+            self.messages.say("Cancelled; no unfinished file is kept.")
 
 
 def under_way(ui: Ui, name: str, canvas: Rect, down: float, words: str, part: float, button: str) -> bool:

@@ -9,8 +9,8 @@ import numpy as np
 from app.errors import UserError
 from app.media.displacement import Displacement, cropped, folds
 from app.media.files import is_sequence
-from app.work.along import widened
 from app.work.export import Target, looked_up, opaque_value, with_alpha
+from app.work.layers import widened
 from solver.gl.device import Device
 from solver.gl.field import FieldError
 from solver.grid import Grid

@@ -27,10 +27,10 @@ from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
 from app.progress import Progress
-from app.work.along import along
 from app.work.applier import Applier, inverted
 from app.work.export import Kept, Report, Target, steps_for, write_all
 from app.work.jobs import check_result, longer_side
+from app.work.layers import resample_layers
 from app.work.states import code
 from app.work.tasks import Piece
 from app.work.threads import prefetch
@@ -182,7 +182,7 @@ class _Applying:
         target = Target(size, self.applier.how, parts(size[1]), alpha and kind.alpha)
         found = self.applier.warped(given, pixels, target)
         look_up, quality = partial(self._look_up, given, size), self.applier.how.quality
-        layers = along(picture.layers, look_up, quality) if "layers" in kind.keeps else ()
+        layers = resample_layers(picture.layers, look_up, quality) if "layers" in kind.keeps else ()
         if picture.wide is None:
             return replace(picture.with_pixels(found), layers=layers)
         return picture.with_wide(found, layers)

@@ -35,10 +35,10 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.timeline import Dissolve, Sentinel, Timeline, dissolved, frame_positions
 from app.progress import Progress
-from app.work.along import along, widened
 from app.work.checkpoints import DEFAULT_BUDGET
 from app.work.held import unmet
 from app.work.jobs import Job, MapOutput, longer_side, result_size
+from app.work.layers import resample_layers, widened
 from app.work.observing import observe
 from app.work.replay import Replay
 from app.work.states import StoredStates, code
@@ -386,7 +386,8 @@ class _Export:
                 return still
             layers = picture.cropped().layers
             return replace(
-                still, layers=along(layers, partial(self._look_up, self.replay.seen, self.size), self._how.quality)
+                still,
+                layers=resample_layers(layers, partial(self._look_up, self.replay.seen, self.size), self._how.quality),
             )
         given = displacement(self.replay, self.size, 0, False, self.progress.check)
         warp = GivenMap(self.device, widened(given, picture.margins))
@@ -396,7 +397,7 @@ class _Export:
             target = Target((width, height), how, parts(height), alpha=not self.job.is_animation)
             wide = looked_up(self.sampler, warp, picture.wide, target)
             return picture.with_wide(
-                wide, along(picture.layers, partial(self._look_up, warp, target.size), how.quality)
+                wide, resample_layers(picture.layers, partial(self._look_up, warp, target.size), how.quality)
             )
         except SamplingError as error:
             raise UserError(f"The map cannot be applied: {error}.") from None

@@ -639,8 +639,8 @@ class _Search:
         numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin) - len(self.aim.own)
         if not len(numbers):
             if self.aim.own:
-                raise UserError("no handle that is led holds anything of the picture: all lie outside it")
-            raise UserError("no pair has its point in the picture; pairs are in pixels from its top-left corner")
+                raise UserError("all handles with a goal lie outside the picture")
+            raise UserError("all pairs lie outside the picture; they are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:
             others = f" beside the recipe's {taken} handles and pins" if taken else ""
             raise UserError(

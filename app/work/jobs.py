@@ -94,7 +94,7 @@ class Outputs:
         if self.resume and not any(map(is_sequence, self.files)):
             raise UserError(f"--resume keeps the files of a sequence, such as f.%04d.png, and {self.files[0]} is none")
         if self.resume and self.stats is not None:
-            raise UserError("--stats has the numbers of all frames, and --resume makes only the missing ones; drop one")
+            raise UserError("--stats needs all frames, and --resume makes only the missing ones; use one of them")
         if self.part != WHOLE and not self.has_frames:
             raise UserError(f"--frames is for an animation, and {self.file} is a picture; write f.%04d.png or .mp4")
 
@@ -215,7 +215,7 @@ class Job:
             if self.clip is not None:
                 raise UserError(f"'time.dissolve' is for a picture, and {self.clip.path} is a clip; leave it out")
             if maps is not None and maps.is_sequence:
-                raise UserError(f"no map shows what dissolves; leave out {maps.path}, or 'time.dissolve'")
+                raise UserError(f"a map cannot show a dissolve; leave out {maps.path}, or 'time.dissolve'")
         outputs.check()
         if outputs.file is not None:
             check_result(result_size(self.recipe, self.picture), self.picture, "--size, or 'output.size',")

@@ -297,7 +297,7 @@ class Session:
             self._hear(self._gesture)
             if len(self._gesture.path) >= LONGEST_GESTURE:
                 self.release()
-                self.notice = "That is as long as a stroke may be. Press again to go on."
+                self.notice = "This stroke has reached its greatest length. Press again to continue."
 
     def release(self) -> None:
         """The pointer went up: the gesture becomes an entry of the history, and the fluid comes to rest by itself."""

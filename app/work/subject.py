@@ -28,7 +28,7 @@ def subject_outline(colours: np.ndarray, box: Box) -> tuple[Point, ...]:
     try:
         import cv2
     except ImportError:
-        raise UserError("Finding a subject needs OpenCV; get it by: pip install opencv-python-headless") from None
+        raise UserError("Finding a subject needs OpenCV; install it with: pip install opencv-python-headless") from None
     height, width = colours.shape[:2]
     sides = np.array([width, height, width, height])
     left, top, right, bottom = np.clip(np.rint(np.array(box) * sides), 0, sides).astype(int).tolist()

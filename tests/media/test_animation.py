@@ -645,7 +645,7 @@ def test_what_is_no_clip(tmp_path: Path):
     for name, message in {
         "missing.mp4": "there is no such file",
         "empty.mp4": "the file is empty",
-        "junk.mp4": "it is no video, or damaged",
+        "junk.mp4": "it is not a video, or it is damaged",
         "cut.mp4": r"cut\.mp4",
         ".": "it is a folder",
     }.items():

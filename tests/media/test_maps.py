@@ -313,7 +313,7 @@ def test_damaged_maps(tmp_path: Path, ending: str, damage: str):
 def test_a_flo_file_without_pixels_is_none(tmp_path: Path):
     for sides in ((0, 3), (3, 0), (-2, 3), (3, -2)):
         (tmp_path / "a.flo").write_bytes(b"PIEH" + np.array(sides, "<i4").tobytes())
-        with pytest.raises(UserError, match=r"it is no Middlebury \.flo file"):
+        with pytest.raises(UserError, match=r"it is not a Middlebury \.flo file"):
             read_map(tmp_path / "a.flo")
 
 
@@ -326,7 +326,7 @@ def test_what_is_no_map(tmp_path: Path):
     with pytest.raises(UserError, match="two channels of 16 or 32 bits"):
         read_map(tmp_path / "a.tif")
     write_picture(tmp_path / "a.exr", Picture(np.zeros((4, 4, 1), np.float32)))
-    with pytest.raises(UserError, match="its channels Y are no map"):
+    with pytest.raises(UserError, match="its channels Y are not a map"):
         read_map(tmp_path / "a.exr")
     np.save(tmp_path / "a.npy", np.zeros((4, 4, 3), np.float32))
     with pytest.raises(
@@ -341,7 +341,7 @@ def test_what_is_no_map(tmp_path: Path):
         read_map(tmp_path / "a.npy")
     header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (True, 4, 2)}\n"
     (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\1\0" + len(header).to_bytes(2, "little") + header + bytes(32))
-    with pytest.raises(UserError, match=r"it is no NumPy array, or truncated \(its shape is \(True, 4, 2\)\)"):
+    with pytest.raises(UserError, match=r"it is not a NumPy array, or truncated \(its shape is \(True, 4, 2\)\)"):
         read_map(tmp_path / "a.npy")
     with pytest.raises(UserError, match=r"b\.npy: there is no such file; check the name\.$"):
         read_map(tmp_path / "b.npy")

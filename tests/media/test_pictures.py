@@ -734,7 +734,7 @@ def test_no_picture_at_all(tmp_path: Path):
         read_picture(tmp_path / "missing.png")
     with pytest.raises(UserError, match=r"empty\.png: the file is empty"):
         read_picture(tmp_path / "empty.png")
-    with pytest.raises(UserError, match=r"junk\.png: it is no picture of a known kind"):
+    with pytest.raises(UserError, match=r"junk\.png: it is not a picture of a known kind"):
         read_picture(tmp_path / "junk.png")
     with pytest.raises(UserError, match="it is a folder"):
         read_picture(tmp_path)
@@ -767,7 +767,7 @@ def test_names_that_cannot_be_written(tmp_path: Path):
         "a": "must end in one of",
         "folder.png": "it is a folder",
         "nowhere/a.png": "there is no folder",
-        "device.png": "it is no ordinary file",
+        "device.png": "it is not an ordinary file",
     }.items():
         with pytest.raises(UserError, match=message):
             write_picture(tmp_path / name, picture)

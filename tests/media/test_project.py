@@ -101,7 +101,7 @@ def test_what_does_not_say_that_it_is_a_project_is_none(made: Project, tmp_path:
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("format.txt", told)
         archive.writestr("recipe.toml", 'picture = "photo.png"')
-    with pytest.raises(UserError, match=r"work\.fluidwarp is no fluidwarp project"):
+    with pytest.raises(UserError, match=r"work\.fluidwarp is not a fluidwarp project"):
         projects.load(path)
 
 
@@ -123,7 +123,7 @@ def test_the_temporary_folder_is_not_told_whatever_the_name_of_the_picture(made:
         archive.writestr("\x1b[31mx.png", b"none")
     with pytest.raises(UserError) as caught:
         projects.load(path)
-    assert str(caught.value).startswith(rf"Cannot read \x1b[31mx.png in {path}: it is no picture")
+    assert str(caught.value).startswith(rf"Cannot read \x1b[31mx.png in {path}: it is not a picture")
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(made: Project, tmp_path: Path) -> None:

@@ -96,6 +96,22 @@ def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
         np.testing.assert_array_equal(np.concatenate(list(tiled.bands(warp, picture, size, how))), wanted)
 
 
+@pytest.mark.parametrize("samples", ["auto", 1, 4])
+def test_black_outside_is_opaque_as_far_as_it_takes_part(device: Device, samples: int | str) -> None:
+    """A picture of one alpha: "transparent" edges tell which part of a pixel it covers, "black" ones fill the rest."""
+    picture, alpha = np.full((48, 64, 4), 0.4, np.float32), 0.4
+    warp, sampler = GivenMap(device, waves((64, 48), 0.2)), Sampler(device)
+    beside, black = (
+        sampler.apply(warp, picture, how=Sampling(edges=edges, samples=samples, premultiplied=True))[..., 3]  # type: ignore[arg-type]
+        for edges in ("transparent", "black")
+    )
+    part = beside / alpha
+    assert part.min() < 0.01
+    assert part.max() > 0.99
+    assert ((part > 0.1) & (part < 0.9)).any() == (samples != 1)
+    np.testing.assert_allclose(black, beside + 1 - part, atol=1e-4)
+
+
 def test_tiles_are_the_same_to_the_bit_where_only_a_corner_is_distorted(device: Device) -> None:
     """Untiled, the corners of the pixels are spread there only; in tiles, everywhere."""
     displacement = waves((120, 104), 0.2)

@@ -11,6 +11,7 @@ from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.tiled import TILE, TiledField
 from solver.grid import Grid
+from solver.paper import PaperWarpMap
 from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
 from solver.warp.factors import Factors
@@ -840,3 +841,13 @@ def test_what_one_step_has_turned_far_is_a_factor_that_holds_it_once(device: Dev
     assert not rest.any()
     for thing in (factors, little.field, far.field):
         thing.release()
+
+
+def test_the_papers_map_is_exact_where_all_moves_alike(device: Device) -> None:
+    """Its coordinates are linear then, and bilinear look-ups of them exact, away from the edges."""
+    warp = PaperWarpMap(device, Grid(64, 48))
+    for _ in range(5):
+        warp.advance_prescribed(np.full((48, 64, 2), (0.2, -0.1), np.float32), 0.05)
+    inner = np.stack(np.meshgrid(np.linspace(0.2, 0.8, 9), np.linspace(0.2, 0.55, 7)), axis=-1).reshape(-1, 2)
+    np.testing.assert_allclose(warp.at(inner), np.broadcast_to((-0.05, 0.025), inner.shape), atol=1e-5)
+    warp.release()

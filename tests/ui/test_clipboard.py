@@ -103,7 +103,7 @@ def test_without_copykitten_a_sentence_says_how_to_get_it(robot: Robot, chord: s
     robot.key(chord)
     robot.frame()
     (message,) = robot.editor.messages.shown
-    assert message.text == "Pictures on the clipboard need copykitten; get it by: pip install copykitten"
+    assert message.text == "Pictures on the clipboard need copykitten; install it with: pip install copykitten"
     assert not robot.editor.exports.is_running
 
 

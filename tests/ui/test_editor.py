@@ -609,7 +609,7 @@ def test_a_picture_whose_name_is_no_text_is_opened_chosen_and_saved(robot: Robot
         robot.frame(count=3)
         robot.editor.dialogs.release()
     assert not robot.editor.files.save_as(tmp_path / "w.fluidwarp", embed=False)
-    assert "its name is no text" in robot.editor.messages.shown[-1].text
+    assert "its name is not text" in robot.editor.messages.shown[-1].text
     assert robot.editor.files.save_as(tmp_path / "w.fluidwarp")
     assert projects.load(tmp_path / "w.fluidwarp").recipe.picture == "caf?.png"
 

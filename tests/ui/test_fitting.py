@@ -273,5 +273,5 @@ def test_what_cannot_be_fitted_is_told(robot: Robot) -> None:
     robot.editor.session.edit("Outside", handle=far)
     robot.key("shift+g")
     wait(robot)
-    assert "no handle that is led holds anything of the picture" in robot.editor.messages.shown[-1].text
+    assert "all handles with a goal lie outside the picture" in robot.editor.messages.shown[-1].text
     assert names(robot)[-1] == "Outside"

@@ -19,6 +19,7 @@ from app.ui.lanes import Lanes
 from app.ui.layout import LEAST_LANES
 from app.ui.panels.lanes import name_of
 from app.ui.viewport import Rect
+from app.work.session import Session
 from solver.gl.device import Device
 from support.editing import Robot, small_project
 from support.widgets import Widgets
@@ -385,6 +386,18 @@ def test_of_two_thousand_strokes_only_what_is_seen_is_drawn(robot: Robot) -> Non
     robot.editor.session.edit("None", stroke=())
     robot.frame()
     assert lanes(robot).drawn == []
+
+
+def test_in_another_work_nothing_is_selected_though_it_has_the_same_bars(painted: Robot) -> None:
+    session, window = painted.editor.session, Lanes()
+    window.look(session)
+    window.selected, window.view = {("stroke", 0)}, (0.0, 10.0)
+    window.look(session)
+    assert window.selected == {("stroke", 0)}
+    other = Session(session.device, replace(session.project, recipe=session.recipe))
+    window.look(other)
+    other.release_gpu()
+    assert (window.selected, window.view) == (set(), None)
 
 
 def test_while_a_stroke_is_painted_the_others_stay_in_their_lanes() -> None:

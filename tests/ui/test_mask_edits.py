@@ -174,3 +174,9 @@ def test_what_is_not_painted_is_not_saved(robot: Robot, tmp_path: Path) -> None:
 def test_every_edit_of_a_mask_is_an_action() -> None:
     kinds = {name.removeprefix("mask_") for name in ACTIONS if name.startswith("mask_")}
     assert kinds == {"invert", "fill", "clear", "feather", "grow", "shrink", "load", "save"}
+
+
+def test_where_nothing_has_been_done_there_are_no_masks_to_clear(robot: Robot) -> None:
+    robot.key("ctrl+d")
+    assert not robot.editor.session.has_begun
+    assert robot.editor.session.document.history.undo_name is None

@@ -463,7 +463,7 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
     loop = WHIRL + "[time]\ndissolve = 0.1\n"
     with pytest.raises(UserError, match=r"'time.dissolve' is for a picture, and .*clip\.mkv is a clip"):
         render(device, loop, clip, tmp_path / "out.mp4")
-    with pytest.raises(UserError, match=r"no map shows what dissolves; leave out .*m\.%02d\.exr, or 'time.dissolve'"):
+    with pytest.raises(UserError, match=r"a map cannot show a dissolve; leave out .*m\.%02d\.exr, or 'time.dissolve'"):
         render(device, loop, picture, tmp_path / "out.mp4", maps=sequence)
     write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
     with pytest.raises(UserError, match="do not make a still"):

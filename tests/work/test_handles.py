@@ -9,11 +9,12 @@ import pytest
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
-from app.model.handles import ARRIVED, MOST_OBJECTIONS, objections
+from app.model.handles import ARRIVED, MOST_OBJECTIONS, RecipeHandle, objections
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
 from app.work.held import as_seen, held_in, unmet
+from app.work.leading import Leading
 from app.work.replay import Replay
 from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
 from solver.brush.handle import Shape
@@ -788,3 +789,9 @@ def test_a_handle_of_no_number_is_refused():
         parts: dict[str, Any] = {"at": (0.5, 0.5)} | each
         with pytest.raises(ValueError, match=r"handle|line"):
             Handle(**parts)
+
+
+def test_keys_of_a_handle_are_fractions_of_either_side_and_stay_in_the_picture() -> None:
+    one = RecipeHandle(at=(0.2, 0.4), radius=0.1, keys=((0.5, 0.2, 0.8), (1.0, 1.2, 0.4)))
+    (handle,) = Leading((1.0, 0.5)).of([one])
+    np.testing.assert_allclose(handle.keys, [(0.5, 0.2, 0.4), (1.0, 1.0, 0.2)])

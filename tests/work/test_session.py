@@ -123,7 +123,7 @@ def test_a_stroke_that_is_as_long_as_one_may_be_ends_and_says_so(
 ) -> None:
     monkeypatch.setattr("app.work.session.LONGEST_GESTURE", 4)
     paint(session, "push", (0.3, 0.3), (0.6, 0.6), ticks=20)
-    assert session.notice == "That is as long as a stroke may be. Press again to go on."
+    assert session.notice == "This stroke has reached its greatest length. Press again to continue."
     (stroke,) = session.recipe.stroke
     assert 4 <= len(stroke.samples) < 10
 
@@ -639,6 +639,22 @@ def test_the_recording_is_played_once_or_over_and_over_or_there_and_back(
     assert ticks[: len(expected)] == expected[: 3 * end]
     assert session.playing == (loops or returns)
     assert session.document.recipe.time.ping_pong == returns
+
+
+def test_a_stroke_begun_while_the_recording_is_played_takes_the_place_of_what_comes_after(session: Session) -> None:
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    end = session.end
+    session.seek(0)
+    session.settle()
+    session.play()
+    for _ in range(3):
+        session.advance(1)
+    tick = session.tick
+    assert 0 < tick < end
+    paint(session, "push", (0.7, 0.5), (0.6, 0.5))
+    assert session.recipe.stroke[-1].first_tick == tick
+    assert session.notice is not None
 
 
 def test_a_stabilised_stroke_is_recorded_as_it_acts_and_ends_at_the_pen(session: Session) -> None:

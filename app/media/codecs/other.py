@@ -25,7 +25,7 @@ def read(name: str, file: Path, max_pixels: int) -> Picture:
     Image.MAX_IMAGE_PIXELS = None  # ours is in check_size, and can be raised for a file
     if (deepest := re.match(DEEPEST, start_of(file))) and int(deepest[1]) > 255:
         # it would be read as 8 bits without a word
-        raise UserError(f"Cannot read {file}: a {name} of 16-bit colours is not understood; convert it to PNG or TIFF.")
+        raise UserError(f"Cannot read {file}: a {name} of 16-bit colours is not supported; convert it to PNG or TIFF.")
     # the plugin is named, or imageio takes whichever it can open the file with
     with iio.imopen(file, "r", plugin="pillow") as opened:
         height, width = opened.properties(index=0).shape[:2]

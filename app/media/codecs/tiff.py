@@ -67,7 +67,7 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         tags = {tag.code: tag.value for tag in page.tags}
         samples = [axis for axis in page.axes if axis in "YXS"]
         if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
-            raise UserError(f"Cannot read {file}: a TIFF with the axes {page.axes} is no picture; save one page of it.")
+            raise UserError(f"Cannot read {file}: a TIFF of axes {page.axes} is not a picture; save one page of it.")
         pieces = math.prod(page.chunked)
         if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
             raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
@@ -92,7 +92,7 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
         pixels = np.iinfo(pixels.dtype).max - pixels
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
-        raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not understood; convert it to RGB.")
+        raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not supported; convert it to RGB.")
 
     premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
     exif = Image.Exif()
@@ -153,7 +153,7 @@ def plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
         return (pixels >> 16).astype(np.uint16)
     if kind == "u" and pixels.dtype.itemsize <= 2:
         return pixels.astype(pixels.dtype.newbyteorder("="))
-    raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not understood; convert it to 16 bits.")
+    raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not supported; convert it to 16 bits.")
 
 
 def write(path: Path, picture: Picture, quality: int) -> None:

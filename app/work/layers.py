@@ -18,7 +18,7 @@ LookUp = Callable[[np.ndarray, Quality], np.ndarray]
 """Looks up pixels (h, w, 1 or 3), uint16 or float32."""
 
 
-def along(layers: Sequence[Layer], look_up: LookUp, quality: Quality) -> tuple[Layer, ...]:
+def resample_layers(layers: Sequence[Layer], look_up: LookUp, quality: Quality) -> tuple[Layer, ...]:
     """Layers looked up in a quality, but for the exact ones: bit for bit from the nearest pixel."""
     mixed = [layer for layer in layers if not layer.exact]
     floats = _in_threes([layer.values.astype(np.float32, copy=False) for layer in mixed], look_up, quality)
