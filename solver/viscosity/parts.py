@@ -83,8 +83,8 @@ def _numbered(inside: np.ndarray, stiffness: np.ndarray, side: int) -> tuple[np.
     """The pieces of a mask within tiles, numbered from 1 on, 0 outside; and which of its cells are hinges.
 
     Two cells side by side belong together if neither is much softer, and a node that both touch has all four cells
-    inside: only nodes resist a turn. A cell is a hinge if just two of its nodes have that, opposite ones: the parts above
-    and below turn about it, so it is joined only to the one above. (Its faces count to whatever lies beside it.)
+    inside: only nodes resist a turn. A cell is a hinge if just two of its nodes have that, opposite ones: the parts
+    above and below turn about it. It is joined only to the one above; its faces belong to the cells beside it.
     """
     count = int(np.count_nonzero(inside))
     number: np.ndarray = np.zeros(inside.shape, int)
