@@ -14,14 +14,14 @@ from solver.gl.passes import Region
 from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
-from solver.warp.state import ACCUMULATED, CLOSED
+from solver.warp.state import ACCUMULATED, CLOSED, MOST_CLOSED
 
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
 STEEPEST = 6.0  # largest |grad A| of a map that goes on: stretched more it folds between its texels
-MOST_CLOSED = 8, 2**24  # maps, and texels of them in all
+MOST_CLOSED_TEXELS = 2**24  # of closed maps in all
 
 Limits = tuple[float, float, float, float]
 
@@ -68,7 +68,7 @@ class AccumulatedMap:
         self.size = size
         self.extent = extent
         self.closed: list[TiledField] = []
-        self._most_closed = min(MOST_CLOSED[0], MOST_CLOSED[1] // (size[0] * size[1]))
+        self._most_closed = min(MOST_CLOSED, MOST_CLOSED_TEXELS // (size[0] * size[1]))
         self._steepness = device.field(blocks_of(size), 1, "accumulated map, steepness")
         self._find_steepest = Reduction(device, blocks_of(size), 1, "max")
         self.now = TiledField(device, size, 2, "accumulated map")

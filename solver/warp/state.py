@@ -13,6 +13,7 @@ from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED = "factor ", "closed map "  # and their numbers
+MOST_CLOSED = 8  # maps: `seek.frag` then reads 16 textures, as many as OpenGL 3.3 promises a stage
 ACCUMULATED = "accumulated map"
 
 
@@ -45,7 +46,10 @@ class MapState(State):
                 made.fields[name] = device.upload(given, f"{name}, given")
             accumulated = self.tiles[ACCUMULATED]
             tiles = {ACCUMULATED: accumulated}
-            for number in range(sum(name.startswith(CLOSED) and name.endswith("/places") for name in arrays)):
+            count = sum(name.startswith(CLOSED) and name.endswith("/places") for name in arrays)
+            if count > MOST_CLOSED:
+                raise ValueError(f"it has {count} closed maps, of which there are at most {MOST_CLOSED}")
+            for number in range(count):
                 tiles[f"{CLOSED}{number}"] = SavedTiles.nothing(accumulated.kind)
             for name, kind in held_kinds(accumulated.kind.size).items():
                 if f"{name}/places" in rest:

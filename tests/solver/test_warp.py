@@ -18,6 +18,7 @@ from solver.warp.frozen import FADED, Frozen
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 from solver.warp.remapping import MOST_TILES, REMAP_STEPS
+from solver.warp.state import MOST_CLOSED
 from solver.warp.submap import Level
 from support import reference
 from support.flows import VORTEX_TIME, saved, vortex, vortex_faces
@@ -677,6 +678,11 @@ def test_closed_maps_are_saved_and_come_back(device: Device) -> None:
     broken = {name: array for name, array in state.arrays().items() if name != "closed map 0/texels"}
     with pytest.raises(ValueError, match="tiles are missing"):
         template.with_arrays(device, broken)
+    many = state.arrays()
+    for number in range(MOST_CLOSED + 1):
+        many |= {f"closed map {number}/{part}": many[f"closed map 0/{part}"] for part in ("places", "texels")}
+    with pytest.raises(ValueError, match="9 closed maps"):
+        template.with_arrays(device, many)
     other.restore(template)
     assert not other.read().any()
     for made in (state, template, resumed, warp, other):
