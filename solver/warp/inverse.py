@@ -18,8 +18,9 @@ class ForwardMap:
     """The inverse of a warp map: y -> y + F(y) gives, for a point of the original, its place in the result.
 
     Found when asked for: the map's cells are drawn as triangles where they are looked up, which gives every point a
-    start on the right branch however far the map has been stirred, and Newton's method does the rest. Where the map is
-    folded one of the branches is taken; a point that is looked up nowhere keeps the nearest place that was tried.
+    start on the right branch however far it has been moved, and Newton's method does the rest. Where the map is folded
+    one of the branches is taken; a point that is looked up nowhere, or where the map is wound up too far for these
+    cells (solver/MEASURED.md), keeps the nearest place that was tried.
     """
 
     def __init__(self, warp: WarpMap | ScaledMap) -> None:

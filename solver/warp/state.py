@@ -14,7 +14,8 @@ from solver.state import State
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED = "factor ", "closed map "  # and their numbers
 ACCUMULATED = "accumulated map"
-MOST_CLOSED = 8, 2**24  # maps, and texels of them in all
+MOST_CLOSED = 8  # maps: `seek.frag` then reads 16 textures, as many as OpenGL 3.3 promises a stage
+MOST_CLOSED_TEXELS = 2**24  # of them in all
 
 
 class MapState(State):
@@ -66,7 +67,7 @@ class MapState(State):
 
 def most_closed(size: tuple[int, int]) -> int:
     """How many closed maps there may be, for a map of `size` texels."""
-    return min(MOST_CLOSED[0], MOST_CLOSED[1] // (size[0] * size[1]))
+    return min(MOST_CLOSED, MOST_CLOSED_TEXELS // (size[0] * size[1]))
 
 
 def held_kinds(size: tuple[int, int]) -> dict[str, Kind]:

@@ -10,7 +10,10 @@ import pytest
 
 import shaders
 from solver.gl.device import Device
+from solver.gl.passes import GL_SAMPLERS
 from solver.gl.program import ShaderError, assemble, compile_program, read_shader
+from solver.warp.frozen import FADED
+from solver.warp.state import MOST_CLOSED
 from support.khronos import Programs
 
 ROOT = Path(shaders.__file__).parent
@@ -27,6 +30,29 @@ def test_stages_that_ask_for_the_wall_compile_with_either(device: Device) -> Non
     assert asking
     for stage in asking:
         compile_program(device.ctx, stage, {"NO_SLIP": 1}).release()
+
+
+@pytest.mark.parametrize(
+    ("stage", "defines"),
+    [
+        ("warp/compose.frag", {"FROM": 1, "HELD": 1}),
+        ("warp/compose.frag", {"REMAP": 1, "KEEP": 1}),
+        ("warp/compose.frag", {"POINTS": 1, "HELD": 1}),
+        ("warp/distortion.frag", {"POINTS": 1, "HELD": 1}),
+        ("warp/strain.frag", {"POINTS": 1, "HELD": 1}),
+        ("warp/seek.frag", {"POINTS": 1, "HELD": 1}),
+    ],
+)
+def test_the_longest_map_is_read_through_no_more_textures_than_gl_promises(
+    device: Device, stage: str, defines: dict[str, object]
+) -> None:
+    """16 a stage (OpenGL 3.3, table 6.45), with all levels, weighed, and all closed maps."""
+    through = {"LEVELS": 3, "WEIGHED": 7, "FADED": FADED, "CLOSED": MOST_CLOSED}
+    program = compile_program(device.ctx, stage, {**through, **defines})
+    names = {name for name in program if getattr(program[name], "gl_type", None) in GL_SAMPLERS}
+    program.release()
+    assert {f"u_closed_{number}" for number in range(MOST_CLOSED)} | {"u_third", "u_held"} <= names
+    assert len(names) <= 16
 
 
 @pytest.mark.parametrize("stage", STAGES)

@@ -250,7 +250,7 @@ def test_a_killed_task_keeps_its_frames(folder: Path, fluidwarp: Run):
     ("words", "told"),
     [
         (["-o", "w.mp4"], "--resume keeps the files of a sequence, such as f.%04d.png, and w.mp4 is none"),
-        (["-o", "w.%04d.exr", "--stats", "s.json"], "--stats has the numbers of all frames"),
+        (["-o", "w.%04d.exr", "--stats", "s.json"], "--stats needs all frames"),
     ],
 )
 def test_what_cannot_be_resumed_is_told(folder: Path, fluidwarp: Run, words: list[str], told: str):
