@@ -55,7 +55,7 @@ def read_outlines(one: Path, other: Path, size: Size) -> tuple[np.ndarray, list[
         UserError: naming the file, if it cannot be read or nothing, or all, is inside.
     """
     notices: list[str] = []
-    lines = [resampled(_outline(path, size, notices), FINE) for path in (one, other)]
+    lines = [resampled(outline(path, size, notices), FINE) for path in (one, other)]
     # The sum of squares is least where the correlation is largest; by how much both lie apart makes no difference.
     first, second = (line @ np.array([1, 1j]) for line in lines)
     likeness = np.fft.ifft(np.conj(np.fft.fft(first)) * np.fft.fft(second)).real
@@ -67,8 +67,12 @@ def read_outlines(one: Path, other: Path, size: Size) -> tuple[np.ndarray, list[
     return paired(closed[0], closed[1], SPACING * max(size)), notices
 
 
-def _outline(path: Path, size: Size, notices: list[str]) -> np.ndarray:
-    """The closed outline (n, 2) of what is inside a mask, clockwise, in pixels of a picture of this size."""
+def outline(path: Path, size: Size, notices: list[str]) -> np.ndarray:
+    """The closed outline (n, 2) of what is inside a mask, clockwise, in pixels of a picture of this size.
+
+    Raises:
+        UserError: as `read_outlines`.
+    """
     from scipy import ndimage
 
     inside = intensity(read_picture(path)) > 0.5

@@ -18,6 +18,7 @@ from app.media.files import sequence_of
 from app.media.landmarks import ENDINGS
 from app.media.maps import MAP_ENDINGS, holds
 from app.media.opening import check_picture
+from app.media.outlines import outline
 from app.media.pictures import write_picture
 from app.media.project import SUFFIX, Project
 from app.media.source import CLIP_ENDINGS, PICTURE_ENDINGS
@@ -83,10 +84,12 @@ class Files:
         """Ask for two masks, and fit the outline of the one to that of the other."""
 
         def ask_other(one: Path) -> None:
-            title = "Fit to a mask of where that goes"
+            picture = self.workspace.session.project.picture
+            outline(one, (picture.width, picture.height), [])  # to refuse it here, where it can be chosen anew
+            title = "Fit it to a mask of where it goes"
             self.chooser.ask_which(title, one.parent, PICTURE_ENDINGS, lambda other: self.fit((), (one, other)))
 
-        title = "Fit from a mask of what is moved"
+        title = "Choose a mask of what is moved"
         self.chooser.ask_which(title, self.preferences.open_from, PICTURE_ENDINGS, ask_other)
 
     def ask_mask(self, state: EditorState) -> None:

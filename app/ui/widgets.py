@@ -153,7 +153,7 @@ class Ui:
     def tooltip(self, title: str, key: str = "", more: str = "", at_once: bool = False, above: bool = False) -> None:
         """What the last item is, shown when the pointer rests on it; `at_once`: its name, beside it, on the way there.
 
-        `key`: the chord that does it by default. `above`: where it covers nothing below.
+        `key`: the chord that does it by default. `above`: where it covers nothing below, as at the bottom in any case.
         """
         rests = imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
         if not (rests or (at_once and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled))):

@@ -241,7 +241,7 @@ def _whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin
             way = hypot(*np.subtract(held.start, held.target) * session.extent)
             rest = f", {pixels * held.left:.0f} px left" if held.is_away else ""
             if way > 1e-9:
-                return f"led {pixels * way:.0f} px{rest}"
+                return f"moves {pixels * way:.0f} px{rest}"
             return f"{'turned' if isinstance(led, RecipeHandle) and led.turns else 'stays'}{rest}"
     return "muted" if led.muted else "not at work at this moment"
 
