@@ -649,8 +649,13 @@ class _Search:
         return numbers
 
     def _reachable(self) -> np.ndarray:
-        """The numbers of the pairs with nothing frozen at their ends or all across their ways; the others are noted."""
+        """The numbers of the pairs with nothing frozen at their ends or all across their ways; the others are noted.
+
+        Of a mask that is changed later no such thing can be said: what is frozen at first may be thawed by then.
+        """
         recipe = self.fine.recipe
+        if any(edit.tick > 0 for edit in recipe.mask):
+            return np.array(self.numbers, int)
         replay = Replay(self.device, recipe, self.fine.pictures, budget=0)
         solid, (nx, ny) = replay.fluid.solid.get() == 255, replay.grid.size
         replay.release()

@@ -99,6 +99,16 @@ def test_what_cannot_be_met_is_told_by_number_and_nothing_folds(
     assert folds == found.trial.folds == 0
 
 
+def test_what_is_frozen_only_at_first_can_be_met(device: Device):
+    frozen = '[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1\n'
+    thawed = '[[mask]]\nkind = "clear"\ntick = 2\nof = "frozen"\n'
+    handle = "[[handle]]\nat = [0.4, 0.5]\nto = [0.43, 0.5]\nstart = 0.12\n"
+    held = fit(device, None, 1, RECIPE + handle + frozen)
+    assert "handle[1] cannot be met: its point is frozen" in held.notices
+    found = fit(device, None, 1, RECIPE + handle + frozen + thawed)
+    assert not any("frozen" in notice for notice in found.notices), found.notices
+
+
 def test_pairs_that_nobody_can_lead_are_refused(device: Device):
     with pytest.raises(UserError, match="all pairs lie outside the picture"):
         fit(device, PAIRS + 2)
