@@ -153,13 +153,17 @@ class Ui:
     def tooltip(self, title: str, key: str = "", more: str = "", at_once: bool = False, above: bool = False) -> None:
         """What the last item is, shown when the pointer rests on it; `at_once`: its name, beside it, on the way there.
 
-        `key`: the chord that does it by default. `above`: where it covers nothing below, as at the bottom in any case.
+        `key`: the chord that does it by default. `above`: where it covers nothing below.
         """
         rests = imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
         if not (rests or (at_once and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled))):
             return
         if at_once or above:
             self._place_beside(imgui.get_item_rect_min(), imgui.get_item_rect_max(), above)
+        elif imgui.get_item_rect_max().y > (display := imgui.get_io().display_size).y - self.px(4 * GRID):
+            # Below the pointer there is no room, and imgui would put it over the item.
+            x, y = imgui.get_mouse_pos().x, imgui.get_item_rect_min().y - self.px(6)
+            imgui.set_next_window_pos(ImVec2(x, y), imgui.Cond_.always, ImVec2(x / display.x, 1.0))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(10), self.px(7)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(6))
         if imgui.begin_tooltip():
