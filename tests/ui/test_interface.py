@@ -89,6 +89,19 @@ def test_a_tooltip_comes_to_a_pointer_that_rests(robot: Robot) -> None:
     assert shown.sum() > 200
 
 
+def test_a_tooltip_at_the_bottom_leaves_what_it_is_about_to_be_seen(robot: Robot) -> None:
+    robot.see()
+    height, width = robot.pixels().shape[:2]
+    live(robot, 5)
+    robot.frame(Move(width - 60, height - 28))  # on the slider of the amount
+    robot.frame()
+    before = robot.pixels().astype(int)
+    live(robot, 5)
+    shown = np.abs(robot.pixels() - before).max(axis=-1) > 20
+    assert shown[height - 110 : height - 44, width - 200 :].sum() > 200
+    assert not shown[height - 42 :].any()
+
+
 def test_at_rest_nothing_is_drawn(robot: Robot) -> None:
     robot.frame(Move(24, 130))
     live(robot, 5)
