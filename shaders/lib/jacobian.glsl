@@ -61,30 +61,7 @@ Bend bend_at(vec2 x) {
 #endif
     follow(u_accumulated, x, bend);
 #define FOLLOW(closed) bend.moved = within_picture(x, bend.moved); follow(closed, x, bend);
-#if CLOSED > 7
-    FOLLOW(u_closed_7)
-#endif
-#if CLOSED > 6
-    FOLLOW(u_closed_6)
-#endif
-#if CLOSED > 5
-    FOLLOW(u_closed_5)
-#endif
-#if CLOSED > 4
-    FOLLOW(u_closed_4)
-#endif
-#if CLOSED > 3
-    FOLLOW(u_closed_3)
-#endif
-#if CLOSED > 2
-    FOLLOW(u_closed_2)
-#endif
-#if CLOSED > 1
-    FOLLOW(u_closed_1)
-#endif
-#if CLOSED > 0
-    FOLLOW(u_closed_0)
-#endif
+    THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
     return bend;
 }

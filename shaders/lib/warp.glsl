@@ -31,30 +31,57 @@ uniform vec4 u_third_window;
 #ifndef CLOSED
 #define CLOSED 0
 #endif
+// THROUGH_CLOSED(GO) is GO(...) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers to go through.
+#define THROUGH_0(GO)
 #if CLOSED > 0
 uniform sampler2D u_closed_0;
+#define THROUGH_1(GO) GO(u_closed_0) THROUGH_0(GO)
+#else
+#define THROUGH_1(GO) THROUGH_0(GO)
 #endif
 #if CLOSED > 1
 uniform sampler2D u_closed_1;
+#define THROUGH_2(GO) GO(u_closed_1) THROUGH_1(GO)
+#else
+#define THROUGH_2(GO) THROUGH_1(GO)
 #endif
 #if CLOSED > 2
 uniform sampler2D u_closed_2;
+#define THROUGH_3(GO) GO(u_closed_2) THROUGH_2(GO)
+#else
+#define THROUGH_3(GO) THROUGH_2(GO)
 #endif
 #if CLOSED > 3
 uniform sampler2D u_closed_3;
+#define THROUGH_4(GO) GO(u_closed_3) THROUGH_3(GO)
+#else
+#define THROUGH_4(GO) THROUGH_3(GO)
 #endif
 #if CLOSED > 4
 uniform sampler2D u_closed_4;
+#define THROUGH_5(GO) GO(u_closed_4) THROUGH_4(GO)
+#else
+#define THROUGH_5(GO) THROUGH_4(GO)
 #endif
 #if CLOSED > 5
 uniform sampler2D u_closed_5;
+#define THROUGH_6(GO) GO(u_closed_5) THROUGH_5(GO)
+#else
+#define THROUGH_6(GO) THROUGH_5(GO)
 #endif
 #if CLOSED > 6
 uniform sampler2D u_closed_6;
+#define THROUGH_7(GO) GO(u_closed_6) THROUGH_6(GO)
+#else
+#define THROUGH_7(GO) THROUGH_6(GO)
 #endif
 #if CLOSED > 7
 uniform sampler2D u_closed_7;
+#define THROUGH_8(GO) GO(u_closed_7) THROUGH_7(GO)
+#else
+#define THROUGH_8(GO) THROUGH_7(GO)
 #endif
+#define THROUGH_CLOSED(GO) THROUGH_8(GO)
 #if defined(HELD) || defined(WEIGHED)
 uniform sampler2D u_held;
 #endif
@@ -155,30 +182,7 @@ void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout v
 vec2 displacement_from(vec2 x, vec2 moved, vec2 place) {
     vec2 more = accumulated_displacement(u_accumulated, place);
 #define FOLLOW(closed) follow(closed, x, moved, more, place);
-#if CLOSED > 7
-    FOLLOW(u_closed_7)
-#endif
-#if CLOSED > 6
-    FOLLOW(u_closed_6)
-#endif
-#if CLOSED > 5
-    FOLLOW(u_closed_5)
-#endif
-#if CLOSED > 4
-    FOLLOW(u_closed_4)
-#endif
-#if CLOSED > 3
-    FOLLOW(u_closed_3)
-#endif
-#if CLOSED > 2
-    FOLLOW(u_closed_2)
-#endif
-#if CLOSED > 1
-    FOLLOW(u_closed_1)
-#endif
-#if CLOSED > 0
-    FOLLOW(u_closed_0)
-#endif
+    THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
     return within(u_limits, x, moved + more);
 }
