@@ -16,7 +16,7 @@ from app.errors import Cancelled, UserError, shown
 from app.progress import INTERRUPTED
 
 if TYPE_CHECKING:
-    from app.work.applying import MapSource
+    from app.work.apply_job import MapSource
     from app.work.tasks import Piece
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
@@ -461,7 +461,7 @@ def apply(
     Several pictures are written to the folder OUT under their own names, or to a name such as OUT/{name}-w.png.
     """
     from app.model.recipe import Recipe
-    from app.work.applying import Application
+    from app.work.apply_job import Application
     from app.work.jobs import Outputs
     from app.work.tasks import Edits
 
@@ -482,7 +482,7 @@ def apply(
 
 
 def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:
-    from app.work.applying import MapSource
+    from app.work.apply_job import MapSource
 
     if kind not in (None, "st", "offsets"):
         raise UserError(f"--kind must be st or offsets, not {kind}")
@@ -513,7 +513,7 @@ def convert(
 ) -> None:
     """Write a warp map in another format."""
     from app.progress import on_terminal
-    from app.work.applying import converted
+    from app.work.apply_job import converted
 
     source = _map_source(map_, kind, grid, overscan, max_pixels)
     _choose(gpu)

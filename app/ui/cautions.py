@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.model.handles import RecipeHandle, RecipePin, heading
 from app.ui.messages import Messages
 from app.ui.workspace import Workspace
-from app.work.held import FIT
+from app.work.handle_status import FIT
 from app.work.session import Session
 
 TOLD = 3  # sentences in a message; the inspector has all of them

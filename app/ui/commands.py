@@ -12,7 +12,7 @@ from app.model.mask_edits import MASKS, ClearMask, mask_edit
 from app.ui.chooser import FileChooser
 from app.ui.dialogs import Dialogs, Preferring
 from app.ui.editor_state import EditorState
-from app.ui.exporting import ExportDialog, Exports, StillExporting
+from app.ui.export_dialog import ExportDialog, Exports, StillExporting
 from app.ui.files import Files
 from app.ui.fitting import Fits
 from app.ui.key_sheet import KeySheet

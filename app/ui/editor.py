@@ -24,7 +24,7 @@ from app.ui.commands import Commands
 from app.ui.dialogs import Dialogs
 from app.ui.editor_state import EditorState
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
-from app.ui.exporting import Exports
+from app.ui.export_dialog import Exports
 from app.ui.files import Files
 from app.ui.fitting import Fits
 from app.ui.imgui_backend import ImGuiBackend
@@ -37,7 +37,7 @@ from app.ui.panels import bar, hud, inspector, lanes, marks, strip, timebar
 from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
-from app.ui.recovering import Recovery
+from app.ui.recovery_dialog import Recovery
 from app.ui.selecting import Selecting
 from app.ui.viewport import Viewport
 from app.ui.widgets import Ui

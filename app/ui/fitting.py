@@ -10,7 +10,7 @@ from app.errors import UserError
 from app.media.landmarks import Pairs
 from app.model.handles import heading
 from app.model.recipe import Recipe
-from app.ui.exporting import under_way
+from app.ui.export_dialog import under_way
 from app.ui.messages import Messages
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
@@ -18,7 +18,7 @@ from app.ui.workspace import Workspace
 from app.work.export_process import FitProcess
 from app.work.fit_job import Fit, pairs_in
 from app.work.fitting import DURATION, EVALUATIONS
-from app.work.held import FIT
+from app.work.handle_status import FIT
 from app.work.session import Session
 
 TOLD = 6  # notices in a message

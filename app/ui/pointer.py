@@ -18,7 +18,7 @@ from app.ui.preferences import Preferences
 from app.ui.selecting import Selecting
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
-from app.work.held import Held
+from app.work.handle_status import Held
 
 SPLIT_REACH = 8.0  # points from the split's line at which it is taken hold of
 GRIP = 11.0  # points from a handle's middle, likewise

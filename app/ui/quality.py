@@ -9,7 +9,7 @@ from statistics import median_low
 from app.model.strokes import Stroke
 from app.ui.canvas import MOVING
 from app.ui.editor_state import EditorState
-from app.ui.exporting import Exports
+from app.ui.export_dialog import Exports
 from app.ui.files import Files, fresh_recipe, settings_of
 from app.ui.fitting import Fits
 from app.ui.messages import Messages

@@ -36,10 +36,10 @@ from app.model.recipe import Recipe
 from app.model.timeline import Dissolve, Sentinel, Timeline, dissolved, frame_positions
 from app.progress import Progress
 from app.work.checkpoints import DEFAULT_BUDGET
-from app.work.held import unmet
+from app.work.handle_status import unmet
 from app.work.jobs import Job, MapOutput, longer_side, result_size
 from app.work.layers import resample_layers, widened
-from app.work.observing import observe
+from app.work.observation import observe
 from app.work.replay import Replay
 from app.work.states import StoredStates, code
 from app.work.threads import prefetch, write_behind

@@ -36,7 +36,7 @@ from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.schema import label_of
 from app.progress import Progress
-from app.work.leading import Leading
+from app.work.loaded_handles import LoadedHandles
 from app.work.replay import Replay
 from solver.brush.handle import Shape, area
 from solver.components import connected_components
@@ -374,7 +374,7 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
 
 def _shapes(handles: Sequence[RecipeHandle], extent: Point) -> list[Shape]:
     """What handles lead, as the solver has it."""
-    return [Shape.of(handle, extent) for handle in Leading(extent).of(handles)]
+    return [Shape.of(handle, extent) for handle in LoadedHandles(extent).of(handles)]
 
 
 def _has_times(recipe: Recipe) -> bool:

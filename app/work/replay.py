@@ -25,8 +25,8 @@ from app.model.strokes import FINEST_DETAIL, Act, Change
 from app.model.windows import FLOWING, FlowWindow, may_have_windows
 from app.work.brushwork import Brushwork, Scene
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
-from app.work.leading import Leading
 from app.work.loaded_forces import LoadedForce, acting
+from app.work.loaded_handles import LoadedHandles
 from solver.brush.handle import Handle
 from solver.brush.handles import Handles
 from solver.brush.masks import Masks
@@ -418,7 +418,7 @@ class Replay:
             self.masks.set_frozen(solid(recipe.freeze, canvas, self.pictures))
         for said in islice(objections(recipe.handle, recipe.pin, self.grid.extent), MOST_OBJECTIONS):
             self.pictures.notice(said)
-        self._leading = Leading(self.grid.extent)
+        self._loaded_handles = LoadedHandles(self.grid.extent)
         self.handles = Handles(self.fluid, self.warp, self._handles())
         self.density = self._new_density() if recipe.mode == "density" else None
         self._viscosity_in_force: float | None = None
@@ -436,7 +436,7 @@ class Replay:
             force.release()
 
     def _handles(self) -> list[Handle]:
-        return self._leading.of(led for _, led in self.led)
+        return self._loaded_handles.of(led for _, led in self.led)
 
     def _begin_with(self, name: str) -> None:
         try:

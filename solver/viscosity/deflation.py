@@ -18,7 +18,7 @@ from solver.components import connected_components
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.packing import PackedFaces, framed, packed
-from solver.viscosity.changed import Box, changed
+from solver.viscosity.box import Box, changed
 from solver.viscosity.clusters import ClusterMatrix
 from solver.viscosity.operator import Coefficients, Level
 from solver.viscosity.parts import Parts, find_parts

@@ -12,7 +12,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.packing import PackedFaces, is_worth_a_transform
 from solver.params import NoSlip
-from solver.viscosity.changed import Box, changed
+from solver.viscosity.box import Box, changed
 from solver.viscosity.deflation import Deflation
 from solver.viscosity.operator import Coefficients, Level, inverse_matrix
 from solver.viscosity.plan import Plan, sweeps_alone

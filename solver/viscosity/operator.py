@@ -18,7 +18,7 @@ from solver.gl.field import Field
 from solver.gl.passes import Region
 from solver.packing import DoublePackedFaces, PackedFaces, packed, unpacked
 from solver.params import NoSlip
-from solver.viscosity.changed import Box
+from solver.viscosity.box import Box
 
 # Texels (of 2 x 2 cells) of the coarsest level, which has a dense inverse: 64 unknowns. BLAS inverts 128 in threads,
 # which wait longer than they work.

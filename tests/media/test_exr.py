@@ -19,7 +19,7 @@ from app.media.source import open_source
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Output, Recipe
 from app.progress import Progress
-from app.work.applying import Application, MapSource
+from app.work.apply_job import Application, MapSource
 from app.work.export import run
 from app.work.jobs import Job, Outputs
 from solver.gl.device import Device

@@ -24,7 +24,7 @@ from app.media.video import read_clip
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Output, Recipe
 from app.progress import Progress
-from app.work.applying import Application, MapSource
+from app.work.apply_job import Application, MapSource
 from app.work.export import run
 from app.work.jobs import Job, Outputs
 from solver.gl.device import Device

@@ -7,7 +7,7 @@ import pytest
 
 from properties import viscosity
 from solver.gl.device import Device
-from solver.viscosity.changed import Box, changed
+from solver.viscosity.box import Box, changed
 
 
 @pytest.mark.parametrize("seed", range(16))

@@ -17,7 +17,7 @@ from app.model.picture import Picture
 from app.ui.actions import ACTIONS
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Drop, Event, Key, Mods, Move, Text, Wheel
-from app.ui.exporting import ExportDialog
+from app.ui.export_dialog import ExportDialog
 from app.ui.files import fresh_recipe
 from app.ui.preferences import Preferences
 from app.work.session import Session

@@ -23,7 +23,7 @@ from app.media.pictures import read_picture, write_picture
 from app.media.reel import AHEAD, Reel
 from app.model.picture import Picture
 from app.progress import Progress
-from app.ui.exporting import ANIMATION, ANIMATIONS, PICTURE
+from app.ui.export_dialog import ANIMATION, ANIMATIONS, PICTURE
 from app.ui.files import tick_for
 from app.work.export import run
 from app.work.jobs import Outputs

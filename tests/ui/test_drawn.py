@@ -23,7 +23,7 @@ from app.ui.browser import Browser
 from app.ui.dialogs import PictureOrMap, Unsaved
 from app.ui.editor_state import SELECT_BY
 from app.ui.events import Mods
-from app.ui.exporting import ANIMATION, MAP, ExportDialog
+from app.ui.export_dialog import ANIMATION, MAP, ExportDialog
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.work import session

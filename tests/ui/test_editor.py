@@ -34,7 +34,7 @@ from app.ui.browser import Browser
 from app.ui.canvas import MOVING, shown_pixels
 from app.ui.dialogs import PictureOrMap, Preferring, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
-from app.ui.exporting import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
+from app.ui.export_dialog import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.key_sheet import KeySheet
 from app.ui.numbers import Numbers

@@ -21,7 +21,7 @@ from app.model.recipe import Output
 from app.model.strokes import BrushPath, Change
 from app.progress import Progress
 from app.ui.events import LEFT, Button, Move
-from app.ui.exporting import ANIMATION, KINDS, MAP, PICTURE, PICTURES, PRESETS, ExportDialog
+from app.ui.export_dialog import ANIMATION, KINDS, MAP, PICTURE, PICTURES, PRESETS, ExportDialog
 from app.ui.files import load_any
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences

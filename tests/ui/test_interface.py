@@ -23,7 +23,7 @@ from app.ui.chooser import FileChooser
 from app.ui.clock import FRAMES, HOVERING, PACE
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
-from app.ui.exporting import ANIMATION, ExportDialog
+from app.ui.export_dialog import ANIMATION, ExportDialog
 from app.ui.files import load_any
 from app.ui.layout import Layout
 from app.ui.panels.hud import BEHIND

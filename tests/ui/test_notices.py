@@ -14,7 +14,7 @@ from app.model.undo import Entry
 from app.ui.browser import Browser
 from app.ui.messages import MOST, Messages
 from app.ui.preferences import MOST_RECENT, Preferences
-from app.ui.recovering import about
+from app.ui.recovery_dialog import about
 from app.work.journal import Work
 
 

@@ -18,7 +18,7 @@ from app.media.maps import write_map
 from app.media.sequence import PictureSequence
 from app.media.video import read_clip
 from app.progress import Progress
-from app.work.applying import Application, MapSource
+from app.work.apply_job import Application, MapSource
 from app.work.jobs import Outputs
 from solver.gl.device import Device
 

@@ -31,7 +31,7 @@ from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
 from app.model.timeline import Timeline
 from app.progress import Progress
-from app.work.applying import Application, MapSource, converted, inverted
+from app.work.apply_job import Application, MapSource, converted, inverted
 from app.work.export import Target, displacement, looked_up, run, shown_positions
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
@@ -404,7 +404,7 @@ def test_a_large_still_says_how_far_it_is(
 ):
     """Band by band while it is looked up, and that it is being written; by a recipe and by a map."""
     monkeypatch.setattr("app.work.export.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
-    monkeypatch.setattr("app.work.applier.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
+    monkeypatch.setattr("app.work.map_sampler.Sampler", partial(Sampler, whole=2_000, tile=(640, 128)))
     maps = MapOutput(tmp_path / "m.exr", size=96)
     job = Job(
         Recipe.parse(WHIRL + "size = 1500"), read_picture(picture), tmp_path, Outputs(tmp_path / "out.png", maps=maps)

@@ -13,8 +13,8 @@ from app.model.handles import ARRIVED, MOST_OBJECTIONS, RecipeHandle, objections
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
-from app.work.held import as_seen, held_in, unmet
-from app.work.leading import Leading
+from app.work.handle_status import as_seen, held_in, unmet
+from app.work.loaded_handles import LoadedHandles
 from app.work.replay import Replay
 from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
 from solver.brush.handle import Shape
@@ -793,5 +793,5 @@ def test_a_handle_of_no_number_is_refused():
 
 def test_keys_of_a_handle_are_fractions_of_either_side_and_stay_in_the_picture() -> None:
     one = RecipeHandle(at=(0.2, 0.4), radius=0.1, keys=((0.5, 0.2, 0.8), (1.0, 1.2, 0.4)))
-    (handle,) = Leading((1.0, 0.5)).of([one])
+    (handle,) = LoadedHandles((1.0, 0.5)).of([one])
     np.testing.assert_allclose(handle.keys, [(0.5, 0.2, 0.4), (1.0, 1.0, 0.2)])

@@ -14,7 +14,7 @@ from app.errors import UserError
 from app.model.picture import Picture
 from app.model.recipe import Output, Playback, Recipe
 from app.work import jobs
-from app.work.applying import Application, MapSource
+from app.work.apply_job import Application, MapSource
 from app.work.jobs import Job, MapOutput, Outputs, longer_side, result_size
 
 PICTURE = Picture(np.zeros((60, 100, 3), np.uint8))

@@ -18,7 +18,7 @@ from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.source import open_source
 from app.progress import Progress
-from app.work.applying import Application, MapSource
+from app.work.apply_job import Application, MapSource
 from app.work.jobs import Outputs
 from app.work.tasks import Edits, Task
 from solver.gl.device import Device

@@ -29,7 +29,7 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.model.undo import History
-from app.ui.recovering import Offer
+from app.ui.recovery_dialog import Offer
 from app.ui.widgets import Ui
 from app.work import locks, recovery
 from app.work.locks import Lock

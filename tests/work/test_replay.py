@@ -14,7 +14,7 @@ from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Sample, Stroke
-from app.work.observing import whereabouts
+from app.work.observation import whereabouts
 from app.work.replay import Replay
 from solver import energy
 from solver.fluid import Fluid

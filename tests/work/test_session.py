@@ -24,7 +24,7 @@ from app.model.strokes import Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
-from app.work.held import FIT
+from app.work.handle_status import FIT
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.session import Session
@@ -121,7 +121,7 @@ def test_an_edit_that_would_be_refused_when_it_is_opened_again_is_not_made(
 def test_a_stroke_that_is_as_long_as_one_may_be_ends_and_says_so(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.work.session.LONGEST_GESTURE", 4)
+    monkeypatch.setattr("app.work.painting.LONGEST_GESTURE", 4)
     paint(session, "push", (0.3, 0.3), (0.6, 0.6), ticks=20)
     assert session.notice == "This stroke has reached its greatest length. Press again to continue."
     (stroke,) = session.recipe.stroke
@@ -576,8 +576,8 @@ def test_what_waits_is_finished_though_nothing_more_is_recorded(session: Session
 def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     session: Session, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    monkeypatch.setattr("app.work.session.QUICK", 0.0)  # a machine on which every tick takes a frame
-    monkeypatch.setattr("app.work.session.PATIENCE", 0.0)
+    monkeypatch.setattr("app.work.playing.QUICK", 0.0)  # a machine on which every tick takes a frame
+    monkeypatch.setattr("app.work.playing.PATIENCE", 0.0)
     dice = random.Random(seed)
 
     def gesture() -> None:

@@ -27,10 +27,10 @@ from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
 from app.progress import Progress
-from app.work.applier import Applier, inverted
 from app.work.export import Kept, Report, Target, steps_for, write_all
 from app.work.jobs import check_result, longer_side
 from app.work.layers import resample_layers
+from app.work.map_sampler import MapSampler, inverted
 from app.work.states import code
 from app.work.tasks import Piece
 from app.work.threads import prefetch
@@ -123,10 +123,10 @@ class Application(Piece):
             mend = "write f.%04d.png or .mp4" if not self.outputs.is_animation else "write a picture, such as out.png"
             given = "several maps or a clip" if not self.outputs.is_animation else "one map and one picture"
             raise UserError(f"Cannot write {self._output}: {given} do not make {what}; {mend}.")
-        with Applier(device(), self.edges, self.filter, source.picture.premultiplied) as applier:
-            work = _Applying(self, source, applier, progress)
+        with MapSampler(device(), self.edges, self.filter, source.picture.premultiplied) as sampler:
+            work = _Applying(self, source, sampler, progress)
             count = work.write_frames() if self.outputs.is_animation else work.write_still()
-            work.notices.extend(applier.notices(self.maps.path))
+            work.notices.extend(sampler.notices(self.maps.path))
         return Report(count, 0, None, tuple(filter(None, work.notices)))
 
     def _size(self, picture: Picture) -> tuple[int, int]:
@@ -137,8 +137,8 @@ class Application(Piece):
 class _Applying:
     """An `Application` at work on its source."""
 
-    def __init__(self, order: Application, source: Source, applier: Applier, progress: Progress) -> None:
-        self.order, self.source, self.applier, self.progress = order, source, applier, progress
+    def __init__(self, order: Application, source: Source, sampler: MapSampler, progress: Progress) -> None:
+        self.order, self.source, self.sampler, self.progress = order, source, sampler, progress
         self.outputs, self.output = order.outputs, order._output
         self.size = order._size(source.picture)
         self.notices = [source.picture.note]
@@ -177,11 +177,11 @@ class _Applying:
             picture = picture.cropped()
         pixels = picture.pixels
         if picture.wide is not None:
-            pixels, given = picture.wide, self.applier.widened(given, picture.margins)
+            pixels, given = picture.wide, self.sampler.widened(given, picture.margins)
             size = pixels.shape[1], pixels.shape[0]
-        target = Target(size, self.applier.how, parts(size[1]), alpha and kind.alpha)
-        found = self.applier.warped(given, pixels, target)
-        look_up, quality = partial(self._look_up, given, size), self.applier.how.quality
+        target = Target(size, self.sampler.how, parts(size[1]), alpha and kind.alpha)
+        found = self.sampler.warped(given, pixels, target)
+        look_up, quality = partial(self._look_up, given, size), self.sampler.how.quality
         layers = resample_layers(picture.layers, look_up, quality) if "layers" in kind.keeps else ()
         if picture.wide is None:
             return replace(picture.with_pixels(found), layers=layers)
@@ -189,8 +189,8 @@ class _Applying:
 
     def _look_up(self, given: Displacement, size: tuple[int, int], pixels: np.ndarray, quality: Quality) -> np.ndarray:
         """The pixels of layers; see `along`."""
-        how = replace(self.applier.how, quality=quality, premultiplied=False)
-        return self.applier.warped(given, pixels, Target(size, how, lambda rows: self.progress.check()))
+        how = replace(self.sampler.how, quality=quality, premultiplied=False)
+        return self.sampler.warped(given, pixels, Target(size, how, lambda rows: self.progress.check()))
 
     def write_frames(self) -> int:
         order, outputs, clip, progress = self.order, self.outputs, self.source.clip, self.progress
@@ -244,8 +244,8 @@ class _Applying:
     def _frame(self, number: int, picture: Picture, is_own: bool) -> Frame:
         given = self._map(self._file(number))
         if not is_own:
-            target = Target(self.size, self.applier.how, lambda rows: self.progress.check())
-            return self.applier.warped(given, picture.pixels, target)
+            target = Target(self.size, self.sampler.how, lambda rows: self.progress.check())
+            return self.sampler.warped(given, picture.pixels, target)
         frame = self._warped(given, picture, lambda height: lambda rows: self.progress.check(), alpha=False)
         return frame.stripped() if self.outputs.strip else frame
 

@@ -12,7 +12,7 @@ from app.model.sampling import Point
 from solver.brush.handle import Handle
 
 
-class Leading:
+class LoadedHandles:
     """Handles and pins of a recipe as the solver has them; of those that stay the same, the same are given again.
 
     Args:

@@ -23,7 +23,7 @@ MOST_CELLS = 1024  # along the longer side, for turning a map round
 REACH = 4  # pixels of a map that interpolation and the stretch reach beyond a place
 
 
-class Applier:
+class MapSampler:
     """Looks pictures up through given maps; keeps the last map on the GPU, as most stay for many frames.
 
     Attributes:
@@ -42,7 +42,7 @@ class Applier:
         self._wide: tuple[Displacement, tuple[int, int, int, int], Displacement] | None = None
         self._folds: list[int] = []  # of the maps that fold over themselves, in how many pixels each
 
-    def __enter__(self) -> Applier:
+    def __enter__(self) -> MapSampler:
         return self
 
     def __exit__(self, *exception: object) -> None:
