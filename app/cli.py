@@ -151,6 +151,10 @@ Cluster = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Dask scheduler to hand several pictures to, such as tcp://host:8786."),
 ]
+Dpi = Annotated[
+    float | None,
+    typer.Option(min=1, max=10_000, help="Dots per inch to note in a PNG, JPEG or TIFF. Default: the picture's."),
+]
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out metadata, but not the colour profile.")]
 Codec = Annotated[
     str | None,
@@ -229,6 +233,7 @@ def render(
     animated: Annotated[bool, typer.Option("--animated", help="Write OUT.webp as an animation, not a still.")] = False,
     codec: Codec = None,
     bits: Bits = None,
+    dpi: Dpi = None,
     strip: Strip = False,
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
@@ -260,7 +265,7 @@ def render(
             "--forward, --offsets, --overscan and --map-size say how --map is written; give --map and a name"
         )
     given = [*([image] if image else []), *(pictures or [])]
-    outputs = Outputs(output, stats, maps, _part(frames), animated, bits, strip, codec, states, resume)
+    outputs = Outputs(output, stats, maps, _part(frames), animated, bits, strip, codec, states, resume, dpi=dpi)
     task = Task(recipe=recipe, edits=edits, picture=given[0] if given else None, outputs=outputs, max_pixels=max_pixels)
     if not given and cluster is not None:
         raise UserError("--cluster is for several pictures; name them after the recipe")
@@ -450,6 +455,7 @@ def apply(
     resume: Resume = False,
     codec: Codec = None,
     bits: Bits = None,
+    dpi: Dpi = None,
     strip: Strip = False,
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
@@ -469,7 +475,7 @@ def apply(
     asked = Edits.of({"output": output_keys}, {"edges": edges}).applied(Recipe())
     order = Application(
         picture=pictures[0],
-        outputs=Outputs(output, part=_part(frames), bits=bits, strip=strip, codec=codec, resume=resume),
+        outputs=Outputs(output, part=_part(frames), bits=bits, strip=strip, codec=codec, resume=resume, dpi=dpi),
         max_pixels=max_pixels,
         maps=_map_source(map_, kind, grid, overscan, max_pixels),
         edges=asked.edges,

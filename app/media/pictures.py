@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.errors import UserError
 from app.media.codecs.decoding import decoding, head_of
+from app.media.codecs.metadata import printed_at
 from app.media.depth import over, to_bits
 from app.media.files import replacing
 from app.media.formats import TABLE, check_picture_output, kind_of, picture_format
@@ -39,6 +40,7 @@ def write_picture(
     strip: bool = False,
     background: tuple[int, int, int] = (0, 0, 0),
     codec: str | None = None,
+    dpi: float | None = None,
 ) -> None:
     """Write a picture in the format of the ending of `path`, whole or not at all.
 
@@ -47,6 +49,7 @@ def write_picture(
     quality: 1-100 for JPEG, WebP and AVIF; WebP is lossless at 100.
     strip: leave out EXIF, XMP, resolution and texts; the colour profile stays.
     codec: the compression of an EXR; None is zip.
+    dpi: dots per inch along both sides; None keeps the picture's own, which may be none.
     background: what shows through where the format has no alpha.
     Raises `UserError`.
     """
@@ -54,6 +57,8 @@ def write_picture(
     chosen = picture_format(path)
     if strip:
         picture = picture.stripped()
+    if dpi is not None:
+        picture = printed_at(picture, dpi)
     depth = bits or max((held for held in chosen.bits if held <= picture.bits), default=chosen.bits[0])
     if "half" in chosen.keeps:
         picture, depth = replace(picture, half=picture.half if bits is None else bits == 16), 32

@@ -57,7 +57,7 @@ def _table() -> list[Action]:
     add("Edit", "remove", "Delete handle or bars", "delete backspace", lambda c: c.remove_selected())
     add("Edit", "fit_handles", "Fit the handles", "shift+g", lambda c: c.fits.start())
     add("Edit", "fit_masks", "Fit a mask to another ...", "", lambda c: c.files.ask_outlines())
-    add("Edit", "cancel", "Cancel the stroke or selection", "escape", lambda c: c.cancel())
+    add("Edit", "cancel", "Cancel, deselect or stop a fit", "escape", lambda c: c.cancel())
 
     for tool in TOOLS:
         add("Tools", f"tool_{tool.name}", tool.label, tool.key, lambda c, n=tool.name: c.state.choose_tool(n, False))
@@ -67,10 +67,11 @@ def _table() -> list[Action]:
             add("Tools", f"tool_{tool.name}_back", label, keys, lambda c, n=tool.name: c.state.choose_tool(n, True))
     add("Tools", "select_next", "Select by another method", "shift+m", lambda c: c.state.select_next())
     add("Masks", "select_invert", "Invert the selection", "i", lambda c: c.selecting.invert())
+    add("Masks", "invert", "Invert the selection or mask", "ctrl+shift+i", lambda c: c.invert())
     add("Masks", "select_fill", "Fill the selection", "enter", lambda c: c.selecting.fill(off=False))
     add("Masks", "select_clear", "Take the selection off the mask", "shift+enter", lambda c: c.selecting.fill(off=True))
     for kind, label, key in (
-        ("invert", "Invert the mask", "ctrl+shift+i"),
+        ("invert", "Invert the mask", ""),
         ("fill", "Fill the mask", "ctrl+shift+f"),
         ("clear", "Clear the mask", ""),
         ("feather", "Feather the mask", ""),

@@ -132,6 +132,13 @@ class Commands:
             edits = (ClearMask(kind="clear", tick=0, of=name) for name in MASKS)
             self.workspace.session.edit_masks("Clear the masks", *edits)
 
+    def invert(self) -> None:
+        """Invert the selection; where there is none, the mask."""
+        if self.state.tool_name == "select" and self.state.selection:
+            self.selecting.invert()
+        else:
+            self.edit_mask("invert")
+
     def edit_mask(self, kind: str) -> None:
         """Do something to the mask that is chosen, and show it."""
         state, edit = self.state, {"kind": kind, "tick": 0, "of": self.state.mask}

@@ -71,6 +71,7 @@ class Preset:
         quality: of kinds of file that have one.
         fps: frames a second of an animation.
         returns: an animation goes there and back again.
+        dpi: dots per inch noted in a picture; None is the picture's own.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Preset:
     quality: int = 90
     fps: float = 30.0
     returns: bool = False
+    dpi: float | None = None
 
 
 def _depths(ending: str, *bits: int) -> tuple[Variant, ...]:
@@ -132,9 +134,10 @@ MAPS = (
 )
 KINDS = (("Picture", PICTURES), ("Animation", ANIMATIONS), ("Warp map", MAPS))
 PICTURE, ANIMATION, MAP = range(3)
+PRINTED = 300  # dots per inch that printers ask for
 PRESETS = (
     Preset("Web", "JPEG, at most 2048 pixels, quality 85.", PICTURE, 1, size=2048, quality=85),
-    Preset("Print", "TIFF of 16 bits, all pixels.", PICTURE, 4, 2),
+    Preset("Print", f"TIFF of 16 bits, all pixels, {PRINTED} dpi.", PICTURE, 4, 2, dpi=PRINTED),
     Preset("Film", "ProRes 4444 with alpha, all pixels, 24 frames a second or the clip's own.", ANIMATION, 1, fps=24.0),
     Preset(
         "Loop", "MP4, at most 1280 pixels; ping-pong, so that it has no jump.", ANIMATION, 0, size=1280, returns=True
@@ -165,6 +168,7 @@ class ExportDialog(Dialog):
         format: which of its kinds of file, for each of these.
         variant: which of the variants, for each kind of file.
         returns: an animation goes there and back again.
+        dpi: dots per inch noted in a picture; None is the picture's own.
         dissolve: seconds in which its end dissolves into its beginning, if it does not return.
         presets: those that there are for it.
         forward: the map tells where the points of the original go.
@@ -200,7 +204,9 @@ class ExportDialog(Dialog):
         self.filter = [name for name, *_ in FILTERS].index(session.recipe.output.filter)
         # Beside lights that are many times as bright as white it shows, elsewhere hardly.
         self._may_ring = self.picture.linear or self.filter > 0 or (self.clip is not None and self.clip.colours.is_high)
-        self.start, self.end = 0.0, session.length * session.dt
+        self.start = 0.0
+        self.dpi: float | None = None
+        self._end: float | None = None
         self.finer = 0
         self.folder = preferences.export_to
         self.name = f"{session.project.name} warped"
@@ -259,18 +265,18 @@ class ExportDialog(Dialog):
         self._choose(preset.kind)
         self.format[preset.kind] = preset.format
         self.variant[preset.kind][preset.format] = preset.variant
-        self.size, self.quality, self.fps, self.returns = self._of(preset)
+        self.size, self.quality, self.fps, self.returns, self.dpi = self._of(preset)
         self.dissolve = 0.0
 
-    def _of(self, preset: Preset) -> tuple[int, int, float, bool]:
+    def _of(self, preset: Preset) -> tuple[int, int, float, bool, float | None]:
         own = max(self.picture.width, self.picture.height)
-        return min(own, preset.size or own), preset.quality, preset.fps, preset.returns
+        return min(own, preset.size or own), preset.quality, preset.fps, preset.returns, preset.dpi
 
     @property
     def preset(self) -> int:
         """The one that says what is chosen; -1 if none does."""
         chosen = self.kind, self.format[self.kind], self.variant[self.kind][self.format[self.kind]]
-        now = self.size, self.quality, self.fps, self.returns
+        now = self.size, self.quality, self.fps, self.returns, self.dpi
         for number, preset in enumerate(self.presets):
             is_plain = not (self.animation and self.dissolve)
             if is_plain and chosen == (preset.kind, preset.format, preset.variant) and now == self._of(preset):
@@ -313,6 +319,8 @@ class ExportDialog(Dialog):
         outputs = Outputs(self.output, animated=how.animated, bits=how.bits, codec=how.codec, recorded=False)
         if self.animation:
             outputs = replace(outputs, part=self._frames)
+        elif self._holds_dpi:
+            outputs = replace(outputs, dpi=self.dpi)
         return self._of_seen(recipe, outputs)
 
     def _of_seen(self, recipe: Recipe, outputs: Outputs) -> Job:
@@ -352,6 +360,19 @@ class ExportDialog(Dialog):
         return self.session.length * self.session.dt
 
     @property
+    def end(self) -> float:
+        """Where the animation ends, seconds: with the recording, which may go on meanwhile, unless chosen otherwise."""
+        return self._seconds if self._end is None else self._end
+
+    @end.setter
+    def end(self, end: float) -> None:
+        self._end = end
+
+    @property
+    def _holds_dpi(self) -> bool:
+        return self.kind == PICTURE and "dpi" in FORMATS[self.ending].keeps
+
+    @property
     def _rate(self) -> Fraction:
         """Frames a second of what is written."""
         return rate_of(self.clip, self.fps)
@@ -379,6 +400,16 @@ class ExportDialog(Dialog):
         if self.ending in RATED and not self.how.animated:
             slid = ui.slider("quality", "Quality", self.quality, 1, 100, default=90)
             self.quality = round(slid.value)
+        if self._holds_dpi:
+            imgui.align_text_to_frame_padding()
+            ui.dim("Resolution")
+            imgui.same_line(0, ui.px(12))
+            own = f"Its own {self.picture.dpi[0]:.0f} dpi" if self.picture.dpi else "Not noted"
+            chosen = ui.segmented("dpi", (own, f"{PRINTED} dpi"), int(self.dpi is not None), -1)
+            self.dpi = float(PRINTED) if chosen else None
+            if dpi := (self.dpi, self.dpi) if self.dpi else self.picture.dpi:
+                across, down = (2.54 * side / per_inch for side, per_inch in zip((width, height), dpi, strict=True))
+                ui.dim(f"Prints at {across:.1f} x {down:.1f} cm.")
         if self.kind == MAP:
             self._ask_about_map(ui)
         elif self._may_ring:
@@ -394,7 +425,8 @@ class ExportDialog(Dialog):
                 self.fps = float(round(slid.value))
             if seconds > 0:
                 self.start = ui.slider("from", "From", self.start, 0, seconds, SECONDS, 0.0).value
-                self.end = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds).value
+                slid = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds)
+                self._end = (slid.value if slid.value < seconds else None) if slid.changed else self._end
             if clip is None:
                 self.returns = ui.check("Ping-pong", self.returns)
                 ui.tooltip("Ping-pong", more="There and back again: a loop without a jump.")
@@ -626,7 +658,9 @@ class Exports:
             self.messages.say("Cancelled; no unfinished file is kept.")
 
 
-def under_way(ui: Ui, name: str, canvas: Rect, down: float, words: str, part: float, button: str) -> bool:
+def under_way(
+    ui: Ui, name: str, canvas: Rect, down: float, words: str, part: float, button: str, key: str = "", more: str = ""
+) -> bool:
     """What is being done and how much of it, so many points below the canvas's edge; True if the button is pressed."""
     with ui.floating(name, canvas.x + canvas.width / 2, canvas.y + ui.px(16 + down), (0.5, 0)):
         imgui.begin_group()
@@ -643,4 +677,7 @@ def under_way(ui: Ui, name: str, canvas: Rect, down: float, words: str, part: fl
         imgui.dummy(ImVec2(width, ui.px(8)))
         imgui.end_group()
         imgui.same_line(0, ui.px(16))
-        return ui.button(f"{button}##{name}", height=30)
+        pressed = ui.button(f"{button}##{name}", height=30)
+        if more:
+            ui.tooltip(button, key, more)
+        return pressed

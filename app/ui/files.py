@@ -229,7 +229,7 @@ class Files:
             self._leave(loading)
             self.messages.warn(loading.error)
         elif workspace.is_dirty and workspace.session.document.recipe is not loading.recipe:
-            self.unless_unsaved(f"open {loading.path.name}", lambda: self._show(loading))
+            self.unless_unsaved(f"open {loading.name}", lambda: self._show(loading))
         else:
             self._show(loading)
 
@@ -266,7 +266,7 @@ class Files:
             return
         with ui.floating("loading", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
             imgui.begin_group()
-            ui.text(f"Opening {self._loading.path.name} ...", size=14)
+            ui.text(f"Opening {self._loading.name} ...", size=14)
             ui.dim("You can go on meanwhile.")
             imgui.end_group()
             imgui.same_line(0, ui.px(16))

@@ -112,7 +112,8 @@ class Fits:
             self._take(process, session)
         else:
             state = "checking the best" if self._stopping else process.state or "getting ready"
-            if under_way(ui, "fitting", canvas, down, f"Fitting: {state}", process.part, "Stop"):
+            words, more = f"Fitting: {state}", "The best that was found so far is kept."
+            if under_way(ui, "fitting", canvas, down, words, process.part, "Stop", "escape", more):
                 self.finish()
 
     def _is_still_of_use(self) -> bool:

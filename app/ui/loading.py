@@ -13,6 +13,7 @@ from app.errors import UserError
 from app.media.project import Project
 from app.model.recipe import Recipe
 from app.ui.canvas import shown_pixels
+from app.ui.clipboard import pasted_folder
 from app.work.recovery import Found
 
 
@@ -44,6 +45,11 @@ class Loading:
         # A daemon: whoever leaves does not have to wait for it.
         self._thread = threading.Thread(target=self._read, name=f"reading {self.path.name}", daemon=True)
         self._thread.start()
+
+    @property
+    def name(self) -> str:
+        """What a person calls it."""
+        return "the copied picture" if self.path.parent == pasted_folder() else self.path.name
 
     def is_done(self, patience: float = 0.0) -> bool:
         """True if it has been read, or has failed; waits for it for so many seconds."""

@@ -160,7 +160,15 @@ class _Applying:
         warped = self._warped(given, picture, lambda height: self.progress.parts(steps, height), alpha=True)
         self.progress.enter("writing")
         how = self.outputs
-        write_picture(self.output, warped, bits=how.bits, quality=self.order.quality, strip=how.strip, codec=how.codec)
+        write_picture(
+            self.output,
+            warped,
+            bits=how.bits,
+            quality=self.order.quality,
+            strip=how.strip,
+            codec=how.codec,
+            dpi=how.dpi,
+        )
         self.progress.count(steps)
         return 1
 

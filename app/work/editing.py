@@ -57,7 +57,7 @@ class Editing(Painting):
         """As `change`, without an entry in the history yet: for a slider that is being dragged."""
         self.release()
         base, lasts = self._base, settings.keys() <= {"viscosity", "drag", "walls"}
-        if not (base.stroke or base.change or base.mask) and self.target == 0 and lasts:
+        if not (base.stroke or base.change or (base.mask and self.end)) and self.target == 0 and lasts:
             self._use_edited(base.edited(fluid=base.fluid.model_copy(update=settings)))
             return
         tick = self._go_on()

@@ -143,6 +143,7 @@ class _Export:
                     quality=recipe.output.quality,
                     strip=outputs.strip,
                     codec=outputs.codec,
+                    dpi=outputs.dpi,
                 )
                 self.progress.count(steps)
             self._note(0, Fraction(end))

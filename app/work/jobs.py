@@ -14,6 +14,7 @@ from app.media.animation import AnimationOptions
 from app.media.clip import WHOLE, Clip, FrameRange, rate_of
 from app.media.encoders import check_colours, check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
+from app.media.formats import picture_format
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map
 from app.media.opening import check_picture
@@ -60,6 +61,7 @@ class Outputs:
         codec: of a video; None is the usual one of its ending.
         states: a folder of states of the simulation, for parts to begin with and to leave for others.
         resume: keep the files of a sequence that are whole, and were made of the same.
+        dpi: dots per inch that a picture is said to have; None keeps the source's.
         recorded: leave beside the files of a sequence what resuming looks at.
     """
 
@@ -74,6 +76,7 @@ class Outputs:
     states: Path | None = None
     resume: bool = False
     recorded: bool = True
+    dpi: float | None = None
 
     @property
     def files(self) -> list[Path]:
@@ -97,6 +100,12 @@ class Outputs:
             raise UserError("--stats needs all frames, and --resume makes only the missing ones; use one of them")
         if self.part != WHOLE and not self.has_frames:
             raise UserError(f"--frames is for an animation, and {self.file} is a picture; write f.%04d.png or .mp4")
+        if self.dpi is None:
+            return
+        if self.file is None or self.is_animation:
+            raise UserError("--dpi is the resolution of a picture, and none is written; leave it out")
+        if "dpi" not in (form := picture_format(self.file)).keeps:
+            raise UserError(f"{form.name} holds no resolution; leave out --dpi, or write a PNG, JPEG or TIFF")
 
     def animation(
         self, first: int, rate: Fraction, quality: int | None, like: Picture, clip: Clip | None

@@ -652,6 +652,20 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
 
 
 @pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
+def test_a_resolution_that_is_asked_for_stands_in_the_file_and_in_its_exif(tmp_path: Path, ending: str):
+    exif = Image.Exif()
+    exif.update({282: 72.0, 283: 72.0, 296: 3, 271: "Maker"})
+    for given in (Picture(smooth(3)), Picture(smooth(3), exif=exif.tobytes(), dpi=(72.0, 36.0))):
+        path = tmp_path / f"a.{ending}"
+        write_picture(path, given, dpi=300.0)
+        assert read_picture(path).dpi == pytest.approx((300, 300), abs=0.01)
+        with Image.open(path) as image:
+            told = image.getexif()
+            assert [told.get(code) for code in (282, 283, 296)] in ([300, 300, 2], [None] * 3)
+            assert told.get(271) == ("Maker" if given.exif else None)
+
+
+@pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
 def test_narrow_pixels_of_a_turned_picture_are_turned_too(tmp_path: Path, ending: str):
     path, image = tmp_path / f"a.{ending}", Image.fromarray(smooth(3))
     tags: dict[str, Any] = {"tiffinfo": {274: 6}} if ending == "tif" else {"exif": exif_bytes(6)}

@@ -422,6 +422,34 @@ def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: Export
     assert (job.recipe.output.fps, job.recipe.time.start, job.recipe.time.end) == pytest.approx((24, 0.1, 0.2))
 
 
+def test_an_animation_ends_where_the_recording_does_that_goes_on_behind_the_dialog(
+    robot: Robot, widgets: Widgets
+) -> None:
+    session = robot.editor.session
+    session.change("Water", viscosity=0.0006)
+    robot.drag((0.3, 0.5), (0.6, 0.5), steps=4)
+    robot.key("ctrl+e")
+    robot.frame(count=3)
+    widgets.click("Animation")
+    dialog, before = robot.editor.dialogs.shown[-1], session.end
+    assert isinstance(dialog, ExportDialog)
+    robot.frame(count=10)
+    assert session.end > before
+    assert dialog.job().recipe.time.end == pytest.approx(session.end * session.dt)
+    widgets.type("To", "0.05")
+    assert dialog.job().recipe.time.end == pytest.approx(0.05)
+
+
+def test_print_notes_the_dots_per_inch_that_printers_ask_for(
+    robot: Robot, dialog: ExportDialog, widgets: Widgets
+) -> None:
+    assert dialog.job().outputs.dpi is None
+    widgets.click("Print")
+    assert dialog.job().outputs.dpi == 300
+    widgets.click("EXR")
+    assert dialog.job().outputs.dpi is None
+
+
 def test_an_exported_map_is_what_is_asked_for(robot: Robot, dialog: ExportDialog, widgets: Widgets) -> None:
     widgets.click("Warp map")
     maps = dialog.job().outputs.maps

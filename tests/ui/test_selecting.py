@@ -139,6 +139,19 @@ def test_an_inverted_selection_is_the_rest_and_can_be_added_to(robot: Robot, wid
     assert robot.editor.messages.shown[-1].text == "Nothing is selected yet."
 
 
+def test_the_chord_that_inverts_is_for_the_selection_and_without_one_for_the_mask(robot: Robot) -> None:
+    session, state = robot.editor.session, robot.editor.state
+    robot.key("m")
+    robot.drag((0.2, 0.2), (0.6, 0.6), steps=4)
+    before = state.selected_part
+    robot.key("ctrl+shift+i")
+    assert state.selected_part == pytest.approx(1 - before, abs=1e-3)
+    assert session.recipe.mask == ()
+    robot.key("escape")
+    robot.key("ctrl+shift+i")
+    assert [edit.kind for edit in session.recipe.mask] == ["invert"]
+
+
 def test_what_is_picked_stays_inverted_while_its_tolerance_is_set(robot: Robot, widgets: Widgets) -> None:
     state = robot.editor.state
     select(robot, "colour", (0.33, 0.5))

@@ -118,6 +118,14 @@ def test_painting_a_mask_at_rest_takes_no_time(session: Session) -> None:
     assert is_same(masks(session.replay), replayed(session))
 
 
+def test_a_fluid_that_is_chosen_over_a_mask_at_rest_takes_no_time_either(session: Session) -> None:
+    session.edit_masks("Freeze", FillMask(kind="fill", of="frozen", tick=0, amount=1.0))
+    session.change("Water", viscosity=0.0006)
+    assert (session.end, session.recipe.change, session.recipe.fluid.viscosity) == (0, (), 0.0006)
+    session.undo()
+    assert session.recipe.fluid.viscosity != 0.0006
+
+
 def test_what_is_painted_while_the_pointer_rests_is_seen_at_once_and_is_so_many_decades(session: Session) -> None:
     """4 decades a second under the brush, of the hand's seconds."""
     press = Press(BrushSettings(0.2, 1.0), False, session.extent, session.dt)

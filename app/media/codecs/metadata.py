@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from app.model.picture import Picture
 
 ORIENTATION, EXIF_IFD = 0x0112, 0x8769
+RESOLUTION = {0x011A: 0, 0x011B: 0, 0x0128: 2}  # EXIF's codes of x, y and their unit; 2 is an inch
 
 
 def upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:
@@ -62,6 +64,20 @@ def exif_of(picture: Picture) -> Any:
             if code in inner:
                 inner[code] = size
     return exif
+
+
+def printed_at(picture: Picture, dpi: float) -> Picture:
+    """The picture at so many dots per inch, also where its EXIF tells another number."""
+    from PIL import Image
+
+    encoded = picture.exif
+    if encoded:
+        exif = Image.Exif()
+        exif.load(encoded)
+        if exif.keys() & RESOLUTION.keys():
+            exif.update({code: value or dpi for code, value in RESOLUTION.items()})
+            encoded = exif.tobytes()
+    return replace(picture, dpi=(dpi, dpi), exif=encoded)
 
 
 def sized_exif(picture: Picture) -> bytes:

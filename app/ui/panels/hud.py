@@ -44,7 +44,7 @@ def draw(
     if state.tool_name == "handle" and not session.recipe.leads:
         how = "Drag a point to where it should go. Click to pin one where it is."
     elif state.tool_name == "freeze" and not _has_frozen(session.recipe):
-        how = "Leave a margin to what you push: fluid sticks to what is frozen."
+        how = "What is frozen holds back the fluid beside it: leave some space to what you push."
     if how and not is_covered and canvas.width > ui.px(HINT):
         _how(ui, canvas, how)
     elif preferences.hint and not how and canvas.width > ui.px(HINT):

@@ -206,7 +206,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
         if ui.button("Fit##handles", width=-1, height=30):
             do("fit_handles")
         more = "Finds the reach and the speed of each; may take a minute."
-        ui.tooltip("Move all of them together, with the least work", ACTIONS["fit_handles"].key, more)
+        ui.tooltip("Move all of them together, with the least work", ACTIONS["fit_handles"].key, more, above=True)
     if ui.button("Fit a mask to another ...", width=-1, height=30):
         do("fit_masks")
     ui.tooltip("Leads the outline of the white area of one picture to that of another", more="Makes handles along it.")
@@ -216,7 +216,7 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     """How a handle is turned and scaled: from its start on, or, once it has keys, at the playhead."""
     tick, dt = session.target, session.dt
     _, rotate, scale = led.turn_key(tick, dt)
-    when = "A key at the playhead." if led.turned else "From its start on."
+    when = "A keyframe at the playhead." if led.turned else "From its start on."
     slid = ui.slider(
         "held rotate", "Rotate", rotate, -180.0, 180.0, DEGREES, 0.0, title="Rotate", more=f"Clockwise. {when}"
     )
@@ -227,10 +227,11 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     _set_held(session, label, f"Scale of a {led.kind}", slid, **turned)
     keyed = led.turned_to(tick, dt, rotate, scale).turned
     is_key = keyed == led.turned
-    if ui.button("Remove the key of its turn" if is_key else "Key its turn here", width=-1, height=30):
+    if ui.button("Remove this keyframe" if is_key else "Add a keyframe here", width=-1, height=30):
         kept = tuple(key for key in led.turned if key != led.turn_key(tick, dt)) if is_key else keyed
-        session.edit_held(f"Key of a {led.kind}", label, turned=kept)
-    ui.tooltip("A key at the playhead", more="It keeps this turn and size until here; what is set later becomes a key.")
+        session.edit_held(f"Keyframe of a {led.kind}", label, turned=kept)
+    more = "Rotate and Scale are kept until here; where you change them at another time, a keyframe is added."
+    ui.tooltip("A keyframe of Rotate and Scale at the playhead", more=more)
 
 
 def _whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin) -> str:
