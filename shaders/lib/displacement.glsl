@@ -32,15 +32,16 @@ vec2 linear_displacement(sampler2D displacement, vec2 p) {
 }
 
 // Four-point cubic along x blended with one along y (the Boolean sum CL + LC - LL of the cubic C and the linear L), which
-// needs no corners: fourth order like the product of both, and on a map as exact. 12 reads.
-vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled) {
+// needs no corners: fourth order like the product of both, and on a map as exact. What is no displacement, the third and
+// fourth component, knows no edges. 12 reads.
+vec4 cubic_texels(sampler2D displacement, vec2 p, float walled) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
     vec4 cx = cubic_lagrange(f.x), cy = cubic_lagrange(f.y);
     vec4 ex = to_edges(p.x, cell.x, size.x, walled), ey = to_edges(p.y, cell.y, size.y, walled);
     vec2 lx = vec2(1.0 - f.x, f.x), ly = vec2(1.0 - f.y, f.y), bend = cx.yz - lx;
     vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
-#define AT(i, j) texture(displacement, vec2(x[i], y[j])).rg * vec2(ex[i], ey[j])
+#define AT(i, j) texture(displacement, vec2(x[i], y[j])) * vec4(ex[i], ey[j], 1.0, 1.0)
     return (cy.y * lx.x + ly.x * bend.x) * AT(1, 1) + (cy.y * lx.y + ly.x * bend.y) * AT(2, 1)
          + (cy.z * lx.x + ly.y * bend.x) * AT(1, 2) + (cy.z * lx.y + ly.y * bend.y) * AT(2, 2)
          + ly.x * (cx.x * AT(0, 1) + cx.w * AT(3, 1)) + ly.y * (cx.x * AT(0, 2) + cx.w * AT(3, 2))
@@ -48,9 +49,11 @@ vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled) {
 #undef AT
 }
 
+vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled) { return cubic_texels(displacement, p, walled).rg; }
+
 // The same with its own derivatives along x (first column) and y, to a texel: far from the middle of the four points, as in
 // a picture's corner, those of another cubic would not tell of its folds. 16 reads.
-vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled, out mat2 slope) {
+vec4 cubic_texels(sampler2D displacement, vec2 p, float walled, out mat2x4 slope) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
     vec4 lx = vec4(0.0, 1.0 - f.x, f.x, 0.0), ly = vec4(0.0, 1.0 - f.y, f.y, 0.0), along = vec4(0.0, -1.0, 1.0, 0.0);
@@ -58,16 +61,23 @@ vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled, out mat2 s
     vec4 ex = to_edges(p.x, cell.x, size.x, walled), ey = to_edges(p.y, cell.y, size.y, walled);
     vec4 dx = to_edges_slope(p.x, cell.x, size.x, walled), dy = to_edges_slope(p.y, cell.y, size.y, walled);
     vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
-    vec2 sum = vec2(0.0);
-    slope = mat2(0.0);
+    vec4 sum = vec4(0.0);
+    slope = mat2x4(0.0);
     for (int j = 0; j < 4; ++j)
         for (int i = 0; i < 4; ++i) {
-            vec2 read = texture(displacement, vec2(x[i], y[j])).rg, value = read * vec2(ex[i], ey[j]);
+            vec4 read = texture(displacement, vec2(x[i], y[j])), value = read * vec4(ex[i], ey[j], 1.0, 1.0);
             float weight = cx[i] * ly[j] + lx[i] * by[j];
             sum += weight * value;
-            slope[0] += (sx[i] * ly[j] + along[i] * by[j]) * value + vec2(weight * dx[i] * read.x, 0.0);
-            slope[1] += (cx[i] * along[j] + lx[i] * sy[j]) * value + vec2(0.0, weight * dy[j] * read.y);
+            slope[0] += (sx[i] * ly[j] + along[i] * by[j]) * value + vec4(weight * dx[i] * read.x, 0.0, 0.0, 0.0);
+            slope[1] += (cx[i] * along[j] + lx[i] * sy[j]) * value + vec4(0.0, weight * dy[j] * read.y, 0.0, 0.0);
         }
+    return sum;
+}
+
+vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled, out mat2 slope) {
+    mat2x4 slopes;
+    vec2 sum = cubic_texels(displacement, p, walled, slopes).rg;
+    slope = mat2(slopes[0].rg, slopes[1].rg);
     return sum;
 }
 

@@ -1,5 +1,5 @@
 // The Jacobian of the warp map by the chain rule: the product of those of its parts, each by the derivatives of the cubic
-// both ways. 32 reads, and 16 more for each of LEVELS above 1 and of CLOSED, 4 for each of WEIGHED.
+// both ways; where something is undone (see `undo` in lib/warp.glsl), that of back + part (x led to - x). 32 reads, and 16 more for each of LEVELS above 1 and of CLOSED, 4 for each of WEIGHED.
 #include "lib/warp.glsl"
 
 // What the map does at x.
@@ -7,6 +7,15 @@ struct Bend {
     vec2 moved;        // D(x)
     mat2 jacobian;     // of x + D(x)
     float determinant; // the product of the parts', which loses nothing where they shear
+#if UNDONE > 0
+    // While closed maps are followed, `moved` and `jacobian` are of where x is led to.
+    vec2 from;         // before the last map that was followed
+    mat2 before;       // the Jacobian there
+    vec2 back;
+    mat2 bent_back;    // its slopes along x and y
+    float part;
+    vec2 fading;       // its slopes
+#endif
 };
 
 // 1 + grad (w S) of a submap at x + moved, w its weight; w S is added to `moved`.
@@ -26,11 +35,42 @@ mat2 bend_of(int level, sampler2D submap, vec4 window, vec2 x, inout vec2 moved)
 void follow(sampler2D accumulated, vec2 x, inout Bend bend) {
     vec2 density = vec2(textureSize(accumulated, 0)) / u_picture;
     mat2 slope;
+#if UNDONE > 0
+    bend.from = bend.moved;
+    bend.before = bend.jacobian;
+#endif
     bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density, u_walled, slope);
     mat2 next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
     bend.determinant *= determinant(next);
     bend.jacobian = next * bend.jacobian;
 }
+
+void follow_closed(sampler2D closed, vec2 x, inout Bend bend) {
+    bend.moved = within_picture(x, bend.moved);
+    follow(closed, x, bend);
+}
+
+#if UNDONE > 0
+void undo(sampler2D undone, vec2 x, inout Bend bend) {
+    vec2 density = vec2(textureSize(undone, 0)) / u_picture;
+    mat2x4 slopes;
+    vec4 read = cubic_texels(undone, (x + bend.from) * density, u_walled, slopes);
+    slopes = mat2x4(slopes[0] * density.x, slopes[1] * density.y) * bend.before;
+    mat2 aside = mat2(slopes[0].rg, slopes[1].rg), bent = bend.jacobian - mat2(1.0);
+    vec2 growing = vec2(slopes[0].b, slopes[1].b) * float(read.b > 0.0 && read.b < 1.0);
+    float kept = 1.0 - clamp(read.b, 0.0, 1.0), left = bend.part * kept;
+    vec2 fading = bend.fading * kept - bend.part * growing, moved = bend.moved + read.rg;
+    bend.back += bend.part * bend.moved - left * moved;
+    bend.bent_back += outerProduct(bend.moved, bend.fading) + bend.part * bent - outerProduct(moved, fading) - left * (bent + aside);
+    bend.moved = moved;
+    bend.part = left;
+    bend.fading = fading;
+    if (any(notEqual(aside[0], vec2(0.0))) || any(notEqual(aside[1], vec2(0.0)))) {
+        bend.jacobian += aside;
+        bend.determinant = determinant(bend.jacobian);
+    }
+}
+#endif
 
 Bend bend_at(vec2 x) {
     mat2 next;
@@ -47,6 +87,11 @@ Bend bend_at(vec2 x) {
     }
 #endif
     bend.moved = vec2(0.0);
+#if UNDONE > 0
+    bend.back = bend.fading = vec2(0.0);
+    bend.bent_back = mat2(0.0);
+    bend.part = 1.0;
+#endif
     bend.jacobian = bend_of(1, u_submap, u_window, x, bend.moved);
     bend.determinant = determinant(bend.jacobian);
 #if LEVELS > 1
@@ -60,8 +105,19 @@ Bend bend_at(vec2 x) {
     bend.jacobian = next * bend.jacobian;
 #endif
     follow(u_accumulated, x, bend);
-#define FOLLOW(closed) bend.moved = within_picture(x, bend.moved); follow(closed, x, bend);
+#if UNDONE > 0
+#define FOLLOW(closed, number) if ((UNDONE >> number & 1) != 0) undo(closed, x, bend); else follow_closed(closed, x, bend);
+#else
+#define FOLLOW(closed, number) follow_closed(closed, x, bend);
+#endif
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
+#if UNDONE > 0
+    if (bend.part < 1.0) {
+        bend.jacobian = mat2(1.0) + bend.bent_back + outerProduct(bend.moved, bend.fading) + bend.part * (bend.jacobian - mat2(1.0));
+        bend.determinant = determinant(bend.jacobian);
+        bend.moved = bend.back + bend.part * bend.moved;
+    }
+#endif
     return bend;
 }

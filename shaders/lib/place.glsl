@@ -3,6 +3,8 @@
 #ifdef POINTS
 uniform sampler2D u_points;
 vec2 fragment_place() { return texelFetch(u_points, ivec2(gl_FragCoord.xy), 0).rg; }
+// What is told of the point besides: the lower half of the list.
+vec4 fragment_more() { return texelFetch(u_points, ivec2(gl_FragCoord.xy) + ivec2(0, textureSize(u_points, 0).y / 2), 0); }
 #elif defined(LATTICES)
 #include "lib/images.glsl"
 uniform vec2 u_origins[MOST_IMAGES];

@@ -1,10 +1,11 @@
 // The warp map as its parts: submaps on windows of the picture, the identity outside them, then the accumulated map.
 //   D(x) = S(x) + A(x + S(x));   with LEVELS defined as 2 or 3, with the submaps that are still to be taken into A,
-//   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 8, with so many closed maps
-//   after A, the last one closed first. A place that is looked up in the next part is kept in the picture, and x + D(x)
-//   within u_limits, as all texels are: between them a polynomial exceeds them, and composed again and again that would grow
-//   without end.
-// u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_7: displacements, longer sides; u_window,
+//   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 9, with so many fields after A,
+//   the last one closed first: closed maps, and where UNDONE has their bit, what the restore brush has taken away of all that
+//   follows. A place that is looked up in the next part is kept in the picture, and x + D(x) within u_limits, as all texels
+//   are: between them a polynomial exceeds them, and composed again and again that would grow without end.
+// u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_8: displacements, longer sides, and of what is undone
+// the part, 0-1, in the third component; u_window,
 // u_second_window, u_third_window: left, top, width and height that the submaps cover, u_picture: width and height of the
 // picture, u_limits: left, top, right, bottom, longer sides; u_walled: 1 if neither what has moved nor A or a closed map
 // crosses the picture's edges, else 0.
@@ -31,57 +32,66 @@ uniform vec4 u_third_window;
 #ifndef CLOSED
 #define CLOSED 0
 #endif
-// THROUGH_CLOSED(GO) is GO(...) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers to go through.
+#ifndef UNDONE
+#define UNDONE 0
+#endif
+// THROUGH_CLOSED(GO) is GO(closed, number) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers to
+// go through.
 #define THROUGH_0(GO)
 #if CLOSED > 0
 uniform sampler2D u_closed_0;
-#define THROUGH_1(GO) GO(u_closed_0) THROUGH_0(GO)
+#define THROUGH_1(GO) GO(u_closed_0, 0) THROUGH_0(GO)
 #else
 #define THROUGH_1(GO) THROUGH_0(GO)
 #endif
 #if CLOSED > 1
 uniform sampler2D u_closed_1;
-#define THROUGH_2(GO) GO(u_closed_1) THROUGH_1(GO)
+#define THROUGH_2(GO) GO(u_closed_1, 1) THROUGH_1(GO)
 #else
 #define THROUGH_2(GO) THROUGH_1(GO)
 #endif
 #if CLOSED > 2
 uniform sampler2D u_closed_2;
-#define THROUGH_3(GO) GO(u_closed_2) THROUGH_2(GO)
+#define THROUGH_3(GO) GO(u_closed_2, 2) THROUGH_2(GO)
 #else
 #define THROUGH_3(GO) THROUGH_2(GO)
 #endif
 #if CLOSED > 3
 uniform sampler2D u_closed_3;
-#define THROUGH_4(GO) GO(u_closed_3) THROUGH_3(GO)
+#define THROUGH_4(GO) GO(u_closed_3, 3) THROUGH_3(GO)
 #else
 #define THROUGH_4(GO) THROUGH_3(GO)
 #endif
 #if CLOSED > 4
 uniform sampler2D u_closed_4;
-#define THROUGH_5(GO) GO(u_closed_4) THROUGH_4(GO)
+#define THROUGH_5(GO) GO(u_closed_4, 4) THROUGH_4(GO)
 #else
 #define THROUGH_5(GO) THROUGH_4(GO)
 #endif
 #if CLOSED > 5
 uniform sampler2D u_closed_5;
-#define THROUGH_6(GO) GO(u_closed_5) THROUGH_5(GO)
+#define THROUGH_6(GO) GO(u_closed_5, 5) THROUGH_5(GO)
 #else
 #define THROUGH_6(GO) THROUGH_5(GO)
 #endif
 #if CLOSED > 6
 uniform sampler2D u_closed_6;
-#define THROUGH_7(GO) GO(u_closed_6) THROUGH_6(GO)
+#define THROUGH_7(GO) GO(u_closed_6, 6) THROUGH_6(GO)
 #else
 #define THROUGH_7(GO) THROUGH_6(GO)
 #endif
 #if CLOSED > 7
 uniform sampler2D u_closed_7;
-#define THROUGH_8(GO) GO(u_closed_7) THROUGH_7(GO)
+#define THROUGH_8(GO) GO(u_closed_7, 7) THROUGH_7(GO)
 #else
 #define THROUGH_8(GO) THROUGH_7(GO)
 #endif
+#if CLOSED > 8
+uniform sampler2D u_closed_8;
+#define THROUGH_CLOSED(GO) GO(u_closed_8, 8) THROUGH_8(GO)
+#else
 #define THROUGH_CLOSED(GO) THROUGH_8(GO)
+#endif
 #if defined(HELD) || defined(WEIGHED)
 uniform sampler2D u_held;
 #endif
@@ -178,13 +188,36 @@ void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout v
     more = accumulated_displacement(closed, place);
 }
 
+// What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T).
+vec3 undone_at(sampler2D undone, vec2 place) {
+    vec3 read = cubic_texels(undone, place, u_walled).rgb;
+    return vec3(read.rg, clamp(read.b, 0.0, 1.0));
+}
+
+// Where x is led on to and D(x) are two things once something is undone: D(x) = back + part (x led to - x). Undoing leaves
+// D(x) so far as it is, leads on by E as if nothing had been undone, and takes T away of the part. Where E and T are 0,
+// nothing changes to the bit.
+void undo(vec3 undone, vec2 moved, inout vec2 more, inout vec2 back, inout float part) {
+    float left = part * (1.0 - undone.b);
+    back += part * (moved + more) - left * (moved + more + undone.rg);
+    part = left;
+    more += undone.rg;
+}
+
 // D(x) of x that the submaps have `moved`, to `place` in A's texels.
 vec2 displacement_from(vec2 x, vec2 moved, vec2 place) {
-    vec2 more = accumulated_displacement(u_accumulated, place);
-#define FOLLOW(closed) follow(closed, x, moved, more, place);
+    vec2 more = accumulated_displacement(u_accumulated, place), back = vec2(0.0);
+    float part = 1.0;
+#define UNDO(undone) undo(undone_at(undone, place), moved, more, back, part)
+#define FOLLOW(closed, number) if ((UNDONE >> number & 1) != 0) UNDO(closed); else follow(closed, x, moved, more, place);
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
-    return within(u_limits, x, moved + more);
+#undef UNDO
+    moved += more;
+#if UNDONE > 0
+    moved = back + part * moved;
+#endif
+    return within(u_limits, x, moved);
 }
 
 // D(x).

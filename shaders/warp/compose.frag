@@ -3,10 +3,11 @@
 // Define CUBIC to read A by the cubic: where it has four texels a cell, or if the result will be interpolated again.
 // Define LINEAR to read A bilinearly, for a target whose texels are no closer together than those of A.
 // Define GATHER for the composition of the submaps alone.
+// Define CARRY (with REMAP) to draw u_undone, what the restore brush has undone, where the submaps lead, in place of A.
 // Define KEEP (with REMAP) to draw only what is newly held: where u_now, whose first texel is u_corner, is 1/2 or more, and
 // u_before, over the picture, is not.
 // Define FROM for W(x + P(x)) - x: u_from (P), texel for texel, longer sides.
-// reads: 48, and 24 with CUBIC, 16 with LINEAR, 12 with GATHER; 12 more for each of LEVELS above 1, 4 for each of WEIGHED, and
+// reads: 48, and 24 with CUBIC, 16 with LINEAR, 24 with CARRY, 12 with GATHER; 12 more for each of LEVELS above 1, 4 for each of WEIGHED, and
 // for each of CLOSED as many as A takes
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
@@ -19,7 +20,12 @@ uniform vec2 u_corner;
 uniform sampler2D u_from;
 in vec2 v_uv;
 #endif
+#ifdef CARRY
+uniform sampler2D u_undone;
+layout(location = 0) out vec4 out_displacement;
+#else
 layout(location = 0) out vec2 out_displacement;
+#endif
 
 void main() {
     vec2 size = vec2(textureSize(u_accumulated, 0)), texel = u_picture / size;
@@ -50,5 +56,9 @@ void main() {
     return;
 #endif
     place += moved / texel;
+#ifdef CARRY
+    out_displacement = vec4(undone_at(u_undone, place), 0.0);
+#else
     out_displacement = from + displacement_from(x, moved, place);
+#endif
 }

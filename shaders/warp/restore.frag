@@ -1,8 +1,10 @@
-// Restore: D'(x) = (1 - amount falloff(|x - c|)) D(x), the map let go back to the identity under a brush.
+// Restore: D'(x) = m D(x), m = 1 - amount falloff(|x - c|), the map let go back to the identity under a brush.
+// Define UNDONE to draw what is undone of the closed maps that follow D: u_undone, the way E and the part T. D' ends (1 - m) D
+// short, by which they are to be read farther on, E' = E + (1 - m) D; of what they give m is left, 1 - T' = m (1 - T).
 // u_displacement: longer sides; u_window: left, top, width and height that it covers, u_center, u_radius: longer sides;
 // u_hardness: the part of the radius that is fully under the brush, below 1; u_amount: 0-1.
 // Define HELD if something is held: in cells of u_still, on the window u_still_window, not at all, over one cell more and more.
-// reads: 1, and 4 more with HELD
+// reads: 1, and 4 more with HELD, 1 with UNDONE
 uniform sampler2D u_displacement;
 uniform vec4 u_window;
 uniform vec2 u_center;
@@ -25,11 +27,23 @@ float freedom(vec2 x) {
 float freedom(vec2 x) { return 1.0; }
 #endif
 in vec2 v_uv;
+#ifdef UNDONE
+uniform sampler2D u_undone;
+layout(location = 0) out vec4 out_undone;
+#else
 layout(location = 0) out vec2 out_displacement;
+#endif
 
 void main() {
     vec2 x = u_window.xy + v_uv * u_window.zw;
     float far = length(x - u_center) / u_radius;
     float falloff = 1.0 - smoothstep(u_hardness, 1.0, far);
-    out_displacement = (1.0 - u_amount * falloff * freedom(x)) * texture(u_displacement, v_uv).rg;
+    float taken = u_amount * falloff * freedom(x);
+    vec2 displacement = texture(u_displacement, v_uv).rg;
+#ifdef UNDONE
+    vec3 undone = texture(u_undone, v_uv).rgb;
+    out_undone = vec4(undone + taken * vec3(displacement, 1.0 - undone.b), 0.0);
+#else
+    out_displacement = (1.0 - taken) * displacement;
+#endif
 }

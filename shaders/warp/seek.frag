@@ -1,19 +1,19 @@
 // Seek: where points of the original are, x with x + D(x) = y, by Newton's method from guesses out of a list: how far x is
 // from the guess, and x + D(x) from y (longer sides).
-// The guess: see lib/place.glsl; u_more: guess - y, then how far a round may go, longer sides.
+// The guess, and what is told of it: see lib/place.glsl; the latter is guess - y, then how far a round may go, longer sides.
 // reads: 408, and 96 more for each of LEVELS above 1, 210 for each of CLOSED, 32 for each of WEIGHED; of six rounds, of which
 // two or three are usual
+#define POINTS 1
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
 #include "lib/jacobian.glsl"
-uniform sampler2D u_more;
 layout(location = 0) out vec4 out_found;
 
 const int ROUNDS = 8;
 const float FOUND = 1e-7;  // longer sides, as places are rounded
 
 void main() {
-    vec3 more = texelFetch(u_more, ivec2(gl_FragCoord.xy), 0).rgb;
+    vec3 more = fragment_more().rgb;
     vec2 guess = fragment_place() * u_picture, gone = vec2(0.0);
     out_found = vec4(0.0, 0.0, 1e30, 0.0);
     for (int round = 0; round < ROUNDS && out_found.z >= FOUND; ++round) {

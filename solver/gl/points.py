@@ -31,14 +31,16 @@ def draw_at(
 ) -> np.ndarray:
     """What a shader that includes `lib/place.glsl` gives at points (n, 2), in longer sides: float32 (n, components).
 
-    `more`: what it is told of each besides, as `u_more`, (n, 1-4).
+    `more`: what it is told of each besides, (n, 4).
     """
-    lists = {"points": points / domain} | ({} if more is None else {"more": more})
     row = min(max(len(points), 1), _ROW)
-    listed = {name: device.upload(in_rows(values, row), f"{name} of a list") for name, values in lists.items()}
-    found = device.field(listed["points"].size, components, "found at points")
-    device.pass_(shader, POINTS=1, **(defines or {}))(found, **listed, **inputs)
+    rows = in_rows(points / domain, row)
+    size = row, len(rows)
+    if more is not None:  # below the points, in one texture with them
+        rows = np.concatenate([np.pad(rows, ((0, 0), (0, 0), (0, 2))), in_rows(more, row)])
+    listed, found = device.upload(rows, "points of a list"), device.field(size, components, "found at points")
+    device.pass_(shader, POINTS=1, **(defines or {}))(found, points=listed, **inputs)
     values = found.get().reshape(-1, components)[: len(points)]
-    for field in (*listed.values(), found):
+    for field in (listed, found):
         field.release()
     return values

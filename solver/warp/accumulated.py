@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from itertools import takewhile
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from solver.gl.passes import Region
 from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
-from solver.warp.state import ACCUMULATED, CLOSED, most_closed
+from solver.warp.state import ACCUMULATED, CLOSED, UNDONE, UNDONE_COMPONENTS, closed_in, most_closed
 
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
@@ -23,6 +24,12 @@ NOWHERE = 1e-4  # texels: a smaller displacement counts as none
 STEEPEST = 6.0  # largest |grad A| of a map that is not closed: one that stretches more folds between its texels
 
 Limits = tuple[float, float, float, float]
+
+
+class Draw(Protocol):
+    """Redraws regions, from the accumulated map or from what is `undone`, into a field that will replace it."""
+
+    def __call__(self, target: Field, regions: list[Region], /, **undone: Field) -> None: ...
 
 
 def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, int]:
@@ -50,7 +57,8 @@ class AccumulatedMap:
 
     Where it has become too steep for its texels it is closed, and a new one of nothing begins; a place is looked up in
     the new one first, then in the closed ones, the last one closed first. Once there are `most_closed` of them, it goes
-    on however steep it is.
+    on however steep it is. What the restore brush takes away of the closed ones is kept beside it, and is moved with
+    it; it is closed together with it, and comes before it in the list.
 
     Args:
         device: the device.
@@ -59,7 +67,8 @@ class AccumulatedMap:
 
     Attributes:
         now: the displacement. Tiles are redrawn into another field, which replaces it once all are done.
-        closed: the closed maps, the first one closed first.
+        undone: what is undone of the closed maps, the way and the part (`undo` in `lib/warp.glsl`); None for nothing.
+        closed: the closed maps, the first one closed first, and what was undone before each.
         limits: of the places looked up: left, top, right, bottom.
     """
 
@@ -73,6 +82,8 @@ class AccumulatedMap:
         self._find_steepest = Reduction(device, blocks_of(size), 1, "max")
         self.now = TiledField(device, size, 2, "accumulated map")
         self._next = TiledField(device, size, 2, "accumulated map, anew")
+        self.undone: TiledField | None = None
+        self._next_undone: TiledField | None = None
         self._tiles = self.now.kind.regions
         self._stale = set[Region]()  # tiles in which `_next` holds something older than `now`
         self._moved: list[Region] = []  # tiles to be drawn anew
@@ -118,13 +129,15 @@ class AccumulatedMap:
     @property
     def defines(self) -> dict[str, object]:
         """The defines of `lib/warp.glsl` for it and the closed maps."""
-        return {"CLOSED": len(self.closed)} if self.closed else {}
+        chain = self._chain
+        undone = sum(1 << number for number, field in enumerate(chain) if _is_undone(field))
+        return {name: number for name, number in (("CLOSED", len(chain)), ("UNDONE", undone)) if number}
 
     def inputs(self) -> dict[str, Any]:
         """The inputs of `lib/warp.glsl` for it and the closed maps."""
         return (
             self.own()
-            | {f"closed_{number}": field for number, field in enumerate(self.closed)}
+            | {f"closed_{number}": field for number, field in enumerate(self._chain)}
             | {"limits": self.limits}
         )
 
@@ -133,28 +146,48 @@ class AccumulatedMap:
         limits = self._picture if self.closed else self.limits
         return {"accumulated": self.now, "picture": self.extent, "limits": limits, "walled": float(self.is_walled)}
 
-    def draw(self, part: float, draw: Callable[[Field, list[Region]], None]) -> None:
-        """Do a `part`, 0-1, of what is planned: `draw` redraws regions, from `now`, into another field."""
+    @property
+    def _chain(self) -> list[TiledField]:
+        """What a place is looked up in after the map, the last one first."""
+        return self.closed if self.undone is None else [*self.closed, self.undone]
+
+    @property
+    def _pairs(self) -> list[tuple[TiledField, TiledField, dict[str, Field]]]:
+        """The map and what is undone, the field each is redrawn into, and what `Draw` is told."""
+        pairs: list[tuple[TiledField, TiledField, dict[str, Field]]] = [(self.now, self._next, {})]
+        if self.undone is not None and self._next_undone is not None:
+            pairs.append((self.undone, self._next_undone, {"undone": self.undone}))
+        return pairs
+
+    def draw(self, part: float, draw: Draw) -> None:
+        """Do a `part`, 0-1, of what is planned."""
         before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
-        if anew := self._moved[before:until]:
-            draw(self._next, anew)
+        count, anew = len(self._moved), self._moved[before:until]
+        for now, after, undone in self._pairs:
+            if anew:
+                draw(after, anew, **undone)
+                if self._is_saved:
+                    after.make_ready(anew)
+            after.take(now, self._copied[max(before - count, 0) : max(until - count, 0)])
+        if anew:
             self._look(anew)
-            if self._is_saved:
-                self._next.make_ready(anew)
-        count = len(self._moved)
-        self._next.take(self.now, self._copied[max(before - count, 0) : max(until - count, 0)])
         self._done = max(before, until)
         if part >= 1:
             self.now, self._next = self._next, self.now
+            self.undone, self._next_undone = self._next_undone, self.undone
             self._stale = set(self._moved)
             self._moved, self._copied, self._done = [], [], 0
-            if len(self.closed) < self._most_closed and self._find_steepest(self._steepness)[0] > STEEPEST**2:
-                self.closed.append(self.now)
+            if self._may_close and self._find_steepest(self._steepness)[0] > STEEPEST**2:
+                self.closed += [self.now] if self.undone is None else [self.undone, self.now]
                 self._begin_anew()
+
+    @property
+    def _may_close(self) -> bool:
+        return len(self._chain) < self._most_closed
 
     def _look(self, tiles: list[Region]) -> None:
         """Draw how steep tiles of `_next` are, if another map may be closed."""
-        if len(self.closed) < self._most_closed:
+        if self._may_close:
             spacing = [side / n for side, n in zip(self.extent, self.size, strict=True)]
             blocks = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in tiles]
             find = self.device.pass_("warp/steepness.frag", TILE=TILE)
@@ -164,6 +197,8 @@ class AccumulatedMap:
         """Go on with a map of nothing, in the field that would be drawn next."""
         self.now, self._next = self._next, TiledField(self.device, self.size, 2, "accumulated map, anew")
         self.now.clear()
+        self.undone = None
+        self._drop_undone()
         self._stale.clear()
 
     def forget(self) -> None:
@@ -171,11 +206,22 @@ class AccumulatedMap:
         self._stale.update(self._moved[: self._done])
         self._moved, self._copied, self._done = [], [], 0
 
-    def change(self, region: Region, draw: Callable[[Field, list[Region]], None]) -> None:
-        """Redraw a region at once; nothing may be planned."""
-        draw(self._next, [region])
-        self.now.copy_from(self._next, region)
+    def undo(self, region: Region, draw: Draw) -> None:
+        """Redraw a region at once, with what is undone of the closed maps, if there are any; nothing may be planned."""
+        if self.closed and self.undone is None:
+            self._begin_undoing()
+        for _, after, undone in self._pairs:
+            draw(after, [region], **undone)
+        for now, after, _ in self._pairs:
+            now.copy_from(after, region)
         self._stale.update(tile for tile in self._tiles if _meet(tile, region))
+
+    def _begin_undoing(self) -> None:
+        fields = (self._blank(UNDONE_COMPONENTS, f"what is undone{more}") for more in ("", ", anew"))
+        self.undone, self._next_undone = fields
+
+    def _blank(self, components: int, label: str) -> TiledField:
+        return TiledField(self.device, self.size, components, label)
 
     def set(self, draw: Callable[[Field], None], limits: Limits) -> None:
         """Draw all of it anew, with places within these limits, and no closed maps; what was planned is forgotten."""
@@ -185,28 +231,30 @@ class AccumulatedMap:
         self._stale = set(self._tiles)
         self.limits, self.is_walled = limits, False
 
-    def merge(self, draw: Callable[[Field], None]) -> None:
-        """Make one map of it and the closed ones: `draw` draws their composition; nothing may be planned."""
-        draw(self._next)
-        self.now, self._next = self._next, self.now
-        self._stale = set(self._tiles)
-        self._open()
-
     def saved(self) -> dict[str, TiledField]:
         """The fields by name, to be saved; from the first call on, tiles are made ready for that as they are drawn."""
         self._is_saved = True
-        return {ACCUMULATED: self.now} | {f"{CLOSED}{number}": field for number, field in enumerate(self.closed)}
+        names = [f"{UNDONE if _is_undone(field) else CLOSED}{number}" for number, field in enumerate(self._chain)]
+        return {ACCUMULATED: self.now} | dict(zip(names, self._chain, strict=True))
 
     def restore(self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool) -> None:
         """Go back to what `saved` gave, as it was then, with the limits of then; what was planned is forgotten."""
         self.forget()
         self._stale.update(self.now.restore(saved[ACCUMULATED]))
-        count = sum(name.startswith(CLOSED) for name in saved)
-        self._open(count)
-        while len(self.closed) < count:
-            self.closed.append(TiledField(self.device, self.size, 2, "closed map"))
-        for number, field in enumerate(self.closed):
-            field.restore(saved[f"{CLOSED}{number}"])
+        names = closed_in(saved)
+        undone = saved[names.pop()] if names and names[-1].startswith(UNDONE) else None
+        kinds = [saved[name].kind for name in names]
+        same = sum(1 for _ in takewhile(lambda pair: pair[0].kind == pair[1], zip(self.closed, kinds, strict=False)))
+        self._open(same)
+        self.closed += [self._blank(kind.components, "closed map") for kind in kinds[same:]]
+        for name, field in zip(names, self.closed, strict=True):
+            field.restore(saved[name])
+        if undone is None:
+            self._drop_undone()
+        elif self.undone is None:
+            self._begin_undoing()
+        if undone is not None and self.undone is not None:
+            self._stale.update(self.undone.restore(undone))
         self.limits, self.is_walled = limits, is_walled
 
     def clear(self) -> None:
@@ -225,9 +273,21 @@ class AccumulatedMap:
             thing.release()
 
     def _open(self, left: int = 0) -> None:
-        """Drop the closed maps but the first so many."""
+        """Drop the closed maps but the first so many, and what is undone of them."""
         while len(self.closed) > left:
             self.closed.pop().release()
+        if not left:
+            self._drop_undone()
+
+    def _drop_undone(self) -> None:
+        for field in (self.undone, self._next_undone):
+            if field is not None:
+                field.release()
+        self.undone = self._next_undone = None
+
+
+def _is_undone(field: TiledField) -> bool:
+    return field.components == UNDONE_COMPONENTS
 
 
 def _meet(a: Region, b: Region) -> bool:

@@ -232,10 +232,8 @@ class WarpMap:
         if not self._is_settled:
             self._begin_remap()  # or there would be a step around the held places
         self._remapping.finish()
-        if self._accumulated.closed:
-            self.remap()
-            self._accumulated.merge(lambda target: self._compose(target, (0.0, 0.0), target.texel, REMAP=1))
-        restore = self.device.pass_("warp/restore.frag", **self._held_defines())
+        held = {} if self._frozen.held is None else {"HELD": 1}
+        restore = self.device.pass_("warp/restore.frag", **held)
         inputs: dict[str, Any] = {"center": center, "radius": radius, "hardness": min(hardness, 0.99), "amount": amount}
         still = None
         if self._frozen.held is not None:
@@ -244,19 +242,19 @@ class WarpMap:
         submap, accumulated = self._submap, self._accumulated
         restore(submap.write, displacement=submap.read, window=window_of(self.grid), **inputs)
         submap.swap()
+        window = 0.0, 0.0, *self.extent
         sides = zip(center, self.size, self.extent, strict=True)
         (left, right), (top, bottom) = (
             (max(math.floor((at - radius) / side * n), 0), min(math.ceil((at + radius) / side * n), n))
             for at, n, side in sides
         )
         if right > left and bottom > top:
-            accumulated.change(
-                (left, top, right - left, bottom - top),
-                lambda target, regions: restore(
-                    target, region=regions, displacement=accumulated.now, window=(0.0, 0.0, *self.extent), **inputs
-                ),
-            )
-        window = 0.0, 0.0, *self.extent
+
+            def draw(target: Field, regions: list[Region], /, **undone: Any) -> None:
+                takes = self.device.pass_("warp/restore.frag", **held, **({"UNDONE": 1} if undone else {}))
+                takes(target, region=regions, displacement=accumulated.now, window=window, **undone, **inputs)
+
+            accumulated.undo((left, top, right - left, bottom - top), draw)
         self.factors.change(lambda target, factor: restore(target, displacement=factor, window=window, **inputs))
         if still is not None:
             still.release()
@@ -426,7 +424,7 @@ class WarpMap:
         Returns:
             The best places found, float64 (n, 2); and how far from the points these are looked up, (n,).
         """
-        more = np.column_stack([guesses - points, farthest])
+        more = np.column_stack([guesses - points, farthest, np.zeros(len(points))])
         shader, defines = "warp/seek.frag", self._defines()
         found = draw_at(self.device, guesses, self.extent, shader, defines, components=4, more=more, **self._parts())
         return guesses + found[:, :2].astype(np.float64), found[:, 2].astype(np.float64)

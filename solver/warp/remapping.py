@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -182,12 +183,13 @@ class Remapping:
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
         inputs = self._accumulated.own() | inputs_of(levels, self._frozen.inputs())
 
-        def draw(target: Field, regions: list[Region]) -> None:
+        def draw(target: Field, regions: list[Region], /, **undone: Any) -> None:
             # Also where it is held: places next to that may look into it, and it goes on from there once released.
             for is_near, parts in self._frozen.parts(regions, (0.0, 0.0), target.texel):
                 defines = defines_of(levels if is_near else away_from_held(levels))
-                compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **defines)
-                compose(target, region=parts, **inputs)
+                carry = {"CARRY": 1} if undone else fine
+                compose = self.device.pass_("warp/compose.frag", REMAP=1, **carry, **defines)
+                compose(target, region=parts, **inputs, **undone)
 
         self._accumulated.draw(part, draw)
 

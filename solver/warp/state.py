@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,10 +13,13 @@ from solver.grid import Grid
 from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
-FACTOR, CLOSED = "factor ", "closed map "  # and their numbers
+FACTOR, CLOSED, UNDONE = "factor ", "closed map ", "undone "  # and their numbers
 ACCUMULATED = "accumulated map"
-MOST_CLOSED = 8  # maps: `seek.frag` then reads 16 textures, as many as OpenGL 3.3 promises a stage
+# Closed maps, or what is undone before them: with what is undone before the accumulated one `seek.frag` then reads 16
+# textures, as many as OpenGL 3.3 promises a stage.
+MOST_CLOSED = 8
 MOST_CLOSED_TEXELS = 2**24  # of them in all
+UNDONE_COMPONENTS = 4  # of what is undone: three, and one more as OpenGL 3.3 draws into no texture of three
 
 
 class MapState(State):
@@ -47,11 +51,13 @@ class MapState(State):
                 made.fields[name] = device.upload(given, f"{name}, given")
             accumulated = self.tiles[ACCUMULATED]
             tiles = {ACCUMULATED: accumulated}
-            closed = sum(name.startswith(CLOSED) and name.endswith("/places") for name in arrays)
-            if closed > most_closed(accumulated.kind.size):
-                raise ValueError(f"its map has {closed} closed ones, more than there may be")
-            for number in range(closed):
-                tiles[f"{CLOSED}{number}"] = SavedTiles.nothing(accumulated.kind)
+            closed = closed_in(name.removesuffix("/places") for name in arrays if name.endswith("/places"))
+            most = most_closed(accumulated.kind.size) + (closed[-1:] != [] and closed[-1].startswith(UNDONE))
+            if len(closed) > most:
+                raise ValueError(f"its map has {len(closed)} closed ones, more than there may be")
+            for name in closed:
+                components = UNDONE_COMPONENTS if name.startswith(UNDONE) else 2
+                tiles[name] = SavedTiles.nothing(accumulated.kind._replace(components=components))
             for name, kind in held_kinds(accumulated.kind.size).items():
                 if f"{name}/places" in rest:
                     tiles[name] = SavedTiles.nothing(kind)
@@ -68,6 +74,25 @@ class MapState(State):
 def most_closed(size: tuple[int, int]) -> int:
     """How many closed maps there may be, for a map of `size` texels."""
     return min(MOST_CLOSED, MOST_CLOSED_TEXELS // (size[0] * size[1]))
+
+
+def closed_in(names: Iterable[str]) -> list[str]:
+    """Of the names of tiles, those of closed maps and of what is undone before them, in the order of their numbers.
+
+    Raises:
+        ValueError: if a number is missing or there twice, or what is undone has no closed map before it.
+    """
+    found = dict[int, str]()
+    for name in names:
+        kind = next((kind for kind in (CLOSED, UNDONE) if name.startswith(kind)), None)
+        if kind is not None:
+            number = name.removeprefix(kind)
+            if not number.isdecimal() or found.setdefault(int(number), name) != name:
+                raise ValueError(f"its {name} is not one of its closed maps")
+    closed = [found.get(number, "") for number in range(len(found))]
+    if not all(closed) or any(b.startswith(UNDONE) and not a.startswith(CLOSED) for a, b in pairwise(["", *closed])):
+        raise ValueError("its closed maps are not in a row")
+    return closed
 
 
 def held_kinds(size: tuple[int, int]) -> dict[str, Kind]:

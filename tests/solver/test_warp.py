@@ -711,6 +711,80 @@ def test_closed_maps_are_held_and_restored_as_one(device: Device) -> None:
     warp.release()
 
 
+def test_what_is_restored_of_closed_maps_is_taken_away_under_the_brush_alone(device: Device) -> None:
+    """Against the same part of what the map was; beyond the brush every bit stays, and nothing folds there.
+
+    One map made of all of them folds all over the swirl.
+    """
+    warp = wound_up(device, 10.0)
+    warp.remap()
+    points = np.random.default_rng(1).random((20000, 2))
+    centre, radius = (0.6, 0.55), 0.1
+    far = np.hypot(*(points - centre).T) / radius
+    before = warp.at(points)
+    left = np.ones(len(points))
+    for amount in (0.4, 0.7):
+        warp.restore_under(centre, radius, 0.3, amount)
+        part = np.clip((far - 0.3) / 0.7, 0, 1)
+        left *= 1 - amount * (1 - part**2 * (3 - 2 * part))
+    after, beyond = warp.at(points), far > 1 + 2 / 192 / radius  # the cubic reaches two texels
+    assert np.linalg.norm(before[far < 1], axis=-1).max() > 0.4
+    np.testing.assert_array_equal(after[beyond], before[beyond])
+    assert np.linalg.norm(after - left[:, None] * before, axis=-1).max() * 192 < 0.2, "texels"
+    determinants = warp.determinants(points)
+    assert determinants[beyond].min() > 0.9
+    step = np.eye(2) * 3e-5
+    slopes = [(warp.at(points + e).astype(np.float64) - warp.at(points - e)) / 6e-5 for e in step]
+    found = np.linalg.det(np.stack(slopes, axis=-1) + np.eye(2))
+    error = np.abs(found - determinants)[far < 1] / (1 + np.abs(found[far < 1]))
+    assert np.median(error) < 5e-3
+    assert np.quantile(error, 0.95) < 0.05, "but where a difference reaches over the side of a texel"
+    for _ in range(20):
+        warp.restore_under(centre, radius, 0.3, 0.5)
+    assert np.abs(warp.at(points[far < 0.3])).max() < 1e-5
+    warp.release()
+
+
+def test_what_is_restored_of_closed_maps_goes_on_with_the_flow(device: Device) -> None:
+    """It is where another flow carries it, over more than one closing; and saved states know of it, to the bit."""
+    warp, flow = wound_up(device, 6.0), swirl((0.45, 0.5), 0.3)
+    warp.remap()
+    for _ in range(10):
+        warp.restore_under((0.6, 0.55), 0.15, 0.3, 0.5)
+    state, alone, then = warp.save(), WarpMap(device, warp.grid), WarpMap(device, warp.grid)
+    assert [name for name in state.tiles if name.startswith("undone")] == [f"undone {closed(warp)}"]
+    template = then.save()
+    resumed = template.with_arrays(device, state.arrays())
+    then.restore(resumed)
+    points = np.random.default_rng(2).random((5000, 2))
+    np.testing.assert_array_equal(then.at(points), warp.at(points))
+    count = closed(warp)
+    for _ in range(50):
+        warp.advance_prescribed(flow, 0.05)
+        alone.advance_prescribed(flow, 0.05)
+    assert closed(warp) > count
+    moved = alone.at(points).astype(np.float64)
+    error = np.linalg.norm(moved + then.at(points + moved) - warp.at(points), axis=-1) * 48
+    assert np.quantile(error, 0.99) < 0.02, "cells"
+    later = warp.read((97, 97))
+    for moment in (state, template, state):
+        then.restore(moment)
+    for _ in range(50):
+        then.advance_prescribed(flow, 0.05)
+    np.testing.assert_array_equal(then.read((97, 97)), later)
+    for step in range(90):
+        if step < 30:
+            warp.advance_prescribed(flow, 0.02)
+        warp.restore_under((0.5, 0.5), 0.6, hardness=0.9, amount=0.3)
+    x, y = warp.grid.centres()
+    assert np.abs(warp.read())[np.hypot(x - 0.5, y - 0.5) < 0.5].max() < 1e-4
+    wrong = {name.replace(f"undone {count}", "undone 0"): array for name, array in state.arrays().items()}
+    with pytest.raises(ValueError, match="closed maps"):
+        template.with_arrays(device, wrong)
+    for made in (state, template, resumed, warp, alone, then):
+        made.release()
+
+
 def test_moving_to_another_grid_keeps_the_map(device: Device) -> None:
     """Two swirls that overlap, each in a window of cells of its own, against float64; the map goes through both."""
     whole = Grid(64, 48)
