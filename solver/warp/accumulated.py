@@ -106,25 +106,20 @@ class AccumulatedMap:
         self.forget()
         least, wanted = NOWHERE * self.extent[0] / self.size[0], set[Region]()
         for submap, cells in moved:
-            grid = cells.refined(submap.shape[1] // cells.nx)
-            counts = np.pad((np.abs(submap) > least).any(axis=-1).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-            for tile in self._tiles:
-                left, right = self._cells(tile, grid, 0)
-                top, bottom = self._cells(tile, grid, 1)
-                if counts[bottom, right] - counts[top, right] - counts[bottom, left] + counts[top, left]:
-                    wanted.add(tile)
+            grid, moves = cells.refined(submap.shape[1] // cells.nx), np.abs(submap) > least
+            wanted |= {tile for tile in self._tiles if moves[self._cells(tile, grid, 1), self._cells(tile, grid, 0)].any()}
         self._moved = [tile for tile in self._tiles if tile in wanted]
         self._steepness.clear()
         self._copied = sorted(self._stale.difference(wanted))
         return len(self._moved)
 
-    def _cells(self, tile: Region, grid: Grid, axis: int) -> tuple[int, int]:
-        """The first cell along an axis that a tile is interpolated from, and the one after the last."""
+    def _cells(self, tile: Region, grid: Grid, axis: int) -> slice:
+        """The cells along an axis that a tile is interpolated from."""
         texel = self.extent[axis] / self.size[axis]
         start, end = tile[axis] * texel, (tile[axis] + tile[axis + 2]) * texel
         origin, step, count = grid.origin[axis], grid.spacing[axis], grid.size[axis]
         first, last = math.floor((start - origin) / step) - REACH, math.ceil((end - origin) / step) + REACH
-        return min(max(first, 0), count), min(max(last, 0), count)
+        return slice(min(max(first, 0), count), min(max(last, 0), count))
 
     @property
     def defines(self) -> dict[str, object]:
