@@ -17,7 +17,9 @@ from app.model.tools import Made
 TIMED = ("stroke", "handle", "pin", "change", "mask")
 """The parts of a recipe that are cut off where the work goes on before their end."""
 
-LONGEST_GESTURE = 50_000  # moves of the pointer: minutes of the fastest mouse
+# Moves of the pointer, and ticks: minutes of the fastest mouse, and of holding still. Below `LONGEST_HAND`, so that a
+# mask that has been painted can be read again.
+LONGEST_GESTURE = 50_000
 ROOM = (
     100,
     8 * LONGEST_GESTURE,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from functools import lru_cache
+from itertools import accumulate, groupby, pairwise
 from math import cos, hypot, inf, pi, sin
 from typing import Annotated, Literal, NamedTuple, Self
 
@@ -19,7 +20,10 @@ FINEST_DETAIL = 65536  # cells along the longer side; places are exact to some 1
 SMALLEST_RADIUS = 1e-6  # longer sides, as of `Tip`; no pixel sees a smaller brush
 LATEST = 10_000_000  # tick
 MOST_TIMES = 1000  # that a stroke repeats
-MOST_AT_ONCE = 2000  # in one tick, all strokes and their times together: each takes half a millisecond
+# In one tick, of all strokes and their times, and of the pieces of their paths that are gone through one by one: each
+# takes about a millisecond. A mouse of 8,000 samples a second leaves 133 in a tick.
+MOST_AT_ONCE = 1000
+ONE_BY_ONE = {"curve", "thicken", "thin", "freeze", "thaw", "smooth", "restore"}
 Tick = Annotated[int, Field(ge=0, le=LATEST)]
 Sample = tuple[Tick, Place, Place, Fraction01]
 """(tick, x, y, pressure); x and y are fractions of the picture's width and height from its top-left corner."""
@@ -41,7 +45,8 @@ class BrushPath(Model):
     Between two samples the pointer moved at a constant speed, so that a stroke does not depend on how often the pointer
     was sampled: during tick n (the step from n to n + 1) the brush passes the path from time n - 1 to time n. A tool
     that acts while it stands still (twirl, bloat, thicken ...) acts in every tick from the first sample to the last.
-    A curve acts all at once, in the tick of its last sample, along the whole path.
+    A curve acts all at once, in the tick of its last sample, along the whole path. Of samples in one tick, as many are
+    left out evenly as leave `MOST_AT_ONCE` pieces.
 
     Attributes:
         radius: of the brush, in longer sides.
@@ -84,6 +89,27 @@ class BrushPath(Model):
     @property
     def last_tick(self) -> int:
         return self.samples[-1][0]
+
+    @property
+    def most_pieces(self) -> int:
+        """Of its path and its images, that are gone through one by one in a tick; at least 1."""
+        counts = [1]
+        if self.tool == "curve":
+            counts.append(len(self.samples) - 1)
+        elif self.tool in ONE_BY_ONE:
+            counts += (len(list(same)) for _, same in groupby(self.samples, lambda sample: sample[0]))
+        return min(max(counts), self._most) * self._images
+
+    @property
+    def _images(self) -> int:
+        """It acts once for each of them, where what is under the brush is looked at; else for all at once."""
+        one_by_one = self.tool in ("restore", "smooth") or (self.detail and self.tool in ("bloat", "pinch"))
+        return 1 + len(turns(self.symmetry, self.sectors)) if one_by_one else 1
+
+    @property
+    def _most(self) -> int:
+        """The pieces that its path has in a tick."""
+        return max(MOST_AT_ONCE // self._images, 1)
 
     @property
     def stays(self) -> bool:
@@ -135,9 +161,9 @@ class BrushPath(Model):
         """The length of the path up to where the pieces of `at(tick)` begin, in units of `extent`'s sides."""
         if tick <= self.first_tick:
             return 0.0
-        passed = list(self.samples[: bisect_left(self.samples, (tick,))])
-        passed.append(self._interpolated(min(tick - 1, self.last_tick)))
-        return sum(hypot((b[1] - a[1]) * extent[0], (b[2] - a[2]) * extent[1]) for a, b in pairwise(passed))
+        number = bisect_left(self.samples, (tick,)) - 1
+        last = self._interpolated(min(tick - 1, self.last_tick))
+        return _lengths(_Path(self.samples), extent)[number] + _apart(self.samples[number], last, extent)
 
     def _interpolated(self, tick: int) -> tuple[int, float, float, float]:
         """Where the pointer was at the end of `tick`, which lies between the first and the last."""
@@ -150,11 +176,12 @@ class BrushPath(Model):
         x, y, pressure = (a + (b - a) * part for a, b in zip(earlier[1:], later[1:], strict=True))
         return tick, x, y, pressure
 
-    @staticmethod
-    def _joined(points: list[tuple[int, float, float, float]] | tuple[Sample, ...]) -> tuple[Dab, ...]:
+    def _joined(self, points: list[tuple[int, float, float, float]] | tuple[Sample, ...]) -> tuple[Dab, ...]:
         if len(points) == 1:
             _, x, y, pressure = points[0]
             return (Dab(x, y, x, y, pressure),)
+        if (pieces := len(points) - 1) > (most := self._most):
+            points = [points[k * pieces // most] for k in range(most + 1)]
         return tuple(Dab(a[1], a[2], b[1], b[2], (a[3] + b[3]) / 2) for a, b in pairwise(points))
 
     def moved(self, ticks: int) -> Self:
@@ -290,22 +317,46 @@ class Stroke(BrushPath):
 
 
 def excess(strokes: Sequence[Stroke]) -> str | None:
-    """A message if more strokes act in some tick than it can do in a second or two; else None."""
+    """A message if in some tick more strokes and pieces of them act than can in a second or two; else None."""
     acting = [stroke for stroke in strokes if not stroke.muted]
-    if sum(stroke.repeat for stroke in acting) <= MOST_AT_ONCE:
+    pieces = [stroke.most_pieces for stroke in acting]
+    if sum(stroke.repeat * count for stroke, count in zip(acting, pieces, strict=True)) <= MOST_AT_ONCE:
         return None
     # By how many more act in a tick than in the one before.
     changes = np.zeros(max(stroke.end_tick for stroke in acting) + 2, np.int32)
-    for stroke in acting:
+    for stroke, count in zip(acting, pieces, strict=True):
         first = stroke.last_tick if stroke.tool == "curve" else stroke.first_tick
-        for tick, change in ((first, 1), (stroke.last_tick + 1, -1)):
+        for tick, change in ((first, count), (stroke.last_tick + 1, -count)):
             changes[tick : tick + (stroke.repeat - 1) * stroke.every + 1 : max(stroke.every, 1)] += change
     acts = np.cumsum(changes, out=changes)
     if (most := int(acts.max())) <= MOST_AT_ONCE:
         return None
-    return (
-        f"{most} strokes act at once in tick {int(acts.argmax())}, with their repetitions; at most {MOST_AT_ONCE} work"
-    )
+    what = "pieces of strokes" if max(pieces) > 1 else "strokes"
+    at = int(acts.argmax())
+    return f"{most} {what} act at once in tick {at}, with their repetitions; at most {MOST_AT_ONCE} work"
+
+
+class _Path:
+    """The samples of a stroke, found again without looking at each."""
+
+    def __init__(self, samples: tuple[Sample, ...]) -> None:
+        self.samples = samples
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Path) and self.samples is other.samples
+
+    def __hash__(self) -> int:
+        return id(self.samples)
+
+
+@lru_cache(64)
+def _lengths(path: _Path, extent: tuple[float, float]) -> list[float]:
+    """Of a path up to each of its samples: once for all ticks, or a long stroke would take the square of its length."""
+    return list(accumulate((_apart(a, b, extent) for a, b in pairwise(path.samples)), initial=0.0))
+
+
+def _apart(a: Sample, b: Sample, extent: tuple[float, float]) -> float:
+    return hypot((b[1] - a[1]) * extent[0], (b[2] - a[2]) * extent[1])
 
 
 def turns(symmetry: Symmetry, sectors: int) -> list[tuple[float, float, float, float]]:

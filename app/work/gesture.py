@@ -38,9 +38,14 @@ class OpenGesture:
         self.path = [touch[1:3]]
         self.pen = touch.tick
         self._tool = tool
-        self._touch = touch
+        self._first = self._touch = touch
         self._string = PulledString(press.string, extent, self.path[0])
         self._drawing = tool.gesture(press, touch)
+
+    @property
+    def ticks(self) -> int:
+        """That it has taken so far."""
+        return self.pen - self._first.tick
 
     def begin(self) -> None:
         """The pointer is down."""

@@ -84,9 +84,13 @@ class Painting(Recording):
         if self._gesture is not None:
             self._gesture.move(x, y, pressure, shift)
             self._hear(self._gesture)
-            if len(self._gesture.path) >= LONGEST_GESTURE:
-                self.release()
-                self.notice = "This stroke has reached its greatest length. Press again to continue."
+            self._end_if_long(self._gesture)
+
+    def _end_if_long(self, gesture: OpenGesture) -> None:
+        """End what has as many moves, or ticks of holding still, as there is to be room for."""
+        if max(len(gesture.path), gesture.ticks) >= LONGEST_GESTURE:
+            self.release()
+            self.notice = "This stroke has reached its greatest length. Press again to continue."
 
     def release(self) -> None:
         """The pointer went up: the gesture becomes an entry of the history, and the fluid comes to rest by itself."""
@@ -110,7 +114,11 @@ class Painting(Recording):
         else:
             last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
         if isinstance(made, MaskStroke):
-            self._keep_masks(gesture.label_of(made), made)
+            try:
+                self._keep_masks(gesture.label_of(made), made)
+            except UserError:
+                self._show(self.document.recipe)
+                raise
             return
         self._live = with_made(self._base, made, max(gesture.pen, last + 1), gesture.taken)
         self.replay.use(self._live)

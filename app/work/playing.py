@@ -47,6 +47,8 @@ class Playing(Editing):
             self._approach(start + PATIENCE)
             return
         while ticks > 0 or self.is_behind:
+            if self._gesture is not None:
+                self._end_if_long(self._gesture)
             if self._is_timeless:
                 self._paint_masks()
             elif self.is_painting and ticks > 0 and (self.made is not None or self.coasting):

@@ -235,6 +235,19 @@ SMALL_AND_HARMFUL = {
         * 6000,
         "12000 strokes act at once in tick 1, with their repetitions",
     ),
+    "images at once": (
+        (
+            "[[stroke]]\ntool = 'bloat'\ndetail = 600\nsymmetry = 'radial'\nsectors = 16\n"
+            "samples = [[0, 0.1, 0.2, 1.0]]\n"
+        )
+        * 63,
+        "1008 pieces of strokes act at once in tick 0",
+    ),
+    "samples at once": (
+        "[[stroke]]\ntool = 'restore'\nsamples = [" + "[0, 0.1, 0.2, 1.0], [0, 0.8, 0.2, 1.0], " * 300 + "]\n"
+        "[[stroke]]\ntool = 'curve'\nsamples = [" + "[0, 0.1, 0.2, 1.0], [0, 0.8, 0.2, 1.0], " * 300 + "]\n",
+        "1199 pieces of strokes act at once in tick 0",
+    ),
     "keys of a handle": (
         "[[handle]]\nat = [0.5, 0.5]\nkeys = ["
         + "".join(f"[{key}, 0.5, 0.5], " for key in range(200_000))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterator
-from itertools import pairwise
+import time
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise, product
 
 import pytest
 from pydantic import ValidationError
@@ -37,10 +38,10 @@ def handle(**more: object) -> RecipeHandle:
     return RecipeHandle.model_validate({"at": (0.4, 0.5), "to": (0.5, 0.5), **more})
 
 
-def random_stroke(dice: random.Random) -> Stroke:
+def random_stroke(dice: random.Random, tools: Sequence[str] = ("push", "twirl", "freeze")) -> Stroke:
     ticks = sorted(dice.randrange(0, 24) for _ in range(dice.randrange(1, 6)))
     samples = tuple((tick, round(dice.random(), 3), round(dice.random(), 3), round(dice.random(), 2)) for tick in ticks)
-    made = stroke(*samples, tool=dice.choice(["push", "twirl", "freeze"]), muted=dice.random() < 0.2)
+    made = stroke(*samples, tool=dice.choice(tools), muted=dice.random() < 0.2)
     times = dice.choice([1, 1, 2, 3, 7])
     return made.repeated(times, dice.randrange(1, 20))
 
@@ -56,7 +57,7 @@ def done(several: tuple[Stroke, ...], tick: int) -> list[tuple[str, float, tuple
 def test_how_many_strokes_act_at_once_is_counted_as_they_act(monkeypatch: pytest.MonkeyPatch) -> None:
     dice = random.Random(3)
     for _ in range(60):
-        several = tuple(random_stroke(dice) for _ in range(dice.randrange(1, 9)))
+        several = tuple(random_stroke(dice, ("push", "twirl")) for _ in range(dice.randrange(1, 9)))
         if dice.random() < 0.5:
             several += (stroke((2, 0.1, 0.1, 1.0), (9, 0.4, 0.1, 1.0), tool="curve", repeat=3, every=2),)
         acts = [sum(1 for one in several for _ in one.acts(tick)) for tick in range(200)]
@@ -66,6 +67,62 @@ def test_how_many_strokes_act_at_once_is_counted_as_they_act(monkeypatch: pytest
         if most := max(acts):
             told = f"{most} strokes act at once in tick {acts.index(most)}, with their repetitions; at most"
             assert strokes.excess(several) == f"{told} {most - 1} work"
+
+
+def test_pieces_that_are_gone_through_one_by_one_are_counted_as_the_most_that_a_stroke_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    dice = random.Random(4)
+    for _ in range(60):
+        several = [
+            random_stroke(dice, ("push", "freeze", "restore", "bloat")).model_copy(
+                update={"symmetry": dice.choice(["none", "both"]), "detail": dice.choice([0, 500])}
+            )
+            for _ in range(dice.randrange(1, 9))
+        ]
+        most = [0] * 200
+        for tick, one in product(range(200), several):
+            for act in one.acts(tick):
+                by_image = one.tool == "restore" or (one.tool == "bloat" and one.detail)
+                pieces = 1 if one.tool in ("push", "bloat") else len(act.dabs)
+                most[tick] += pieces * (4 if by_image and one.symmetry == "both" else 1)
+        monkeypatch.setattr(strokes, "MOST_AT_ONCE", max(0, max(most) - 1))
+        said = strokes.excess(several)
+        assert not max(most) or (said is not None and int(said.split()[0]) >= max(most))
+        monkeypatch.setattr(strokes, "MOST_AT_ONCE", sum(one.repeat * one.most_pieces for one in several))
+        assert strokes.excess(several) is None
+
+
+@pytest.mark.parametrize("tool", ["curve", "thicken", "restore", "push"])
+def test_of_very_many_samples_in_a_tick_some_are_passed_over_evenly(tool: str) -> None:
+    samples = [(0, k / 50_000, 0.5, k / 50_000) for k in range(50_001)]
+    pieces = stroke(*samples, tool=tool).at(0)
+    assert len(pieces) == strokes.MOST_AT_ONCE
+    assert (pieces[0].x0, pieces[-1].x1) == (0.0, 1.0)
+    for one, other in pairwise(pieces):
+        assert one[2:4] == other[:2]
+    for piece in pieces:
+        assert piece.x1 - piece.x0 == pytest.approx(1 / strokes.MOST_AT_ONCE)
+        assert piece.pressure == pytest.approx((piece.x0 + piece.x1) / 2)
+    fewer = samples[: strokes.MOST_AT_ONCE + 1]
+    assert [(piece.x0, piece.x1) for piece in stroke(*fewer, tool=tool).at(0)] == [
+        (one[1], other[1]) for one, other in pairwise(fewer)
+    ]
+    radial = stroke(*samples, tool=tool).model_copy(update={"symmetry": "radial", "sectors": 10})
+    assert len(radial.at(0)) == strokes.MOST_AT_ONCE // (10 if tool == "restore" else 1)
+
+
+def test_how_far_a_stroke_has_come_is_added_up_once() -> None:
+    dice, extent = random.Random(5), (1.0, 0.7)
+    samples = [(k // 200, dice.random(), dice.random(), 1.0) for k in range(100_000)]
+    begun, long = time.process_time(), stroke(*samples)
+    far = [long.travelled(tick, extent) for tick in range(-1, 502)]
+    assert time.process_time() - begun < 2  # or 8 s, going through what is passed at each tick
+    for tick in (0, 1, 2, 250, 499, 500):
+        ways = [(b[1] - a[1], 0.7 * (b[2] - a[2])) for a, b in pairwise(samples[: 200 * tick])]
+        assert far[tick + 1] == pytest.approx(sum(math.hypot(*way) for way in ways), rel=1e-12)
+    assert far[0] == far[1] == 0.0
+    assert far[501] == far[502]
 
 
 # -- a stroke ---------------------------------------------------------------------------------------------------------

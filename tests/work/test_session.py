@@ -17,10 +17,10 @@ from app.model import edits, toml
 from app.model.bars import Which
 from app.model.forces import VortexForce
 from app.model.handles import RecipeHandle
-from app.model.mask_edits import InvertMask, MaskStroke, mask_edit
+from app.model.mask_edits import LONGEST_HAND, InvertMask, MaskStroke, mask_edit
 from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.model.recipe import Recipe
-from app.model.strokes import Stroke
+from app.model.strokes import BrushPath, Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
@@ -126,6 +126,45 @@ def test_a_stroke_that_is_as_long_as_one_may_be_ends_and_says_so(
     assert session.notice == "This stroke has reached its greatest length. Press again to continue."
     (stroke,) = session.recipe.stroke
     assert 4 <= len(stroke.samples) < 10
+
+
+@pytest.mark.parametrize("tool", ["thicken", "twirl"])
+def test_a_pen_that_is_held_still_for_too_long_ends_its_stroke_and_says_so(
+    tool: str, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert edits.LONGEST_GESTURE < LONGEST_HAND / 2  # also where the brush comes after the pointer for as long again
+    monkeypatch.setattr("app.work.session.LONGEST_GESTURE", 8)
+    monkeypatch.setattr("app.model.mask_edits.LONGEST_HAND", 16)
+    press = Press(BrushSettings(0.12, 0.2), False, session.extent, session.dt)
+    session.press(TOOL[tool], press, 0.4, 0.5)
+    for _ in range(40):
+        session.advance(1)
+    assert session.notice == "This stroke has reached its greatest length. Press again to continue."
+    assert not session.is_painting
+    session.settle()
+    (made,) = session.document.recipe.mask or session.document.recipe.stroke
+    assert isinstance(made, BrushPath)
+    assert made.last_tick - made.first_tick == 7
+    assert Recipe.parse(session.document.recipe.text()) == session.document.recipe == session.recipe
+
+
+def test_a_stroke_on_a_mask_that_is_refused_when_it_ends_is_as_if_it_had_not_been(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paint(session, "thicken", (0.3, 0.3), (0.6, 0.6))
+    before, painted = session.document.recipe, session.replay.masks.thickness.get()
+    press = Press(BrushSettings(0.2, 0.2), False, session.extent, session.dt)
+    session.press(TOOL["thicken"], press, 0.4, 0.5)
+    for place in (0.5, 0.6, 0.7):
+        session.move(place, 0.5)
+        session.advance(1)
+    assert not np.array_equal(session.replay.masks.thickness.get(), painted)
+    monkeypatch.setattr(edits, "MOST_NUMBERS", 1)
+    with pytest.raises(UserError, match="as large as one may be"):
+        session.release()
+    session.settle()
+    assert session.recipe == session.document.recipe == session.replay.recipe == before
+    assert np.array_equal(session.replay.masks.thickness.get(), painted)
 
 
 @pytest.mark.long
