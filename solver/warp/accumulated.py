@@ -107,7 +107,9 @@ class AccumulatedMap:
         least, wanted = NOWHERE * self.extent[0] / self.size[0], set[Region]()
         for submap, cells in moved:
             grid, moves = cells.refined(submap.shape[1] // cells.nx), np.abs(submap) > least
-            wanted |= {tile for tile in self._tiles if moves[self._cells(tile, grid, 1), self._cells(tile, grid, 0)].any()}
+            wanted |= {
+                tile for tile in self._tiles if moves[self._cells(tile, grid, 1), self._cells(tile, grid, 0)].any()
+            }
         self._moved = [tile for tile in self._tiles if tile in wanted]
         self._steepness.clear()
         self._copied = sorted(self._stale.difference(wanted))

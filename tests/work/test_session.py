@@ -133,7 +133,7 @@ def test_a_pen_that_is_held_still_for_too_long_ends_its_stroke_and_says_so(
     tool: str, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert edits.LONGEST_GESTURE < LONGEST_HAND / 2  # also where the brush comes after the pointer for as long again
-    monkeypatch.setattr("app.work.session.LONGEST_GESTURE", 8)
+    monkeypatch.setattr("app.work.painting.LONGEST_GESTURE", 8)
     monkeypatch.setattr("app.model.mask_edits.LONGEST_HAND", 16)
     press = Press(BrushSettings(0.12, 0.2), False, session.extent, session.dt)
     session.press(TOOL[tool], press, 0.4, 0.5)
