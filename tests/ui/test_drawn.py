@@ -26,7 +26,7 @@ from app.ui.events import Mods
 from app.ui.export_dialog import ANIMATION, MAP, ExportDialog
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
-from app.work import session
+from app.work import playing, recording
 from solver.gl.device import Device
 from support.drawn import Drawn, differences, new_in
 from support.editing import Robot, add_bars, small_project, summary
@@ -268,9 +268,9 @@ def golden() -> Iterator[dict[str, list[str]]]:
 @pytest.fixture(autouse=True)
 def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """However fast the machine is."""
-    monkeypatch.setattr(session, "QUICK", 0.0)
-    monkeypatch.setattr(session, "PATIENCE", 0.0)
-    monkeypatch.setattr(session, "RETURN", 600.0)
+    monkeypatch.setattr(playing, "QUICK", 0.0)
+    monkeypatch.setattr(playing, "PATIENCE", 0.0)
+    monkeypatch.setattr(recording, "RETURN", 600.0)
 
 
 @pytest.mark.parametrize("tour", TOURS, ids=lambda tour: tour.__name__)

@@ -18,7 +18,7 @@ from imgui_bundle import imgui
 from app.model.handles import RecipeHandle, RecipePin
 from app.ui.actions import ACTIONS
 from app.ui.events import LEFT, MIDDLE, RIGHT, Mods
-from app.work import session
+from app.work import playing, recording
 from solver.gl.device import Device
 from support.drawn import Drawn
 from support.editing import Robot, add_bars, small_project, summary
@@ -84,9 +84,9 @@ def golden(shared_device: Device) -> Iterator[Golden]:
 def test_a_walk_leads_where_it_did(
     device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, area: str, number: int, golden: Golden
 ) -> None:
-    monkeypatch.setattr(session, "QUICK", 0.0)
-    monkeypatch.setattr(session, "PATIENCE", 0.0)
-    monkeypatch.setattr(session, "RETURN", 600.0)
+    monkeypatch.setattr(playing, "QUICK", 0.0)
+    monkeypatch.setattr(playing, "PATIENCE", 0.0)
+    monkeypatch.setattr(recording, "RETURN", 600.0)
     name, dice = f"{imgui.get_version()} {area} {number}", Random(f"{area} {number}")
     if not WRITES and not golden.has(name):
         pytest.skip("letters lie elsewhere in other versions of imgui")
