@@ -179,18 +179,21 @@ vec2 accumulated_displacement(sampler2D accumulated, vec2 place) {
 #endif
 }
 
+// Texels of a closed map, or of what is undone, for each of A's.
+vec2 texels_of(sampler2D closed) { return vec2(textureSize(closed, 0)) / vec2(textureSize(u_accumulated, 0)); }
+
 // Looks a closed map up where x has been led: x + moved + more, kept in the picture. `place` is x + moved in A's texels; it
 // is moved along and not computed anew, so that it stays on its texel to the bit where nothing has moved.
 void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
     vec2 led = within_picture(x, moved + more) - moved;
     moved += led;
-    place += led * vec2(textureSize(closed, 0)) / u_picture;
-    more = accumulated_displacement(closed, place);
+    place += led * vec2(textureSize(u_accumulated, 0)) / u_picture;
+    more = accumulated_displacement(closed, place * texels_of(closed));
 }
 
 // What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T).
 vec3 undone_at(sampler2D undone, vec2 place) {
-    vec3 read = cubic_texels(undone, place, u_walled).rgb;
+    vec3 read = cubic_texels(undone, place * texels_of(undone), u_walled).rgb;
     return vec3(read.rg, clamp(read.b, 0.0, 1.0));
 }
 

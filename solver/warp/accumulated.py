@@ -15,13 +15,22 @@ from solver.gl.passes import Region
 from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
-from solver.warp.state import ACCUMULATED, CLOSED, UNDONE, UNDONE_COMPONENTS, closed_in, most_closed
+from solver.warp.state import (
+    ACCUMULATED,
+    CLOSED,
+    MOST_CLOSED,
+    MOST_CLOSED_BYTES,
+    UNDONE,
+    UNDONE_COMPONENTS,
+    closed_in,
+)
 
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
 STEEPEST = 6.0  # largest |grad A| of a map that is not closed: one that stretches more folds between its texels
+CLOSED_TEXELS = 8  # of a closed map along a cell, at least, if it has fewer than A: with as many none folds
 
 Limits = tuple[float, float, float, float]
 
@@ -56,9 +65,10 @@ class AccumulatedMap:
     """A displacement of the whole picture, RG32F, longer sides, redrawn tile by tile where something has moved.
 
     Where it has become too steep for its texels it is closed, and a new one of nothing begins; a place is looked up in
-    the new one first, then in the closed ones, the last one closed first. Once there are `most_closed` of them, it goes
-    on however steep it is. What the restore brush takes away of the closed ones is kept beside it, and is moved with
-    it; it is closed together with it, and comes before it in the list.
+    the new one first, then in the closed ones, the last one closed first. These have fewer texels where as many would
+    leave no room for `MOST_CLOSED`, but no fewer than `CLOSED_TEXELS` for a cell that moved them. Once there are as
+    many as there may be, it goes on however steep it is. What the restore brush takes away of the closed ones is kept
+    beside it, is moved and closed with it, and comes before it in the list.
 
     Args:
         device: the device.
@@ -70,6 +80,7 @@ class AccumulatedMap:
         undone: what is undone of the closed maps, the way and the part (`undo` in `lib/warp.glsl`); None for nothing.
         closed: the closed maps, the first one closed first, and what was undone before each.
         limits: of the places looked up: left, top, right, bottom.
+        finest: the smallest cell that has moved the map, longer sides; 0 if it may have any detail.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
@@ -77,7 +88,6 @@ class AccumulatedMap:
         self.size = size
         self.extent = extent
         self.closed: list[TiledField] = []
-        self._most_closed = most_closed(size)
         self._steepness = device.field(blocks_of(size), 1, "accumulated map, steepness")
         self._find_steepest = Reduction(device, blocks_of(size), 1, "max")
         self.now = TiledField(device, size, 2, "accumulated map")
@@ -92,18 +102,21 @@ class AccumulatedMap:
         self._is_saved = False  # if so, tiles are copied for the next save as they are drawn, not all of them at once
         self.limits = self._picture = (0.0, 0.0, *extent)
         self.is_walled = True
+        self.finest = 1.0
 
     def is_fine(self, grid: Grid) -> bool:
         """True if it has `LEAST_TEXELS` texels along a cell of a grid."""
         texels = (n * step / side for n, step, side in zip(self.size, grid.spacing, self.extent, strict=True))
         return min(texels) > LEAST_TEXELS - 1e-6
 
-    def begin(self, *moved: tuple[np.ndarray, Grid]) -> int:
+    def begin(self, *moved: tuple[np.ndarray, Grid], is_held: bool = False) -> int:
         """Plan to redraw all tiles in which one of several submaps moves anything; returns how many there are.
 
-        Each submap has one texel, or n x n, for every cell of its grid: (ny, nx, 2).
+        Each submap has one texel, or n x n, for every cell of its grid: (ny, nx, 2). Is anything held, they stop within
+        a few texels.
         """
         self.forget()
+        self.finest = 0.0 if is_held else min(self.finest, *(min(grid.spacing) for _, grid in moved))
         least, wanted = NOWHERE * self.extent[0] / self.size[0], set[Region]()
         for submap, cells in moved:
             grid, moves = cells.refined(submap.shape[1] // cells.nx), np.abs(submap) > least
@@ -175,12 +188,21 @@ class AccumulatedMap:
             self._stale = set(self._moved)
             self._moved, self._copied, self._done = [], [], 0
             if self._may_close and self._find_steepest(self._steepness)[0] > STEEPEST**2:
-                self.closed += [self.now] if self.undone is None else [self.undone, self.now]
-                self._begin_anew()
+                self._close()
+
+    @property
+    def _closed_size(self) -> tuple[int, int]:
+        """(width, height) in texels that it has once it is closed."""
+        least = (self.finest * n / side / CLOSED_TEXELS for n, side in zip(self.size, self.extent, strict=True))
+        fitting = math.sqrt(self.now.nbytes * MOST_CLOSED / MOST_CLOSED_BYTES)
+        times = max(min(math.ceil(fitting), *map(math.floor, least)), 1)
+        return -(-self.size[0] // times), -(-self.size[1] // times)
 
     @property
     def _may_close(self) -> bool:
-        return len(self._chain) < self._most_closed
+        width, height = self._closed_size
+        own = sum(field.components for field, _, _ in self._pairs) * 4 * width * height
+        return len(self._chain) < MOST_CLOSED and own + sum(field.nbytes for field in self.closed) <= MOST_CLOSED_BYTES
 
     def _look(self, tiles: list[Region]) -> None:
         """Draw how steep tiles of `_next` are, if another map may be closed."""
@@ -190,12 +212,24 @@ class AccumulatedMap:
             find = self.device.pass_("warp/steepness.frag", TILE=TILE)
             find(self._steepness, region=blocks, displacement=self._next, spacing=spacing, side=SIDE)
 
-    def _begin_anew(self) -> None:
-        """Go on with a map of nothing, in the field that would be drawn next."""
-        self.now, self._next = self._next, TiledField(self.device, self.size, 2, "accumulated map, anew")
-        self.now.clear()
-        self.undone = None
+    def _close(self) -> None:
+        """Keep it as it is, and go on with a map of nothing."""
+        size, steep = self._closed_size, [self.now] if self.undone is None else [self.undone, self.now]
+        if size == self.size:
+            self.closed += steep
+            self.now, self.undone = self._blank(2, "accumulated map"), None
+        else:
+            for now in steep:
+                self.closed.append(closed := self._blank(now.components, "closed map", size))
+                resample = self.device.pass_("warp/resample.frag", CUBIC=1)
+                resample(closed, displacement=now, origin=(0.0, 0.0), step=closed.texel)
         self._drop_undone()
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        self.finest = 1.0
+        for field in (self.now, self._next):
+            field.clear()
         self._stale.clear()
 
     def forget(self) -> None:
@@ -203,8 +237,12 @@ class AccumulatedMap:
         self._stale.update(self._moved[: self._done])
         self._moved, self._copied, self._done = [], [], 0
 
-    def undo(self, region: Region, draw: Draw) -> None:
-        """Redraw a region at once, with what is undone of the closed maps, if there are any; nothing may be planned."""
+    def undo(self, region: Region, draw: Draw, edge: float) -> None:
+        """Redraw a region at once, with what is undone of the closed maps, if there are any; nothing may be planned.
+
+        `edge`: how wide the brush's is, longer sides.
+        """
+        self.finest = min(self.finest, edge / 2)
         if self.closed and self.undone is None:
             self._begin_undoing()
         for _, after, undone in self._pairs:
@@ -217,8 +255,8 @@ class AccumulatedMap:
         fields = (self._blank(UNDONE_COMPONENTS, f"what is undone{more}") for more in ("", ", anew"))
         self.undone, self._next_undone = fields
 
-    def _blank(self, components: int, label: str) -> TiledField:
-        return TiledField(self.device, self.size, components, label)
+    def _blank(self, components: int, label: str, size: tuple[int, int] | None = None) -> TiledField:
+        return TiledField(self.device, size or self.size, components, label)
 
     def set(self, draw: Callable[[Field], None], limits: Limits) -> None:
         """Draw all of it anew, with places within these limits, and no closed maps; what was planned is forgotten."""
@@ -227,6 +265,7 @@ class AccumulatedMap:
         draw(self.now)
         self._stale = set(self._tiles)
         self.limits, self.is_walled = limits, False
+        self.finest = 0.0
 
     def saved(self) -> dict[str, TiledField]:
         """The fields by name, to be saved; from the first call on, tiles are made ready for that as they are drawn."""
@@ -234,8 +273,13 @@ class AccumulatedMap:
         names = [f"{UNDONE if _is_undone(field) else CLOSED}{number}" for number, field in enumerate(self._chain)]
         return {ACCUMULATED: self.now} | dict(zip(names, self._chain, strict=True))
 
-    def restore(self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool) -> None:
-        """Go back to what `saved` gave, as it was then, with the limits of then; what was planned is forgotten."""
+    @property
+    def sizes(self) -> list[tuple[int, int]]:
+        """(width, height) in texels of the closed maps, and of what is undone, as `saved` names them."""
+        return [field.size for field in self._chain]
+
+    def restore(self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool, finest: float) -> None:
+        """Go back to what `saved` gave, as it was then, with all else of then; what was planned is forgotten."""
         self.forget()
         self._stale.update(self.now.restore(saved[ACCUMULATED]))
         names = closed_in(saved)
@@ -243,7 +287,7 @@ class AccumulatedMap:
         kinds = [saved[name].kind for name in names]
         same = sum(1 for _ in takewhile(lambda pair: pair[0].kind == pair[1], zip(self.closed, kinds, strict=False)))
         self._open(same)
-        self.closed += [self._blank(kind.components, "closed map") for kind in kinds[same:]]
+        self.closed += [self._blank(kind.components, "closed map", kind.size) for kind in kinds[same:]]
         for name, field in zip(names, self.closed, strict=True):
             field.restore(saved[name])
         if undone is None:
@@ -252,15 +296,13 @@ class AccumulatedMap:
             self._begin_undoing()
         if undone is not None and self.undone is not None:
             self._stale.update(self.undone.restore(undone))
-        self.limits, self.is_walled = limits, is_walled
+        self.limits, self.is_walled, self.finest = limits, is_walled, finest
 
     def clear(self) -> None:
         """The identity; what was planned is forgotten."""
         self.forget()
         self._open()
-        for field in (self.now, self._next):
-            field.clear()
-        self._stale.clear()
+        self._begin_anew()
         self.limits, self.is_walled = self._picture, True
 
     def release(self) -> None:

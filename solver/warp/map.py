@@ -28,7 +28,7 @@ from solver.warp.factors import Factors
 from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
-from solver.warp.state import ACCUMULATED, FACTOR, SUBMAPS, MapState, grid_in, values_of
+from solver.warp.state import ACCUMULATED, FACTOR, SIZES, SUBMAPS, MapState, grid_in, values_of
 from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
@@ -254,7 +254,8 @@ class WarpMap:
                 takes = self.device.pass_("warp/restore.frag", **held, **({"UNDONE": 1} if undone else {}))
                 takes(target, region=regions, displacement=accumulated.now, window=window, **undone, **inputs)
 
-            accumulated.undo((left, top, right - left, bottom - top), draw)
+            edge = radius * (1 - inputs["hardness"])
+            accumulated.undo((left, top, right - left, bottom - top), draw, edge)
         self.factors.change(lambda target, factor: restore(target, displacement=factor, window=window, **inputs))
         if still is not None:
             still.release()
@@ -309,8 +310,9 @@ class WarpMap:
     def save(self) -> MapState:
         """A copy of this moment, on the GPU, which the caller releases; states share tiles that are the same."""
         fields: dict[str, Field] = {"submap": self._submap.read, **self._accumulated.saved()}
-        values: dict[str, Any] = {"steps": self._steps, "limits": self._accumulated.limits}
-        values["walled"] = self._accumulated.is_walled
+        accumulated = self._accumulated
+        values: dict[str, Any] = {"steps": self._steps, "limits": accumulated.limits, "walled": accumulated.is_walled}
+        values |= {"finest": accumulated.finest} | ({SIZES: accumulated.sizes} if accumulated.sizes else {})
         values |= {"grid": values_of(self.grid), "settled": self._is_settled}
         fields |= self.factors.save()
         for name, level in self._remapping.saved():
@@ -334,7 +336,8 @@ class WarpMap:
             raise ValueError("the state is of another picture")
         left, top, right, bottom = state.values["limits"].tolist()
         is_walled = bool(state.values.get("walled", True))
-        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled)
+        finest = float(state.values.get("finest", 0.0))
+        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled, finest)
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)

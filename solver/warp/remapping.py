@@ -87,7 +87,7 @@ class Remapping:
         if self._gathered is None:
             self._take_in(1.0)
         else:
-            self._accumulated.begin(*((level.field.get(), level.grid) for level in self.levels))
+            self._begin(self.levels)
             self._draw_anew(self.levels, 1.0)
             self.drop()
 
@@ -130,10 +130,15 @@ class Remapping:
 
     def _stand_by(self, moved: Level, progress: int = 0) -> bool:
         """Make a level pending, from a `progress` on; False if there is nothing to take in."""
-        self._tiles = self._accumulated.begin((moved.field.get(), moved.grid))
+        self._tiles = self._begin([moved])
         self._begun = self._done = max(0, min(progress, self._whole - 1))
         self._pending = moved if self._tiles else None
         return self._tiles > 0
+
+    def _begin(self, levels: list[Level]) -> int:
+        """Plan the accumulated map's tiles anew that these levels move; how many there are."""
+        is_held = self._frozen.held is not None
+        return self._accumulated.begin(*((level.field.get(), level.grid) for level in levels), is_held=is_held)
 
     def _gather(self, submap: Submap, is_weighed: bool) -> None:
         """Add a submap to the gathered level."""

@@ -14,11 +14,11 @@ from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED, UNDONE = "factor ", "closed map ", "undone "  # and their numbers
-ACCUMULATED = "accumulated map"
+ACCUMULATED, SIZES = "accumulated map", "closed sizes"
 # Closed maps, or what is undone before them: with what is undone before the accumulated one `seek.frag` then reads 16
 # textures, as many as OpenGL 3.3 promises a stage.
 MOST_CLOSED = 8
-MOST_CLOSED_TEXELS = 2**24  # of them in all
+MOST_CLOSED_BYTES = 2**27  # of them in all
 UNDONE_COMPONENTS = 4  # of what is undone: three, and one more as OpenGL 3.3 draws into no texture of three
 
 
@@ -52,12 +52,11 @@ class MapState(State):
             accumulated = self.tiles[ACCUMULATED]
             tiles = {ACCUMULATED: accumulated}
             closed = closed_in(name.removesuffix("/places") for name in arrays if name.endswith("/places"))
-            most = most_closed(accumulated.kind.size) + (closed[-1:] != [] and closed[-1].startswith(UNDONE))
-            if len(closed) > most:
+            if len(closed) - (closed[-1:] != [] and closed[-1].startswith(UNDONE)) > MOST_CLOSED:
                 raise ValueError(f"its map has {len(closed)} closed ones, more than there may be")
-            for name in closed:
+            for name, size in zip(closed, _sizes(arrays, len(closed), accumulated.kind.size), strict=True):
                 components = UNDONE_COMPONENTS if name.startswith(UNDONE) else 2
-                tiles[name] = SavedTiles.nothing(accumulated.kind._replace(components=components))
+                tiles[name] = SavedTiles.nothing(accumulated.kind._replace(size=size, components=components))
             for name, kind in held_kinds(accumulated.kind.size).items():
                 if f"{name}/places" in rest:
                     tiles[name] = SavedTiles.nothing(kind)
@@ -71,9 +70,12 @@ class MapState(State):
         return made
 
 
-def most_closed(size: tuple[int, int]) -> int:
-    """How many closed maps there may be, for a map of `size` texels."""
-    return min(MOST_CLOSED, MOST_CLOSED_TEXELS // (size[0] * size[1]))
+def _sizes(arrays: Mapping[str, np.ndarray], count: int, largest: tuple[int, int]) -> list[tuple[int, int]]:
+    """Of so many closed maps, in texels; the largest if they are not told."""
+    sizes = arrays.get(SIZES, np.tile(largest, (count, 1)))
+    if sizes.shape != (count, 2) or ((sizes < 1) | (sizes > largest)).any():
+        raise ValueError("the sizes of its closed maps are missing")
+    return [(int(width), int(height)) for width, height in sizes]
 
 
 def closed_in(names: Iterable[str]) -> list[str]:

@@ -689,6 +689,46 @@ def test_closed_maps_are_saved_and_come_back(device: Device) -> None:
         made.release()
 
 
+def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Room for two of 16 texels a cell: with half as many each way it does not fold either, and saved states go on."""
+    monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 2 * 768 * 768 * 8)
+    grid, flow = Grid(48, 48), swirl((0.5, 0.5), 0.45)
+    warp, then, frozen = (WarpMap(device, grid, (768, 768)) for _ in range(3))
+    frozen.hold(device.upload(np.eye(16, dtype=np.uint8) * 255))
+    for step in range(160):
+        if step == 100:
+            warp.remap()
+            warp.restore_under((0.8, 0.8), 0.2, 0.0, 0.1)  # an edge as wide as eight cells
+            state = warp.save()
+        for one in (warp, frozen):
+            one.advance_prescribed(flow, 0.05)
+    count = closed(warp)
+    assert count >= 4
+    assert {tuple(size) for size in state.values["closed sizes"].tolist()} == {(384, 384), (768, 768)}
+    assert [field.size for field in warp._accumulated.closed] == [(384, 384)] * (count + 1), "and what is undone"
+    assert [field.size for field in frozen._accumulated.closed] == [(768, 768)] * 2, "beside what is held in full"
+    points = np.random.default_rng(0).random((4000, 2))
+    right, down = (points - 0.5).T
+    turn = -32 * np.clip(1 - (right**2 + down**2) / 0.45**2, 0, None) ** 4
+    exact = np.stack([np.cos(turn) * right - np.sin(turn) * down, np.sin(turn) * right + np.cos(turn) * down], axis=-1)
+    off = np.linalg.norm(warp.at(points) - (exact - (points - 0.5)), axis=-1) * 48
+    assert off[np.hypot(right, down) < 0.2].max() < 0.25, "cells"
+    assert warp.determinants(points)[np.hypot(right, down) < 0.2].min() > 0.9
+    later, template = warp.read(), then.save()
+    resumed = template.with_arrays(device, state.arrays())
+    then.restore(resumed)
+    for _ in range(60):
+        then.advance_prescribed(flow, 0.05)
+    np.testing.assert_array_equal(then.read(), later)
+    for sizes in (np.full((2, 2), 384), np.full((count, 2), 999)):
+        with pytest.raises(ValueError, match="sizes of its closed maps"):
+            template.with_arrays(device, state.arrays() | {"closed sizes": sizes})
+    for made in (state, template, resumed, warp, then, frozen):
+        made.release()
+
+
 def test_closed_maps_are_held_and_restored_as_one(device: Device) -> None:
     """What is frozen keeps every bit while more are closed; the restore brush gets through them to the identity."""
     warp, flow = wound_up(device, 5.0), swirl((0.5, 0.5), 0.45)
