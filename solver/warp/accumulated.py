@@ -120,21 +120,22 @@ class AccumulatedMap:
         least, wanted = NOWHERE * self.extent[0] / self.size[0], set[Region]()
         for submap, cells in moved:
             grid, moves = cells.refined(submap.shape[1] // cells.nx), np.abs(submap) > least
-            wanted |= {
-                tile for tile in self._tiles if moves[self._cells(tile, grid, 1), self._cells(tile, grid, 0)].any()
-            }
+            wanted |= {tile for tile in self._tiles if moves[self._cells(tile, grid)].any()}
         self._moved = [tile for tile in self._tiles if tile in wanted]
         self._steepness.clear()
         self._copied = sorted(self._stale.difference(wanted))
         return len(self._moved)
 
-    def _cells(self, tile: Region, grid: Grid, axis: int) -> slice:
-        """The cells along an axis that a tile is interpolated from."""
-        texel = self.extent[axis] / self.size[axis]
-        start, end = tile[axis] * texel, (tile[axis] + tile[axis + 2]) * texel
-        origin, step, count = grid.origin[axis], grid.spacing[axis], grid.size[axis]
-        first, last = math.floor((start - origin) / step) - REACH, math.ceil((end - origin) / step) + REACH
-        return slice(min(max(first, 0), count), min(max(last, 0), count))
+    def _cells(self, tile: Region, grid: Grid) -> tuple[slice, slice]:
+        """The rows and columns of cells that a tile is interpolated from."""
+        spans = []
+        for axis in (1, 0):
+            texel = self.extent[axis] / self.size[axis]
+            start, end = tile[axis] * texel, (tile[axis] + tile[axis + 2]) * texel
+            origin, step, count = grid.origin[axis], grid.spacing[axis], grid.size[axis]
+            first, last = math.floor((start - origin) / step) - REACH, math.ceil((end - origin) / step) + REACH
+            spans.append(slice(min(max(first, 0), count), min(max(last, 0), count)))
+        return spans[0], spans[1]
 
     @property
     def defines(self) -> dict[str, object]:

@@ -27,7 +27,8 @@ class Remapping:
     """Submaps that are being taken into the accumulated map.
 
     The *pending* one is taken in tile by tile, and stands above the accumulated map until all tiles are done. What is
-    given meanwhile is *gathered* in a level above it, of several texels a cell, which is pending next.
+    given meanwhile is *gathered* in a level above it, which is pending next: one submap as it is, more of them, or one
+    with weights, resampled with several texels a cell.
 
     Args:
         device: the device.
@@ -141,9 +142,13 @@ class Remapping:
         return self._accumulated.begin(*((level.field.get(), level.grid) for level in levels), is_held=is_held)
 
     def _gather(self, submap: Submap, is_weighed: bool) -> None:
-        """Add a submap to the gathered level."""
+        """Add a submap to the gathered level; the first one is that level, unless its weights have to be fixed."""
         before, level = self._gathered, Level(submap.read, submap.grid, is_weighed)
-        self._gathered = self._resampled([level, *([] if before is None else [before])])
+        if before is None and not is_weighed:
+            self._gathered = level
+            submap.replace()
+            return
+        self._gathered = self._resampled([level] if before is None else [level, before])
         submap.read.clear()
         if before is not None:
             before.field.release()

@@ -880,7 +880,7 @@ def test_a_large_map_is_made_anew_a_little_in_each_step(device: Device) -> None:
     assert np.abs(found - small.read((100, 100))).max() < 2e-3 * whole.h
     assert warp.statistics().folds == 0
     warp.remap()
-    np.testing.assert_allclose(warp.read((100, 100)), found, atol=2e-3 * whole.h)
+    np.testing.assert_allclose(warp.read((100, 100)), found, atol=5e-4 * whole.h, err_msg="resampled on the way")
 
 
 def test_restoring_under_a_brush_reaches_through_a_window(device: Device) -> None:
