@@ -60,6 +60,8 @@ cli = typer.Typer(
 def main() -> None:
     """Run the command line; what goes wrong ends in one message on stderr and a status that is not 0."""
     try:
+        if "" in sys.argv[1:]:
+            raise UserError("one of the words of this command is empty; is a variable in it not set?")
         cli()
     except UserError as error:
         _fail(str(error), error.status)

@@ -321,6 +321,7 @@ BAD = {
     "too narrow for any": (["a.toml", "-i", "thread.png", "-o", "x.png"], "too narrow for any grid; crop it"),
     "unknown ending": (["a.toml", "-o", "x.xyz"], "x.xyz"),
     "no ending": (["a.toml", "-o", "x"], "Cannot write x"),
+    "an empty name": (["a.toml", "-o", ""], "one of the words of this command is empty"),
     "an unknown video": (["a.toml", "-o", "x.avi"], ".exr, an animation's in .mp4"),
     "a sequence of videos": (["a.toml", "-o", "x.%04d.mp4"], "leave out the number for one .mp4"),
     "no such folder": (["a.toml", "-o", "none/x.png"], "none"),

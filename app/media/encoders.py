@@ -116,8 +116,18 @@ def _apng(stream: Stream) -> list[str]:
 
 
 def _webp(stream: Stream) -> list[str]:
-    kind = ["-pix_fmt", "yuva420p" if stream.alpha else "yuv420p", "-quality", "90", "-compression_level", "3"]
-    return ["-c:v", "libwebp_anim", *kind, "-loop", str(stream.loops), "-f", "webp"]
+    if (quality := 90 if stream.quality is None else stream.quality) == 100:
+        kind = [
+            "-pix_fmt",
+            "bgra",
+            "-lossless",
+            "1",
+            "-quality",
+            "75",
+        ]  # that of a lossless file is the encoder's effort
+    else:
+        kind = ["-pix_fmt", "yuva420p" if stream.alpha else "yuv420p", "-quality", str(quality)]
+    return ["-c:v", "libwebp_anim", *kind, "-compression_level", "3", "-loop", str(stream.loops), "-f", "webp"]
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,17 @@ def make_folder(path: Path) -> None:
         raise cannot_write(path, error) from None
 
 
+def check_folder(path: Path) -> None:
+    """Raise `UserError` if a folder cannot be made, or written to, as far as that can be told before."""
+    try:
+        there = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
+    except OSError as error:
+        raise cannot_write(path, error) from None
+    number = errno.ENOTDIR if not there.is_dir() else 0 if os.access(there, os.W_OK | os.X_OK) else errno.EACCES
+    if number:
+        raise cannot_write(path, OSError(number, os.strerror(number)))
+
+
 def is_sequence(path: str | os.PathLike[str]) -> bool:
     """Whether `path` numbers its files, as `name.%04d.png` and `name.####.png` do."""
     return NUMBER.search(Path(path).name) is not None

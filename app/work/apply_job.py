@@ -115,6 +115,7 @@ class Application(Piece):
         progress.enter("reading")
         source = open_source(self.picture, self.max_pixels, self.outputs.is_animation)
         check_result(self._size(source.picture), source.picture)
+        self.make_folder()
         check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
         if source.clip is not None:
             check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)

@@ -12,7 +12,7 @@ from typing import Any, Self, TypeVar
 
 from app.errors import UserError
 from app.media.encoders import ANIMATIONS
-from app.media.files import check_kept, is_sequence, make_folder, takes_place, unnumbered
+from app.media.files import check_folder, check_kept, is_sequence, make_folder, takes_place, unnumbered
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
 from app.media.opening import Opened, open_recipe
@@ -76,11 +76,13 @@ class Piece(ABC):
         picture: the picture or clip; of a recipe, None is its own.
         outputs: what is written; "{name}" in their names stands for the picture's.
         max_pixels: larger pictures are refused.
+        folder: that it is written to, if that may have to be made.
     """
 
     picture: Path | None
     outputs: Outputs
     max_pixels: int = MAX_PIXELS
+    folder: Path | None = None
 
     @property
     def label(self) -> str:
@@ -93,6 +95,11 @@ class Piece(ABC):
         if picture is None:
             return self
         return replace(self, outputs=self.outputs.renamed(lambda path: named(path, picture)))
+
+    def make_folder(self) -> None:
+        """Called once all is read: what fails before that leaves no empty folder. Raises `UserError`."""
+        if self.folder is not None:
+            make_folder(self.folder)
 
     def located(self) -> Self:
         """The same with names that do not depend on the present folder: a cluster's workers do not start from it."""
@@ -143,6 +150,7 @@ class Task(Piece):
     def perform(self, device: Callable[[], Device], progress: Progress) -> Report:
         progress.enter("reading")  # a large picture takes its time too
         job = self.job()
+        self.make_folder()
         job.check()
         progress.enter("")
         return run(device(), job, progress)
@@ -174,7 +182,7 @@ def _opened(name: str, max_pixels: int, state: tuple[int, ...]) -> Opened:
 
 
 def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
-    """The piece of work for each of the pictures: its output is a folder, which is made, or a name with "{name}" in it.
+    """The piece of work for each of the pictures: its output is a folder, which is made, or has "{name}" in it.
 
     In a folder they keep their names and endings, or get .png where theirs cannot be written.
 
@@ -195,8 +203,8 @@ def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
         pieces.append(replace(one, outputs=one.outputs.renamed(Path.absolute)))
     _check_apart(pieces)
     if folder is not None:
-        make_folder(folder)
-    return [one.located() for one in pieces]
+        check_folder(folder)
+    return [replace(one, folder=folder and folder.absolute()).located() for one in pieces]
 
 
 def _ending(picture: Path) -> str:

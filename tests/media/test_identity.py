@@ -193,6 +193,31 @@ def test_a_lossless_clip_comes_back(device: Device, tmp_path: Path, dtype: type,
     assert_same_bits(np.frombuffer(found, dtype).reshape(3, 23, 37, channels), np.stack(frames))
 
 
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("ending", [".webp", ".apng"])
+def test_an_animated_picture_comes_back(device: Device, tmp_path: Path, ending: str, channels: int) -> None:
+    """As OpenCV reads it: all frames and how long each is shown. WebP keeps no colour that is wholly transparent."""
+    random = np.random.default_rng(channels)
+    frames = [random.integers(0, 256, (23, 37, channels)).astype(np.uint8) for _ in range(4)]
+    for number, frame in enumerate(frames):
+        frame[number : number + 5, :9, 3:] = 0
+        frame[9 + number :, :9] = frames[0][9 + number :, :9]  # what an encoder may leave out
+    first, *others = map(Image.fromarray, frames)
+    lengths = [100, 40, 200, 60]
+    first.save(tmp_path / "in.apng", save_all=True, append_images=others, duration=lengths)
+    rendered(device, tmp_path / "in.apng", tmp_path / f"out{ending}", animated=True)
+    read, animation = cv2.imreadanimation(str(tmp_path / f"out{ending}"))
+    assert read
+    assert len(animation.frames) == 4
+    assert list(animation.durations) == lengths
+    for found, wanted in zip(animation.frames, frames, strict=True):
+        colours = found[..., [2, 1, 0]]
+        alpha = found[..., 3:] if found.shape[2] == 4 else np.full_like(found[..., :1], 255)
+        np.testing.assert_array_equal(alpha, wanted[..., 3:] if channels == 4 else 255)
+        shown = alpha > 0 if ending == ".webp" else True
+        np.testing.assert_array_equal(colours * shown, wanted[..., :3] * shown)
+
+
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (9, 1), (2, 3)], ids=str)
 @pytest.mark.parametrize("ending", [".exr", ".tif", ".png"])
 def test_the_smallest_pictures_come_back_through_a_map_that_does_nothing(

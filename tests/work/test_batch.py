@@ -100,7 +100,7 @@ def test_names_of_the_results(tmp_path: Path):
     pictures = [Path(name) for name in ("a.JPG", "b.bmp", "c.mov", "d.avi")]
     made = [one.outputs.file for one in spread(task, pictures)]
     assert made == [tmp_path / "new/out" / name for name in ("a.JPG", "b.png", "c.mov", "d.mp4")]
-    assert (tmp_path / "new/out").is_dir()
+    assert not (tmp_path / "new").exists()  # yet
 
     pattern = order("coffee", None, Outputs(tmp_path / "{name} new.tif", stats=tmp_path / "{name}.json"))
     (one,) = spread(pattern, [Path("x/e.png")])
@@ -221,6 +221,10 @@ def test_the_command_line(folder: Path):
         "fluidwarp: 1 of 3 pictures failed; all others are written",
     ]
     assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
+    assert fluidwarp("gone.png", "missing.png", "-o", "new/folder").returncode == 1
+    assert not (folder / "new").exists()
+    ran = fluidwarp("p0.png", "p1.png", "-o", "a.toml/out")
+    assert ran.stderr == "fluidwarp: Cannot write a.toml/out: a part of its path is a file; choose another folder.\n"
     ran = fluidwarp("p2.png", "-o", "out")
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
     assert (folder / "out/p2.png").is_file()
