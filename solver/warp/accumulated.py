@@ -11,9 +11,9 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
+from solver.steepness import Steepness
 from solver.warp.state import ACCUMULATED, CLOSED, most_closed
 
 LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs nothing
@@ -69,8 +69,7 @@ class AccumulatedMap:
         self.extent = extent
         self.closed: list[TiledField] = []
         self._most_closed = most_closed(size)
-        self._steepness = device.field(blocks_of(size), 1, "accumulated map, steepness")
-        self._find_steepest = Reduction(device, blocks_of(size), 1, "max")
+        self._steepness = Steepness(device, size, "accumulated map", TILE=TILE)
         self.now = TiledField(device, size, 2, "accumulated map")
         self._next = TiledField(device, size, 2, "accumulated map, anew")
         self._tiles = self.now.kind.regions
@@ -98,7 +97,7 @@ class AccumulatedMap:
             grid, moves = cells.refined(submap.shape[1] // cells.nx), np.abs(submap) > least
             wanted |= {tile for tile in self._tiles if moves[self._cells(tile, grid)].any()}
         self._moved = [tile for tile in self._tiles if tile in wanted]
-        self._steepness.clear()
+        self._steepness.forget()
         self._copied = sorted(self._stale.difference(wanted))
         return len(self._moved)
 
@@ -136,7 +135,9 @@ class AccumulatedMap:
         before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
         if anew := self._moved[before:until]:
             draw(self._next, anew)
-            self._look(anew)
+            if len(self.closed) < self._most_closed:
+                spacing = self.extent[0] / self.size[0], self.extent[1] / self.size[1]
+                self._steepness.look(self._next, spacing, anew)
             if self._is_saved:
                 self._next.make_ready(anew)
         count = len(self._moved)
@@ -146,17 +147,9 @@ class AccumulatedMap:
             self.now, self._next = self._next, self.now
             self._stale = set(self._moved)
             self._moved, self._copied, self._done = [], [], 0
-            if len(self.closed) < self._most_closed and self._find_steepest(self._steepness)[0] > STEEPEST**2:
+            if len(self.closed) < self._most_closed and self._steepness.found() > STEEPEST**2:
                 self.closed.append(self.now)
                 self._begin_anew()
-
-    def _look(self, tiles: list[Region]) -> None:
-        """Draw how steep tiles of `_next` are, if another map may be closed."""
-        if len(self.closed) < self._most_closed:
-            spacing = [side / n for side, n in zip(self.extent, self.size, strict=True)]
-            blocks = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in tiles]
-            find = self.device.pass_("warp/steepness.frag", TILE=TILE)
-            find(self._steepness, region=blocks, displacement=self._next, spacing=spacing, side=SIDE)
 
     def _begin_anew(self) -> None:
         """Go on with a map of nothing, in the field that would be drawn next."""
@@ -219,7 +212,7 @@ class AccumulatedMap:
     def release(self) -> None:
         """Free the textures."""
         self._open()
-        for thing in (self.now, self._next, self._steepness, self._find_steepest):
+        for thing in (self.now, self._next, self._steepness):
             thing.release()
 
     def _open(self, left: int = 0) -> None:
