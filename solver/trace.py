@@ -8,9 +8,9 @@ from typing import Any
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.grid import Grid
 from solver.params import Walls
+from solver.steepness import Steepness
 
 # In each part of the trace the largest gradient of the velocity, times the time of the part, is this at most. Below 1
 # trajectories do not cross (Smolarkiewicz and Pudykiewicz), and below .73 neither do those of the midpoint rule.
@@ -37,9 +37,7 @@ class Trace:
     def __init__(self, device: Device, size: tuple[int, int]) -> None:
         self.device = device
         self.field = device.field(size, 2, "trace")
-        blocks = blocks_of((size[0] - 1, size[1] - 1))
-        self._steepness = device.field(blocks, 1, "trace, steepness")
-        self._find_steepest = Reduction(device, blocks, 1, "max")
+        self._steepness = Steepness(device, size, "trace")
         self._dt: float | None = None  # the step that it is of
 
     def is_of(self, dt: float) -> bool:
@@ -54,9 +52,7 @@ class Trace:
         hx, hy = grid.spacing
         defines, inputs = walls.defines, {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **walls.inputs}
         if in_parts:
-            find = self.device.pass_("warp/steepness.frag")
-            find(self._steepness, displacement=velocity, spacing=grid.spacing, side=SIDE)
-            strain = dt * math.sqrt(self._find_steepest(self._steepness)[0])
+            strain = dt * math.sqrt(self._steepness.of(velocity, grid.spacing))
             if not math.isfinite(strain):
                 raise ValueError("the motion that carries the picture is too fast")
             defines = defines | {"PARTS": 1}
@@ -69,5 +65,5 @@ class Trace:
         self._dt = None
 
     def release(self) -> None:
-        for thing in (self.field, self._steepness, self._find_steepest):
+        for thing in (self.field, self._steepness):
             thing.release()

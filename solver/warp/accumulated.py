@@ -12,9 +12,9 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
-from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
+from solver.steepness import Steepness
 from solver.warp.state import (
     ACCUMULATED,
     CLOSED,
@@ -88,8 +88,7 @@ class AccumulatedMap:
         self.size = size
         self.extent = extent
         self.closed: list[TiledField] = []
-        self._steepness = device.field(blocks_of(size), 1, "accumulated map, steepness")
-        self._find_steepest = Reduction(device, blocks_of(size), 1, "max")
+        self._steepness = Steepness(device, size, "accumulated map", TILE=TILE)
         self.now = TiledField(device, size, 2, "accumulated map")
         self._next = TiledField(device, size, 2, "accumulated map, anew")
         self.undone: TiledField | None = None
@@ -122,7 +121,7 @@ class AccumulatedMap:
             grid, moves = cells.refined(submap.shape[1] // cells.nx), np.abs(submap) > least
             wanted |= {tile for tile in self._tiles if moves[self._cells(tile, grid)].any()}
         self._moved = [tile for tile in self._tiles if tile in wanted]
-        self._steepness.clear()
+        self._steepness.forget()
         self._copied = sorted(self._stale.difference(wanted))
         return len(self._moved)
 
@@ -188,7 +187,7 @@ class AccumulatedMap:
             self.undone, self._next_undone = self._next_undone, self.undone
             self._stale = set(self._moved)
             self._moved, self._copied, self._done = [], [], 0
-            if self._may_close and self._find_steepest(self._steepness)[0] > STEEPEST**2:
+            if self._may_close and self._steepness.found() > STEEPEST**2:
                 self._close()
 
     @property
@@ -206,12 +205,10 @@ class AccumulatedMap:
         return len(self._chain) < MOST_CLOSED and own + sum(field.nbytes for field in self.closed) <= MOST_CLOSED_BYTES
 
     def _look(self, tiles: list[Region]) -> None:
-        """Draw how steep tiles of `_next` are, if another map may be closed."""
+        """Look at how steep tiles of `_next` are, if another map may be closed."""
         if self._may_close:
-            spacing = [side / n for side, n in zip(self.extent, self.size, strict=True)]
-            blocks = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in tiles]
-            find = self.device.pass_("warp/steepness.frag", TILE=TILE)
-            find(self._steepness, region=blocks, displacement=self._next, spacing=spacing, side=SIDE)
+            spacing = self.extent[0] / self.size[0], self.extent[1] / self.size[1]
+            self._steepness.look(self._next, spacing, tiles)
 
     def _close(self) -> None:
         """Keep it as it is, and go on with a map of nothing."""
@@ -309,7 +306,7 @@ class AccumulatedMap:
     def release(self) -> None:
         """Free the textures."""
         self._open()
-        for thing in (self.now, self._next, self._steepness, self._find_steepest):
+        for thing in (self.now, self._next, self._steepness):
             thing.release()
 
     def _open(self, left: int = 0) -> None:

@@ -8,14 +8,14 @@ from typing import Any
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
 from solver.gl.passes import Region
-from solver.gl.reduction import Reduction
 from solver.grid import Grid
+from solver.steepness import Steepness
 from solver.warp.state import FACTOR
 from solver.warp.submap import Level, defines_of, inputs_of
 
 # How far det J may fall where a factor is scaled, as a fraction of min(1, det J) at 100 %: 1/2 is a quarter turn. The
 # present submap may turn by another 41 degrees before its remap, and then det J still falls to no less than 0.1.
-CLOSED, SPLIT = 0.5, 0.05
+LEAST_LEFT, SPLIT = 0.5, 0.05
 MOST = 12  # closed factors, as every checkpoint has a copy of them; all that follows goes into one
 TEXELS = 2  # of a factor along a cell: with one, two of twelve random recipes without folds fold between 60 and 90 %
 
@@ -36,8 +36,8 @@ class Factors:
         self._closed: list[Field] = []
         size = grid.refined(TEXELS).size
         self._open = DoubleField(device, size, 2, "open factor")
-        self._scaling = device.field(size, 1, "scaling of a factor")
-        self._find_largest = Reduction(device, size, 1, "max")
+        self._spacing = self.picture[0] / size[0], self.picture[1] / size[1]
+        self._scaling = Steepness(device, size, "scaling of a factor", SCALING=1)
 
     @property
     def is_one(self) -> bool:
@@ -55,7 +55,7 @@ class Factors:
             self._merge(self._open.write, submap, held)
             left = self._left(self._open.write)
         self._open.swap()
-        if left < CLOSED and len(self._closed) < MOST:
+        if left < LEAST_LEFT and len(self._closed) < MOST:
             self._close(self._open.read)
             self._open.read.clear()
 
@@ -121,7 +121,7 @@ class Factors:
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (*self._closed, self._open, self._scaling, self._find_largest):
+        for thing in (*self._closed, self._open, self._scaling):
             thing.release()
 
     def _close(self, field: Field) -> None:
@@ -139,8 +139,7 @@ class Factors:
 
     def _left(self, factor: Field) -> float:
         """What is left of its least det J where it is scaled; waits for the GPU."""
-        self.device.pass_("warp/scaling.frag")(self._scaling, factor=factor, picture=self.picture)
-        return -float(self._find_largest(self._scaling)[0])
+        return -self._scaling.of(factor, self._spacing)
 
 
 def _number(name: str) -> int:

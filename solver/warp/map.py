@@ -44,8 +44,8 @@ class WarpMap:
     A is too steep for its texels it is closed, and another begins before it. Longer sides, RG32F at the centres of
     cells and texels. Only tiles of A that have moved are redrawn, a few in each step. Until all are done, the submap
     being taken in, *pending*, stands between S and A; what has to be remapped meanwhile is *gathered* in a level
-    between S and the pending one. Every place x + S(x) lies in the picture, and every x + D(x) there or where a map that
-    was `set` had looked. Reading the map changes nothing in it.
+    between S and the pending one. Every place x + S(x) lies in the picture, and every x + D(x) there or where a map
+    that was `set` had looked. Reading the map changes nothing in it.
 
     Args:
         device: the device.

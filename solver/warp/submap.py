@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
-from solver.gl.reduction import SIDE, Reduction, blocks_of
 from solver.grid import Grid
+from solver.steepness import Steepness
 from solver.warp.frozen import FADED
 
 STEEPEST = 1.0  # largest |grad S| that the cubic carries well
@@ -30,9 +30,7 @@ class Submap(DoubleField):
         self.device = device
         self.grid = grid
         self.trace = device.field(grid.size, 2, "submap, trace")
-        blocks = blocks_of((grid.nx - 1, grid.ny - 1))
-        self._steepness = device.field(blocks, 1, "submap, steepness")
-        self._find_steepest = Reduction(device, blocks, 1, "max")
+        self._steepness = Steepness(device, grid.size, "submap")
 
     def advance(self, trace: Field, is_walled: bool) -> None:
         """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
@@ -58,13 +56,11 @@ class Submap(DoubleField):
     @property
     def is_steep(self) -> bool:
         """True if it is bent too far for its interpolation; waits for the GPU."""
-        find = self.device.pass_("warp/steepness.frag")
-        find(self._steepness, displacement=self.read, spacing=self.grid.spacing, side=SIDE)
-        return self._find_steepest(self._steepness)[0] > STEEPEST**2
+        return self._steepness.of(self.read, self.grid.spacing) > STEEPEST**2
 
     def release(self) -> None:
         super().release()
-        for part in (self.trace, self._steepness, self._find_steepest):
+        for part in (self.trace, self._steepness):
             part.release()
 
 

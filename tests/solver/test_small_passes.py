@@ -134,8 +134,9 @@ def test_how_near_a_part_of_a_factor_comes_to_a_fold(
     """-min det(1 + a M) over a from 0 to 1, of the smaller of 1 and det(1 + M)."""
     x, y = GRID.centres()
     factor = np.stack([row[0] * x + row[1] * y for row in slope], axis=-1).astype(np.float32)
-    found = drawn(device, "warp/scaling.frag", 1, factor=factor, picture=(1.0, 0.75))
-    np.testing.assert_allclose(found[3:-3, 3:-3], wanted, atol=1e-4)
+    given = {"displacement": factor, "spacing": GRID.spacing, "side": 8.0}
+    found = drawn(device, "warp/steepness.frag", 1, (3, 2), SCALING=1, **given)
+    np.testing.assert_allclose(found, wanted, atol=1e-4)
 
 
 @pytest.mark.parametrize("partial", [False, True])
