@@ -62,7 +62,10 @@ def main() -> None:
     try:
         if "" in sys.argv[1:]:
             raise UserError("one of the words of this command is empty; is a variable in it not set?")
-        cli()
+        if sys.argv[1:] == ["--version"]:  # without pydantic, which typer loads for any option, and takes as long again
+            _print_version()
+        else:
+            cli()
     except UserError as error:
         _fail(str(error), error.status)
     except Cancelled:
@@ -83,6 +86,12 @@ def main() -> None:
         words = str(error).strip().splitlines()
         said = f": {words[0]}" if words else ""
         _fail(f"this is a bug in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)
+
+
+def _print_version() -> None:
+    from importlib.metadata import version
+
+    print(f"fluidwarp {version('fluidwarp')}")
 
 
 def _fail(message: str, status: int) -> NoReturn:
@@ -108,9 +117,7 @@ def start(
 ) -> None:
     """Without a command, opens the editor; with a picture, a clip, a recipe or a project alone, on that."""
     if version:
-        from importlib.metadata import version as installed
-
-        print(f"fluidwarp {installed('fluidwarp')}")
+        _print_version()
         raise typer.Exit
     if context.invoked_subcommand is None:
         edit(None)

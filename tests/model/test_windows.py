@@ -228,7 +228,7 @@ def test_a_replay_in_windows_gives_the_same_bytes_by_any_path(device: Device):
     assert None in windows
     assert len(windows) > 5
     replay = replayed(device, recipe, 2**28)
-    for tick in (33, 9, 18, 3, 30, 21, 6, 27, 33):
+    for tick in (33, 9, 30, 3, 21, 33):
         replay.seek(tick)
         same(replay.snapshot(), wanted[tick])
     # Undone and done again, with the playhead where it was.

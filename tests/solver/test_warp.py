@@ -194,7 +194,7 @@ def test_looking_changes_nothing(device: Device) -> None:
     velocity = device.upload(vortex_faces(grid, 0.0))
     found = []
     for looked in (False, True):
-        warp = WarpMap(device, grid, (700, 700))
+        warp = WarpMap(device, grid, (400, 400))
         for _ in range(29):
             warp.advance(velocity, 0.02)
             if looked:

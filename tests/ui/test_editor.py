@@ -123,12 +123,12 @@ def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
     """A row of the present entry's ground; also after steps back and forth."""
     ground = np.array([67, 55, 37])
     for number in range(12):
-        robot.drag((0.3 + 0.03 * number, 0.4), (0.35 + 0.03 * number, 0.45))
+        robot.editor.session.edit(f"Amount {number}", amount=0.9 - 0.01 * number)
     robot.see()
     for chords in ((), ("ctrl+z",) * 10, ("ctrl+shift+z",) * 10):
         for chord in chords:
             robot.key(chord)
-        robot.rest()
+        robot.frame(count=2)
         shown = robot.pixels()[560:740, 1010:1270, :3].astype(int)
         assert (np.abs(shown - ground).max(axis=-1) <= 8).sum() > 200 * 20
 
@@ -332,8 +332,7 @@ def test_before_and_split(robot: Robot) -> None:
     assert names(robot) == ["Open", "Push"]
 
 
-@pytest.mark.parametrize("key", ["1", "2", "3", "4", "5"])
-def test_overlays_show_something(robot: Robot, key: str) -> None:
+def test_overlays_show_something(robot: Robot) -> None:
     robot.key("f")
     robot.drag((0.7, 0.5), (0.7, 0.55), steps=2)
     robot.key("v")
@@ -345,12 +344,13 @@ def test_overlays_show_something(robot: Robot, key: str) -> None:
     robot.move(900, 20)
     robot.frame(count=2)
     without = robot.canvas().astype(int)
-    robot.key(key)
-    robot.frame()
-    assert np.abs(robot.canvas() - without).max() > 20
-    robot.key(key)
-    robot.frame()
-    assert np.abs(robot.canvas() - without).max() <= 1
+    for key in "12345":
+        robot.key(key)
+        robot.frame()
+        assert np.abs(robot.canvas() - without).max() > 20, key
+        robot.key(key)
+        robot.frame()
+        assert np.abs(robot.canvas() - without).max() <= 1, key
 
 
 def test_what_was_seen_stays_while_it_is_made_again_on_another_grid(robot: Robot) -> None:
@@ -550,7 +550,7 @@ def test_works_opened_before_are_no_more_than_their_bounds(
 @pytest.mark.long
 def test_a_session_saved_and_rendered_is_the_same_picture(device: Device, robot: Robot, tmp_path: Path) -> None:
     dice = random.Random(1)
-    for _ in range(12):
+    for _ in range(8):
         robot.key(dice.choice(["p", "t", "b", "f", "v", "r"]))
         start = dice.uniform(0.2, 0.8), dice.uniform(0.2, 0.8)
         robot.drag(start, (start[0] + dice.uniform(-0.1, 0.1), start[1] + dice.uniform(-0.1, 0.1)), steps=3)
@@ -863,35 +863,35 @@ def test_without_a_system_s_file_dialog_there_is_ours(
 # Warp maps ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["m.exr", "m.tif", "m.flo", "m.npy"])
 def test_a_map_dropped_on_the_window_is_what_the_picture_starts_from(
-    device: Device, robot: Robot, tmp_path: Path, name: str
+    device: Device, robot: Robot, tmp_path: Path
 ) -> None:
     robot.see()
     clean = robot.canvas()
     robot.drag((0.4, 0.5), (0.55, 0.5))
     robot.rest()
-    run(
-        device,
-        Job(robot.editor.session.recipe, pattern(), tmp_path, Outputs(None, maps=MapOutput(tmp_path / name))),
-        Progress(),
-    )
-    warped = robot.warp()
+    warped, recipe = robot.warp(), robot.editor.session.recipe
     robot.key("ctrl+z")
     robot.rest()
-    robot.drop(tmp_path / name)
-    robot.rest()
-    assert names(robot) == ["Open", "Start from a map"]
-    # Resampled to the grid of 48 cells: within a twentieth of a cell.
-    assert np.abs(robot.warp() - warped).max() < 0.05 / 48
-    robot.move(900, 20)
-    robot.frame(count=2)
-    assert np.abs(robot.canvas().astype(int) - clean).mean() > 1
+    for name in ("m.exr", "m.tif", "m.flo", "m.npy"):
+        maps = MapOutput(tmp_path / name)
+        run(device, Job(recipe, pattern(), tmp_path, Outputs(None, maps=maps)), Progress())
+        robot.drop(maps.path)
+        robot.rest()
+        assert names(robot) == ["Open", "Start from a map"]
+        # Resampled to the grid of 48 cells: within a twentieth of a cell.
+        assert np.abs(robot.warp() - warped).max() < 0.05 / 48, name
+        robot.move(900, 20)
+        robot.frame(count=2)
+        assert np.abs(robot.canvas().astype(int) - clean).mean() > 1, name
+        if name != "m.npy":
+            robot.key("ctrl+z")
+            robot.rest()
     # Painted on, saved and rendered by the command line's way, it is the same picture.
     robot.drag((0.6, 0.3), (0.7, 0.3))
     robot.rest()
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
-    (tmp_path / name).unlink()
+    maps.path.unlink()
     loaded = projects.load(tmp_path / "work.fluidwarp")
     robot.editor.open(loaded)
     robot.rest()

@@ -262,8 +262,16 @@ def wait_until(true: Callable[[], object]) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("moment", ["starting", "working", "a worker was killed"])
+@pytest.mark.parametrize(
+    ("number", "moment"),
+    [
+        (signal.SIGINT, "starting"),
+        (signal.SIGINT, "working"),
+        (signal.SIGTERM, "working"),
+        (signal.SIGHUP, "working"),
+        (signal.SIGTERM, "a worker was killed"),
+    ],
+)
 def test_stopping_all_processes_at_once(folder: Path, number: signal.Signals, moment: str):
     """As Ctrl+C, a scheduler and a closed terminal do, at any time: one line, and nothing half-written."""
     job = at_work(folder)

@@ -102,16 +102,16 @@ def test_what_is_frozen_while_it_moves_keeps_every_bit(
 PUTTY, WATER = {"viscosity": 0.3, "local": 1.0}, {"viscosity": 0.0065, "local": 0.0}
 
 
-@pytest.mark.parametrize("frozen_first", [True, False])
 @pytest.mark.parametrize(
-    ("size", "grid", "detail", "feel", "seed"),
+    ("size", "grid", "detail", "feel", "seed", "frozen_first"),
     [
-        ((640, 480), 48, 0, WATER, 0),
-        ((640, 480), 96, 0, PUTTY, 0),
-        ((1600, 1000), 24, 0, WATER, 1),
-        ((1600, 1000), 64, 0, PUTTY, 1),
-        ((900, 600), 48, 455, PUTTY, 2),
-        ((900, 600), 48, 1079, WATER, 3),
+        ((640, 480), 48, 0, WATER, 0, True),
+        ((640, 480), 48, 0, WATER, 0, False),
+        ((640, 480), 96, 0, PUTTY, 0, False),
+        ((1600, 1000), 24, 0, WATER, 1, True),
+        ((1600, 1000), 64, 0, PUTTY, 1, False),
+        ((900, 600), 48, 455, PUTTY, 2, True),
+        ((900, 600), 48, 1079, WATER, 3, False),
     ],
 )
 def test_at_the_ring_the_map_has_no_step(

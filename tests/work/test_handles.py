@@ -35,7 +35,7 @@ def led_to(at: list[float], to: list[float], **rest: Any) -> dict[str, Any]:
     return {"at": at, "to": to, "duration": 0.4, **rest}
 
 
-@pytest.mark.parametrize(("count", "seed"), [(1, 0), (4, 1), (16, 2), (16, 3)])
+@pytest.mark.parametrize(("count", "seed"), [(1, 0), (4, 1), (16, 2)])  # bench_handles.py draws more
 def test_handles_arrive_and_stay_where_the_spline_may_fold(count: int, seed: int, device: Device):
     found = led(device, *arrangement(seed, count), seed=seed, dt=DT)
     assert found.is_within, found.told

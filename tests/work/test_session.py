@@ -322,8 +322,9 @@ def test_a_moderate_push_does_not_fold(session: Session, feel: Feel, radius: flo
     assert statistics.displacement_max > 0.15
 
 
-@pytest.mark.parametrize("radius", [0.1, 0.15])
-@pytest.mark.parametrize("feel", FEELS, ids=lambda feel: feel.name)
+@pytest.mark.parametrize(
+    ("feel", "radius"), [*((feel, 0.15) for feel in FEELS), (WATER, 0.1)], ids=lambda part: getattr(part, "name", part)
+)
 def test_the_same_push_made_again_and_again_slips_and_does_not_fold(
     session: Session, feel: Feel, radius: float
 ) -> None:
@@ -411,15 +412,14 @@ def test_a_push_into_something_a_thousand_times_thicker_does_not_fold_at_its_bor
     assert statistics.displacement_max > 0.15
 
 
-@pytest.mark.parametrize("feel", [HONEY, PUTTY], ids=lambda feel: feel.name)
 @pytest.mark.parametrize(
-    "ways",
+    ("feel", "ways"),
     [
-        [((0.1, 0.5), (0.9, 0.5))],
-        [((0.1, 0.1), (0.9, 0.9))],
-        [((0.1 + 0.2 * k, 0.5), (0.3 + 0.2 * k, 0.5)) for k in range(4)],
+        (HONEY, [((0.1, 0.5), (0.9, 0.5))]),
+        (PUTTY, [((0.1, 0.1), (0.9, 0.9))]),
+        *((feel, [((0.1 + 0.2 * k, 0.5), (0.3 + 0.2 * k, 0.5)) for k in range(4)]) for feel in (HONEY, PUTTY)),
     ],
-    ids=["across", "corner to corner", "four after one another"],
+    ids=["Honey, across", "Putty, corner to corner", "Honey, four after one another", "Putty, four after one another"],
 )
 def test_a_long_push_smears_and_does_not_fold(session: Session, feel: Feel, ways: list) -> None:
     session.set_grid(96)
