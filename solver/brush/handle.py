@@ -12,7 +12,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from solver.brush.tip import FARTHEST, Point
+from solver.brush.tip import FARTHEST, SMALLEST, Point
 from solver.course import SAME_TIME, Course
 from solver.limits import (
     LARGEST_LEAD,
@@ -221,8 +221,8 @@ class Shape:
         led: their places in the original, (n, 2).
         goals: where they shall be, likewise; None if the handle has no goals.
         around: the first of those that lie around an area; None if they are no closed line and no ring, if the line or
-            its goals cross themselves, or if a part of it is outside and it is neither scaled nor has goals: the edge
-            closes it, and what flows along that.
+            its goals cross themselves or have no width, or if a part of it is outside and it is neither scaled nor has
+            goals: the edge closes it, and what flows along that.
         extent: the sides of the picture, which lines do not leave.
     """
 
@@ -251,8 +251,8 @@ class Shape:
             if handle.points and not (inside.all() or handle.goals or handle.turns):
                 around = None
             led, goals = led[inside], goals if goals is None else goals[inside]
-        if handle.closed and any(_crosses_itself(line) for line in (led, goals) if line is not None):
-            around = None  # the areas of its loops cancel, and what is left of that tells of no growth
+        if handle.closed and any(_crosses_itself(line) or _is_flat(line) for line in (led, goals) if line is not None):
+            around = None  # the areas of its loops cancel, or there is none: what is left tells of no growth
         return cls(handle, led, goals, around if len(led) >= 3 + (around or 0) else None, extent)
 
     @property
@@ -334,6 +334,19 @@ def area(loop: np.ndarray) -> float:
     """The area within a closed line of places (n, 2), positive clockwise."""
     x, y = (loop - loop.mean(axis=0)).T
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def swelling(loop: np.ndarray, motion: np.ndarray) -> float:
+    """How fast the area within a closed line of places (n, 2) grows by their motion, in parts of it: 1 / s."""
+    x, y = (np.roll(loop, -1, axis=0) - np.roll(loop, 1, axis=0)).T
+    grown, now = 0.5 * float((motion[:, 0] * y - motion[:, 1] * x).sum()), area(loop)
+    return grown / now if now else 0.0
+
+
+def _is_flat(loop: np.ndarray) -> bool:
+    """True if the area within a closed line of places (n, 2) is no more than their rounding makes it."""
+    around = float(np.hypot(*(np.roll(loop, -1, axis=0) - loop).T).sum())
+    return abs(area(loop)) <= SMALLEST * around
 
 
 def _crosses_itself(loop: np.ndarray) -> bool:

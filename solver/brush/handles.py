@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.brush.balance import Balance, solved, system
 from solver.brush.brush import Brush
-from solver.brush.handle import Handle, Shape, area, spun
+from solver.brush.handle import Handle, Shape, area, spun, swelling
 from solver.brush.listed import draw_listed
 from solver.brush.pushes import Pushes
 from solver.brush.tip import SMALLEST, Tip
@@ -522,7 +522,7 @@ class Handles:
         lacks = lead.wanted - found[:, :2]
         for loop in lead.loops:  # the fluid swells by itself: (H4)
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
-            lacks[loop] -= (lacks[loop] * arms).sum() / max((arms**2).sum(), 1e-30) * arms
+            lacks[loop] -= swelling(lead.places[loop], lacks[loop]) / 2 * arms
         told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
         strengths, count = lead.balance.strengths(told), 2 * len(lead.drawn)
         lacking, spins = strengths[:count].reshape(-1, 2), strengths[count:]

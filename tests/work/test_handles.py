@@ -17,7 +17,7 @@ from app.work.handle_status import as_seen, held_in, unmet
 from app.work.loaded_handles import LoadedHandles
 from app.work.replay import Replay
 from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
-from solver.brush.handle import Shape
+from solver.brush.handle import Shape, area, swelling
 from solver.limits import MOST_STRETCH, beside_edges
 from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
 
@@ -226,6 +226,40 @@ def test_a_closed_line_that_crosses_itself_arrives(eight: tuple[tuple[float, flo
         handles.advance(DT)
     assert handles.away[0] < ARRIVED
     assert warp.statistics().det_min > 0.9
+
+
+@pytest.mark.parametrize(("angle", "long"), [(0.0, 0.2), (0.5, 0.3)])
+def test_a_thin_closed_line_is_led_across_itself(angle: float, long: float, device: Device):
+    """Its area tells nothing of its length: that these drew together held them 2 and 7 pixels short."""
+    grid, turn = Grid(64, 64), np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid, (256, 256))
+    fluid.set_viscosity(0.0065)
+    corners = 0.45 + 0.5 * np.array([(-long, -0.03), (long, -0.03), (long, 0.03), (-long, 0.03)]) @ turn
+    to = 0.45 + np.array([0.0, 0.1]) @ turn
+    led = Handles(fluid, warp, [Handle((0.45, 0.45), to, 0.1, points=corners, closed=True)])  # pyright: ignore[reportArgumentType]
+    for _ in range(60):
+        led.advance(DT)
+    assert led.away[0] * 256 < 0.5
+    assert warp.statistics().folds == 0
+
+
+def test_a_closed_line_without_an_area_is_led_as_one_that_is_open(device: Device):
+    """What rounding makes of its area says nothing of how it grows, and would hold it 9 pixels of 256 short."""
+    corners = ((0.3, 0.45), (0.45, 0.45), (0.6, 0.45))
+    led, warp = led_alone(device, Handle((0.45, 0.45), (0.5, 0.52), 0.2, duration=0.5, points=corners, closed=True))
+    assert led.away[0] * PIXELS < 0.5
+    assert warp.statistics().folds == 0
+
+
+def test_how_fast_a_closed_line_swells():
+    loop = np.random.default_rng(0).uniform(size=(7, 2)) + np.array(
+        [[0, 0], [1, 0], [2, 0], [2, 2], [1, 2], [0, 2], [0, 1]]
+    )
+    x, y = loop.T
+    for motion, rate in ((2 * x, 0 * y), 2), ((x, -y), 0), ((-y, x), 0), ((x, y), 2), ((1 + 0 * x, 3 + 0 * y), 0):
+        assert swelling(loop, np.stack(motion, axis=-1)) == pytest.approx(rate, abs=1e-12)
+    grown = loop + 1e-6 * loop**2
+    assert swelling(loop, loop**2) == pytest.approx((area(grown) / area(loop) - 1) / 1e-6, rel=1e-4)
 
 
 def test_why_a_line_stays_short_beside_the_edge_is_told(device: Device):
