@@ -82,6 +82,7 @@ class Projection:
         self._prepare()
 
     def _prepare(self) -> None:
+        """Make the cycle anew; the one before stays until that is done, as a mask may fail to be taken up."""
         before, self._cycle = self._cycle, Cycle(self.device, self.size, self._aspect, self._solid)
         before.release()
 

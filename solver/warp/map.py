@@ -22,6 +22,7 @@ from solver.gl.points import draw_at
 from solver.grid import Grid
 from solver.limits import check_finite, check_size, check_step, check_type, numbers, places, real_array
 from solver.state import State
+from solver.trace import Tracing
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.factors import Factors
@@ -110,11 +111,7 @@ class WarpMap:
         check_type("what the map is to follow", fluid, Fluid)
         if fluid.grid != self.grid:
             raise ValueError(f"a map on {self.grid} cannot follow a fluid on {fluid.grid}; `move_to` takes it there")
-        if tracing := fluid.begin_trace(check_step(dt)):
-            self._submap.advance_tracing(tracing.target, self._accumulated.is_walled, tracing.defines, tracing.inputs)
-            self._advanced()
-        else:
-            self.advance_traced(fluid.trace(dt))
+        self._advance(fluid.begin_trace(check_step(dt)) or fluid.trace(dt))
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
@@ -128,11 +125,11 @@ class WarpMap:
     def advance_traced(self, trace: Field) -> None:
         """Carry the map one step by a trace: x_departed - x at every cell centre, in cells."""
         check_field("a trace", trace, self.grid)
-        self._submap.advance(trace, self._accumulated.is_walled)
-        self._advanced()
+        self._advance(trace)
 
-    def _advanced(self) -> None:
-        """A step was made: go on with a remap, or begin one if it is time."""
+    def _advance(self, trace: Field | Tracing) -> None:
+        """Make a step, and go on with a remap, or begin one if it is time."""
+        self._submap.advance(trace, self._accumulated.is_walled)
         self._steps += 1
         self._changed()
         self._remapping.advance(self.grid)

@@ -8,6 +8,7 @@ from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
 from solver.grid import Grid
 from solver.steepness import Steepness
+from solver.trace import Tracing
 from solver.warp.frozen import FADED
 
 STEEPEST = 1.0  # largest |grad S| that the cubic carries well
@@ -32,20 +33,16 @@ class Submap(DoubleField):
         self.trace = device.field(grid.size, 2, "submap, trace")
         self._steepness = Steepness(device, grid.size, "submap")
 
-    def advance(self, trace: Field, is_walled: bool) -> None:
-        """Carry it one step, given for every cell centre how far back the fluid came from, in cells."""
-        self._advance(self.write, {}, {"trace": trace, "walled": float(is_walled)})
-
-    def advance_tracing(self, trace: Field, is_walled: bool, defines: dict[str, Any], inputs: dict[str, Any]) -> None:
-        """Carry it one step and draw `trace`, the fluid's own, beside it: the defines and inputs of `trace.frag`."""
-        self._advance((self.write, trace), {"TRACE": 1, **defines}, {"walled": float(is_walled), **inputs})
-
-    def _advance(self, target: Field | tuple[Field, Field], defines: dict[str, Any], inputs: dict[str, Any]) -> None:
+    def advance(self, trace: Field | Tracing, is_walled: bool) -> None:
+        """Carry it one step, given how far back the fluid came from, in cells at their centres; or draw that too."""
+        target, inputs, defines = [self.write], dict[str, Any](trace=trace), dict[str, Any]()
+        if isinstance(trace, Tracing):
+            target, inputs, defines = [self.write, trace.target], trace.inputs, {"TRACE": 1, **trace.defines}
         inner = tuple(0.0 if at_edge else 1.0 for at_edge in self.grid.at_edge)
         if any(inner):
-            defines, inputs = defines | {"INNER": 1}, inputs | {"inner": inner}
+            inputs, defines = {**inputs, "inner": inner}, {**defines, "INNER": 1}
         advance = self.device.pass_("warp/advance.frag", **defines)
-        advance(target, displacement=self.read, spacing=self.grid.spacing, **inputs)
+        advance(target, displacement=self.read, spacing=self.grid.spacing, walled=float(is_walled), **inputs)
         self.swap()
 
     def replace(self) -> Field:
