@@ -11,16 +11,18 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.passes import Region
+from solver.gl.tiled import TILE
 from solver.grid import Grid
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.frozen import Frozen
 from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
 
 REMAP_STEPS = 8  # steps over which a remap is spread, at least
-# Tiles redrawn in a step, as much work as a step of the fluid, unless a level of another grid has to be finished.
-MOST_TILES = 8
+# Tiles redrawn in a step, half as much work as a step of the fluid, unless a level of another grid has to be finished.
+MOST_TILES = 4
 # Texels of the gathered level, along a cell and in all, but at least `LEAST_TEXELS` along a cell.
 MOST_GATHERED = 8, 2**19
+FEW_TILES = MOST_GATHERED[1] // TILE**2  # that are no more work than to gather
 
 
 class Remapping:
@@ -67,8 +69,8 @@ class Remapping:
         """Take over what a submap holds, weighted or not, and empty it."""
         if self._gathered is not None and self._gathered.grid != submap.grid:
             self.finish()
-        elif self._tiles * (1 - self._done / self._whole) <= MOST_TILES:
-            self._take_in(1.0)  # which is less work than to gather
+        elif self._tiles * (1 - self._done / self._whole) <= FEW_TILES:
+            self._take_in(1.0)
         if self._pending is not None:
             self._gather(submap, is_weighed)
         elif self._stand_by(Level(submap.read, submap.grid, is_weighed)):
