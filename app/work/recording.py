@@ -56,7 +56,7 @@ class Recording:
     def __init__(self, device: Device, project: Project) -> None:
         self.device = device
         self.project = project
-        self.document = Document(project.picture, project.recipe, project.path)
+        self.document = Document(project.recipe)
         self.pictures = Pictures(project.picture, project.folder, project.clip)
         self.replay = Replay(device, project.recipe, self.pictures, BUDGET)
         self.playing = False

@@ -144,11 +144,10 @@ class Session(Playing):
 
     def saved(self, project: Project) -> None:
         """Take note that the work has been saved as `project`: what is in the file is exported too, grid and all."""
-        assert project.path is not None
         self.project = project
         self.is_grid_automatic = False
         self.forget_grid()
-        self.document.saved(project.path)
+        self.document.saved()
 
     def release_gpu(self) -> None:
         """Free the textures; what makes them is kept."""

@@ -62,6 +62,16 @@ def test_a_coarse_residual_is_that_of_the_matrix(device: Device, aspect: float) 
     multigrid.release()
 
 
+@pytest.mark.parametrize("size", [(57, 41), (64, 33), (9, 130)])
+def test_a_coarse_level_covers_all_of_the_finer_one(device: Device, size: tuple[int, int]) -> None:
+    """Also the last cell of an odd number."""
+    multigrid = Multigrid(device, size, (1 / max(size), 1 / max(size)))
+    for fine, coarse in pairwise(multigrid.levels):
+        for whole, half in zip(fine.size, coarse.size, strict=True):
+            assert whole <= 2 * half <= whole + 1
+    multigrid.release()
+
+
 @pytest.mark.parametrize("aspect", [1.0, 1.3])
 def test_coarse_operators_are_galerkin_products(device: Device, aspect: float) -> None:
     """(A - I) of a level is P' (A - I) P / 4 of the next finer one."""

@@ -54,7 +54,7 @@ class Desk:
     def __init__(self, root: Path, project: Project) -> None:
         self.root = root
         self.project = project
-        self.document = Document(project.picture, project.recipe, project.path)
+        self.document = Document(project.recipe)
         self.journal = Journal(root)
 
     def push(self, count: int = 1, samples: int = 3) -> None:
@@ -62,7 +62,8 @@ class Desk:
             now = self.document.recipe
             places = tuple((now.ticks + k, 0.1 + k / (7 * samples), 0.5, 1.0) for k in range(samples))
             stroke = Stroke(tool="push", samples=places)
-            self.document.edit("Push", stroke=(*now.stroke, stroke), duration=now.duration + 1 / 3)
+            recipe = now.edited(stroke=(*now.stroke, stroke), duration=now.duration + 1 / 3)
+            self.document.history.commit("Push", recipe)
             self.keep()
 
     def keep(self) -> None:
@@ -70,7 +71,7 @@ class Desk:
 
     def save(self, path: Path) -> None:
         self.project = projects.save(replace(self.project, recipe=self.document.recipe), path)
-        self.document.saved(path)
+        self.document.saved()
         self.keep()
 
     def write(self) -> None:

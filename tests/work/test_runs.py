@@ -22,7 +22,6 @@ from solver.resample.plan import Edges, GivenMap, Sampling
 from solver.resample.sampler import Sampler
 from support.gl_objects import Made
 from support.golden import GOLDEN, Golden, told
-from support.passes import Passes
 
 RUNS: dict[str, Any] = tomllib.loads((GOLDEN / "runs.toml").read_text("utf-8"))
 TICKS = 9
@@ -36,31 +35,35 @@ def picture(width: int = 60, height: int = 45, channels: int = 3) -> np.ndarray:
     return ((0.4 * np.stack(waves, axis=-1) + 0.5 + 0.1 * rough).clip(0, 1) * 255).astype(np.uint8)
 
 
+def cost(device: Device) -> list[float]:
+    """How many passes, and thousands of texels read and written, in all stages, since they were last taken."""
+    timings = device.timings
+    passes, *texels = (sum(book.values()) for book in (timings.passes, timings.texel_reads, timings.texel_writes))
+    return [float(passes), *(count / 1e3 for count in texels)]
+
+
 @pytest.fixture(scope="module")
 def golden(shared_device: Device) -> Iterator[Golden]:
     with Golden.of_software(shared_device, "runs.txt") as golden:
         yield golden
 
 
-@pytest.fixture(scope="module")
-def passes(shared_device: Device) -> Iterator[Golden]:
-    with Golden.of_software(shared_device, "passes.txt") as golden:
-        yield golden
-
-
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_gives_the_numbers_that_are_written_down(
-    device: Device, name: str, golden: Golden, passes: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    device: Device, name: str, golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    noted, made = Passes(monkeypatch), Made(monkeypatch)
+    made = Made(monkeypatch)
     write_picture(tmp_path / "field.png", Picture(picture(30, 20)))
     parts = {"duration": 1.0} | RUNS[name]
     parts["fluid"] = {"grid": 36, "dt": 0.025, "viscosity": 0.002} | parts.get("fluid", {})
     replay = Replay(device, Recipe.model_validate(frozen(parts)), Pictures(Picture(picture()), tmp_path))
     found: dict[str, list[float]] = {}
     try:
+        device.timings.take()
         for _ in range(TICKS):
             replay.advance()
+        # What is left out or ends early changes no other number.
+        found["passes, thousands of texels read and written"] = cost(device)
         replay.fluid.measuring = True
         found["map"] = told(replay.warp.read())
         found["velocity"] = told(replay.fluid.velocity_at_centres())
@@ -87,17 +90,14 @@ def test_a_run_gives_the_numbers_that_are_written_down(
     assert not made.left, "these are still on the GPU"
     for what, numbers in found.items():
         golden.compare(f"{name} {what}", numbers, 0.1 if what.startswith("decades") else None)
-    noted.compare(passes, name)
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
-def test_pictures_are_looked_up_as_it_is_written_down(
-    device: Device, channels: int, golden: Golden, passes: Golden, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    noted = Passes(monkeypatch)
+def test_pictures_are_looked_up_as_it_is_written_down(device: Device, channels: int, golden: Golden) -> None:
     y, x = np.mgrid[0:30, 0:40] / 40
     values = np.stack([0.2 * np.sin(9 * y) + 0.1 * x, 0.15 * np.cos(11 * x) - 0.2 * y], axis=-1).astype(np.float32)
     warp, sampler = GivenMap(device, values), Sampler(device)
+    device.timings.take()
     pixels = picture(channels=channels)
     depths = pixels, pixels.astype(np.uint16) * 257, (pixels / 200).astype(np.float32)
     ways: list[tuple[int, dict[str, Any], tuple[int, int] | None]] = [
@@ -119,4 +119,4 @@ def test_pictures_are_looked_up_as_it_is_written_down(
     finally:
         sampler.release()
         warp.release()
-    noted.compare(passes, f"{channels} channels")
+    golden.compare(f"{channels} channels, passes, thousands of texels read and written", cost(device))
