@@ -53,6 +53,8 @@ LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each 
 KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
 MOST_COASTING = 60.0  # seconds
 BUDGET = 400 * 2**20  # bytes of texture memory for checkpoints
+LEAST_BUDGET = BUDGET // 64  # with less, it is the grid that is too large
+COARSEST = 32  # cells that a full graphics memory leaves
 PATIENCE = 0.05  # seconds of a frame for getting to where the playhead was sent
 RETURN = 0.08  # seconds of the frame in which another state of the history is asked for
 QUICK = 0.01  # seconds a tick may take for another one in the same frame: rather a slower fluid than fewer frames
@@ -964,6 +966,28 @@ class Session:
         self.is_grid_automatic = False
         self.forget_grid()
         self.document.saved(project.path)
+
+    def make_room(self) -> str:
+        """Where the graphics memory is full: keep less of the past or, if that is little, simulate on half the cells.
+
+        The present is made anew over the next frames. Says what has been done.
+
+        Raises:
+            MemoryError: if there can be no less.
+        """
+        checkpoints, cells = self.replay.checkpoints, self._live.fluid.grid // 2
+        if checkpoints.budget > LEAST_BUDGET:
+            checkpoints.budget //= 8
+            said = "less of the past is kept now, and going back takes longer."
+        elif cells >= COARSEST:
+            self.document.simulate_on(cells)
+            self._base, self._live = self._base.on_grid(cells), self._live.on_grid(cells)
+            said = f"the simulation goes on with {cells} cells."
+        else:
+            raise MemoryError
+        self.release_gpu()
+        self.wake()
+        return f"The graphics memory is full: {said}"
 
     def release_gpu(self) -> None:
         """Free the textures; what makes them is kept."""
