@@ -45,6 +45,7 @@ from app.ui.workspace import Workspace
 from app.work.recovery import Found
 from app.work.session import Session
 from solver.gl.device import Device
+from solver.gl.field import GraphicsMemoryError
 
 AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
 TOLD = 2  # frames after a click or a key that may begin or end typing, in which imgui tells whether text is typed
@@ -285,6 +286,8 @@ class Editor:
             self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
         except UserError as error:
             self.messages.warn(error.in_window)
+        except GraphicsMemoryError:
+            self.messages.warn(self.session.make_room())
 
     def _handle(self, events: Sequence[Event]) -> None:
         for event in events:
@@ -295,6 +298,8 @@ class Editor:
                 # What the hand tries in vain is no state of the work, that somebody would have to take note of.
                 tell = self.messages.caution if isinstance(event, (Button, Move)) else self.messages.warn
                 tell(error.in_window)
+            except GraphicsMemoryError:
+                self.messages.warn(self.session.make_room())
 
     def _handle_one(self, event: Event) -> None:
         match event:

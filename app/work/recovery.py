@@ -337,4 +337,8 @@ def _look_into(held: LockedFolder) -> Found | None:
     if not path.is_file():
         return None
     origin, work = read(path.read_bytes())
-    return Found(held, origin, work, datetime.fromtimestamp(path.stat().st_mtime)) if work.is_unsaved else None
+    try:
+        when = datetime.fromtimestamp(path.stat().st_mtime)
+    except (ValueError, OverflowError):  # the clock, or the disk, is wrong by thousands of years
+        when = datetime.max
+    return Found(held, origin, work, when) if work.is_unsaved else None

@@ -17,8 +17,12 @@ from app.media.project import Project
 from app.model.handles import ARRIVED, MOST_OBJECTIONS, objections
 from app.work.handle_status import FIT, Held, as_seen, held_in, unmet
 from app.work.playing import Playing
+from app.work.recording import BUDGET
 from app.work.replay import Replay
 from solver.gl.device import Device
+
+LEAST_BUDGET = BUDGET // 64  # with less, it is the grid that is too large
+COARSEST = 32  # cells that a full graphics memory leaves
 
 T = TypeVar("T")
 
@@ -148,6 +152,28 @@ class Session(Playing):
         self.is_grid_automatic = False
         self.forget_grid()
         self.document.saved()
+
+    def make_room(self) -> str:
+        """Where the graphics memory is full: keep less of the past or, if that is little, simulate on half the cells.
+
+        The present is made anew over the next frames. Says what has been done.
+
+        Raises:
+            MemoryError: if there can be no less.
+        """
+        checkpoints, cells = self.replay.checkpoints, self._live.fluid.grid // 2
+        if checkpoints.budget > LEAST_BUDGET:
+            checkpoints.budget //= 8
+            said = "less of the past is kept now, and going back takes longer."
+        elif cells >= COARSEST:
+            self.document.simulate_on(cells)
+            self._base, self._live = self._base.on_grid(cells), self._live.on_grid(cells)
+            said = f"the simulation goes on with {cells} cells."
+        else:
+            raise MemoryError
+        self.release_gpu()
+        self.wake()
+        return f"The graphics memory is full: {said}"
 
     def release_gpu(self) -> None:
         """Free the textures; what makes them is kept."""

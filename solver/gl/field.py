@@ -14,6 +14,10 @@ from solver.gl.context import Context
 DTYPES = {"f1": np.uint8, "nu2": np.uint16, "u4": np.uint32, "f2": np.float16, "f4": np.float32}
 
 
+class GraphicsMemoryError(MemoryError):
+    """The graphics memory is full."""
+
+
 class FieldError(ValueError):
     """A field of an impossible size, or data that does not fit it."""
 
@@ -53,7 +57,7 @@ class Field:
         self.components = components
         self.label = label
         self.dtype = dtype
-        texture = device.ctx.texture(self.size, components, dtype=dtype, alignment=1)
+        texture = new_texture(device.ctx, self.size, components, dtype)
         texture.repeat_x = texture.repeat_y = False
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         framebuffer = device.ctx.framebuffer([texture])
@@ -165,6 +169,16 @@ class Field:
 
     def __repr__(self) -> str:
         return f"Field({self.label}, {self.width} x {self.height} x {self.components} {self.dtype})"
+
+
+def new_texture(ctx: moderngl.Context, size: tuple[int, int], components: int, dtype: str) -> moderngl.Texture:
+    """A texture whose rows are not padded. Raises `GraphicsMemoryError`."""
+    _ = ctx.error  # of whatever was before
+    texture = ctx.texture(size, components, dtype=dtype, alignment=1)
+    if ctx.error == "GL_OUT_OF_MEMORY":
+        texture.release()
+        raise GraphicsMemoryError(f"there is no room for {size[0]} x {size[1]} x {components} more")
+    return texture
 
 
 class DoubleField:

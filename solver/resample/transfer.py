@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 
 from solver.gl.device import Device
-from solver.gl.field import Field, FieldPool
+from solver.gl.field import Field, FieldPool, new_texture
 from solver.resample.plan import KINDS, Plan
 from solver.resample.tiles import Piece, edge_index
 
@@ -92,7 +92,7 @@ class PictureTexture:
         if kept is not None:
             kept.release()
         components = 4 if channels == 3 and dtype in WORDS else channels
-        texture = self.device.ctx.texture(size, components, dtype=dtype, alignment=1)
+        texture = new_texture(self.device.ctx, size, components, dtype)
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         texture.repeat_x = texture.repeat_y = False
         texture.swizzle = SWIZZLES[channels]

@@ -145,3 +145,48 @@ def test_another_driver_gives_the_same_picture(tmp_path: Path):
         pictures.append(np.asarray(Image.open(tmp_path / f"{driver}.png")).astype(int))
     assert abs(pictures[0] - pictures[1]).max() <= 1
     assert pictures[0].std() > 20
+
+
+# So little memory that a software rasteriser, which has its textures there, runs out of it as a card does.
+FULL = """
+import resource, sys
+from pathlib import Path
+from app.cli import main
+from solver.gl.device import Device
+from solver.gl.field import GraphicsMemoryError
+
+def limited(kind, headless=Device.headless):
+    device = headless()
+    device.field((64, 64), 1, "before")
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    most = pages * resource.getpagesize() + 600 * 2**20
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    return device
+"""
+FILLING = """
+device, kept = limited(None), []
+try:
+    for number in range(99):
+        kept.append(device.field((2048, 2048), 4, str(number)))
+except GraphicsMemoryError as error:
+    print(error)
+assert kept
+kept.pop().release()
+assert device.field((1024, 1024), 4, "after").get().sum() == 0
+"""
+RENDERING = """
+Device.headless = classmethod(limited)
+sys.argv = ["fluidwarp", "render", "coffee", "-o", "full.png", "--grid", "4096"]
+main()
+"""
+
+
+@linux
+def test_full_graphics_memory_is_told_and_what_is_given_back_can_be_used(tmp_path: Path):
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "LIBGL_ALWAYS_SOFTWARE": "1"}
+    for script, status, told in ((FILLING, 0, "there is no room for 2048 x 2048 x 4 more"), (RENDERING, 1, "")):
+        command = [sys.executable, "-c", FULL + script]
+        ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment)
+        assert (ran.returncode, ran.stdout.strip()) == (status, told), ran.stderr
+    assert ran.stderr == "fluidwarp: there is not enough memory; try a smaller --size or --grid\n"
+    assert not list(tmp_path.iterdir())

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -45,6 +46,7 @@ from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
 from solver.brush.masks import ZERO
 from solver.gl.device import Device
+from solver.gl.field import GraphicsMemoryError, new_texture
 from solver.resample.plan import Sampling
 from solver.resample.sampler import Sampler
 from support.commands import Run
@@ -1593,3 +1595,70 @@ def test_light_without_alpha_is_seen() -> None:
     flame[0, 3] = 4, 0.5, 0, 1
     seen = shown_pixels(Picture(flame, premultiplied=True), 64)[0].tolist()
     assert seen == [[188, 137, 0, 0], [0, 0, 0, 0], [94, 0, 0, 128], [255, 188, 0, 255]]
+
+
+def test_where_the_graphics_memory_is_full_less_is_kept_and_nothing_lost(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A card with a little room beside what the simulation takes."""
+    session, living, most = robot.editor.session, list[moderngl.Texture](), 2**40
+
+    def limited(ctx: moderngl.Context, size: tuple[int, int], components: int, dtype: str) -> moderngl.Texture:
+        living[:] = [texture for texture in living if not isinstance(texture.mglo, moderngl.InvalidObject)]
+        texture = new_texture(ctx, size, components, dtype)
+        living.append(texture)
+        if sum(each.width * each.height * each.components * 4 for each in living) > most:
+            texture.release()
+            raise GraphicsMemoryError
+        return texture
+
+    def rest() -> None:
+        robot.frame()
+        while session.is_moving:
+            robot.frame()
+
+    monkeypatch.setattr("solver.gl.field.new_texture", limited)
+    monkeypatch.setattr("app.work.session.LEAST_BUDGET", 2**12)
+    session.replay.checkpoints.budget = 2**21
+    session.release_gpu()
+    session.wake()
+    robot.drag((0.3, 0.3), (0.6, 0.6), steps=4)
+    robot.rest()
+    session.replay.checkpoints.clear()
+    most = sum(each.width * each.height * each.components * 4 for each in living) + 2**19
+    full = "The graphics memory is full: less of the past is kept now, and going back takes longer."
+    for number in range(20):
+        robot.drag((0.7, 0.3), (0.2 + number / 40, 0.8), steps=4)
+        rest()
+        if full in [message.text for message in robot.editor.messages.shown]:
+            break
+    else:
+        pytest.fail("its memory was never full")
+    rest()
+    assert len(session.document.recipe.stroke) == number + 2
+    assert session.recipe == session.document.recipe
+    found = robot.warp()
+    most = 2**40
+    session.release_gpu()
+    session.wake()
+    robot.rest()
+    assert np.array_equal(robot.warp(), found)
+
+
+def test_where_the_graphics_memory_holds_no_past_at_all_the_cells_become_fewer(robot: Robot) -> None:
+    session = robot.editor.session
+    robot.drag((0.3, 0.3), (0.6, 0.6), steps=4)
+    robot.rest()
+    session.set_grid(64)
+    robot.rest()
+    done, strokes, said = session.document.history.undo_name, session.recipe.stroke, ""
+    for _ in range(9):
+        if "cells" in (said := session.make_room()):
+            break
+    assert said == "The graphics memory is full: the simulation goes on with 32 cells."
+    robot.rest()
+    assert session.replay.grid.nx == session.recipe.fluid.grid == session.document.recipe.fluid.grid == 32
+    assert (session.document.history.undo_name, session.recipe.stroke) == (done, strokes)
+    assert np.abs(robot.warp()).max() > 0.01
+    with pytest.raises(MemoryError):
+        session.make_room()

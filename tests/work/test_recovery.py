@@ -8,11 +8,13 @@ import os
 import random
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import ClassVar
 
@@ -29,7 +31,7 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.model.undo import History
-from app.ui.recovery_dialog import Offer
+from app.ui.recovery_dialog import Offer, about
 from app.ui.widgets import Ui
 from app.work import locks, recovery
 from app.work.locks import Lock
@@ -156,6 +158,21 @@ def test_what_was_not_saved_is_found(desk: Desk) -> None:
     assert np.array_equal(project.picture.pixels, desk.project.picture.pixels)
     assert (project.name, project.folder, project.path) == ("pattern", desk.project.folder, None)
     assert found.is_as_it_was(project)
+
+
+@pytest.mark.parametrize("clock", [-2e9, 0, 4e9, 1e12])
+def test_what_was_not_saved_is_found_whatever_the_clock_said(tmp_path: Path, clock: float) -> None:
+    """In memory, where there is such a disk: it keeps times that others do not, of years that have no date."""
+    shared = Path("/dev/shm")
+    with tempfile.TemporaryDirectory(dir=shared if shared.is_dir() else tmp_path) as folder:
+        desk = Desk(Path(folder), small_project(tmp_path))
+        desk.push(3)
+        desk.die()
+        for path in Path(folder).rglob("*"):
+            os.utime(path, (clock, clock))
+        found = found_in(desk.root)
+        assert is_all_of(found, desk.document)
+        assert about(found, date(2026, 1, 1)).startswith("3 strokes, ")
 
 
 def test_nothing_is_written_where_nothing_would_be_lost(desk: Desk, tmp_path: Path) -> None:
