@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.field import Field
 
 _ROW = 256  # points in a row of the texture that lists them
 
@@ -36,7 +37,7 @@ def draw_at(
     lists = {"points": points / domain} | ({} if more is None else {"more": more})
     row = min(max(len(points), 1), _ROW)
     listed = {name: device.upload(in_rows(values, row), f"{name} of a list") for name, values in lists.items()}
-    found = device.field(listed["points"].size, components, "found at points")
+    found = Field(device, listed["points"].size, components, "found at points", cleared=False)
     device.pass_(shader, POINTS=1, **(defines or {}))(found, **listed, **inputs)
     values = found.get().reshape(-1, components)[: len(points)]
     for field in (*listed.values(), found):
