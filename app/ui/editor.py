@@ -340,6 +340,9 @@ class Editor:
         # Clearing is many times cheaper than the same rectangles drawn by imgui, which blends every pixel.
         target.clear(*self.ui.palette.panel)
         self._device.fences.hold()
+        # Where handles are is read back, which waits for all that is being drawn: so before the canvas, with which a
+        # software rasteriser goes on while the panels are made.
+        _ = self.session.marks
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         by_keys = bool(self.dialogs.shown) or self.ui.has_popup

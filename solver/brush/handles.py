@@ -488,7 +488,7 @@ class Handles:
         fluid, device = self._fluid, self._fluid.device
         listed = np.column_stack([lead.places - fluid.grid.origin, lead.radii])
         handles = device.upload(listed[None].astype(np.float32), "handles")
-        found = device.field(handles.size, 4, "fluid at the handles")
+        found = Field(device, handles.size, 4, "fluid at the handles", cleared=False)
         inputs: dict[str, Any] = {
             "viscosity": fluid.viscosity,
             "solid": fluid.solid,

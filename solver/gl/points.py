@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.field import Field
 
 _ROW = 256  # points in a row of the texture that lists them
 
@@ -38,7 +39,8 @@ def draw_at(
     size = row, len(rows)
     if more is not None:  # below the points, in one texture with them
         rows = np.concatenate([np.pad(rows, ((0, 0), (0, 0), (0, 2))), in_rows(more, row)])
-    listed, found = device.upload(rows, "points of a list"), device.field(size, components, "found at points")
+    listed = device.upload(rows, "points of a list")
+    found = Field(device, size, components, "found at points", cleared=False)
     device.pass_(shader, POINTS=1, **(defines or {}))(found, points=listed, **inputs)
     values = found.get().reshape(-1, components)[: len(points)]
     for field in (listed, found):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import pairwise
 from math import cos, hypot, pi, sin
 from typing import Any
@@ -180,14 +181,19 @@ def _number(ui: Ui, label: str, at: ImVec2, is_left: bool, is_lit: bool, lines: 
     the name. Lit it is a box of the accent.
     """
     ground, ink = (packed(ui.palette.accent), ui.palette.on_accent) if is_lit else (packed(BLACK, 0.5), WHITE)
-    words = in_words(label).removeprefix("handle ")
-    words = re.sub(r'^(\d+) "pair \1"$', r"\1", words)  # a fit's own name says no more
+    words = _words(label)
     imgui.push_font(ui.fonts.bold, 12.0)
     size, box = imgui.calc_text_size(words), ImVec2(ui.px(3), 0.0)
     at = ImVec2(at.x - (size.x if is_left else 0.0), at.y - size.y / 2)
     lines.add_rect_filled(at - box, at + size + box, ground, ui.px(4))
     lines.add_text(at, packed(ink), words)
     imgui.pop_font()
+
+
+@lru_cache(256)
+def _words(label: str) -> str:
+    words = in_words(label).removeprefix("handle ")
+    return re.sub(r'^(\d+) "pair \1"$', r"\1", words)  # a fit's own name says no more
 
 
 def _path(ui: Ui, view: Viewport, session: Session, lines: imgui.ImDrawList) -> None:
