@@ -33,7 +33,12 @@ JOBS: dict[str, tuple[str, Box]] = {
     "retouching-jaw": ("Slimming a jaw with ten small dabs", (2600, 1880, 3340, 2590)),
     "retouching-eye": ("Enlarging an eye; the rim of the glasses is frozen", (2540, 1580, 3140, 1980)),
 }
-POSTERS = ("poster-terrace", "poster-tanguy", "poster-night-cafe")
+# And of the posters.
+POSTERS: dict[str, Box] = {
+    "poster-terrace": (380, 100, 1080, 620),
+    "poster-tanguy": (870, 60, 1570, 580),
+    "poster-night-cafe": (780, 0, 1480, 520),
+}
 
 
 def make(device: Device, folder: Path, progress: Progress) -> dict[str, Measured]:
@@ -79,13 +84,18 @@ def retouch(studio: Studio, name: str, smaller: int = 1) -> Measured:
 
 
 def poster(studio: Studio, name: str) -> Measured:
-    """Play a poster, and write it and its sheet."""
+    """Play a poster, and write it, its sheet, and one of a part of it at 100 %."""
     recipe = load(name)
     source = source_of(recipe)
     part = POSTER / max(source.shape)
-    after, _, numbers = _played(studio, recipe, source, (round(source.shape[1] * part), round(source.shape[0] * part)))
+    size = round(source.shape[1] * part), round(source.shape[0] * part)
+    after, _, numbers = _played(studio, recipe, source, size)
     write_picture(studio.folder / f"{name}.png", Picture(after))
     studio.sheet(name, recipe.name, [("before", source), ("after", after)], SHOWN)
+    left, top, right, bottom = POSTERS[name]
+    before = np.asarray(Image.fromarray(source).resize(size, Image.Resampling.LANCZOS))
+    panels = [(caption, whole[top:bottom, left:right]) for caption, whole in (("before", before), ("after", after))]
+    studio.sheet(f"{name}-detail", f"{recipe.name}, at 100 %", panels, bottom - top)
     return numbers
 
 
