@@ -1,7 +1,7 @@
 """Driving the solver by a recipe: the one way to a warp, for the window and for the command line.
 
 One long class: a step, and going back by a checkpoint, need all parts of the simulation. What strokes, forces and
-handles do in a step is in `brushwork.py`, `loaded_forces.py` and `leading.py`.
+handles do in a step is in `brushwork.py`, `loaded_forces.py` and `loaded_handles.py`.
 """
 
 from __future__ import annotations

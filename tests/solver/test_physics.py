@@ -195,6 +195,21 @@ def test_half_a_local_push_is_half_as_fast(device: Device) -> None:
     np.testing.assert_allclose(half, whole / 2, atol=1e-6)
 
 
+def test_local_pushes_that_overlap_add_up(device: Device) -> None:
+    grid, brush = Grid(48, 32), Brush(device)
+    tips = [Tip((0.5, 0.3), (0.51, 0.295), radius=0.15), Tip((0.55, 0.35), (0.55, 0.37), radius=0.15)]
+    found = []
+    for together in ([0], [1], [0, 1]):
+        fluid = Fluid(device, grid)
+        for number in together:
+            brush.carry(fluid, Push(tips[number], 1 / 60, local=1.0))
+        found.append(fluid.carrier().get())
+        fluid.release()
+    brush.release()
+    assert all(one.any() for one in found[:2])
+    np.testing.assert_allclose(found[2], found[0] + found[1], atol=1e-6)
+
+
 @pytest.mark.parametrize("inwards", [True, False])
 def test_a_local_push_at_the_edge_does_not_fold(device: Device, inwards: bool) -> None:
     fluid, warp, brush = Fluid(device, Grid(48, 32)), WarpMap(device, Grid(48, 32)), Brush(device)
