@@ -65,7 +65,7 @@ def together(command: str, lines: list[str]) -> dict[str, str]:
     """The words of three of the lines at once, by chance: what one does may depend on another."""
     dice = Random(command)
     # With the others nothing comes of what they stand with.
-    ways = [line for line in lines if line and not line.endswith((" 100", " other", "--forward", "--frames 1"))]
+    ways = [line for line in lines if line and not line.endswith((" 100", " other", "--forward", "--frames 1", " 300"))]
     made = dict[str, str]()
     for number in range(TOGETHER[command]):
         words = " ".join(dice.sample(ways, 3)).split()

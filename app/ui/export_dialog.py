@@ -457,6 +457,10 @@ class ExportDialog(Dialog):
         if os.path.exists(self.output):
             ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(6)))
+        if self.session.is_moving:  # beside the buttons, which stay where they are when it comes to rest
+            imgui.align_text_to_frame_padding()
+            ui.dim("Still moving: " + ("recorded until you export." if self.animation else "this moment is exported."))
+            imgui.same_line()
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
         if ui.button("Cancel", width=96):
             return False

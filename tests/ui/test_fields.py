@@ -423,14 +423,20 @@ def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: Export
 
 
 def test_an_animation_ends_where_the_recording_does_that_goes_on_behind_the_dialog(
-    robot: Robot, widgets: Widgets
+    robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = robot.editor.session
     session.change("Water", viscosity=0.0006)
     robot.drag((0.3, 0.5), (0.6, 0.5), steps=4)
     robot.key("ctrl+e")
     robot.frame(count=3)
+    words, text = [], Ui.text
+    monkeypatch.setattr(Ui, "text", lambda ui, said, *how, **more: words.append(said) or text(ui, said, *how, **more))
+    robot.frame()
+    assert "Still moving: this moment is exported." in words
     widgets.click("Animation")
+    robot.frame()
+    assert "Still moving: recorded until you export." in words
     dialog, before = robot.editor.dialogs.shown[-1], session.end
     assert isinstance(dialog, ExportDialog)
     robot.frame(count=10)
