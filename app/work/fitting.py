@@ -326,10 +326,12 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
     picture = pictures.source
     extent = picture.width / max(picture.width, picture.height), picture.height / max(picture.width, picture.height)
     if pairs is not None:
-        base = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each)))
+        base, start = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each))), _anew(recipe)
+        if start:
+            base = base.edited(duration=max(base.duration, start + DURATION[0]))
         # What is local carries a curve's points between its handles along: a fluid flows back there. And all do, since
         # those that push as a fluid does halt where what is local has pressed the picture together.
-        one = RecipeHandle(at=(0.5, 0.5), keys=(), local=1.0 if any(pairs.curves) else 0.0)
+        one = RecipeHandle(at=(0.5, 0.5), keys=(), start=start, local=1.0 if any(pairs.curves) else 0.0)
         names = tuple(f"{NAME} {number}" for number in range(1, len(pairs.places) + 1))
         pairs, leads = Pairs(np.round(pairs.places, DECIMALS), pairs.curves), list[_Lead]()
         for name, (at, to) in zip(names, pairs.places.tolist(), strict=True):
@@ -386,6 +388,11 @@ def _has_times(recipe: Recipe) -> bool:
 def _flows(recipe: Recipe) -> bool:
     """True if something but handles moves the fluid, or sets it: another viscosity would make that another one."""
     return bool(recipe.stroke or recipe.change or recipe.force)
+
+
+def _anew(recipe: Recipe) -> float:
+    """The seconds from which on what is led stays: when the warp is reset for the last time, or else 0."""
+    return max((change.tick for change in recipe.change if change.reset_warp), default=0) * recipe.fluid.dt
 
 
 def _lets_go(led: RecipeHandle | RecipePin, recipe: Recipe) -> bool:

@@ -99,6 +99,20 @@ def test_what_cannot_be_met_is_told_by_number_and_nothing_folds(
     assert folds == found.trial.folds == 0
 
 
+def test_pairs_are_led_after_the_last_reset_of_the_warp(device: Device):
+    """Led before it, they would lose their way by it: they ended 20 pixels of 256 short."""
+    stroke = '[[stroke]]\ntool = "push"\nradius = 0.2\nsamples = [[0, 0.3, 0.5, 1.0], [9, 0.5, 0.5, 1.0]]\n'
+    reset = "[[change]]\ntick = 10\nreset_warp = true\n"
+    found = fit(device, PAIRS, recipe=FREE + stroke + reset)
+    recipe = found.trial.recipe
+    assert {handle.start for handle in recipe.handle} == {0.4}
+    assert len(recipe.stroke) == len(recipe.change) == 1
+    places, _, folds = arrived(device, recipe, PAIRS[:, 0])
+    assert np.hypot(*((places - PAIRS[:, 1]) * EXTENT).T).max() * 64 < 0.1
+    assert folds == 0
+    assert not found.notices
+
+
 def test_what_is_frozen_only_at_first_can_be_met(device: Device):
     frozen = '[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1\n'
     thawed = '[[mask]]\nkind = "clear"\ntick = 2\nof = "frozen"\n'
