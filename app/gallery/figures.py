@@ -170,13 +170,14 @@ def beside_spline(studio: Studio, name: str) -> Measured:
         GivenMap(studio.device, theirs.astype(np.float32)), played.source, how=Sampling(edges=played.recipe.edges)
     )
     ours, splines = ((*stretch_and_det(each), beyond(each)) for each in (mine, theirs))
+    has_folds = bool((splines[1] <= 0).any())
     studio.sheet(
         name,
         f"{played.recipe.name}, and the same by a thin-plate spline",
         [
             ("a  source; handles and pins", led(played.source, played.recipe)),
             ("b  handles", marked(played.result, ours[1])),
-            ("c  thin-plate spline; folds in red", marked(other, splines[1])),
+            (f"c  thin-plate spline; {'folds in red' if has_folds else 'no folds'}", marked(other, splines[1])),
         ],
     )
     return {
