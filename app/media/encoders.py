@@ -117,14 +117,8 @@ def _apng(stream: Stream) -> list[str]:
 
 def _webp(stream: Stream) -> list[str]:
     if (quality := 90 if stream.quality is None else stream.quality) == 100:
-        kind = [
-            "-pix_fmt",
-            "bgra",
-            "-lossless",
-            "1",
-            "-quality",
-            "75",
-        ]  # that of a lossless file is the encoder's effort
+        # Of a lossless file the quality is the encoder's effort.
+        kind = ["-pix_fmt", "bgra", "-lossless", "1", "-quality", "75"]
     else:
         kind = ["-pix_fmt", "yuva420p" if stream.alpha else "yuv420p", "-quality", str(quality)]
     return ["-c:v", "libwebp_anim", *kind, "-compression_level", "3", "-loop", str(stream.loops), "-f", "webp"]
