@@ -100,7 +100,8 @@ class Application(Piece):
         outputs, output = self.outputs, self._output
         check_output(output, animated=outputs.animated, fps=self.fps, codec=outputs.codec, bits=outputs.bits)
         maps.check_map(self.maps.path)
-        writable(output)
+        if self.folder is None:
+            writable(output)
         self.check_names([*self.maps.files().values(), *([self.picture] if self.picture else [])])
         outputs.check()
 
@@ -116,6 +117,7 @@ class Application(Piece):
         source = open_source(self.picture, self.max_pixels, self.outputs.is_animation)
         check_result(self._size(source.picture), source.picture)
         self.make_folder()
+        writable(self._output)
         check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
         if source.clip is not None:
             check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)

