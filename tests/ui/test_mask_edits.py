@@ -47,7 +47,7 @@ def test_the_hint_of_a_margin_goes_once_something_is_frozen(
     robot.key("f")
     said.clear()
     robot.frame()
-    assert any("Leave a margin" in words for words in said) == (tool == "push")
+    assert any("leave some space" in words for words in said) == (tool == "push")
 
 
 def test_a_mask_follows_the_pointer_in_every_frame_and_takes_no_time(robot: Robot) -> None:
