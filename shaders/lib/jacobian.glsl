@@ -115,8 +115,8 @@ Bend bend_at(vec2 x) {
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
 #if UNDONE > 0
-    // Where nothing is undone, the determinant stays the product of the parts'. At a sharp edge the cubic leads on, by E, also
-    // where the part T, kept in 0-1, is 0.
+    // Where nothing is undone, the determinant stays the product of the parts'. At a sharp edge the cubic leads on, by E,
+    // also where the part T, kept in 0-1, is 0.
     if (bend.part < 1.0 || bend.back != vec2(0.0) || bend.bent_back != mat2(0.0)) {
         mat2 bent = bend.bent_back + outerProduct(bend.moved, bend.fading) + bend.part * (bend.jacobian - mat2(1.0));
         bend.jacobian = mat2(1.0) + bent;
