@@ -45,8 +45,8 @@ class BrushPath(Model):
     Between two samples the pointer moved at a constant speed, so that a stroke does not depend on how often the pointer
     was sampled: during tick n (the step from n to n + 1) the brush passes the path from time n - 1 to time n. A tool
     that acts while it stands still (twirl, bloat, thicken ...) acts in every tick from the first sample to the last.
-    A curve acts all at once, in the tick of its last sample, along the whole path. Of samples in one tick, as many are
-    left out evenly as leave `MOST_AT_ONCE` pieces.
+    A curve acts all at once, in the tick of its last sample, along the whole path. Where the path would have more than
+    `MOST_AT_ONCE` pieces in one tick, or in a curve, samples are left out evenly.
 
     Attributes:
         radius: of the brush, in longer sides.
@@ -92,7 +92,7 @@ class BrushPath(Model):
 
     @property
     def most_pieces(self) -> int:
-        """Of its path and its images, that are gone through one by one in a tick; at least 1."""
+        """The most pieces that are gone through one by one in a tick, counted for each of its images; at least 1."""
         counts = [1]
         if self.tool == "curve":
             counts.append(len(self.samples) - 1)
@@ -102,13 +102,13 @@ class BrushPath(Model):
 
     @property
     def _images(self) -> int:
-        """It acts once for each of them, where what is under the brush is looked at; else for all at once."""
+        """How often each piece is gone through: once an image where what is under the brush is looked at, else once."""
         one_by_one = self.tool in ("restore", "smooth") or (self.detail and self.tool in ("bloat", "pinch"))
         return 1 + len(turns(self.symmetry, self.sectors)) if one_by_one else 1
 
     @property
     def _most(self) -> int:
-        """The pieces that its path has in a tick."""
+        """The most pieces that its path may have in a tick."""
         return max(MOST_AT_ONCE // self._images, 1)
 
     @property

@@ -87,7 +87,7 @@ class Painting(Recording):
             self._end_if_long(self._gesture)
 
     def _end_if_long(self, gesture: OpenGesture) -> None:
-        """End what has as many moves, or ticks of holding still, as there is to be room for."""
+        """End a gesture of as many moves, or of as many ticks, as one may have; a pen held still makes no moves."""
         if max(len(gesture.path), gesture.ticks) >= LONGEST_GESTURE:
             self.release()
             self.notice = "This stroke has reached its greatest length. Press again to continue."

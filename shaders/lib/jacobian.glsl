@@ -1,5 +1,6 @@
 // The Jacobian of the warp map by the chain rule: the product of those of its parts, each by the derivatives of the cubic
-// both ways; where something is undone (see `undo` in lib/warp.glsl), that of back + part (x led to - x). 32 reads, and 16 more for each of LEVELS above 1 and of CLOSED, 4 for each of WEIGHED.
+// both ways; where something is undone (see `undo` in lib/warp.glsl), that of back + part (x led to - x).
+// 32 reads, and 16 more for each of LEVELS above 1 and of CLOSED, 4 for each of WEIGHED.
 #include "lib/warp.glsl"
 
 // What the map does at x.
@@ -61,7 +62,8 @@ void undo(sampler2D undone, vec2 x, inout Bend bend) {
     float kept = 1.0 - clamp(read.b, 0.0, 1.0), left = bend.part * kept;
     vec2 fading = bend.fading * kept - bend.part * growing, moved = bend.moved + read.rg;
     bend.back += bend.part * bend.moved - left * moved;
-    bend.bent_back += outerProduct(bend.moved, bend.fading) + bend.part * bent - outerProduct(moved, fading) - left * (bent + aside);
+    bend.bent_back += outerProduct(bend.moved, bend.fading) + bend.part * bent;
+    bend.bent_back -= outerProduct(moved, fading) + left * (bent + aside);
     bend.moved = moved;
     bend.part = left;
     bend.fading = fading;
@@ -113,8 +115,11 @@ Bend bend_at(vec2 x) {
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
 #if UNDONE > 0
-    if (bend.part < 1.0) {
-        bend.jacobian = mat2(1.0) + bend.bent_back + outerProduct(bend.moved, bend.fading) + bend.part * (bend.jacobian - mat2(1.0));
+    // Where nothing is undone, the determinant stays the product of the parts'. At a sharp edge the cubic leads on, by E,
+    // also where the part T, kept in 0-1, is 0.
+    if (bend.part < 1.0 || bend.back != vec2(0.0) || bend.bent_back != mat2(0.0)) {
+        mat2 bent = bend.bent_back + outerProduct(bend.moved, bend.fading) + bend.part * (bend.jacobian - mat2(1.0));
+        bend.jacobian = mat2(1.0) + bent;
         bend.determinant = determinant(bend.jacobian);
         bend.moved = bend.back + bend.part * bend.moved;
     }

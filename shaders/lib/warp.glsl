@@ -1,14 +1,13 @@
 // The warp map as its parts: submaps on windows of the picture, the identity outside them, then the accumulated map.
 //   D(x) = S(x) + A(x + S(x));   with LEVELS defined as 2 or 3, with the submaps that are still to be taken into A,
-//   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 9, with so many fields after A,
-//   the last one closed first: closed maps, and where UNDONE has their bit, what the restore brush has taken away of all that
-//   follows. A place that is looked up in the next part is kept in the picture, and x + D(x) within u_limits, as all texels
-//   are: between them a polynomial exceeds them, and composed again and again that would grow without end.
+//   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 9, with so many fields after
+//   A, the last one closed first: closed maps, and where UNDONE has their bit, what the restore brush has taken away of all
+//   that follows. A place that is looked up in the next part is kept in the picture, and x + D(x) within u_limits, as all
+//   texels are: between them a polynomial exceeds them, and composed again and again that would grow without end.
 // u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_8: displacements, longer sides, and of what is undone
-// the part, 0-1, in the third component; u_window,
-// u_second_window, u_third_window: left, top, width and height that the submaps cover, u_picture: width and height of the
-// picture, u_limits: left, top, right, bottom, longer sides; u_walled: 1 if neither what has moved nor A or a closed map
-// crosses the picture's edges, else 0.
+// the part, 0-1, in the third component; u_window, u_second_window, u_third_window: left, top, width and height that the
+// submaps cover, u_picture: width and height of the picture, u_limits: left, top, right, bottom, longer sides; u_walled: 1
+// if neither what has moved nor A or a closed map crosses the picture's edges, else 0.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
 // that are carried less and less before that, 1, 2 and 4 or their sum, and FADED: see weight.
 #include "lib/displacement.glsl"
@@ -35,8 +34,8 @@ uniform vec4 u_third_window;
 #ifndef UNDONE
 #define UNDONE 0
 #endif
-// THROUGH_CLOSED(GO) is GO(closed, number) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers to
-// go through.
+// THROUGH_CLOSED(GO) is GO(closed, number) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers
+// to go through.
 #define THROUGH_0(GO)
 #if CLOSED > 0
 uniform sampler2D u_closed_0;

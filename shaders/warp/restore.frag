@@ -1,6 +1,7 @@
 // Restore: D'(x) = m D(x), m = 1 - amount falloff(|x - c|), the map let go back to the identity under a brush.
-// Define UNDONE to draw what is undone of the closed maps that follow D: u_undone, the way E and the part T. D' ends (1 - m) D
-// short, by which they are to be read farther on, E' = E + (1 - m) D; of what they give m is left, 1 - T' = m (1 - T).
+// Define UNDONE to draw what is undone of the closed maps that follow D: u_undone, the way E and the part T (S9). D' is
+// shorter by (1 - m) D, which is added to the way to where they are read, E' = E + (1 - m) D; of what they give m is left,
+// 1 - T' = m (1 - T).
 // u_displacement: longer sides; u_window: left, top, width and height that it covers, u_center, u_radius: longer sides;
 // u_hardness: the part of the radius that is fully under the brush, below 1; u_amount: 0-1.
 // Define HELD if something is held: in cells of u_still, on the window u_still_window, not at all, over one cell more and more.

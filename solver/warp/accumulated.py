@@ -30,7 +30,7 @@ MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
 STEEPEST = 6.0  # largest |grad A| of a map that is not closed: one that stretches more folds between its texels
-CLOSED_TEXELS = 8  # of a closed map along a cell, at least, if it has fewer than A: with as many none folds
+CLOSED_TEXELS = 8  # along a cell, at least, of a closed map that has fewer texels than A: with so many none folds
 
 Limits = tuple[float, float, float, float]
 
@@ -111,8 +111,8 @@ class AccumulatedMap:
     def begin(self, *moved: tuple[np.ndarray, Grid], is_held: bool = False) -> int:
         """Plan to redraw all tiles in which one of several submaps moves anything; returns how many there are.
 
-        Each submap has one texel, or n x n, for every cell of its grid: (ny, nx, 2). Is anything held, they stop within
-        a few texels.
+        Each submap has one texel, or n x n, for every cell of its grid: (ny, nx, 2). `is_held`: something is held, and
+        what they move ends within a few texels of it.
         """
         self.forget()
         self.finest = 0.0 if is_held else min(self.finest, *(min(grid.spacing) for _, grid in moved))
@@ -238,7 +238,7 @@ class AccumulatedMap:
     def undo(self, region: Region, draw: Draw, edge: float) -> None:
         """Redraw a region at once, with what is undone of the closed maps, if there are any; nothing may be planned.
 
-        `edge`: how wide the brush's is, longer sides.
+        `edge`: how wide the brush's edge is, longer sides: what it leaves is as detailed as on cells half as large.
         """
         self.finest = min(self.finest, edge / 2)
         if self.closed and self.undone is None:

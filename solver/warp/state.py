@@ -15,8 +15,8 @@ from solver.state import State
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED, UNDONE = "factor ", "closed map ", "undone "  # and their numbers
 ACCUMULATED, SIZES = "accumulated map", "closed sizes"
-# Closed maps, or what is undone before them: with what is undone before the accumulated one `seek.frag` then reads 16
-# textures, as many as OpenGL 3.3 promises a stage.
+# Closed maps, each with what is undone of those before it counted as one more. With what is undone beside the
+# accumulated map, `seek.frag` then reads 16 textures, as many as OpenGL 3.3 promises a stage.
 MOST_CLOSED = 8
 MOST_CLOSED_BYTES = 2**27  # of them in all
 UNDONE_COMPONENTS = 4  # of what is undone: three, and one more as OpenGL 3.3 draws into no texture of three

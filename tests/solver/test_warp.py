@@ -825,6 +825,25 @@ def test_what_is_restored_of_closed_maps_goes_on_with_the_flow(device: Device) -
         made.release()
 
 
+def test_the_slopes_of_what_is_restored_are_right_where_it_is_carried_on(device: Device) -> None:
+    """Against differences, at a sharp edge: there the cubic leads places on also where it takes no part away."""
+    warp, flow = wound_up(device, 6.0), swirl((0.45, 0.5), 0.3)
+    warp.remap()
+    for _ in range(10):
+        warp.restore_under((0.6, 0.55), 0.15, 0.9, 0.5)
+    for _ in range(6):
+        warp.advance_prescribed(flow, 0.05)
+        warp.remap()
+    points = 0.3 + 0.5 * np.random.default_rng(3).random((20000, 2))
+    slopes = [(warp.at(points + e).astype(np.float64) - warp.at(points - e)) / 4e-5 for e in 2e-5 * np.eye(2)]
+    wanted = np.linalg.det(np.stack(slopes, axis=-1) + np.eye(2))
+    error = np.abs(warp.determinants(points) - wanted) / (1 + np.abs(wanted))
+    assert np.quantile(error, 0.99) < 0.1, "but where a difference reaches over the side of a texel"
+    assert (wanted <= 0).sum() > 300
+    assert ((warp.determinants(points) <= 0) != (wanted <= 0)).mean() < 1e-3
+    warp.release()
+
+
 def test_moving_to_another_grid_keeps_the_map(device: Device) -> None:
     """Two swirls that overlap, each in a window of cells of its own, against float64; the map goes through both."""
     whole = Grid(64, 48)
