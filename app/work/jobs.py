@@ -103,7 +103,7 @@ class Outputs:
         if self.dpi is None:
             return
         if self.file is None or self.is_animation:
-            raise UserError("--dpi is the resolution of a picture, and none is written; leave it out")
+            raise UserError("--dpi is for a single picture, and none is written; leave it out")
         if "dpi" not in (form := picture_format(self.file)).keeps:
             raise UserError(f"{form.name} holds no resolution; leave out --dpi, or write a PNG, JPEG or TIFF")
 
