@@ -419,11 +419,10 @@ def _starts(
     if not ticks or (max(ticks) <= recipe.begins and recipe.map is None):
         return first, starts
     replay = Replay(device, recipe, pictures, budget=0)
-    progress.enter("looking where the handles were set")
     try:
-        now = replay.handles.shapes
-        while replay.tick < min(max(ticks) + 1, recipe.ticks):
-            progress.check()
+        now, end = replay.handles.shapes, min(max(ticks) + 1, recipe.ticks)
+        while replay.tick < end:
+            progress.enter(f"looking where the handles were set, {100 * replay.tick // end} %")
             replay.advance()
         saved = replay.handles.save().values
     finally:

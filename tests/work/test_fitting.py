@@ -339,6 +339,14 @@ def test_stopped_it_is_as_good_as_was_told_last(device: Device):
     assert not found.is_met
 
 
+def test_how_far_the_look_at_where_handles_were_set_has_come_is_told(device: Device):
+    handle = "[[handle]]\nat = [0.3, 0.4]\nto = [0.34, 0.42]\nstart = 0.4\nduration = 0.3\n"
+    late, said = RECIPE.replace("0.4", "0.8", 1) + handle, list[str]()
+    fit(device, None, 1, late, tell=said.append)
+    looks = [int(state.split()[-2]) for state in said if state.startswith("looking where the handles were set, ")]
+    assert looks == [100 * tick // 11 for tick in range(11)]  # the handle begins at tick 10
+
+
 def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp: Run, tmp_path: Path):
     write_picture(tmp_path / "a.png", PICTURE)
     (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE)
