@@ -436,7 +436,7 @@ class Work(RuleBasedStateMachine):
             self.work.edit("Amount", amount=value)
             self._did("Amount")
             self._note()
-            back = self.index - (value != amount)
+            back = max(self.index - (value != amount), 0)  # what has grown too large has nothing before it
             self.work.retract()
             self._turned(back)
             self._look()
