@@ -665,7 +665,10 @@ class Exports:
 def under_way(
     ui: Ui, name: str, canvas: Rect, down: float, words: str, part: float, button: str, key: str = "", more: str = ""
 ) -> bool:
-    """What is being done and how much of it, so many points below the canvas's edge; True if the button is pressed."""
+    """What is being done and how much of it, so many points below the canvas's edge; True if the button is pressed.
+
+    `button`: what it says; empty where nothing can be stopped.
+    """
     with ui.floating(name, canvas.x + canvas.width / 2, canvas.y + ui.px(16 + down), (0.5, 0)):
         imgui.begin_group()
         width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
@@ -680,6 +683,8 @@ def under_way(
         lines.add_rect_filled(corner, done, packed(ui.palette.accent), ui.px(3))
         imgui.dummy(ImVec2(width, ui.px(8)))
         imgui.end_group()
+        if not button:
+            return False
         imgui.same_line(0, ui.px(16))
         pressed = ui.button(f"{button}##{name}", height=30)
         if more:

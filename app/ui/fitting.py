@@ -113,7 +113,8 @@ class Fits:
         else:
             state = "checking the best" if self._stopping else process.state or "getting ready"
             words, more = f"Fitting: {state}", "The best that was found so far is kept."
-            if under_way(ui, "fitting", canvas, down, words, process.part, "Stop", "escape", more):
+            button = "" if self._stopping else "Stop"
+            if under_way(ui, "fitting", canvas, down, words, process.part, button, "escape", more):
                 self.finish()
 
     def _is_still_of_use(self) -> bool:
