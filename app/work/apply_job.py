@@ -22,7 +22,6 @@ from app.media.files import check_kept, check_numbers, is_sequence, numbered_fil
 from app.media.formats import picture_format, unheld
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, read_map
-from app.media.pictures import write_picture
 from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
@@ -162,16 +161,7 @@ class _Applying:
         self.progress.enter("")
         warped = self._warped(given, picture, lambda height: self.progress.parts(steps, height), alpha=True)
         self.progress.enter("writing")
-        how = self.outputs
-        write_picture(
-            self.output,
-            warped,
-            bits=how.bits,
-            quality=self.order.quality,
-            strip=how.strip,
-            codec=how.codec,
-            dpi=how.dpi,
-        )
+        self.outputs.write(warped, self.order.quality)
         self.progress.count(steps)
         return 1
 

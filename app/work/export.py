@@ -28,7 +28,6 @@ from app.media.encoders import passes, unheld_of_clip
 from app.media.files import is_sequence, replacing
 from app.media.formats import picture_format, unheld
 from app.media.maps import map_writer, write_map
-from app.media.pictures import write_picture
 from app.media.record import Record, digest_of
 from app.model.handles import ARRIVED
 from app.model.picture import Picture
@@ -136,15 +135,7 @@ class _Export:
                 steps = steps_for(self.size)
                 picture = self._still(self.like, lambda height: self.progress.parts(steps, height))
                 self.progress.enter("writing")
-                write_picture(
-                    outputs.file,
-                    picture,
-                    bits=outputs.bits,
-                    quality=recipe.output.quality,
-                    strip=outputs.strip,
-                    codec=outputs.codec,
-                    dpi=outputs.dpi,
-                )
+                outputs.write(picture, recipe.output.quality)
                 self.progress.count(steps)
             self._note(0, Fraction(end))
             count = 1

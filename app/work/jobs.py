@@ -18,6 +18,7 @@ from app.media.formats import picture_format
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map
 from app.media.opening import check_picture
+from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 
@@ -106,6 +107,13 @@ class Outputs:
             raise UserError("--dpi is for a single picture, and none is written; leave it out")
         if "dpi" not in (form := picture_format(self.file)).keeps:
             raise UserError(f"{form.name} holds no resolution; leave out --dpi, or write a PNG, JPEG or TIFF")
+
+    def write(self, picture: Picture, quality: int) -> None:
+        """Write a picture to `file` as is asked for; see `write_picture`."""
+        assert self.file is not None
+        write_picture(
+            self.file, picture, bits=self.bits, quality=quality, strip=self.strip, codec=self.codec, dpi=self.dpi
+        )
 
     def animation(
         self, first: int, rate: Fraction, quality: int | None, like: Picture, clip: Clip | None

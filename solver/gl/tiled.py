@@ -160,6 +160,12 @@ class TiledField(Field):
         self._pass = device.pass_
         super().__init__(device, size, components, label, dtype)
 
+    @property
+    def tiles(self) -> list[Region]:
+        """Those that something was drawn into; the others are blank."""
+        tiles = zip(self.kind.regions, self._same.flat, strict=True)
+        return [region for region, same in tiles if same is None or same.field is not None]
+
     def drawn(self, region: Region | None = None) -> None:
         if region is None:
             self._same[...] = None

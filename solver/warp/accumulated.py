@@ -220,7 +220,8 @@ class AccumulatedMap:
             for now in steep:
                 self.closed.append(closed := self._blank(now.components, "closed map", size))
                 resample = self.device.pass_("warp/resample.frag", CUBIC=1)
-                resample(closed, displacement=now, origin=(0.0, 0.0), step=closed.texel)
+                regions = [_resampled(tile, self.size, size) for tile in now.tiles]
+                resample(closed, region=regions, displacement=now, origin=(0.0, 0.0), step=closed.texel)
         self._drop_undone()
         self._begin_anew()
 
@@ -325,6 +326,17 @@ class AccumulatedMap:
 
 def _is_undone(field: TiledField) -> bool:
     return field.components == UNDONE_COMPONENTS
+
+
+def _resampled(tile: Region, size: tuple[int, int], fewer: tuple[int, int]) -> Region:
+    """The texels of a field of fewer texels that are interpolated from a tile."""
+    x, y, width, height = tile
+    spans = []
+    for start, length, texels, left in zip((x, y), (width, height), size, fewer, strict=True):
+        first, last = start * left // texels - 1, -(-(start + length) * left // texels) + 1
+        spans.append((max(first, 0), min(last, left)))
+    (left, right), (top, bottom) = spans
+    return left, top, right - left, bottom - top
 
 
 def _meet(a: Region, b: Region) -> bool:

@@ -21,7 +21,7 @@ REMAP_STEPS = 8  # steps over which a remap is spread, at least
 # Tiles redrawn in a step, half as much work as a step of the fluid, unless a level of another grid has to be finished.
 MOST_TILES = 4
 # Texels of the gathered level, along a cell and in all, but at least `LEAST_TEXELS` along a cell.
-MOST_GATHERED = 8, 2**19
+MOST_GATHERED = 16, 2**19
 FEW_TILES = MOST_GATHERED[1] // TILE**2  # that are no more work than to gather
 
 

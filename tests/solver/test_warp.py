@@ -870,7 +870,7 @@ def test_moving_to_another_grid_keeps_the_map(device: Device) -> None:
 
 
 def test_a_large_map_is_made_anew_a_little_in_each_step(device: Device) -> None:
-    """Also where the next remap is wanted long before, or another grid; and it is as exact as a smaller one."""
+    """Also where the next remap is wanted long before, or another grid; and it is as exact as one made anew at once."""
     whole = Grid(32, 32)
     grids = [whole, window(whole.refined(2), 8, 8, 40, 40), whole]
     flow, steps, dt = swirl((0.45, 0.45), 0.28), 26, 0.03
@@ -894,17 +894,9 @@ def test_a_large_map_is_made_anew_a_little_in_each_step(device: Device) -> None:
     assert gathered > steps
     assert max(most) < 2 * -(-100 // REMAP_STEPS) + 5, "tiles of 100, each drawn and copied, and what is gathered"
     assert np.median(most) < 2 * MOST_TILES + 2
-    found, at_once = warp.read((100, 100)), small.read((100, 100))
-    x, y = (np.indices((100, 100))[axis] / 100 + 0.005 for axis in (1, 0))
-    u, v = flow(x, y, 0.0)
-    right, down = x - 0.45, y - 0.45
-    turn = -len(grids) * steps * dt * np.hypot(u, v) / np.hypot(right, down)  # each place turns about the centre
-    exact = np.stack([np.cos(turn) * right - np.sin(turn) * down, np.sin(turn) * right + np.cos(turn) * down], axis=-1)
-    exact -= np.stack([right, down], axis=-1)
+    found = warp.read((100, 100))
     assert np.abs(found).max() > 5 * whole.h
-    errors = [np.abs(map_ - exact).max() for map_ in (found, at_once)]  # of the 32 cells, .13 of one
-    assert errors[0] < 1.01 * errors[1]
-    assert np.abs(found - at_once).max() < 6e-3 * whole.h, "what waits has eight texels a cell"
+    assert np.abs(found - small.read((100, 100))).max() < 2e-3 * whole.h
     assert warp.statistics().folds == 0
     warp.remap()
     np.testing.assert_allclose(warp.read((100, 100)), found, atol=5e-4 * whole.h, err_msg="resampled on the way")
