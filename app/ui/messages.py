@@ -95,7 +95,7 @@ class Messages:
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(14), ui.px(10)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(9))
         imgui.push_style_var(imgui.StyleVar_.window_border_size, ui.px(1))
-        flags = PANEL | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
+        flags = PANEL | imgui.WindowFlags_.always_auto_resize
         imgui.begin("message", None, flags)
         imgui.pop_style_var(3)
         corner = imgui.get_cursor_screen_pos()

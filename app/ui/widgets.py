@@ -26,6 +26,8 @@ PANEL = int(
     | imgui.WindowFlags_.no_saved_settings
     | imgui.WindowFlags_.no_bring_to_front_on_focus
     | imgui.WindowFlags_.no_nav_focus
+    # One that comes up while a slider is dragged would end the drag.
+    | imgui.WindowFlags_.no_focus_on_appearing
 )
 
 
@@ -381,7 +383,7 @@ class Ui:
             before = self._untyped.get(name, value)
             new = before if unit.value(number) == unit.value(unit.number(before)) else unit.value(number)
         if changed:  # a number of few digits may be less than the least, and no value at all: 0 of .2 pixels
-            new = min(max(new, low), high)
+            new = min(max(new, low), high) + 0.0  # and not -0
         done = imgui.is_item_deactivated_after_edit()
         hovered, held, again = imgui.is_item_hovered(), imgui.is_item_active(), False
         if hovered and default is not None and imgui.is_mouse_double_clicked(0) and not typing:

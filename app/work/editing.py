@@ -12,6 +12,7 @@ from app.model.bars import Changed, Which, with_changed
 from app.model.edits import check_size, with_change, with_led
 from app.model.mask_edits import MaskEdit
 from app.model.recipe import Recipe
+from app.work.handle_status import held_in
 from app.work.painting import Painting
 from solver.gl.device import Device
 
@@ -122,8 +123,13 @@ class Editing(Painting):
             self._send(self.end)
         if commit:
             self.commit(name)
-            if self.is_behind and self.target == self.end:
+            if self.target == self.end and (self.is_behind or self._is_away()):
                 self._coast()
+
+    def _is_away(self) -> bool:
+        """Something is not yet where the recipe leads it, at the playhead."""
+        self._take_up()
+        return any(held.is_away for held in held_in(self.replay))
 
     def let_go(self, label: str) -> None:
         """Take a handle or a pin away, as if it had never been."""

@@ -134,6 +134,23 @@ def test_a_turn_takes_its_time_however_its_slider_was_dragged(robot: Robot, prev
     assert session.end * session.dt >= session.recipe.handle[0].last
 
 
+def test_a_turn_of_which_all_was_simulated_before_its_slider_was_let_go_arrives(robot: Robot) -> None:
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    robot.rest()
+    session = robot.editor.session
+    (led,) = session.recipe.handle
+    session.edit_held("Keyframe", "handle[1]", turned=led.turned_to(session.target, session.dt, 0.0, 1.0).turned)
+    robot.rest()
+    (led,) = session.recipe.handle
+    turned = led.turned_to(session.target, session.dt, 40.0, 1.0).turned
+    session.edit_held("Turn", "handle[1]", False, turned=turned)
+    while session.is_behind:
+        robot.frame()
+    session.edit_held("Turn", "handle[1]", turned=turned)
+    robot.rest()
+    assert session.held[0].left < ARRIVED
+
+
 @pytest.mark.parametrize("key", ["ctrl+z", "home"])
 def test_a_handle_that_has_gone_under_the_finger_is_not_led(robot: Robot, key: str) -> None:
     robot.key("p")

@@ -917,3 +917,21 @@ def test_the_statistics_are_of_the_map_also_before_the_first_step(
     robot.key("ctrl+i")
     robot.frame(count=3)
     assert "det J  1.00 to 1.00    folds 0" in words
+
+
+def test_a_drag_goes_on_when_a_panel_comes_up(robot: Robot, widgets: Widgets) -> None:
+    session = robot.editor.session
+    before = session.recipe.fluid.drag
+    widgets.look()
+    x, y = widgets.at["Drag"].middle
+    robot.move(x, y)
+    robot.press()
+    robot.editor.state.statistics = True  # as the note does that the picture is simulated again
+    robot.frame(count=2)
+    for step in range(4):
+        robot.move(x + 10 * step, y)
+    in_the_middle = session.recipe.fluid.drag
+    robot.move(x + 80, y)
+    robot.release()
+    robot.rest()
+    assert before != in_the_middle < session.recipe.fluid.drag
