@@ -113,7 +113,7 @@ class Canvas:
         scale: float,
     ) -> None:
         """Draw the canvas into `target`, `height` pixels high: what of the picture lies on it, and the ground."""
-        density, rect = viewport.density, viewport.rect
+        density, rect = viewport.density, viewport.drawn
         visible = _common(rect, viewport.canvas)
         seen = (0, 0, 0, 0) if visible is None else _in_pixels(visible, density)
         for strip in _around(seen, _in_pixels(viewport.canvas, density)):
@@ -259,7 +259,7 @@ class Canvas:
         if warp.is_untouched:
             self._last = self._still, WHOLE
             return *self._last, None
-        (left, top, right, bottom), rect, density = seen, viewport.rect, viewport.density
+        (left, top, right, bottom), rect, density = seen, viewport.drawn, viewport.density
 
         def lattice(apart: int) -> Lattice:
             # One more on every side, to be interpolated between.

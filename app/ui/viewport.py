@@ -81,6 +81,13 @@ class Viewport:
         return Rect(x, y, width, height)
 
     @property
+    def drawn(self) -> Rect:
+        """`rect`, moved to begin on a whole pixel of the screen: else at 100 % a pixel would be a mean of several."""
+        rect = self.rect
+        x, y = (round(side * self.density) / self.density for side in (rect.x, rect.y))
+        return Rect(x, y, rect.width, rect.height)
+
+    @property
     def longer(self) -> float:
         """Points of the screen along the picture's longer side."""
         return max(self.picture) * self.scale

@@ -11,6 +11,7 @@ import pytest
 from app.model.picture import srgb_to_linear
 from app.ui.canvas import EDGES
 from solver.gl.device import Device
+from support.editing import Robot, pattern
 from support.golden import Golden, told
 
 SIDE = 4
@@ -177,3 +178,14 @@ def test_a_pixel_at_rest_is_the_mean_of_what_is_under_it_along_each_side(
     )
     light = srgb_to_linear(code[..., :3]).reshape(SIDE, down, SIDE, across, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(srgb_to_linear(target.get()[::-1, :, :3]), light, atol=2e-3)
+
+
+@pytest.mark.parametrize("pan", [(0.0, 0.0), (0.3, 0.5), (-7.5, 2.2)])
+def test_at_100_percent_a_pixel_of_the_picture_is_one_of_the_screen(robot: Robot, pan: tuple[float, float]) -> None:
+    editor = robot.editor
+    editor.workspace.view = editor.view.zoomed(1.0, *editor.view.canvas.middle).panned(*pan)
+    robot.see()
+    rect, pixels = editor.view.drawn, pattern().pixels
+    left, top, (height, width) = round(rect.x), round(rect.y), pixels.shape[:2]
+    seen = robot.pixels()[top : top + height, left : left + width]
+    assert np.abs(seen.astype(int) - pixels[..., :3]).max() <= 1
