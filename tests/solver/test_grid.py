@@ -48,6 +48,18 @@ def test_what_is_no_picture_is_refused():
             Grid(8, 8, extent)
 
 
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), 1e30, "0.1", None, 0.1j, (0.1, 0.1, 0.1)], ids=str)
+@pytest.mark.parametrize(("name", "side"), [(n, s) for n in ("extent", "origin", "picture") for s in (0, 1)])
+def test_each_number_of_a_grid_is_looked_at(name: str, side: int, wrong: object):
+    """And taken as floats, whatever they come in."""
+    parts = {"extent": [0.5, 0.25], "origin": [0.25, 0.125], "picture": [1, 0.5]}
+    made = Grid(16, 8, **{key: np.array(part) for key, part in parts.items()})
+    assert made == Grid(16, 8, (0.5, 0.25), (0.25, 0.125), (1.0, 0.5))
+    parts[name][side] = wrong
+    with pytest.raises(ValueError, match=f"a grid's {name}"):
+        Grid(16, 8, **parts)
+
+
 def test_a_window_of_a_grid_is_its_part(device: Device):
     """A brush in a window draws what it draws in the whole."""
     whole = Grid(64, 48)
