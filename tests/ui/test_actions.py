@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from imgui_bundle import imgui
 
 from app.model.handles import RecipeHandle
+from app.model.strokes import Stroke
 from app.model.tools import TOOL
 from app.ui.actions import ACTIONS
 from app.ui.editor_state import EditorState
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import Robot, add_bars, small_project
 
 DOES = {
     "Load ...": "mask_load", "Save ...": "mask_save", "Invert": "mask_invert", "Fill": "mask_fill",
@@ -91,3 +93,30 @@ def test_what_an_action_sets_is_there_again_after_a_start(
         robot.editor.do("lanes")
         assert Preferences.load().lanes is state.lanes.shown is True
     assert changed == {"inspector", "brushes", "sections", "theme"}
+
+
+def test_letters_have_the_same_size_of_the_design_at_every_scale(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is handed to imgui is multiplied by it: all that is drawn, with bars in the timeline."""
+    strokes = tuple(
+        Stroke(tool="push", samples=((first, 0.2, 0.2, 1.0), (first + 20, 0.3, 0.2, 1.0))) for first in (0, 5, 9)
+    )
+    robot.editor.session.edit("Strokes", stroke=strokes, duration=2.0)
+    add_bars(robot.editor.session)
+    robot.editor.state.lanes.shown = True
+    robot.editor.state.sections = dict.fromkeys(("masks", "view", "quality", "fluid"), False)
+    push, sizes = imgui.push_font, set[float]()
+
+    def pushed(font: imgui.ImFont, size: float) -> None:
+        sizes.add(round(size, 3))
+        push(font, size)
+
+    monkeypatch.setattr(imgui, "push_font", pushed)
+    found = []
+    for scale in (1.0, 1.25):
+        robot.editor.preferences.scale = scale
+        robot.frame(count=3)
+        sizes.clear()
+        robot.frame(count=2)
+        found.append(set(sizes))
+    assert len(found[0]) > 2
+    assert found[1] == found[0]
