@@ -16,6 +16,7 @@ import subprocess
 import threading
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ import typer.main
 
 import solver.gl.passes
 from app import cli
+from app.work.recovery import LOCK
 from solver.gl.device import Device
 from support.commands import Run
 from support.desk import Desk
@@ -84,6 +86,28 @@ def no_thread_holds_up_the_end() -> Iterator[None]:
     yield
     threading.Thread.__init__ = make
     assert held <= {"app.work.export_process.end"}
+
+
+def _held_open(root: Path) -> set[str]:
+    """What this process has open beneath a folder, as far as the system tells."""
+    held = set[str]()
+    for number in os.listdir("/proc/self/fd") if os.path.isdir("/proc/self/fd") else ():
+        with suppress(OSError):  # it has just been closed, as the list itself
+            held.add(os.readlink(f"/proc/self/fd/{number}"))
+    # Whose work is found, or dies with its journal open, keeps its lock: many tests of journals end there.
+    return {place for place in held if place.startswith(f"{root}{os.sep}") and os.path.basename(place) != LOCK}
+
+
+@pytest.fixture(autouse=True)
+def no_file_stays_open(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Every file that a test has opened is closed at its end, by whoever had it and not by chance."""
+    root = tmp_path_factory.getbasetemp()
+    before = _held_open(root)
+    yield
+    if left := _held_open(root) - before:
+        gc.collect()
+        left = _held_open(root) - before
+    assert not left
 
 
 @pytest.fixture(scope="module")

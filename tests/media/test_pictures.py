@@ -715,10 +715,12 @@ def test_truncated_files(tmp_path: Path, capfd: pytest.CaptureFixture, ending: s
     path = saved(tmp_path, ending)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(len(whole) * part)])
+    outputs = [os.fstat(number) for number in (1, 2)]
     with pytest.raises(UserError, match="truncated or damaged") as raised:
         read_picture(path)
     assert str(path) in str(raised.value)
     assert capfd.readouterr() == ("", "")
+    assert all(map(os.path.samestat, outputs, [os.fstat(number) for number in (1, 2)]))
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,6 +47,18 @@ def test_what_is_no_picture_is_refused():
     for extent in ((1.0, 0.0), (0.5, 0.5), (1.0, 2.0)):
         with pytest.raises(ValueError, match="the longer must be 1"):
             Grid(8, 8, extent)
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), 1e30, "0.1", None, 0.1j, (0.1, 0.1, 0.1)], ids=str)
+@pytest.mark.parametrize(("name", "side"), [(n, s) for n in ("extent", "origin", "picture") for s in (0, 1)])
+def test_each_number_of_a_grid_is_looked_at(name: str, side: int, wrong: object):
+    """And taken as floats, whatever they come in."""
+    parts: dict[str, Any] = {"extent": [0.5, 0.25], "origin": [0.25, 0.125], "picture": [1, 0.5]}
+    made = Grid(16, 8, **dict[str, Any]((key, np.array(part)) for key, part in parts.items()))
+    assert made == Grid(16, 8, (0.5, 0.25), (0.25, 0.125), (1.0, 0.5))
+    parts[name][side] = wrong
+    with pytest.raises(ValueError, match=f"a grid's {name}"):
+        Grid(16, 8, **parts)
 
 
 def test_a_window_of_a_grid_is_its_part(device: Device):

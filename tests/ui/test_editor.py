@@ -1534,6 +1534,18 @@ def test_the_grid_of_saved_work_stays(measured: Robot, tmp_path: Path) -> None:
     assert session.recipe.fluid.grid == 128
 
 
+def test_a_grid_that_was_wanted_for_one_picture_is_not_taken_for_the_next(measured: Robot, tmp_path: Path) -> None:
+    """Which is opened before the slow painting has been answered."""
+    measured.editor.session.begin_with(grid=128)
+    paint_at(measured, 0.1, ENOUGH)
+    assert measured.editor.quality.is_preparing or measured.editor.session.is_moving
+    measured.editor.open(projects.from_picture(tmp_path / "pattern.png", fresh_recipe()))
+    grid = measured.editor.session.recipe.fluid.grid
+    measured.frame(count=20)
+    assert measured.editor.session.recipe.fluid.grid == grid
+    assert not measured.editor.messages.shown
+
+
 def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
     with Robot(device, small_project(tmp_path, 128), preferences=Preferences(auto_quality=True)) as robot:
         paint_at(robot, 0.1, ENOUGH)

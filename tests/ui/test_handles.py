@@ -11,7 +11,7 @@ import pytest
 
 from app.media import project as projects
 from app.media.pictures import read_picture
-from app.model.handles import ARRIVED, MOST_HANDLES
+from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES
 from app.model.recipe import Recipe
 from app.progress import Progress
 from app.ui.events import Mods
@@ -238,6 +238,16 @@ def test_nothing_is_held_outside_the_picture_nor_too_much_in_it(robot: Robot) ->
     robot.click(*robot.at(0.2, 0.2))
     assert f"{MOST_HANDLES} handles" in robot.editor.messages.shown[-1].text
     assert len(robot.editor.session.recipe.handle) == MOST_HANDLES
+    # Of lines there may be fewer; a point still has room then.
+    line = {"points": ((0.5, 0.5), (0.6, 0.5)), "to": (0.55, 0.5)}
+    lines = Recipe.model_validate({"handle": tuple(line for _ in range(MOST_LINES))})
+    robot.editor.session.edit("Lines", handle=lines.handle)
+    robot.mods = Mods(shift=True)
+    robot.drag((0.2, 0.2), (0.3, 0.2))
+    assert f"{MOST_LINES} lines" in robot.editor.messages.shown[-1].text
+    robot.mods = Mods()
+    robot.click(*robot.at(0.2, 0.2))
+    assert len(robot.editor.session.recipe.handle) + len(robot.editor.session.recipe.pin) == MOST_LINES + 1
 
 
 def test_what_cannot_be_met_is_told_as_the_command_line_tells_it_until_it_is_mended(

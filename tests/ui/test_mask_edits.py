@@ -176,6 +176,27 @@ def test_every_edit_of_a_mask_is_an_action() -> None:
     assert kinds == {"invert", "fill", "clear", "feather", "grow", "shrink", "load", "save"}
 
 
+def test_each_button_is_enabled_where_there_is_something_for_it(robot: Robot, widgets: Widgets) -> None:
+    """Of the masks also while nothing has moved."""
+
+    def pressed() -> list[str]:
+        for words in buttons:
+            widgets.click(words)
+        return [entry.name for entry in robot.editor.session.document.history.entries]
+
+    buttons = ("Stop all motion", "Reset the warp", "Clear the masks")
+    sections = ("fluid", "view", "quality", "masks", "history", "numbers")
+    robot.editor.state.sections = {name: name == "masks" for name in sections}
+    robot.frame(count=2)
+    assert pressed() == ["Open"]
+    robot.editor.commands.edit_mask("fill")
+    assert pressed()[2:] == ["Clear the masks"]
+    assert not frozen(robot).any()
+    robot.drag((0.4, 0.5), (0.45, 0.5))
+    robot.rest()
+    assert pressed()[3:] == ["Push", *buttons]
+
+
 def test_where_nothing_has_been_done_there_are_no_masks_to_clear(robot: Robot) -> None:
     robot.key("ctrl+d")
     assert not robot.editor.session.has_begun

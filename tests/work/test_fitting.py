@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from app.media.pictures import write_picture
 from app.media.recipes import read_recipe
 from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.progress import Progress
+from app.progress import INTERRUPTED, Progress
 from app.work import fitting
 from app.work.fit_job import FitJob
 from app.work.fitting import LEAST_DET, Fitted, Trial, fitted
@@ -319,6 +320,32 @@ def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device
     assert found.trial.recipe.fluid.dt == 0.04
     with pytest.raises(Cancelled):
         fit(device, PAIRS, cancel=lambda: True)
+
+
+@pytest.mark.parametrize(
+    ("replays", "said"), [(1, "cancelled; nothing half-written is left"), (6, "stopped; the best so far is written")]
+)
+def test_ctrl_c_ends_it_with_the_best_so_far(
+    fluidwarp: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, replays: int, said: str
+):
+    """Where there is none, with nothing."""
+    left = [replays]
+
+    class Interrupted(Replay):
+        def __init__(self, *given: Any, **named: Any) -> None:
+            super().__init__(*given, **named)
+            left[0] -= 1
+            if left[0] == 0:
+                signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(fitting, "Replay", Interrupted)
+    write_picture(tmp_path / "a.png", PICTURE)
+    (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE)
+    (tmp_path / "p.csv").write_text("10,10,12,12\n40,20,38,22\n")
+    done = fluidwarp(tmp_path, "fit", "r.toml", "--pairs", "p.csv", "-o", "f.toml", "--time-limit", "100")
+    assert done.returncode == INTERRUPTED
+    assert done.stderr.splitlines()[-1] == f"fluidwarp: {said}"
+    assert (tmp_path / "f.toml").exists() is (replays > 1)
 
 
 def test_stopped_it_is_as_good_as_was_told_last(device: Device):

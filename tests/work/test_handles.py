@@ -683,6 +683,21 @@ def test_what_is_left_of_a_turned_line_is_its_farthest_point_s_way_wherever_it_i
     replay.release()
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_middle_of_a_line_goes_as_its_points_do_as_the_picture_is_seen_at_an_amount(device: Device, closed: bool):
+    corners = [[0.3, 0.3], [0.3, 0.5], [0.45, 0.55]]
+    line = {"points": corners, "closed": closed, "to": [0.45, 0.4], "duration": 0.1}
+    replay = replay_of(device, handle=[line], amount=0.5, duration=0.2)
+    replay.seek(12)
+    (one,) = held_in(replay)
+    (seen,) = as_seen([one], replay)
+    last = len(one.line) - closed  # a closed one ends where it begins
+    moved = np.mean(seen.line[:last], axis=0) - np.mean(one.line[:last], axis=0)
+    assert np.hypot(*moved) > 0.01
+    np.testing.assert_allclose(np.subtract(seen.now, one.now), moved, atol=1e-6)
+    replay.release()
+
+
 def test_marks_lie_on_what_they_hold_as_the_picture_is_seen_at_an_amount(device: Device):
     line = {"points": [[0.3, 0.3], [0.3, 0.5]], "to": [0.35, 0.4], "duration": 0.1}
     replay = replay_of(device, handle=[led_to([0.7, 0.5], [0.8, 0.45], duration=0.1), line], amount=0.5, duration=0.2)

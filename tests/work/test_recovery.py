@@ -71,8 +71,8 @@ class Desk:
     def keep(self) -> None:
         self.journal.keep(self.project, self.document)
 
-    def save(self, path: Path) -> None:
-        self.project = projects.save(replace(self.project, recipe=self.document.recipe), path)
+    def save(self, path: Path, embedded: bool = True) -> None:
+        self.project = projects.save(replace(self.project, recipe=self.document.recipe), path, embedded)
         self.document.saved()
         self.keep()
 
@@ -285,13 +285,18 @@ def test_a_journal_torn_anywhere_gives_what_was_whole(desk: Desk) -> None:
             file.parent.mkdir()
 
 
-def test_work_that_was_restored_outlasts_a_failure_before_its_first_frame(desk: Desk) -> None:
+@pytest.mark.parametrize("discard", [False, True])
+def test_work_that_was_restored_outlasts_a_failure_before_its_first_frame(desk: Desk, discard: bool) -> None:
+    """And does not outlast the person who leaves it then."""
     desk.push()
     desk.die()
     journal = Journal(desk.root, found_in(desk.root).held)
-    journal.end(discard=False)
+    journal.end(discard)
     journal.join()
-    assert is_all_of(found_in(desk.root), desk.document)
+    if discard:
+        assert files_in(desk.root) == []
+    else:
+        assert is_all_of(found_in(desk.root), desk.document)
 
 
 def test_of_work_that_was_closed_nothing_stays_in_memory(tmp_path: Path) -> None:
@@ -398,7 +403,11 @@ def test_what_cannot_be_read_is_left_alone_with_a_sentence(desk: Desk, data: byt
     assert file.read_bytes() == data
 
 
-def test_a_picture_that_is_gone_is_told_and_the_work_kept(desk: Desk, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_project", [False, True])
+def test_a_picture_that_is_gone_is_told_and_the_work_kept(desk: Desk, tmp_path: Path, is_project: bool) -> None:
+    """By its own name, also where a project names it."""
+    if is_project:
+        desk.save(tmp_path / "work.fluidwarp", embedded=False)
     desk.push()
     desk.die()
     picture = tmp_path / "pattern.png"
