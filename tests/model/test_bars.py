@@ -86,7 +86,8 @@ def test_pieces_that_are_gone_through_one_by_one_are_counted_as_the_most_that_a_
                 by_image = one.tool == "restore" or (one.tool in ("push", "twirl", "bloat") and one.detail)
                 pieces = 1 if one.tool in ("push", "twirl", "bloat") else len(act.dabs)
                 images = 4 if by_image else 2 if one.tool == "push" else 1
-                most[tick] += pieces * (images if one.symmetry == "both" else 1)
+                once = 2 if one.tool in ("push", "twirl") and one.detail else 1
+                most[tick] += pieces * (images if one.symmetry == "both" else once)
         whole = sum(one.repeat * one.most_pieces for one in several)
         monkeypatch.setattr(strokes, "MOST_AT_ONCE", max(0, max(most) - 1))
         said = strokes.excess(several)
