@@ -193,6 +193,8 @@ def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -
 def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:
     """What `error` means for the user who wanted `path` written."""
     reason = MENDS.get(error.errno or 0, error.strerror or str(error) or "the system gave no reason")
+    if error.errno == errno.ENOENT and Path(path).parent.is_dir():  # as of /proc
+        reason = "its folder takes no new files; choose another"
     return UserError(f"Cannot write {path}: {reason}.")
 
 

@@ -92,7 +92,14 @@ class BrushPath(Model):
 
     @property
     def most_pieces(self) -> int:
-        """The most pieces that are gone through one by one in a tick, counted for each of its images; at least 1."""
+        """The most pieces that are gone through one by one in a tick, counted for each of its images; at least 1.
+
+        What leads the fluid goes the whole way at once. A push looks at what lies under each of its images, which takes
+        about as long again; with detail each image takes back what it gives, and one counts as two.
+        """
+        if self.tool in ("push", "twirl"):
+            images = 1 + len(turns(self.symmetry, self.sectors))
+            return max(images, 2) if self.detail else min(images, 2) if self.tool == "push" else 1
         counts = [1]
         if self.tool == "curve":
             counts.append(len(self.samples) - 1)

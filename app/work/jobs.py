@@ -107,6 +107,8 @@ class Outputs:
             raise UserError("--dpi is for a single picture, and none is written; leave it out")
         if "dpi" not in (form := picture_format(self.file)).keeps:
             raise UserError(f"{form.name} holds no resolution; leave out --dpi, or write a PNG, JPEG or TIFF")
+        if form.name == "JPEG" and not self.dpi.is_integer():
+            raise UserError(f"JPEG holds whole dots per inch, not {self.dpi:g}; round --dpi, or write a PNG or TIFF")
 
     def write(self, picture: Picture, quality: int) -> None:
         """Write a picture to `file` as is asked for; see `write_picture`."""

@@ -113,14 +113,16 @@ class Painting(Recording):
             self.last_place, last = gesture.path[-1], made.last_tick
         else:
             last = max(made.first_tick(self.dt), ceil(made.last / self.dt - 0.5))
-        if isinstance(made, MaskStroke):
-            try:
+        try:
+            if isinstance(made, MaskStroke):
                 self._keep_masks(gesture.label_of(made), made)
-            except UserError:
-                self._show(self.document.recipe)
-                raise
-            return
-        self._live = with_made(self._base, made, max(gesture.pen, last + 1), gesture.taken)
+                return
+            recipe = with_made(self._base, made, max(gesture.pen, last + 1), gesture.taken)
+            check_size(recipe, self._base)  # others may go on behind the recording's end, and act with it
+        except UserError:
+            self._show(self.document.recipe)
+            raise
+        self._live = recipe
         self.replay.use(self._live)
         self.commit(gesture.label_of(made))
         self._coast()

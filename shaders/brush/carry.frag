@@ -1,7 +1,7 @@
 // Carry: the local part of a push, b F and nothing beside it, drawn with additive blending; less its image beyond a wall
 // that it pushes at or from, so that it comes to rest there smoothly.
-// u_motion: the fluid at each image, from probe; u_slip: from slip; v_vector: the local part of its velocity, lengths / s;
-// u_viscosity: cells, lengths^2 / s: what is thicker than at the brush is carried less.
+// u_motion: the fluid at each image, from probe; u_slip: from slip, in row u_row; v_vector: the local part of its
+// velocity, lengths / s; u_viscosity: cells, lengths^2 / s: what is thicker than at the brush is carried less.
 // With SOLIDS: u_apart, cells, lengths to what is closed: within the radius all is carried less, beside it by the square of
 // that. What is local knows no pressure, so in proportion to it all would be pressed together, or drawn out, exponentially
 // with the way; and along it, held by nothing, be sheared within a cell.
@@ -10,6 +10,7 @@
 #include "lib/brush.glsl"
 uniform sampler2D u_motion;
 uniform sampler2D u_slip;
+uniform float u_row;
 uniform sampler2D u_viscosity;
 uniform vec2 u_spacing;
 flat in vec4 v_segment;
@@ -35,6 +36,7 @@ void main() {
     vec2 apart = texture(u_apart, uv).r + vec2(texture(u_apart, left).r, texture(u_apart, above).r);
     weight *= smoothstep(0.0, u_radius, 0.5 * apart);
 #endif
-    out_velocity = texelFetch(u_slip, image, 0).r * v_share * attenuation * max(weight, 0.0) * v_vector
+    float slip = texelFetch(u_slip, image + ivec2(0, int(u_row)), 0).r;
+    out_velocity = slip * v_share * attenuation * max(weight, 0.0) * v_vector
                  * vec2(greaterThan(p, vec2(1.0)));
 }

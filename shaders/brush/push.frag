@@ -2,14 +2,15 @@
 //   dv = curl psi,  psi = b (dF x r),  dF = gain scaling strength (slip v_brush - v_fluid(centre)),       (B1)
 // r from the nearest point of the path: the discrete curl of a stream function at the nodes, so exactly free of
 // divergence; at the path dv = dF, and where images of the brush overlap, of each its share.
-// u_motion: the fluid's motion at each image, from probe; u_slip: from slip; u_scaling: from restrain; v_vector: the
-// brush's velocity, lengths / s.
+// u_motion: the fluid's motion at each image, from probe; u_slip: from slip, in row u_row; u_scaling: from restrain;
+// v_vector: the brush's velocity, lengths / s.
 // vertices: lib/images.vert
 // reads: 3, and 20 when ATTENUATED
 #include "lib/brush.glsl"
 #include "lib/attenuation.glsl"
 uniform sampler2D u_motion;
 uniform sampler2D u_slip;
+uniform float u_row;
 uniform sampler2D u_scaling;
 uniform float u_strength;
 uniform float u_gain;
@@ -29,7 +30,7 @@ void main() {
     vec2 cell = floor(gl_FragCoord.xy);
     ivec2 image = ivec2(v_number, 0);
     vec4 motion = texelFetch(u_motion, image, 0);
-    float slip = texelFetch(u_slip, image, 0).r;
+    float slip = texelFetch(u_slip, image + ivec2(0, int(u_row)), 0).r;
     vec2 force = u_gain * texelFetch(u_scaling, image, 0).r * u_strength * unobstructed(image) * v_share
                * (slip * v_vector - motion.xy);
     float corner = stream(cell, force, motion.w);

@@ -3,7 +3,7 @@
 // brakes a faster fluid is allowed. Without it a brush drawn to and fro would pump up a fluid without viscosity without end,
 // since it looks at the middle alone.
 //   sum |v + scaling f P|^2 <= max(sum |v|^2, u_most V^2 sum |P|^2)   over the brush, P its flow along f = slip V - v(middle)
-// u_velocity, u_impulse: MAC faces; u_motion: from probe; u_slip: from slip; u_velocities: the brush's, lengths / s;
+// u_velocity, u_impulse: MAC faces; u_motion: from probe; u_slip: from slip, in row u_row; u_velocities: the brush's, lengths / s;
 // u_strength; u_segments, u_radius, u_spacing: lengths.
 // reads: 787
 #include "lib/mac.glsl"
@@ -13,6 +13,7 @@ uniform sampler2D u_velocity;
 uniform sampler2D u_impulse;
 uniform sampler2D u_motion;
 uniform sampler2D u_slip;
+uniform float u_row;
 uniform vec2 u_velocities[MOST_IMAGES];
 uniform float u_strength;
 uniform float u_most;
@@ -24,7 +25,8 @@ const int FINE = 4; // places along the radius
 void main() {
     ivec2 image = ivec2(gl_FragCoord.xy);
     vec2 size = vec2(textureSize(u_velocity, 0)), middle = u_segments[image.x].zw, brush = u_velocities[image.x];
-    vec2 lacking = u_strength * (texelFetch(u_slip, image, 0).r * brush - texelFetch(u_motion, image, 0).xy);
+    float slip = texelFetch(u_slip, image + ivec2(0, int(u_row)), 0).r;
+    vec2 lacking = u_strength * (slip * brush - texelFetch(u_motion, image, 0).xy);
     float far = length(lacking), moving = 0.0, along = 0.0, own = 0.0;
     vec2 direction = lacking / max(far, 1e-20);
     for (int j = -FINE; j <= FINE; ++j)

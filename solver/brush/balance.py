@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-ROUNDS = 12  # in which those that would be too strong are weighed anew, a bound on the cost
+# In which those that would be too strong are weighed anew: so many rounds, and no more than take so many
+# multiplications, as many as a core does in about half a second.
+ROUNDS, MOST_WORK = 12, 2**33
 CLOSE = 1.01  # times its bound where that ends; by as much as one still exceeds it, all are less
 
 
@@ -39,7 +41,8 @@ class Balance:
             return found
         wanted, shares = self._as_one(wanted), self._shares
         found = solved(self._of_all, wanted)
-        for _ in range(ROUNDS):
+        count, unknowns = self._influence.shape
+        for _ in range(min(ROUNDS, MOST_WORK // max(count * count * unknowns, 1))):
             over = self._over(found)
             if over.max() <= CLOSE:
                 break
@@ -69,7 +72,9 @@ class Balance:
 def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """W K' and K W K' + diag(soft) of (H3)."""
     back = (shares * influence).T
-    return back, influence @ back + np.diag(soft)
+    matrix = influence @ back
+    matrix[np.diag_indices_from(matrix)] += soft
+    return back, matrix
 
 
 def solved(both: tuple[np.ndarray, np.ndarray], wanted: np.ndarray) -> np.ndarray:

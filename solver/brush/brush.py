@@ -47,7 +47,9 @@ class Brush:
         """
         check_finite("a gain", gain)
         _check(fluid, motion, warp)
-        self._look(fluid, motion, fluid.faces(), warp)
+        velocity = fluid.faces()
+        self._look(fluid, motion, velocity, warp)
+        self._restrain(fluid, motion, velocity)
         fluid.impulse.add(lambda faces: self._draw(fluid, motion, faces, gain))
 
     def make_up(self, fluid: Scheme, motion: Motion, velocity: Field, warp: WarpMap | None = None) -> None:
@@ -59,6 +61,7 @@ class Brush:
         _check(fluid, motion, warp)
         check_field("a velocity", velocity, fluid.grid)
         self._look(fluid, motion, velocity, warp)
+        self._restrain(fluid, motion, velocity)
         obstruct, inputs = self.device.pass_("brush/obstruct.frag"), motion.tip.shape(fluid.grid)
         inputs |= {"motion": self._motion, "viscosity": fluid.viscosity, "solid": fluid.solid}
         obstruct(self._obstruction, region=(0, 0, len(motion.tip.paths), 1), **inputs)
@@ -74,7 +77,7 @@ class Brush:
         self._look(fluid, push, fluid.faces(), warp)
         solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
         carry = self.device.pass_("brush/carry.frag", **({"SOLIDS": 1} if solids else {}))
-        inputs = {"motion": self._motion, "slip": self._slip.factor, "viscosity": fluid.viscosity, **solids}
+        inputs = {"motion": self._motion, "viscosity": fluid.viscosity, **solids} | self._slip.inputs()
         inputs["hardness"] = push.local_hardness
         vectors = push.local_velocities
         fluid.local.add(lambda motion: push.tip.draw(carry, motion, fluid.grid, vectors, add=True, **inputs))
@@ -122,6 +125,10 @@ class Brush:
         )
         if isinstance(motion, Push):
             self._slip.find(motion, warp)
+
+    def _restrain(self, fluid: Scheme, motion: Motion, velocity: Field) -> None:
+        """After `_look`: find by how much a push is scaled."""
+        if isinstance(motion, Push):
             at_brush = {"velocity": velocity, "impulse": fluid.impulse.field, "motion": self._motion}
             self._slip.restrain(motion, fluid.grid, **at_brush)
 
@@ -131,13 +138,13 @@ class Brush:
         paint, tip = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {})), motion.tip
         inputs: dict[str, Any] = motion.inputs() | {"motion": self._motion, "gain": gain} | (attenuation or {})
         if isinstance(motion, Push):
-            inputs |= {"slip": self._slip.factor, "scaling": self._slip.scaling}
+            inputs |= self._slip.inputs() | {"scaling": self._slip.scaling}
 
         def draw(target: Field, only: int | None = None) -> None:
             tip.draw(paint, target, fluid.grid, motion.vectors, only, add=True, **inputs)
 
         draw(faces)
-        for image, path in enumerate(tip.paths):
+        for image, path in enumerate(tip.paths if tip.near else ()):
             if any(glides := _glides(fluid, tip, path)):
                 given = self._sum(fluid, 2, lambda target, image=image: draw(target, image))
                 self._take_back(fluid, tip, path, faces, np.where(glides, given, 0.0))
@@ -205,12 +212,12 @@ class Sum:
 
 
 def _glides(fluid: Scheme, tip: Tip, path: Path) -> tuple[bool, bool]:
-    """Whether a tip that is near reaches over edges along which the fluid glides, on a path: for u, and for v."""
+    """Whether a tip reaches over edges along which the fluid glides, on a path: for u, and for v."""
     edges = [edge and not sticks for edge, sticks in zip(fluid.grid.at_edge, fluid.params.walls.no_slip, strict=False)]
     over = [
         over
         for a, b, side in zip(path.start, path.end, fluid.grid.picture, strict=True)
         for over in (min(a, b) < tip.radius, max(a, b) > side - tip.radius)
     ]
-    left, right, top, bottom = (tip.near and at_edge and beyond for at_edge, beyond in zip(edges, over, strict=True))
+    left, right, top, bottom = (at_edge and beyond for at_edge, beyond in zip(edges, over, strict=True))
     return top or bottom, left or right

@@ -295,7 +295,7 @@ class Shape:
         if self.is_ring:
             arms = places[1:] - places[0]
             grown = math.sqrt(abs(area(places[1:]) / (area(ends[1:]) or 1.0)))
-            turned, scaled = spun(left[1:] - left[0], arms), abs(grown - 1) * float(np.hypot(*arms.T).mean())
+            turned, scaled = float(spun(left[1:] - left[0], arms)), abs(grown - 1) * float(np.hypot(*arms.T).mean())
             return float(np.hypot(*left[0]) + math.hypot(turned, scaled))
         return float(np.hypot(*left.T).max())
 
@@ -318,10 +318,11 @@ class Shape:
         return there + scale * _spun(from_middle, angle)
 
 
-def spun(motion: np.ndarray, arms: np.ndarray) -> float:
-    """How far the ends of arms (n, 2) move with the turn that their motion is in the mean."""
+def spun(motion: np.ndarray, arms: np.ndarray) -> np.ndarray:
+    """How far the ends of arms (n, 2) move with the turn that their motion (..., n, 2) is in the mean; (...)."""
     turn = np.stack([-arms[:, 1], arms[:, 0]], axis=-1)
-    return float((motion * turn).sum() / max(float((arms**2).sum()), 1e-30) * np.hypot(*arms.T).mean())
+    along = np.ascontiguousarray(motion * turn).reshape(*motion.shape[:-2], arms.size).sum(axis=-1)
+    return along / max(float((arms**2).sum()), 1e-30) * np.hypot(*arms.T).mean()
 
 
 def _spun(arms: np.ndarray, angle: float) -> np.ndarray:

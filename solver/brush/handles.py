@@ -234,6 +234,7 @@ class Handles:
         soft, shares = np.concatenate([soft, softs[centres]]), np.concatenate([shares, np.ones(len(rings))])
         owners = [np.concatenate([np.repeat(numbers[each], 2), numbers[centres]]) for each in (pushed, drawn)]
         influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * reaches / dt
+        del push  # of many points it is as large as all that balancing needs
         balance = Balance(influence, soft, shares, (owners[0], owners[1]), bounds)
         self._places[listed] += wanted * dt  # where to look for them
         lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, balance, wanted, carried)
@@ -553,16 +554,21 @@ def _matrix(influence: np.ndarray) -> np.ndarray:
 
 def _spins(motion: np.ndarray, rings: list[Ring]) -> np.ndarray:
     """How fast rings turn where their points, and those within, move so: longer sides / s at their arms' ends."""
-    return np.array([spun(motion[ring.rows] - motion[ring.centre], ring.arms) for ring in rings])
+    return np.array([float(spun(motion[ring.rows] - motion[ring.centre], ring.arms)) for ring in rings])
 
 
 def _with_rings(places: np.ndarray, pushed: np.ndarray, push: np.ndarray, rings: list[Ring]) -> np.ndarray:
     """The matrix of what pushes do to what is pushed, with what they do to rings, and turns of rings to all."""
     if not rings:
         return _matrix(push[pushed])
-    columns = [push[:, :, number, axis] for number in range(push.shape[2]) for axis in (0, 1)]
-    columns += [_turned(places, ring) for ring in rings]
-    return np.stack([np.concatenate([each[pushed].ravel(), _spins(each, rings)]) for each in columns], axis=-1)
+    turned = [_turned(places, ring) for ring in rings]
+    of_pushes = [spun(np.moveaxis(push[ring.rows] - push[ring.centre], (0, 1), (2, 3)), ring.arms) for ring in rings]
+    return np.block(
+        [
+            [_matrix(push[pushed]), np.stack([each[pushed].ravel() for each in turned], axis=-1)],
+            [np.stack(of_pushes).reshape(len(rings), -1), np.stack([_spins(each, rings) for each in turned], axis=-1)],
+        ]
+    )
 
 
 def _turned(places: np.ndarray, ring: Ring) -> np.ndarray:

@@ -54,6 +54,8 @@ CORE = 0.9
 FINE = 8
 AROUND = 2 * (FINE + 1) + 1
 
+KEPT = 1024  # pushes of one step whose factors are kept
+
 
 def coasting(tip: Tip, dt: float, drag: float, viscosity: float) -> float:
     """Radii that the fluid goes on without the brush, from the tip's speed: seconds, 1 / s, lengths^2 / s."""
@@ -157,34 +159,44 @@ class Slip:
     """How firmly a push holds: the laws that look at the map and at the fluid, on the GPU.
 
     Attributes:
-        factor: the part of its speed that it gives, by what it has carried and stretched: the second and third law.
+        factor: the part of its speed that it gives, by what it has carried and stretched: the second and third law. A
+            push has a row of it.
+        row: that of the push that `find` was last asked for.
         scaling: of what the fluid lacks, that it gives, by energy: the fourth.
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self.factor = device.field((MOST_IMAGES, 1), 1, "slip factor")
+        self.factor = device.field((MOST_IMAGES, KEPT), 1, "slip factor")
+        self.row = 0
         self.scaling = device.field((MOST_IMAGES, 1), 1, "scaling of the push")
         self._around = device.field((AROUND, MOST_IMAGES * AROUND), 2, "displacement around the brush")
-        self._found: tuple[Push, WarpMap | None, int] | None = None  # what the factor was found for
+        self._seen: tuple[WarpMap | None, int] | None = None  # the map that the factors were found on
+        self._found: dict[int, tuple[Push, int]] = {}  # their rows, by the identity of the push
 
     def find(self, push: Push, warp: WarpMap | None) -> None:
-        """Set `factor` for a push on the picture of a map; without one it holds as firmly as it can."""
-        version = 0 if warp is None else warp.version
+        """Set `row`, and what `factor` has there, for a push on a map; without one it holds as firmly as it can."""
         # A push leads, makes up and carries in one step, in which the map is the same.
-        if self._found is not None and self._found[0] is push and self._found[1:] == (warp, version):
-            return
-        self._found = push, warp, version
+        if (seen := (warp, 0 if warp is None else warp.version)) != self._seen or len(self._found) == KEPT:
+            self._seen = seen
+            self._found.clear()
+            if warp is None:
+                self.factor.clear(1.0)
         if warp is None:
-            self.factor.clear(1.0)
+            self.row = 0
             return
+        if (found := self._found.get(id(push))) is not None:
+            self.row = found[1]
+            return
+        self.row = len(self._found)
+        self._found[id(push)] = push, self.row
         width, height = warp.extent
         places = [(min(max(start[0], 0.0), width), min(max(start[1], 0.0), height)) for start, _, _ in push.tip.paths]
         step = push.tip.radius / FINE
         warp.probe(self._around, [(x / width, y / height) for x, y in places], (step / width, step / height))
         self.device.pass_("brush/slip.frag")(
             self.factor,
-            region=(0, 0, len(places), 1),
+            region=(0, self.row, len(places), 1),
             around=self._around,
             velocities=for_images(push.velocities),
             radius=push.tip.radius,
@@ -196,9 +208,13 @@ class Slip:
 
     def restrain(self, push: Push, grid: Grid, **at_brush: Field) -> None:
         """Set `scaling`, after `factor`, for a push on a fluid: its velocity, impulse and motion at the brush."""
-        inputs = push.tip.shape(grid) | push.inputs() | {"slip": self.factor, "most": MOST_ENERGY}
+        inputs: dict[str, Any] = push.tip.shape(grid) | push.inputs() | self.inputs() | {"most": MOST_ENERGY}
         inputs |= {"velocities": for_images(push.vectors), "region": (0, 0, len(push.tip.paths), 1)}
         self.device.pass_("brush/restrain.frag")(self.scaling, **at_brush, **inputs)
+
+    def inputs(self) -> dict[str, Any]:
+        """What shaders read the factor from."""
+        return {"slip": self.factor, "row": float(self.row)}
 
     def release(self) -> None:
         self.factor.release()

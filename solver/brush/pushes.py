@@ -70,9 +70,11 @@ class Pushes:
     def _at(self, places: np.ndarray, matrices: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarray:
         """What all images do at places (n, 2), from the entries of each one's matrix there, some places at a time."""
         several = max(BLOCK // max(len(self._radii), 1), 1)
-        starts = range(0, max(len(places), 1), several)
-        blocks = (places[start : start + several] for start in starts)
-        return np.concatenate([self._together(*matrices(*self._apart(block))) for block in blocks])
+        found = np.empty((len(places), len(self._firsts), 2, 2)).transpose(0, 2, 1, 3)
+        for start in range(0, len(places), several):
+            block = slice(start, start + several)
+            found[block] = self._together(*matrices(*self._apart(places[block])))
+        return found
 
     def _apart(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """From each image to each place, in radii: x, y, and how far."""

@@ -233,12 +233,24 @@ SMALL_AND_HARMFUL = {
             "samples = [[0, 0.1, 0.2, 1.0], [1, 0.2, 0.2, 1.0]]\n"
         )
         * 6000,
-        "12000 strokes act at once in tick 1, with their repetitions",
+        "24000 pieces of strokes act at once in tick 1, with their repetitions",
     ),
     "images at once": (
         (
             "[[stroke]]\ntool = 'bloat'\ndetail = 600\nsymmetry = 'radial'\nsectors = 16\n"
             "samples = [[0, 0.1, 0.2, 1.0]]\n"
+        )
+        * 63,
+        "1008 pieces of strokes act at once in tick 0",
+    ),
+    "images that are pushed": (
+        "[[stroke]]\ntool = 'push'\nsymmetry = 'radial'\nsamples = [[0, 0.1, 0.2, 1.0], [0, 0.2, 0.2, 1.0]]\n" * 501,
+        "1002 pieces of strokes act at once in tick 0",
+    ),
+    "images that are pushed nearby": (
+        (
+            "[[stroke]]\ntool = 'push'\ndetail = 600\nsymmetry = 'radial'\nsectors = 16\n"
+            "samples = [[0, 0.1, 0.2, 1.0], [0, 0.2, 0.2, 1.0]]\n"
         )
         * 63,
         "1008 pieces of strokes act at once in tick 0",

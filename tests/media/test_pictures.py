@@ -24,6 +24,7 @@ from app.media.depth import to_bits
 from app.media.ffmpeg import executable
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
+from app.work.jobs import Outputs
 
 MODES = {1: "grey", 2: "grey+alpha", 3: "RGB", 4: "RGBA"}
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
@@ -917,3 +918,19 @@ def test_a_thumbnail_in_the_exif_is_told(tmp_path: Path, ending: str) -> None:
     write_picture(tmp_path / f"b{ending}", read_picture(path))
     assert small.getvalue() not in (tmp_path / f"b{ending}").read_bytes()
     assert not read_picture(tmp_path / f"b{ending}").note
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="no /proc")
+def test_a_folder_that_takes_no_new_files_is_not_told_as_gone() -> None:
+    with pytest.raises(UserError, match=r"Cannot write /proc/nope\.png: its folder takes no new files"):
+        write_picture(Path("/proc/nope.png"), Picture(smooth(3)))
+
+
+def test_jpeg_is_not_asked_for_a_part_of_a_dot_per_inch(tmp_path: Path) -> None:
+    for dpi in (72.5, 72.0):
+        outputs = Outputs(tmp_path / "a.jpg", dpi=dpi)
+        if dpi.is_integer():
+            outputs.check()
+        else:
+            with pytest.raises(UserError, match=r"JPEG holds whole dots per inch, not 72\.5"):
+                outputs.check()

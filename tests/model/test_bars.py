@@ -75,7 +75,7 @@ def test_pieces_that_are_gone_through_one_by_one_are_counted_as_the_most_that_a_
     dice = random.Random(4)
     for _ in range(60):
         several = [
-            random_stroke(dice, ("push", "freeze", "restore", "bloat")).model_copy(
+            random_stroke(dice, ("push", "twirl", "freeze", "restore", "bloat")).model_copy(
                 update={"symmetry": dice.choice(["none", "both"]), "detail": dice.choice([0, 500])}
             )
             for _ in range(dice.randrange(1, 9))
@@ -83,14 +83,18 @@ def test_pieces_that_are_gone_through_one_by_one_are_counted_as_the_most_that_a_
         most = [0] * 200
         for tick, one in product(range(200), several):
             for act in one.acts(tick):
-                by_image = one.tool == "restore" or (one.tool == "bloat" and one.detail)
-                pieces = 1 if one.tool in ("push", "bloat") else len(act.dabs)
-                most[tick] += pieces * (4 if by_image and one.symmetry == "both" else 1)
+                by_image = one.tool == "restore" or (one.tool in ("push", "twirl", "bloat") and one.detail)
+                pieces = 1 if one.tool in ("push", "twirl", "bloat") else len(act.dabs)
+                images = 4 if by_image else 2 if one.tool == "push" else 1
+                once = 2 if one.tool in ("push", "twirl") and one.detail else 1
+                most[tick] += pieces * (images if one.symmetry == "both" else once)
+        whole = sum(one.repeat * one.most_pieces for one in several)
         monkeypatch.setattr(strokes, "MOST_AT_ONCE", max(0, max(most) - 1))
         said = strokes.excess(several)
         assert not max(most) or (said is not None and int(said.split()[0]) >= max(most))
-        monkeypatch.setattr(strokes, "MOST_AT_ONCE", sum(one.repeat * one.most_pieces for one in several))
+        monkeypatch.setattr(strokes, "MOST_AT_ONCE", whole)
         assert strokes.excess(several) is None
+        monkeypatch.undo()
 
 
 @pytest.mark.parametrize("tool", ["curve", "thicken", "restore", "push"])

@@ -67,3 +67,16 @@ def test_turns_of_rings_are_not_bounded():
         np.array([0.0, 2.0, 3.0])
     )
     np.testing.assert_allclose(found, [0, 1, 1.5])
+
+
+def test_however_few_rounds_there_is_room_for_no_push_exceeds_its_bound(
+    influence: np.ndarray, monkeypatch: pytest.MonkeyPatch
+):
+    wanted, round_ = 0.3 * np.random.default_rng(0).normal(size=16), 16**3
+    left = list[float]()
+    for rounds in (0, 2, 12, 99):
+        monkeypatch.setattr("solver.brush.balance.MOST_WORK", round_ * (rounds + 1) - 1)
+        found = balance(influence, np.arange(8), 1.0).strengths(wanted)
+        assert sizes(found).max() <= 1 + 1e-9
+        left.append(float(np.linalg.norm(wanted - influence @ found)))
+    assert left[0] > left[1] > left[2] == left[3]

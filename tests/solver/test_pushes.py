@@ -6,9 +6,12 @@ import tracemalloc
 
 import numpy as np
 
-from solver import Device, Grid
+from solver import Device, Fluid, Grid, WarpMap
+from solver.brush.brush import Brush
 from solver.brush.listed import draw_listed
+from solver.brush.push import Push
 from solver.brush.pushes import Pushes
+from solver.brush.tip import Tip
 
 GRID = Grid(128, 96)
 PLACES = np.array([[0.05, 0.4], [0.5, 0.72], [0.98, 0.02], [0.5, 0.4]])
@@ -53,3 +56,35 @@ def test_many_pushes_are_reckoned_a_block_at_a_time() -> None:
     assert most < 8 * together.nbytes
     alone = [pushes.influence(place[None]) for place in places[::85]]
     np.testing.assert_array_equal(together[::85], np.concatenate(alone))
+
+
+def test_each_of_several_pushes_slips_as_it_would_by_itself(device: Device):
+    """A push leads, makes up and carries with what was found for it, whatever others were looked at between."""
+    limits = {0.2: 0.9, 0.45: 0.2, 0.7: 0.05}
+    pushes = [
+        Push(Tip((x, 0.4), (x + 0.03, 0.42), 0.15), 1 / 60, strain_limit=limit, local=0.5)
+        for x, limit in limits.items()
+    ]
+    fluid = Fluid(device, Grid(32, 24))
+    fluid.set_velocity(0.5 * np.sin(np.arange(24 * 32 * 2).reshape(24, 32, 2)))
+    warp, velocity = WarpMap(device, fluid.grid), device.field(fluid.grid.size, 2)
+    warp.set(0.05 * np.sin(0.4 * np.arange(24 * 32 * 2).reshape(24, 32, 2)))
+
+    def drawn(brushes: list[Brush]) -> list[np.ndarray]:
+        fluid.impulse.clear()
+        fluid.local.clear()
+        velocity.clear()
+        for brush, push in zip(brushes, pushes, strict=True):
+            brush.lead(fluid, push, warp=warp)
+        for brush, push in zip(brushes, pushes, strict=True):
+            brush.make_up(fluid, push, velocity, warp)
+            brush.carry(fluid, push, warp)
+        return [fluid.impulse.field.get(), velocity.get(), fluid.local.field.get()]
+
+    brushes = [Brush(device) for _ in pushes]
+    together, apart = drawn(3 * brushes[:1]), drawn(brushes)
+    for one, other in zip(together, apart, strict=True):
+        assert np.abs(one).max() > 0
+        np.testing.assert_array_equal(one, other)
+    for thing in (*brushes, warp, fluid, velocity):
+        thing.release()

@@ -167,6 +167,21 @@ def test_a_stroke_on_a_mask_that_is_refused_when_it_ends_is_as_if_it_had_not_bee
     assert np.array_equal(session.replay.masks.thickness.get(), painted)
 
 
+def test_a_stroke_with_which_too_many_would_act_at_once_is_refused_when_it_ends(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.model.strokes.MOST_AT_ONCE", 40)
+    samples = (0, 0.2, 0.2, 1.0), (100, 0.2, 0.2, 1.0)
+    goes_on = Stroke.model_validate({"tool": "push", "strength": 0.01, "samples": samples})
+    session.edit("Strokes", stroke=40 * (goes_on,), duration=6 * session.dt)
+    before = session.recipe
+    with pytest.raises(UserError, match=r"^That was not done\. With it, 41 strokes act at once in tick \d+"):
+        paint(session, "push", (0.5, 0.5), (0.6, 0.5))
+    session.settle()
+    assert session.recipe == session.document.recipe == session.replay.recipe == before
+    assert Recipe.parse(before.text()) == before
+
+
 @pytest.mark.long
 def test_two_hundred_strokes_saved_and_rendered_are_the_same_map(
     device: Device, session: Session, tmp_path: Path
