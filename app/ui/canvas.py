@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from app.media.depth import to_bits
+from app.media.project import Project
 from app.model.picture import Picture
 from app.ui.editor_state import EditorState
 from app.ui.theme import Palette
@@ -20,7 +21,8 @@ from solver.gl.device import Device
 from solver.gl.field import Field, FieldPool
 from solver.grid import Grid
 
-LARGEST = 4096  # pixels along a side of the picture as it is shown; what is exported has them all
+LARGEST = 8192  # pixels along a side of the picture as it is shown; what is exported has them all
+LARGEST_FRAME = 4096  # of a clip, which is sent to the GPU frame by frame
 EDGES = {"transparent": 0, "black": 1, "clamp": 2, "mirror": 3, "wrap": 4}
 ARROW = 30.0  # points between two arrows
 FORCE_ARROW = 32.0
@@ -57,16 +59,23 @@ class Canvas:
 
     Args:
         device: where it is drawn.
-        picture: shown as sRGB, at most `largest` pixels along a side.
+        project: whose picture is shown as sRGB.
         pixels: `shown_pixels` of it, if somebody has made them already.
+
+    Attributes:
+        largest: pixels along a side of the picture that are shown.
+        reduction: pixels of the picture along a side of one that is shown.
     """
 
-    def __init__(self, device: Device, picture: Picture, pixels: np.ndarray | None = None) -> None:
+    def __init__(self, device: Device, project: Project, pixels: np.ndarray | None = None) -> None:
         self.device = device
+        self.largest = largest_shown(project, device.limits.max_texture_size)
+        picture = project.picture
         pixels = shown_pixels(picture, self.largest) if pixels is None else pixels
         height, width = pixels.shape[:2]
         self.size = (picture.width, picture.height)
         self._shrunk = width / picture.width
+        self.reduction = round(picture.width / width)
         self._has_alpha = picture.has_alpha
         self._texture = device.ctx.texture((width, height), 4, pixels.tobytes())
         self._texture.repeat_x = self._texture.repeat_y = False
@@ -85,11 +94,6 @@ class Canvas:
         self.thumbnails = Thumbnails(device, self.size, self._draw_small)
         self._force_fields: tuple[Field, Field] | None = None
         self._forces_of: object = None
-
-    @property
-    def largest(self) -> int:
-        """Pixels along a side of the picture that are shown."""
-        return min(LARGEST, self.device.limits.max_texture_size)
 
     @property
     def is_unfinished(self) -> bool:
@@ -397,6 +401,11 @@ class Canvas:
 def _window_of(grid: Grid) -> tuple[float, ...]:
     """Left, top, width and height of a grid, 0-1 of the picture."""
     return tuple(np.divide((*grid.origin, *grid.extent), grid.picture * 2).tolist())
+
+
+def largest_shown(project: Project, largest: int) -> int:
+    """Pixels along a side of its picture that are shown, on a GPU with textures that are so large."""
+    return min(LARGEST if project.clip is None else LARGEST_FRAME, largest)
 
 
 def shown_pixels(picture: Picture, largest: int) -> np.ndarray:

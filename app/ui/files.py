@@ -201,7 +201,8 @@ class Files:
         """
         self.give_up_loading()
         recipe = None if leaves else self.workspace.session.document.recipe
-        self._loading = Loading(path, load, self.workspace.canvas.largest, recipe, found)
+        largest = self.workspace.session.device.limits.max_texture_size
+        self._loading = Loading(path, load, largest, recipe, found)
         self._loading.is_done(AT_ONCE)
         self.poll()
 

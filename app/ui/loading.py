@@ -12,7 +12,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.project import Project
 from app.model.recipe import Recipe
-from app.ui.canvas import shown_pixels
+from app.ui.canvas import largest_shown, shown_pixels
 from app.ui.clipboard import pasted_folder
 from app.work.recovery import Found
 
@@ -24,7 +24,7 @@ class Loading:
     Attributes:
         path: the file.
         load: reads it; runs in a thread of its own, and knows no GL.
-        largest: pixels along a side of the picture as the canvas shows it.
+        largest: pixels along a side of a texture.
         recipe: the work that may be left for it without a question; None is none.
         found: what it is that is restored, where it is not just opened.
         project, pixels: what has been read, and the picture as the canvas shows it.
@@ -59,7 +59,7 @@ class Loading:
     def _read(self) -> None:
         try:
             project = self.load()
-            self.pixels = shown_pixels(project.picture, self.largest)
+            self.pixels = shown_pixels(project.picture, largest_shown(project, self.largest))
             self.project = project
         except UserError as error:
             self.error = error.in_window

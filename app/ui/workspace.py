@@ -45,7 +45,7 @@ class Work:
     def wake(self, device: Device) -> Canvas:
         """What draws it; it is played again if it was asleep."""
         if self.canvas is None:
-            self.canvas = Canvas(device, self.session.project.picture)
+            self.canvas = Canvas(device, self.session.project)
             self.session.wake()
         return self.canvas
 
@@ -129,7 +129,7 @@ class Workspace:
 
         `pixels`: the picture as the canvas shows it, if it is at hand. `found`: what the project was restored from.
         """
-        canvas = Canvas(self._device, project.picture, pixels)
+        canvas = Canvas(self._device, project, pixels)
         try:
             session = Session(self._device, project)
         except Exception:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
 
-from app.model.picture import srgb_to_linear
-from app.ui.canvas import EDGES
+from app.model.picture import Picture, srgb_to_linear
+from app.ui.canvas import EDGES, Canvas, largest_shown
+from app.ui.widgets import Ui
 from solver.gl.device import Device
-from support.editing import Robot, pattern
+from support.editing import Robot, pattern, small_project
 from support.golden import Golden, told
 
 SIDE = 4
@@ -189,3 +192,23 @@ def test_at_100_percent_a_pixel_of_the_picture_is_one_of_the_screen(robot: Robot
     left, top, (height, width) = round(rect.x), round(rect.y), pixels.shape[:2]
     seen = robot.pixels()[top : top + height, left : left + width]
     assert np.abs(seen.astype(int) - pixels[..., :3]).max() <= 1
+
+
+def test_a_picture_is_shown_with_all_its_pixels_and_what_is_larger_tells(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project = small_project(tmp_path)
+    wide = replace(project, picture=Picture(np.zeros((6, 4200, 3), np.uint8)))
+    assert largest_shown(wide, 2**14) >= 6000  # of a camera of 24 megapixels
+    assert largest_shown(wide, 2**12) == 2**12
+    canvas = Canvas(device, wide)
+    assert canvas.reduction == 1
+    canvas.release()
+    monkeypatch.setattr("app.ui.canvas.LARGEST", 120)
+    told: list[str] = []
+    monkeypatch.setattr(Ui, "dim", lambda _, words, *more: told.append(words))
+    with Robot(device, project) as robot:
+        robot.editor.state.sections["quality"] = True
+        robot.frame()
+        assert robot.editor.canvas.reduction == 2
+    assert "Shown at 1/2 of that; an export has all." in told

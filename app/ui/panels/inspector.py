@@ -315,6 +315,8 @@ def _quality(ui: Ui, workspace: Workspace, quality: Quality) -> None:
     width, height = workspace.canvas.size
     grid = session.recipe.fluid.grid
     ui.dim(f"{width} x {height} pixels, {session.project.picture.bits} bits")
+    if (reduction := workspace.canvas.reduction) > 1:
+        ui.dim(f"Shown at 1/{reduction} of that; an export has all.")
     automatic = quality.is_on
     # What saved work or a recipe is simulated on may be none of those that are offered.
     grids = sorted({*GRIDS, grid})
