@@ -118,5 +118,5 @@ def test_a_result_is_not_written_over_its_source(tmp_path: Path) -> None:
         (errno.EIO, "of its own"),
     ],
 )
-def test_why_a_file_cannot_be_written_is_told_with_what_mends_it(number: int, said: str) -> None:
-    assert said in str(cannot_write("a.png", OSError(number, "of its own")))
+def test_why_a_file_cannot_be_written_is_told_with_what_mends_it(tmp_path: Path, number: int, said: str) -> None:
+    assert said in str(cannot_write(tmp_path / "gone" / "a.png", OSError(number, "of its own")))
