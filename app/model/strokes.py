@@ -99,7 +99,9 @@ class BrushPath(Model):
         """
         if self.tool in ("push", "twirl"):
             images = 1 + len(turns(self.symmetry, self.sectors))
-            return max(images, 2) if self.detail else min(images, 2) if self.tool == "push" else 1
+            if self.detail:
+                return max(images, 2)
+            return min(images, 2) if self.tool == "push" else 1
         counts = [1]
         if self.tool == "curve":
             counts.append(len(self.samples) - 1)

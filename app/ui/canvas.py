@@ -64,7 +64,6 @@ class Canvas:
 
     Attributes:
         largest: pixels along a side of the picture that are shown.
-        reduction: pixels of the picture along a side of one that is shown.
     """
 
     def __init__(self, device: Device, project: Project, pixels: np.ndarray | None = None) -> None:
@@ -74,8 +73,7 @@ class Canvas:
         pixels = shown_pixels(picture, self.largest) if pixels is None else pixels
         height, width = pixels.shape[:2]
         self.size = (picture.width, picture.height)
-        self._shrunk = width / picture.width
-        self.reduction = round(picture.width / width)
+        self._shrunk = max(width, height) / max(self.size)
         self._has_alpha = picture.has_alpha
         self._texture = device.ctx.texture((width, height), 4, pixels.tobytes())
         self._texture.repeat_x = self._texture.repeat_y = False
@@ -94,6 +92,11 @@ class Canvas:
         self.thumbnails = Thumbnails(device, self.size, self._draw_small)
         self._force_fields: tuple[Field, Field] | None = None
         self._forces_of: object = None
+
+    @property
+    def reduction(self) -> int:
+        """Pixels of the picture along a side of one that is shown."""
+        return round(1 / self._shrunk)
 
     @property
     def is_unfinished(self) -> bool:
@@ -413,13 +416,15 @@ def shown_pixels(picture: Picture, largest: int) -> np.ndarray:
     pixels = picture.pixels
     step = -(-max(picture.width, picture.height) // largest)
     if step > 1:
-        height, width = (size // step * step for size in pixels.shape[:2])
+        # A side that is shorter than that is one pixel.
+        down, across = (min(step, size) for size in pixels.shape[:2])
+        height, width = (size // each * each for size, each in zip(pixels.shape[:2], (down, across), strict=True))
         pixels = pixels[:height, :width]
         if pixels.dtype == np.uint8 and pixels.shape[2] in (3, 4):
             # The same means, several times faster, and other threads go on meanwhile.
-            pixels = np.asarray(Image.fromarray(pixels).reduce(step))
+            pixels = np.asarray(Image.fromarray(pixels).reduce((across, down)))
         else:
-            blocks = pixels.reshape(height // step, step, width // step, step, -1)
+            blocks = pixels.reshape(height // down, down, width // across, across, -1)
             pixels = blocks.mean(axis=(1, 3), dtype=np.float32).astype(picture.pixels.dtype)
     shown = picture.with_pixels(pixels)
     straight = shown.straight().pixels

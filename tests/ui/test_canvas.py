@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.model.picture import Picture, srgb_to_linear
-from app.ui.canvas import EDGES, Canvas, largest_shown
+from app.ui.canvas import EDGES, Canvas, largest_shown, shown_pixels
 from app.ui.widgets import Ui
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
@@ -212,3 +212,20 @@ def test_a_picture_is_shown_with_all_its_pixels_and_what_is_larger_tells(
         robot.frame()
         assert robot.editor.canvas.reduction == 2
     assert "Shown at 1/2 of that; an export has all." in told
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("size", [(9, 12), (1, 12), (12, 2), (10, 13)])
+def test_a_reduced_picture_has_the_means_of_its_pixels_however_narrow_it_is(
+    size: tuple[int, int], dtype: type[np.unsignedinteger]
+) -> None:
+    pixels = np.random.default_rng(5).integers(0, np.iinfo(dtype).max, (*size, 3), dtype, endpoint=True)
+    found = shown_pixels(Picture(pixels), 5)
+    down, across = (min(3, side) for side in size)
+    whole = pixels[: size[0] // down * down, : size[1] // across * across].astype(float)
+    means = [
+        [whole[y : y + down, x : x + across].mean(axis=(0, 1)) for x in range(0, whole.shape[1], across)]
+        for y in range(0, whole.shape[0], down)
+    ]
+    np.testing.assert_allclose(found[..., :3], np.array(means) * (255 / np.iinfo(dtype).max), atol=1.01)
+    assert (found[..., 3] == 255).all()
