@@ -167,7 +167,8 @@ bool is_held(vec2 place) {
 vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), 0.0); }
 #endif
 
-// A, a closed map or what is undone, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the quintic.
+// A, a closed map or what is undone, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the
+// quintic.
 vec4 accumulated_texels(sampler2D accumulated, vec2 place) {
 #if defined(LINEAR)
     return linear_texels(accumulated, place);
